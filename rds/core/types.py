@@ -1,0 +1,111 @@
+"""The vocabulary: the values that models, controllers, interpolators and modes exchange.
+
+Units throughout: s, mm, mm/s, mm/s², V; degrees for a rotary axis, rev/min for a spindle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+
+class Reference(NamedTuple):
+    """What the axis should do at one sample; arrays in axis order for a controller of several axes."""
+
+    position: float  # mm (degrees; for a spindle the speed, rev/min)
+    velocity: float  # mm/s
+    acceleration: float  # mm/s²
+
+
+@dataclass(frozen=True, slots=True)
+class LineSegment:
+    """A straight move. `start` and `end` hold one position per axis, mm; `feed_rate` is in mm/s."""
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    feed_rate: float
+
+
+@dataclass(frozen=True, slots=True)
+class ArcSegment:
+    """A circular or helical move about `centre`, in the plane of the axes `plane` (by index).
+
+    `start`, `end` and `centre` hold one position per axis, mm; `feed_rate` is in mm/s along the path.
+    `clockwise` is seen from the positive end of the axis normal to the plane. An `end` equal to
+    `start` is a full circle.
+    """
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+    centre: tuple[float, ...]
+    feed_rate: float
+    clockwise: bool = False
+    plane: tuple[int, int] = (0, 1)
+
+
+Segment = LineSegment | ArcSegment
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a student's or library function came from, so that a record can prove that it was the same."""
+
+    name: str  # library name, function name or file name
+    path: str | None = None  # absolute path of the file, if it came from one
+    sha256: str | None = None  # of the file's bytes or of the function's source text
+    text: str | None = None  # its source
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A control law with its parameters.
+
+    `control(t, r, y, state, params) -> (voltage, next_state)`: time s, `Reference`, measured position,
+    the state it returned last, its parameters; voltage in V. All its memory is in `state`.
+    With `coupled`, one law drives all axes: reference, position and voltage are arrays in axis order.
+    """
+
+    control: Callable[..., tuple[Any, Any]]
+    initial_state: Any = ()
+    params: Mapping[str, Any] = field(default_factory=dict)
+    source: Source = Source("user-defined")
+    coupled: bool = False
+
+
+@dataclass(frozen=True)
+class Model:
+    """An axis model: how the state answers a voltage that is constant over one sample.
+
+    `advance(x, u, T, params) -> next x` with x the state (position mm, velocity mm/s, ...), u the voltage in V
+    and T in s. `output(x) -> y` is what the encoder sees (default: the first state).
+    `start(T)` gives the model in motion (see `contracts.Motion`); a model with a faster way of running
+    hands in its own `motion`.
+    """
+
+    advance: Callable[[Sequence[float], float, float, Mapping[str, Any]], Sequence[float]]
+    initial_state: Sequence[float]
+    params: Mapping[str, Any] = field(default_factory=dict)
+    output: Callable[[Sequence[float]], float] | None = None
+    source: Source = Source("user-defined")
+    motion: Callable[[Model, float], Any] | None = None
+
+
+class Ending(StrEnum):
+    """How a run came to its end."""
+
+    DONE = "done"  # every sample was taken
+    STOPPED = "stopped"  # asked to stop
+    OVERLOADED = "overloaded"  # more late samples in a row than the late policy allows
+    FAULT = "fault"  # the student's code broke its contract or raised
+    MACHINE_LOST = "machine lost"  # a module stopped answering, or the bus failed
+    KILLED = "killed"  # the target process ended without saying why
+
+
+class Verdict(StrEnum):
+    """Whether the sample period was kept; void when the system alone could not have kept it."""
+
+    MET = "met"
+    MISSED = "missed"
+    VOID = "void"

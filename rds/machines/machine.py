@@ -1,0 +1,136 @@
+"""Machines as data: axes, converter and encoders, read from TOML."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Converter:
+    """The digital-to-analogue converter of the output board: ±`range` V in 2^`bits` levels."""
+
+    range: float = 10.0
+    bits: int = 12
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a machine.
+
+    `model` names the library model that a student starts from, with its parameters; `machine` holds the
+    parameters of the simulated machine behind the bus, which the student does not see.
+    """
+
+    name: str
+    node: int
+    unit: str
+    travel: tuple[float, float]
+    resolution: float  # unit per encoder count
+    model: dict[str, Any] = field(default_factory=dict)
+    machine: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine: its axes by name, its converter, its sample period in s, and the file it was read from."""
+
+    name: str
+    title: str
+    sample_period: float
+    converter: Converter
+    axes: dict[str, Axis]
+    path: str
+
+    def axis(self, name: str) -> Axis:
+        """The axis called `name`; InputError names the ones there are."""
+        if name not in self.axes:
+            raise InputError(f"machine {self.name!r} has no axis {name!r}; it has {', '.join(self.axes)}", self.path)
+        return self.axes[name]
+
+
+def machine_names() -> list[str]:
+    """Names of the machines that come with the package."""
+    return sorted(f.name.removesuffix(".toml") for f in files("rds.machines").iterdir() if f.name.endswith(".toml"))
+
+
+def load_machine(name: str) -> Machine:
+    """The machine called `name`, or the one described by the TOML file at that path.
+
+    Raises InputError for an unknown name, a missing file or a file that does not describe a machine.
+    """
+    path = Path(name) if name.endswith(".toml") else Path(str(files("rds.machines").joinpath(f"{name}.toml")))
+    if not path.is_file():
+        raise InputError(
+            f"there is no machine {name!r}; known machines: {', '.join(machine_names())}, or the path of a .toml file"
+        )
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"not valid TOML: {error}", str(path)) from error
+    return _machine(data, str(path))
+
+
+_TOP = {"name", "title", "sample_period", "converter", "axis"}
+_AXIS = {"node", "unit", "travel", "resolution", "model", "machine"}
+
+
+def _machine(data: dict[str, Any], path: str) -> Machine:
+    _known(data, _TOP, path, "")
+    axes = {}
+    for name, table in _table(data, "axis", path).items():
+        place = f"{path}, [axis.{name}]"
+        _known(table, _AXIS, path, f"axis.{name}.")
+        travel = table.get("travel", [])
+        if len(travel) != 2 or not travel[0] < travel[1]:
+            raise InputError(f"travel = {travel!r} must be [lowest, highest]", place)
+        resolution = _number(table, "resolution", place)
+        if resolution <= 0:
+            raise InputError(f"resolution = {resolution!r} must be more than 0 (unit per encoder count)", place)
+        axes[name] = Axis(
+            name=name,
+            node=int(_number(table, "node", place)),
+            unit=str(table.get("unit", "mm")),
+            travel=(float(travel[0]), float(travel[1])),
+            resolution=resolution,
+            model=dict(table.get("model", {})),
+            machine=dict(table.get("machine", {})),
+        )
+    nodes = [axis.node for axis in axes.values()]
+    if len(set(nodes)) != len(nodes):
+        raise InputError(f"two axes share a node; nodes are {nodes}", path)
+    converter = data.get("converter", {})
+    _known(converter, {"range", "bits"}, path, "converter.")
+    return Machine(
+        name=str(data.get("name", Path(path).stem)),
+        title=str(data.get("title", "")),
+        sample_period=_number(data, "sample_period", path),
+        converter=Converter(**converter),
+        axes=axes,
+        path=path,
+    )
+
+
+def _table(data: dict[str, Any], key: str, path: str) -> dict[str, Any]:
+    table = data.get(key)
+    if not isinstance(table, dict) or not table:
+        raise InputError(f"needs at least one [{key}.NAME] table", path)
+    return table
+
+
+def _known(table: dict[str, Any], known: set[str], path: str, prefix: str) -> None:
+    for key in table:
+        if key not in known:
+            raise InputError(f"unknown key '{prefix}{key}'; known keys: {', '.join(sorted(known))}", path)
+
+
+def _number(table: dict[str, Any], key: str, where: str) -> float:
+    value = table.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{key} = {value!r} must be a number", where)
+    return value
