@@ -1,0 +1,1 @@
+"""RDS: rapid development system for machine-tool axes."""
