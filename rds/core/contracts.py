@@ -38,8 +38,14 @@ class Clock(Protocol):
     def now(self) -> int:
         """Nanoseconds; always 0 where time is virtual."""
 
+    def taken(self) -> int:
+        """Nanoseconds so far in which this thread was ready to run and the system ran something else."""
+
     def wait(self, k: int) -> int:
         """Wait until sample `k` is due; return the sample to take now, later than `k` if periods were discarded."""
 
-    def finish(self, k: int) -> bool:
-        """Sample `k` is complete; true if the late policy ends the run here."""
+    def lateness(self, k: int, at: int) -> int:
+        """Nanoseconds from the due time of sample `k` to the instant `at`."""
+
+    def finish(self, k: int, at: int) -> bool:
+        """Sample `k` was complete at the instant `at`; true if the late policy ends the run here."""

@@ -1,0 +1,119 @@
+"""When samples are due: a clock for virtual time and one for real time. Both are handed to the loop."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+
+# Sleeping wakes tens of microseconds late on an ordinary kernel, so the last stretch is spun. It stays well
+# below the share of a core that the kernel grants to real-time processes (sched_rt_runtime_us, 95 %).
+SPIN_NS = 200_000
+
+
+@dataclass(frozen=True)
+class LatePolicy:
+    """What to do when a sample is late: the modes of LabVIEW's timed loop, and stopping.
+
+    `discard` drops the periods that passed meanwhile, otherwise they are processed one after the other at once;
+    `keep_phase` holds on to the original due times, otherwise the schedule starts anew from the late sample;
+    `stop_after` ends the run after that many late samples in a row (0: never); the first sample does not count.
+    """
+
+    discard: bool = False
+    keep_phase: bool = True
+    stop_after: int = 0
+
+
+class VirtualClock:
+    """Time that stands still while the loop computes: every sample is on time."""
+
+    def now(self) -> int:
+        """Always 0 ns: nothing takes time."""
+        return 0
+
+    def taken(self) -> int:
+        """Always 0 ns."""
+        return 0
+
+    def wait(self, k: int) -> int:
+        """Sample `k` is due."""
+        return k
+
+    def lateness(self, k: int, at: int) -> int:
+        """Always 0 ns."""
+        return 0
+
+    def finish(self, k: int, at: int) -> bool:
+        """Never ends the run."""
+        return False
+
+
+class RealTimeClock:
+    """Absolute due times in integer nanoseconds on the monotonic clock: origin + k·period."""
+
+    def __init__(self, period_ns: int, policy: LatePolicy | None = None, spin_ns: int = SPIN_NS):
+        self.period = period_ns
+        self.policy = policy or LatePolicy()
+        self.now = time.perf_counter_ns
+        self._spin = min(spin_ns, period_ns // 4)
+        self._origin = self.now() + period_ns
+        self._late_in_a_row = 0
+        self._schedstat = _open_schedstat()
+
+    def start(self) -> None:
+        """Sample 0 is due one period from now."""
+        self._origin = self.now() + self.period
+        self._late_in_a_row = 0
+
+    def taken(self) -> int:
+        """Nanoseconds so far in which this thread was ready to run but not run (0 where the kernel doesn't tell)."""
+        if self._schedstat < 0:
+            return 0
+        return int(os.pread(self._schedstat, 64, 0).split()[1])
+
+    def close(self) -> None:
+        """Let go of the kernel's statistics."""
+        if self._schedstat >= 0:
+            os.close(self._schedstat)
+            self._schedstat = -1
+
+    def wait(self, k: int) -> int:
+        """Wait until sample `k` is due; the sample to take now: later than `k` where periods are discarded."""
+        now = self.now
+        due = self._origin + k * self.period
+        at = now()
+        if at < due:
+            sleep = due - at - self._spin
+            if sleep > 0:
+                time.sleep(sleep * 1e-9)
+            while now() < due:
+                pass
+            return k
+        if self.policy.discard:
+            missed = (at - due) // self.period
+            k += missed
+            due += missed * self.period
+        if not self.policy.keep_phase:
+            self._origin += at - due
+        return k
+
+    def lateness(self, k: int, at: int) -> int:
+        """How long after its due time sample `k` is at the instant `at`, ns."""
+        return at - self._origin - k * self.period
+
+    def finish(self, k: int, at: int) -> bool:
+        """Sample `k` was complete at the instant `at`; true if that was one late sample too many in a row."""
+        if self.lateness(k, at) <= self.period:
+            self._late_in_a_row = 0
+            return False
+        self._late_in_a_row += k > 0
+        return 0 < self.policy.stop_after <= self._late_in_a_row
+
+
+def _open_schedstat() -> int:
+    """The kernel's account of this thread (on the processor, waiting for it, in ns), or -1 where there is none."""
+    try:
+        return os.open("/proc/thread-self/schedstat", os.O_RDONLY)
+    except OSError:
+        return -1

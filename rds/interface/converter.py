@@ -1,0 +1,61 @@
+"""The computer-system interface, computer's side: what the output board makes of a command voltage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from numbers import Real
+from typing import Any
+
+from rds.core.errors import ContractError
+
+
+def as_voltage(value: Any) -> float:
+    """A controller's answer as a float, V.
+
+    Raises ContractError unless it is one finite real number (a float, an int, or a numpy scalar or array of one).
+    """
+    size = getattr(value, "size", None)
+    if size == 1 and getattr(value, "dtype", None) is not None and value.dtype.kind in "fiu":
+        value = value.reshape(-1)[0].item()
+    if isinstance(value, Real) and not isinstance(value, bool) and isfinite(value):
+        return float(value)
+    raise ContractError(f"control() gave {value!r} as the voltage; it must be one finite number in V")
+
+
+def converter(
+    full_scale: float, bits: int, *, saturation: bool = True, quantization: bool = True
+) -> Callable[[float], float]:
+    """The function from command voltage to output voltage of a bipolar converter of 2^bits levels.
+
+    The levels are k·2·full_scale/2^bits for k from -2^(bits-1) to 2^(bits-1) - 1, so the highest is one step
+    below +full_scale. Either effect can be switched off to see what it does. NaN or text raises ContractError.
+    """
+    step = 2.0 * full_scale / 2**bits
+    low = -full_scale
+    high = full_scale - step if quantization else full_scale
+
+    def both(u: Any) -> float:
+        if type(u) is not float:
+            u = as_voltage(u)
+        if low <= u <= high:
+            return round(u / step) * step
+        if not isfinite(u):
+            as_voltage(u)
+        return high if u > high else low
+
+    def saturate(u: Any) -> float:
+        if type(u) is not float:
+            u = as_voltage(u)
+        if low <= u <= high:
+            return u
+        if not isfinite(u):
+            as_voltage(u)
+        return high if u > high else low
+
+    def quantize(u: Any) -> float:
+        return round(as_voltage(u) / step) * step
+
+    if saturation:
+        return both if quantization else saturate
+    return quantize if quantization else as_voltage

@@ -1,0 +1,52 @@
+"""Files that are either whole or not there."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+from rds.core.errors import InputError
+
+
+def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
+    """Let each writer fill the file at its path; the files appear complete, together, or not at all.
+
+    Each is written to a temporary file beside its place and synced; only when all are on disk do they take
+    their names. A failure or a kill before that leaves what was there before. Missing directories are made.
+    Raises InputError where the system refuses to write.
+    """
+    staged: dict[Path, Path] = {}
+    path = Path()
+    try:
+        for path, write in writers.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+            with open(temporary, "xb") as stream:
+                staged[path] = temporary
+                write(stream)
+                stream.flush()
+                os.fsync(stream.fileno())
+        for path, temporary in staged.items():
+            os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(
+            f"cannot write: {error.strerror or error}; choose a place that can be written to", str(path)
+        ) from error
+    finally:
+        for temporary in staged.values():
+            temporary.unlink(missing_ok=True)
+    for directory in {path.parent for path in staged}:
+        _sync_directory(directory)
+
+
+def _sync_directory(directory: Path) -> None:
+    if os.name != "posix":
+        return  # Windows does not open directories; its rename is durable enough for a result
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

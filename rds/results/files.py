@@ -1,0 +1,106 @@
+"""Results saved and reopened: CSV, MAT and Parquet by suffix, or all three in a directory."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.results.atomic import write_files
+from rds.results.foreign import from_table
+from rds.results.header import assemble
+from rds.results.result import Result
+
+# in the order in which a directory's files are preferred
+_FORMATS = {
+    ".parquet": "rds.results.parquet_file",
+    ".csv": "rds.results.csv_file",
+    ".mat": "rds.results.mat_file",
+}
+_STEM = "result"
+_RECORD = "record.rds"
+
+
+def save_result(result: Result, path: str | Path) -> Path:
+    """Save to one file, in the format that its suffix names (.csv with a .json of the same name beside it).
+
+    Nothing half-written is ever left. Raises InputError for an unknown suffix or a place that can't be written.
+    """
+    path = Path(path)
+    write_files(_format(path).writers(result, path))
+    return path
+
+
+def save_all(result: Result, directory: str | Path) -> dict[str, Path]:
+    """Save as result.csv, result.json, result.mat and result.parquet in `directory`; their paths by kind.
+
+    Either all appear, complete, or none. Raises InputError if the directory cannot be written.
+    """
+    directory = Path(directory)
+    writers: dict[Path, Any] = {}
+    for suffix in _FORMATS:
+        path = directory / f"{_STEM}{suffix}"
+        writers.update(_format(path).writers(result, path))
+    write_files(writers)
+    return {path.suffix.removeprefix("."): path for path in writers}
+
+
+def open_result(path: str | Path) -> Result:
+    """The result saved at `path`: a file of any format, or a directory that holds one result.
+
+    A directory with only the raw record of a run (one that was killed before it could save) is opened from that.
+    A table from elsewhere with `time` and measured columns opens with what it has. Raises InputError, naming the
+    file, the fault and the remedy, for anything else.
+    """
+    path = Path(path)
+    try:
+        if path.is_dir():
+            path = _choose(path)
+        if path.name == _RECORD:
+            return _open_record(path)
+        if not path.exists():
+            raise InputError("there is no such file; give a saved result (.parquet, .csv, .mat) or its directory")
+        columns, header = _format(path).read(path)
+        return from_table(columns) if header is None else assemble(columns, header)
+    except InputError as error:
+        if error.where is not None:
+            raise
+        raise InputError(str(error), str(path)) from error
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", str(path)) from error
+
+
+def _format(path: Path) -> Any:
+    module = _FORMATS.get(path.suffix.lower())
+    if module is None:
+        raise InputError(f"unknown suffix {path.suffix!r}; results are {', '.join(_FORMATS)}", str(path))
+    return import_module(module)
+
+
+def _choose(directory: Path) -> Path:
+    """The one result in `directory`; InputError lists them if there are several or none."""
+    known = [file for file in sorted(directory.iterdir()) if file.suffix.lower() in _FORMATS and file.is_file()]
+    stems = sorted({file.stem for file in known})
+    stem = _STEM if _STEM in stems else stems[0] if len(stems) == 1 else None
+    if stem is not None:
+        return next(directory / f.name for suffix in _FORMATS for f in known if (f.stem, f.suffix.lower()) == (stem, suffix))
+    if stems:
+        raise InputError(f"holds several results ({', '.join(file.name for file in known)}); name one of the files")
+    if (directory / _RECORD).is_file():
+        return directory / _RECORD
+    inside = [d.name for d in sorted(directory.iterdir()) if d.is_dir() and _holds_result(d)]
+    if inside:
+        raise InputError(f"holds results in directories of their own ({', '.join(inside)}); name one of them")
+    raise InputError(f"holds no result; it needs {', '.join(_STEM + suffix for suffix in _FORMATS)} or {_RECORD}")
+
+
+def _holds_result(directory: Path) -> bool:
+    return any(f.name == _RECORD or (f.stem == _STEM and f.suffix in _FORMATS) for f in directory.iterdir())
+
+
+def _open_record(path: Path) -> Result:
+    # imported here: a saved result opens without the runtime
+    record = import_module("rds.runtime.record")
+    columns, units, meta = record.read_record(path.parent)
+    return Result(columns, units, meta)

@@ -1,0 +1,113 @@
+"""Numbers that say how well an axis followed its reference and how well its model foretold it.
+
+The error is reference - measured. Standard deviations are of the population (ddof = 0). The fit is that of
+system identification, 100·(1 - ‖y - ŷ‖ / ‖y - mean(y)‖) in per cent, with y measured and ŷ modelled.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from rds.results.result import Result
+
+ERROR_METRICS = ("mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error")
+
+
+def axis_metrics(result: Result) -> dict[str, dict[str, float | None]]:
+    """Per axis: `mean_error`, `std_error`, `mean_abs_error`, `std_abs_error`, `max_abs_error`, `rms_error` and
+    `fit_percent`; plain floats that JSON can hold.
+
+    A key is absent where there is nothing to compare: the six errors without a reference (system test, model
+    validation), `fit_percent` without a modelled response (simulation, emulation). It is None where the number is
+    not defined: no samples, or a fit to a measured response that never moves.
+
+    The first period of a periodic reference is left out, because the axis starts from rest; a run that is not
+    longer than one period is used whole (`metric_notes` says so).
+    """
+    return {axis: _one_axis(result, axis) for axis in result.axes}
+
+
+def _one_axis(result: Result, axis: str) -> dict[str, float | None]:
+    metrics: dict[str, float | None] = {}
+    used = settled(result, axis)
+    error = tracking_error(result, axis)
+    if error is not None:
+        metrics.update(error_metrics(error[used]))
+    measured, modelled = f"{axis}_measured", f"{axis}_modelled"
+    if measured in result and modelled in result:
+        metrics["fit_percent"] = fit_percent(result[measured][used], result[modelled][used])
+    return metrics
+
+
+def tracking_error(result: Result, axis: str) -> np.ndarray | None:
+    """Reference - measured at every sample, in the axis's unit; None where either is missing."""
+    reference, measured = f"{axis}_reference", f"{axis}_measured"
+    if reference not in result or measured not in result:
+        return None
+    return np.asarray(result[reference] - result[measured], dtype=float)
+
+
+def error_metrics(error: np.ndarray) -> dict[str, float | None]:
+    """The six metrics of a tracking error, in the error's unit; all None for no samples."""
+    if not len(error):
+        return dict.fromkeys(ERROR_METRICS)
+    size = np.abs(error)
+    values = (error.mean(), error.std(), size.mean(), size.std(), size.max(), math.sqrt(float(np.mean(error**2))))
+    return {name: _finite(value) for name, value in zip(ERROR_METRICS, values, strict=True)}
+
+
+def fit_percent(measured: np.ndarray, modelled: np.ndarray) -> float | None:
+    """100·(1 - ‖y - ŷ‖ / ‖y - mean(y)‖) in per cent; None if `measured` is constant or empty."""
+    if not len(measured) or np.ptp(measured) == 0:
+        return None
+    spread = float(np.linalg.norm(measured - np.mean(measured)))
+    return _finite(100.0 * (1.0 - float(np.linalg.norm(measured - modelled)) / spread)) if spread else None
+
+
+def settled(result: Result, axis: str) -> slice:
+    """The samples that the metrics use: after the first period, or all if none are left by that."""
+    period = _period(result, axis)
+    if period is None:
+        return slice(None)
+    time = result["time"]
+    # half a sample less, so that rounding in k·T does not decide about the sample at the period's end
+    first = int(np.searchsorted(time, time[0] + period - result.sample_period / 2)) if len(time) else 0
+    return slice(first, None) if first < len(time) else slice(None)
+
+
+def metric_notes(result: Result) -> list[str]:
+    """What the metrics leave out, or could not, in a sentence per case."""
+    notes: dict[str, list[str]] = {}
+    for axis in result.axes:
+        period = _period(result, axis)
+        if period is None or not len(result):
+            continue
+        first = settled(result, axis).start
+        if first is None:
+            note = f"the run is not longer than one period of the reference ({period:g} s): the metrics use all of it"
+        else:
+            rest = len(result) - first
+            note = f"the metrics leave out the first period of the reference ({period:g} s)"
+            if rest * result.sample_period < period - result.sample_period / 2:
+                note += f"; only {rest * result.sample_period:g} s of the second are there"
+        notes.setdefault(note, []).append(axis)
+    return [f"{', '.join(axes)}: {note}." for note, axes in notes.items()]
+
+
+def metric_units(result: Result, axis: str) -> dict[str, str]:
+    """The unit of each metric of `axis`: that of its position (mm, degrees, rev/min), and % for the fit."""
+    unit = result.units.get(f"{axis}_measured", "")
+    return {**dict.fromkeys(ERROR_METRICS, unit), "fit_percent": "%"}
+
+
+def _period(result: Result, axis: str) -> float | None:
+    period = (result.meta.get("period") or {}).get(axis)
+    return float(period) if period and period > 0 else None
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
