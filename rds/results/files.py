@@ -84,7 +84,9 @@ def _choose(directory: Path) -> Path:
     stems = sorted({file.stem for file in known})
     stem = _STEM if _STEM in stems else stems[0] if len(stems) == 1 else None
     if stem is not None:
-        return next(directory / f.name for suffix in _FORMATS for f in known if (f.stem, f.suffix.lower()) == (stem, suffix))
+        return next(
+            directory / f.name for suffix in _FORMATS for f in known if (f.stem, f.suffix.lower()) == (stem, suffix)
+        )
     if stems:
         raise InputError(f"holds several results ({', '.join(file.name for file in known)}); name one of the files")
     if (directory / _RECORD).is_file():

@@ -32,7 +32,8 @@ def writers(result: Result, path: Path) -> dict[Path, Callable[[BinaryIO], None]
             entry["variable"] = variable
         content: dict[str, Any] = {e["variable"]: result.columns[e["name"]] for e in header["columns"]}
         content[_DESCRIPTION] = json.dumps(header, allow_nan=False)
-        savemat(stream, content, long_field_names=True, do_compression=True, oned_as="column")
+        file: Any = stream  # savemat takes open files, though its stubs know only paths
+        savemat(file, content, long_field_names=True, do_compression=True, oned_as="column")
 
     return {path: write}
 

@@ -181,7 +181,9 @@ def _check_columns(columns: Mapping[str, np.ndarray]) -> None:
     steps = np.diff(columns["time"])
     if not (steps > 0).all():
         row = int(np.flatnonzero(~(steps > 0))[0]) + 1
-        raise InputError(f"time does not increase at sample {row}: {columns['time'][row - 1]} s, then " + _at(columns, row))
+        raise InputError(
+            f"time does not increase at sample {row}: {columns['time'][row - 1]} s, then " + _at(columns, row)
+        )
 
 
 def _at(columns: Mapping[str, np.ndarray], row: int) -> str:

@@ -1,0 +1,103 @@
+"""Results as pieces of HTML: all text escaped, nothing fetched from anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_notes, metric_units
+from rds.results.units import heading
+
+if TYPE_CHECKING:
+    from rds.results.result import Result
+
+METRIC_TITLES = {
+    "mean_error": "mean error",
+    "std_error": "std of error",
+    "mean_abs_error": "mean |error|",
+    "std_abs_error": "std of |error|",
+    "max_abs_error": "max |error|",
+    "rms_error": "RMS error",
+    "fit_percent": "fit",
+}
+
+
+def number(value: Any) -> str:
+    """A cell's text: four significant digits for a float, a dash for None."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "", note: str = "") -> str:
+    """A table of escaped cells: numbers right-aligned, the rest to the left."""
+    head = "".join(f'<th scope="col">{escape(str(column))}</th>' for column in columns)
+    body = "".join(f"<tr>{''.join(_cell(value) for value in row)}</tr>" for row in rows)
+    caption = f"<caption>{escape(title)}</caption>" if title else ""
+    below = f'<p class="note">{escape(note)}</p>' if note else ""
+    return (
+        f'<div class="scroll"><table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{below}'
+    )
+
+
+def _cell(value: Any) -> str:
+    style = ' class="number"' if isinstance(value, int | float) and not isinstance(value, bool) else ""
+    return f"<td{style}>{escape(number(value))}</td>"
+
+
+def metrics_rows(result: Result) -> tuple[list[str], list[list[Any]]]:
+    """Headings and rows of a result's metrics: a row per metric and unit, a column per axis.
+
+    Axes of different units (mm, rev/min) get rows of their own; a metric that no axis has gets none.
+    """
+    metrics = axis_metrics(result)
+    rows = []
+    for key in (*ERROR_METRICS, "fit_percent"):
+        units = list(dict.fromkeys(metric_units(result, a)[key] for a in result.axes if key in metrics[a]))
+        for unit in units:
+            cells = [metrics[a].get(key) if metric_units(result, a)[key] == unit else None for a in result.axes]
+            rows.append([heading(METRIC_TITLES[key], unit), *cells])
+    return ["", *result.axes], rows
+
+
+def verdict_line(result: Result) -> str:
+    """The verdict with its reason, as a paragraph; "" where there is none."""
+    if not result.verdict:
+        return ""
+    kind = result.verdict if result.verdict in ("met", "missed", "void") else "other"
+    reason = str(result.meta.get("verdict_reason") or "")
+    return f'<p class="verdict {kind}"><strong>{escape(result.verdict)}</strong> {escape(reason)}</p>'
+
+
+def notes_list(notes: Iterable[str]) -> str:
+    """Notes as a small paragraph each."""
+    return "".join(f'<p class="note">{escape(note)}</p>' for note in notes)
+
+
+def result_fragment(result: Result) -> str:
+    """How a result shows itself in a notebook: what it is, its verdict, its metrics."""
+    what = f"{result.mode or 'run'} of {', '.join(result.axes)}, {len(result)} samples of {result.sample_period:g} s"
+    ending = result.meta.get("ending")
+    if ending and ending != "done":
+        what += f", ended: {ending}"
+    columns, rows = metrics_rows(result)
+    shown = table(columns, rows) if rows else ""
+    return f"<p>{escape(what)}</p>{verdict_line(result)}{shown}{notes_list(metric_notes(result))}"
+
+
+def key_values(values: Mapping[str, Any], title: str = "") -> str:
+    """A mapping as a table of two columns; nested mappings as `a.b`."""
+    return table(["", ""], [[key, value] for key, value in _flat(values)], title) if values else ""
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        elif isinstance(value, list | tuple):
+            yield f"{prefix}{key}", ", ".join(number(item) for item in value)
+        else:
+            yield f"{prefix}{key}", value
