@@ -1,0 +1,68 @@
+"""Errors of a student's code, reduced to the student's own lines."""
+
+from __future__ import annotations
+
+import linecache
+import sysconfig
+from pathlib import Path
+from traceback import extract_tb
+
+from rds.core.types import Source
+
+_LONGEST = 300  # characters of an exception's own text; some print whole arrays
+
+
+def student_error(exc: BaseException, path_or_source: str | Path | Source | None = None) -> str:
+    """One line that says where in the student's own code `exc` came from.
+
+    `path_or_source` is the student's file, or the `Source` of a function written in a notebook. The innermost
+    line of that file (or of a file next to it) is named; without one, the innermost line outside this package,
+    the standard library and the installed packages. Gives for example
+    "file.py, line 12, in control: ZeroDivisionError: division by zero: `u = 1 / y`".
+    """
+    path = path_or_source.path if isinstance(path_or_source, Source) else path_or_source
+    if isinstance(exc, SyntaxError) and exc.filename:
+        line = (exc.text or "").strip()
+        return _sentence(f"{Path(exc.filename).name}, line {exc.lineno}", type(exc).__name__, exc.msg, line)
+    own = [frame for frame in extract_tb(exc.__traceback__) if _is_own(frame.filename, path)]
+    if not own:
+        return f"{type(exc).__name__}: {_text(exc)}"
+    frame = own[-1]
+    line = (frame.line or linecache.getline(frame.filename, frame.lineno or 0)).strip()
+    name = "a notebook cell" if "ipykernel" in frame.filename else Path(frame.filename).name
+    where = f"{name}, line {frame.lineno}, in {frame.name}"
+    return _sentence(where, type(exc).__name__, _text(exc), line)
+
+
+def student_line(exc: BaseException, path: str | Path) -> int | None:
+    """The number of the innermost line of the file `path` on the way to `exc`."""
+    if isinstance(exc, SyntaxError) and exc.filename and Path(exc.filename) == Path(path):
+        return exc.lineno
+    numbers = [frame.lineno for frame in extract_tb(exc.__traceback__) if Path(frame.filename) == Path(path)]
+    return numbers[-1] if numbers else None
+
+
+def _is_own(filename: str, path: str | Path | None) -> bool:
+    if path is not None:
+        return Path(filename).parent == Path(path).resolve().parent and not _is_installed(filename)
+    return not filename.startswith("<frozen") and not _is_installed(filename)
+
+
+def _is_installed(filename: str) -> bool:
+    """True for a file of this package, of the standard library or of an installed package."""
+    parts = sysconfig.get_paths()
+    roots = {parts["stdlib"], parts["purelib"], parts["platlib"], str(Path(__file__).resolve().parents[1])}
+    return any(Path(filename).is_relative_to(root) for root in roots)
+
+
+def _text(exc: BaseException) -> str:
+    try:
+        text = str(exc)
+    except Exception:  # an exception class of the student's own may fail to print itself
+        text = "(its message cannot be printed)"
+    return text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
+
+
+def _sentence(where: str, kind: str, text: str, line: str) -> str:
+    said = f"{where}: {kind}: {text}" if text else f"{where}: {kind}"
+    return f"{said}: `{line}`" if line else said

@@ -1,0 +1,279 @@
+"""A student's file, functions or notebook namespace, as the interfaces that they fill."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import inspect
+import io
+import sys
+import tokenize
+import types
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rds.core.blame import student_error, student_line
+from rds.core.errors import ContractError, InputError
+from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
+from rds.core.types import Controller, Reference, Source
+
+__all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "student_error"]
+
+_LARGEST = 10_000_000  # bytes; a file of data, not of code
+
+
+@dataclass(frozen=True)
+class StudentFile:
+    """What a student handed in: the interface functions by name, and what goes with them.
+
+    `initial_state` is None where the student gave none. One `params` and one `initial_state` serve every
+    function of a file; a model and a controller whose states differ belong in two files. `misfits` are functions
+    that have the name but not the arguments of an interface, such as a helper called `interpolate`, with the reason.
+    """
+
+    source: Source
+    functions: Mapping[str, Callable[..., Any]]
+    params: Mapping[str, Any] = field(default_factory=dict)
+    initial_state: Any = None
+    misfits: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def interfaces(self) -> tuple[str, ...]:
+        """Those it fills of "controller", "model" and "interpolator"."""
+        return tuple(dict.fromkeys(INTERFACES[name] for name in self.functions if name in INTERFACES))
+
+    def parameters(self, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Its own copy of `params` with `overrides`; InputError for a key that `params` does not have."""
+        merged = copy.deepcopy(dict(self.params))
+        for key, value in (overrides or {}).items():
+            if key not in merged:
+                known = ", ".join(map(str, merged)) or "none"
+                raise InputError(f"unknown parameter {key!r}; known parameters: {known}", self.source.name)
+            merged[key] = value
+        return merged
+
+    def controller(self, coupled: bool = False, params: Mapping[str, Any] | None = None) -> Controller:
+        """The controller, with `params` over its own; ContractError if there is none or it lacks a state."""
+        control = self.functions.get("control")
+        if control is None:
+            raise ContractError(f"no controller: it defines no {form('control')}", self.source.name)
+        merged = self.parameters(params)
+        if self.initial_state is None and not coupled:
+            _needs_no_state(control, merged, self.source)
+        state = () if self.initial_state is None else copy.deepcopy(self.initial_state)
+        return Controller(control, state, merged, self.source, coupled)
+
+
+def load_student(path: str | Path, validate: bool = True) -> StudentFile:
+    """Run the student's file at `path` as a module of its own and find what it defines.
+
+    Files next to it can be imported, but do not come before the standard library and installed packages.
+    InputError, with file and line, for a file that cannot be read or run or that defines no interface;
+    ContractError for a function with the wrong arguments or `params` that is no dict, unless `validate` is
+    off (the conformance check reports these itself). Only the student's own errors are caught: Ctrl-C is not.
+    """
+    file = Path(path)
+    data = _read(file)
+    file = file.resolve()
+    text = _decode(data, file)
+    source = Source(file.name, str(file), hashlib.sha256(data).hexdigest(), text)
+    return _student(_run(text, file), source, validate)
+
+
+def from_namespace(namespace: Mapping[str, Any] | types.ModuleType, validate: bool = True) -> StudentFile:
+    """What a module, or the variables of a notebook (`globals()`), define of the interfaces; errors as for a file."""
+    variables = vars(namespace) if isinstance(namespace, types.ModuleType) else namespace
+    functions = [f for name in ARGUMENTS if inspect.isfunction(f := variables.get(name))]
+    texts = [text for f in functions if (text := _source_text(f)) is not None]
+    name = namespace.__name__ if isinstance(namespace, types.ModuleType) else "notebook"
+    return _student(variables, _source(name, "\n\n".join(texts) or None), validate)
+
+
+def from_function(
+    function: Callable[..., Any],
+    initial_state: Any = None,
+    params: Mapping[str, Any] | None = None,
+    role: str | None = None,
+    validate: bool = True,
+) -> StudentFile:
+    """One function, as from a notebook cell, in the `role` of "control", "derivatives", "advance" or "interpolate".
+
+    Without `role` it is the function's name, else the interface whose arguments it has. Errors as for a file.
+    """
+    name = getattr(function, "__name__", type(function).__name__)
+    role = role or (name if name in INTERFACES else _role_of(function, name))
+    variables = {role: function, "params": {} if params is None else params, "initial_state": initial_state}
+    return _student(variables, _source(name, _source_text(function)), validate)
+
+
+def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> StudentFile:
+    # `import control` or `from scipy import interpolate` is no controller and no interpolator
+    functions = {name: f for name in ARGUMENTS if callable(f := variables.get(name)) and not inspect.isclass(f)}
+    if not any(name in INTERFACES for name in functions):
+        names = ", ".join(form(name) for name in INTERFACES)
+        hint = near_misses({k: v for k, v in variables.items() if _is_written_here(v, variables)})
+        raise InputError(f"it defines none of {names}{'; ' + hint if hint else ''}", source.path or source.name)
+    misfits = {name: fault for name, f in functions.items() if (fault := argument_fault(name, f))}
+    if all(name in misfits for name in functions if name in INTERFACES):
+        misfits = {}  # nothing else fills an interface, so these were meant to
+    elif {"derivatives", "advance"} & (set(functions) - set(misfits)):
+        misfits.pop("output", None)  # next to a model it is meant for it
+    fitting = {name: f for name, f in functions.items() if name not in misfits}
+    params, state = variables.get("params"), variables.get("initial_state")
+    student = StudentFile(source, fitting, {} if params is None else params, state, misfits)
+    if validate:
+        _validate(student)
+    return student
+
+
+def _validate(student: StudentFile) -> None:
+    if not isinstance(student.params, Mapping):
+        kind = type(student.params).__name__
+        where = student.source.path or student.source.name
+        raise ContractError(
+            f"params is {student.params!r:.60} ({kind}); it must be a dict of defaults, as in {{'gain': 20.0}}", where
+        )
+    for name, function in student.functions.items():
+        if fault := argument_fault(name, function):
+            code = getattr(inspect.unwrap(function), "__code__", None)
+            line = f":{code.co_firstlineno}" if code and student.source.path == code.co_filename else ""
+            raise ContractError(fault, f"{student.source.path or student.source.name}{line}")
+
+
+def _is_written_here(value: Any, variables: Mapping[str, Any]) -> bool:
+    """False for what a file imported: a library's class is no near miss of the student's."""
+    module = getattr(value, "__module__", None)
+    return module is None or module == variables.get("__name__", module)
+
+
+def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source: Source) -> None:
+    """A trial call with the empty state: "index out of range" in a running loop does not say what is missing."""
+    try:
+        control(0.0, Reference(0.0, 0.0, 0.0), 0.0, (), copy.deepcopy(params))
+    except (IndexError, KeyError, TypeError, ValueError) as error:
+        raise ContractError(
+            f"control() fails with the empty state, and there is no initial_state: {student_error(error, source)}; "
+            "define initial_state, as in `initial_state = [0.0]`",
+            source.path or source.name,
+        ) from error
+    except Exception:
+        return  # not for want of a state: whoever runs it reports it
+
+
+def _role_of(function: Callable[..., Any], name: str) -> str:
+    fits = [role for role in INTERFACES if argument_fault(role, function) is None]
+    if len(fits) > 1:  # derivatives and advance both take four
+        names = set(inspect.signature(function).parameters)
+        fits = [role for role in fits if names >= set(ARGUMENTS[role])] or fits
+    if len(fits) != 1:
+        forms = ", ".join(form(role) for role in INTERFACES)
+        raise ContractError(f"cannot tell which interface {name}() fills; name it and its arguments as in {forms}")
+    return fits[0]
+
+
+def _source(name: str, text: str | None) -> Source:
+    sha256 = hashlib.sha256(text.encode()).hexdigest() if text is not None else None
+    return Source(name, None, sha256, text)
+
+
+def _source_text(function: Callable[..., Any]) -> str | None:
+    try:
+        return inspect.getsource(function)
+    except (OSError, TypeError):
+        return None
+
+
+def _read(file: Path) -> bytes:
+    where = str(file)
+    if not file.exists():
+        raise InputError("there is no such file; check the name and the folder", where)
+    if not file.is_file():
+        kind = "a directory" if file.is_dir() else "not a regular file"
+        raise InputError(f"it is {kind}; name the Python file in which the functions are", where)
+    if file.suffix == ".ipynb":
+        raise InputError("it is a notebook; save the cells that define the functions as a .py file", where)
+    try:
+        if file.stat().st_size > _LARGEST:
+            raise InputError(f"it has {file.stat().st_size} bytes, more than {_LARGEST}; keep data out of it", where)
+        return file.read_bytes()
+    except OSError as error:
+        raise InputError(f"it cannot be read: {error.strerror}", where) from error
+
+
+def _decode(data: bytes, file: Path) -> str:
+    if b"\0" in data:
+        line = data[: data.index(b"\0")].count(b"\n") + 1
+        raise InputError("it contains null bytes, so it is not UTF-8 text; save it as UTF-8", f"{file}:{line}")
+    try:
+        encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        bad = data[error.start : error.start + 1]
+        raise InputError(f"byte {bad!r} is not UTF-8 text; save it as UTF-8", f"{file}:{line}") from error
+    except SyntaxError as error:  # an unknown encoding, or bytes that are not in it, in the first two lines
+        raise InputError(f"{error.msg}; save it as UTF-8", f"{file}:1") from error
+
+
+def _run(text: str, file: Path) -> dict[str, Any]:
+    """Variables of the module that `text` makes when it runs; the module's name is new each time."""
+    module = types.ModuleType(f"rds_student_{file.stem}_{uuid.uuid4().hex[:12]}")
+    module.__file__ = str(file)
+    sys.modules[module.__name__] = module  # dataclasses and pickle look it up there
+    try:
+        with _siblings(file.parent):
+            exec(compile(text, str(file), "exec", dont_inherit=True), module.__dict__)
+    except BaseException as error:
+        del sys.modules[module.__name__]
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        raise _load_error(error, file) from error
+    return module.__dict__
+
+
+@contextmanager
+def _siblings(folder: Path) -> Iterator[None]:
+    """Files of `folder` can be imported, last of all; afterwards the next student's file finds none of them.
+
+    They are imported without leaving byte code in the student's folder: a stale one would hide an edit.
+    """
+    before, path, no_bytecode = set(sys.modules), list(sys.path), sys.dont_write_bytecode
+    sys.path.append(str(folder))
+    sys.dont_write_bytecode = True
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        sys.dont_write_bytecode = no_bytecode
+        sys.path_importer_cache.pop(str(folder), None)
+        for name in set(sys.modules) - before:
+            origin = getattr(sys.modules[name], "__file__", None)
+            is_part = name.partition(".")[0] in before  # of a package that the student's folder only happens to hold
+            if origin and not is_part and _is_inside(origin, folder):
+                del sys.modules[name]
+
+
+def _is_inside(origin: str, folder: Path) -> bool:
+    """Imported through `folder`; an environment that merely lies below it holds installed packages."""
+    path = Path(origin)
+    return path.is_relative_to(folder) and "site-packages" not in path.relative_to(folder).parts
+
+
+def _load_error(error: BaseException, file: Path) -> InputError:
+    line = student_line(error, file)
+    where = f"{file}:{line}" if line else str(file)
+    if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
+        text = (error.text or "").strip()
+        return InputError(f"syntax error: {error.msg}{f': `{text}`' if text else ''}; Python cannot read it", where)
+    said = student_error(error, file)
+    if isinstance(error, SystemExit):
+        return InputError(f"it ends the program while it loads: {said}; remove the exit", where)
+    if isinstance(error, ModuleNotFoundError):
+        remedy = f"install {error.name}, or put {error.name}.py next to the file"
+    else:
+        remedy = 'correct it, or move what is not a definition under `if __name__ == "__main__":`'
+    return InputError(f"it fails while it loads: {said}; {remedy}", where)
