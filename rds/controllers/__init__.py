@@ -1,1 +1,53 @@
-"""controllers."""
+"""Control laws, one per file, by name.
+
+Each file has `law`, a pure function on floats and tuples of floats (numba compiles it as it stands),
+`control`, the fixed interface over it, and `make`, which checks the options and fills in tuned gains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
+
+from rds.core.registry import Registry
+from rds.core.types import Controller
+
+LIBRARY = Registry(
+    "controller",
+    {
+        "p": "rds.controllers.proportional",
+        "pid": "rds.controllers.pid",
+        "modified-pid": "rds.controllers.modified_pid",
+        "tracking": "rds.controllers.tracking",
+    },
+)
+
+
+def controller_names() -> list[str]:
+    """Names of the library's controllers."""
+    return LIBRARY.names()
+
+
+def controller_module(name: str) -> ModuleType:
+    """The module of the controller called `name`, with its `law`, `control` and `make`."""
+    return LIBRARY.module(name)
+
+
+def library_controller(
+    name: str,
+    axis_model: Mapping[str, Any],
+    T: float,
+    converter_range: float,
+    *,
+    unit: str = "mm",
+    **options: Any,
+) -> Controller:
+    """The library's controller called `name`, for one axis sampled every `T` s.
+
+    `axis_model` holds the axis's `tau` (s) and `K` ((unit/s)/V; for a spindle unit/V); other keys are left alone.
+    `converter_range` is the voltage (V) at which the command saturates, inf if nothing saturates it. An axis
+    whose `unit` is "rev/min" is a spindle: first order, its speed measured. Options not given are tuned from
+    `tau`, `K` and `T`. Raises InputError for an unknown name or option, or a value that will not do.
+    """
+    return LIBRARY.module(name).make(axis_model, T, converter_range, unit=unit, **options)

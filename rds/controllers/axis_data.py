@@ -1,0 +1,46 @@
+"""What a law is tuned from: the axis's time constant and gain, the sample period and the converter's range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from rds.core.errors import InputError
+from rds.core.options import Option
+
+SPINDLE_UNIT = "rev/min"
+
+
+class AxisData(NamedTuple):
+    """An axis as its controller sees it."""
+
+    tau: float  # s
+    K: float  # (mm/s)/V; (rev/min)/V for a spindle
+    T: float  # s
+    converter_range: float  # V, inf without a limit
+    spindle: bool  # first order, its speed measured; else second order, its position measured
+
+
+_MODEL = {
+    "tau": Option("time constant of the axis, s", more_than=0.0),
+    "K": Option("gain of the axis, (mm/s)/V; (rev/min)/V for a spindle", more_than=0.0),
+}
+
+
+def axis_data(axis_model: Mapping[str, Any], T: float, converter_range: float, unit: str, owner: str) -> AxisData:
+    """The checked data of an axis; InputError if something is missing or impossible."""
+    for name, option in _MODEL.items():
+        if name not in axis_model:
+            raise InputError(
+                f"{owner} needs the axis's {name} ({option.meaning}), which its model does not give; "
+                f"use the machine's axis model or give {name} among the model's params"
+            )
+    return AxisData(
+        tau=_MODEL["tau"].check(axis_model["tau"], "tau", owner),
+        K=_MODEL["K"].check(axis_model["K"], "K", owner),
+        T=Option("sample period, s", more_than=0.0).check(T, "T", owner),
+        converter_range=Option("range of the converter, V", more_than=0.0, infinite=True).check(
+            converter_range, "converter_range", owner
+        ),
+        spindle=unit == SPINDLE_UNIT,
+    )

@@ -1,0 +1,85 @@
+"""Modified PID control: proportional and derivative act on the measurement, with set-point weights b and c.
+
+    u = bias + Pgain (b r - y) + Igain ∫(r - y) + Dgain d/dt (c r - y)_f
+
+A step of the reference then reaches the axis through the integral, and only a share b of it through Pgain, so that
+it overshoots less, and with c = 0 it gives no derivative kick. The price is a following error of
+(1 - b) Pgain/Igain per mm/s of reference. Integral, derivative filter and anti-windup are discretized as in
+`rds.controllers.pid`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import exp
+from typing import Any
+
+from rds.controllers.axis_data import axis_data
+from rds.controllers.tuning import pid_gains
+from rds.controllers.words import BIAS, ERROR_LIMITS, FILTER, GAINS, OUTPUT_LIMIT, limit_or_none, output_limit
+from rds.core.options import Option, read_options
+from rds.core.types import Controller, Reference, Source
+
+NAME = "modified-pid"
+WEIGHTS = {
+    "b": Option("set-point weight of the proportional part", at_least=0.0),
+    "c": Option("set-point weight of the derivative part", at_least=0.0),
+}
+OPTIONS = GAINS | WEIGHTS | BIAS | {"maxerrorI": ERROR_LIMITS["maxerrorI"]} | OUTPUT_LIMIT | FILTER
+
+
+def law(position, velocity, acceleration, y, state, c):
+    """Voltage (V) and next state, for a reference (mm, mm/s, mm/s²) and the measured position `y` (mm).
+
+    State: integral of the error (mm s), filtered derivative of c r - y (mm/s), the last c r - y (mm), and 0.0 before
+    the first sample, 1.0 after it.
+    """
+    integral, derivative, last, started = state
+    T, q, slope, P, I, D, b, weight, bias, maxerrorI, limit = c  # noqa: E741
+    e = position - y
+    weighted = weight * position - y
+    summed = integral + e * T
+    if summed > maxerrorI:
+        summed = maxerrorI
+    elif summed < -maxerrorI:
+        summed = -maxerrorI
+    if started != 0.0:  # there is no slope before the second sample
+        derivative = q * derivative + slope * (weighted - last)
+    u = bias + P * (b * position - y) + I * summed + D * derivative
+    if u > limit:
+        u = limit
+        if e > 0.0:
+            summed = integral
+    elif u < -limit:
+        u = -limit
+        if e < 0.0:
+            summed = integral
+    return u, (summed, derivative, weighted, 1.0)
+
+
+def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, Any]) -> tuple[float, Any]:
+    """The fixed interface over `law`."""
+    return law(r[0], r[1], r[2], y, state, params["coefficients"])
+
+
+def make(
+    axis_model: Mapping[str, Any], T: float, converter_range: float, *, unit: str = "mm", **options: Any
+) -> Controller:
+    """Modified PID control of one axis; see `rds.controllers.library_controller` and `OPTIONS`.
+
+    Defaults: gains of `tuning.pid_gains`, b = 0.6, c = 0, no limits.
+    """
+    owner = f"controller {NAME!r}"
+    given = read_options(options, OPTIONS, owner)
+    axis = axis_data(axis_model, T, converter_range, unit, owner)
+    gains = dict.fromkeys(OPTIONS, 0.0) | pid_gains(axis) | {"b": 0.6, "c": 0.0} | given
+    q = exp(-axis.T / gains["derivative_filter"]) if gains["derivative_filter"] > 0.0 else 0.0
+    coefficients = (
+        axis.T,
+        q,
+        (1.0 - q) / axis.T,
+        *(gains[name] for name in ("Pgain", "Igain", "Dgain", "b", "c", "bias")),
+        limit_or_none(gains["maxerrorI"]),
+        output_limit(gains["maxoutput"], axis.converter_range),
+    )
+    return Controller(control, (0.0, 0.0, 0.0, 0.0), gains | {"coefficients": coefficients}, Source(NAME))

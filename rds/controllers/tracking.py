@@ -1,0 +1,112 @@
+"""The general tracking controller with reduced-order observer (mini-cnc-rds, equations 4 to 9).
+
+    u = (τ/K) (a_r + v_r/τ + g₁ (x_r - y) + g₂ (v_r - v̂))
+
+with v̂ from the observer of `rds.controllers.observer`, which is fed the voltage after saturation: what the
+axis really gets. Friction is not in the law. In steady motion it leaves an error of (F_C/τ)(1 + g₂/|pole|)/g₁.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rds.controllers import observer
+from rds.controllers.axis_data import SPINDLE_UNIT, AxisData, axis_data
+from rds.core.errors import InputError
+from rds.core.options import Option, check_known
+from rds.core.types import Controller, Reference, Source
+
+NAME = "tracking"
+OPTIONS = ("poles", "observer_pole", "gains")
+POLES = ((-32.0, 24.0), (-32.0, -24.0))  # 1/s: the paper's, settling in 0.125 s
+OBSERVER_POLE = -320.0  # 1/s: the paper's
+
+
+def law(position, velocity, acceleration, y, state, c):
+    """Voltage (V) and next state, for a reference (mm, mm/s, mm/s²) and the measured position `y` (mm).
+
+    State: the observer's z (mm/s), and 0.0 before the first sample, 1.0 after it.
+    """
+    z, started = state
+    inverse_gain, inertia, g1, g2, L, F, G, H, limit = c
+    if started == 0.0:
+        z = -L * y  # the axis starts at rest, wherever it stands
+    u = inertia * (acceleration + g1 * (position - y) + g2 * (velocity - (L * y + z))) + inverse_gain * velocity
+    if u > limit:
+        u = limit
+    elif u < -limit:
+        u = -limit
+    return u, (F * z + G * y + H * u, 1.0)
+
+
+def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, Any]) -> tuple[float, Any]:
+    """The fixed interface over `law`."""
+    return law(r[0], r[1], r[2], y, state, params["coefficients"])
+
+
+def estimated_velocity(y: float, state: tuple[float, float], params: Mapping[str, Any]) -> float:
+    """The velocity (mm/s) that the observer sees at measured position `y` when `state` is handed in with it."""
+    z, started = state
+    return params["L"] * y + z if started else 0.0
+
+
+def make(
+    axis_model: Mapping[str, Any], T: float, converter_range: float, *, unit: str = "mm", **options: Any
+) -> Controller:
+    """The tracking controller of one position axis; see `rds.controllers.library_controller`.
+
+    Options: `poles`, two closed-loop poles as [real, imaginary] or complex numbers, 1/s (default: the paper's
+    -32 ± 24i); or `gains` = [g1, g2] (1/s², 1/s), already computed; `observer_pole`, 1/s (default -320).
+    Raises InputError for a spindle (its speed is measured, so there is nothing to observe), and for poles too fast
+    for the sample period; gains that are handed in are taken as they are.
+    """
+    owner = f"controller {NAME!r}"
+    check_known(options, OPTIONS, owner)
+    if unit == SPINDLE_UNIT:
+        raise InputError(
+            f"{owner} drives position axes: a spindle (unit {unit!r}) has its speed measured and nothing to observe; "
+            f"use 'p', 'pid' or 'modified-pid'"
+        )
+    axis = axis_data(axis_model, T, converter_range, unit, owner)
+    pole = observer.check_pole(options.get("observer_pole", OBSERVER_POLE), owner)
+    g1, g2 = _gains(options, axis.tau, owner)
+    if "gains" not in options:
+        _check_sampled(axis, g1, g2, owner)
+    L, F, G, H = observer.coefficients(axis.tau, axis.K, pole, axis.T)
+    readable = {"g1": g1, "g2": g2, "L": L, "F": F, "G": G, "H": H, "observer_pole": pole}
+    coefficients = (1.0 / axis.K, axis.tau / axis.K, g1, g2, L, F, G, H, axis.converter_range)
+    return Controller(control, (0.0, 0.0), readable | {"coefficients": coefficients}, Source(NAME))
+
+
+def _check_sampled(axis: AxisData, g1: float, g2: float, owner: str) -> None:
+    """InputError if poles that are stable in continuous time make the sampled loop unstable (Jury's criterion).
+
+    The observer of the held axis separates: the loop's poles are its own F and those of the state feedback.
+    """
+    a12, a22, b1, b2 = observer.held_axis(axis.tau, axis.K, axis.T)
+    kx, kv = axis.tau / axis.K * g1, axis.tau / axis.K * g2
+    trace = 1.0 - b1 * kx + a22 - b2 * kv
+    determinant = (1.0 - b1 * kx) * (a22 - b2 * kv) + b2 * kx * (a12 - b1 * kv)
+    if not (abs(determinant) < 1.0 and abs(trace) < 1.0 + determinant):
+        raise InputError(
+            f"{owner}: with T = {axis.T:g} s these poles make the sampled loop unstable; "
+            f"choose slower poles or a shorter sample period"
+        )
+
+
+def _gains(options: Mapping[str, Any], tau: float, owner: str) -> tuple[float, float]:
+    if "gains" not in options:
+        # On demand: python-control takes seconds to import, and whoever brings finished gains does without it.
+        from rds.controllers.design import tracking_gains
+
+        return tracking_gains(tau, options.get("poles", POLES))
+    if "poles" in options:
+        raise InputError(f"{owner}: gains and poles both say what the gains are; give one of them")
+    gains = options["gains"]
+    if not isinstance(gains, list | tuple) or len(gains) != 2:
+        raise InputError(f"{owner}: gains = {gains!r} must be [g1, g2], in 1/s² and 1/s")
+    return (
+        Option("position gain, 1/s²").check(gains[0], "gains[0]", owner),
+        Option("velocity gain, 1/s").check(gains[1], "gains[1]", owner),
+    )

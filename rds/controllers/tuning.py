@@ -1,0 +1,54 @@
+"""Default gains from the axis's time constant and gain, so that any axis is well damped at any sample period.
+
+A position axis K/(s (τ s + 1)) in a sampled loop lags by τ, by half a period for the hold and by up to one more
+period for the bus. The sum τ_Σ = τ + 1.5 T takes the place of τ; every gain below follows from K and τ_Σ alone,
+so the shape of the response is the same for every axis and its speed falls as T grows. A spindle K/(τ s + 1) has
+the dead time θ = 1.5 T beside its lag.
+"""
+
+from __future__ import annotations
+
+from rds.controllers.axis_data import AxisData
+
+BANDWIDTH = 0.6  # ω τ_Σ of the position loop's closed-loop poles
+DAMPING = 0.8  # of its complex pair: as the paper's poles -32 ± 24i
+SPINDLE_LOOP_GAIN = 9.0  # at most: a steady error of 10 % under P alone
+SPINDLE_SPEED_UP = 5.0  # closed loop at most this many times faster than the spindle itself
+
+
+def lag(axis: AxisData) -> float:
+    """τ_Σ, s."""
+    return axis.tau + 1.5 * axis.T
+
+
+def proportional_gain(axis: AxisData) -> float:
+    """P alone, V/mm.
+
+    Axis: K P = 1/(2 τ_Σ), the modulus optimum: damping 0.71, overshoot about 4 %. Spindle: K P = τ/(2 θ), which
+    leaves a phase margin above 60°, and at most 9.
+    """
+    if axis.spindle:
+        return min(SPINDLE_LOOP_GAIN, axis.tau / (3.0 * axis.T)) / axis.K
+    return 0.5 / (axis.K * lag(axis))
+
+
+def pid_gains(axis: AxisData) -> dict[str, float]:
+    """Pgain, Igain, Dgain and the derivative's filter time.
+
+    Axis: the PID that places the poles of K/(s (τ_Σ s + 1)) at ω(-0.8 ± 0.6i) and -ω with ω = 0.6/τ_Σ, its
+    derivative filtered with τ_Σ/8. Spindle: PI by internal-model control, Igain = Pgain/τ and K P = τ/(λ + θ), for
+    a closed loop 1/(λ s + 1) with λ = τ/5, but not below θ.
+    """
+    if axis.spindle:
+        dead_time = 1.5 * axis.T
+        wanted = max(axis.tau / SPINDLE_SPEED_UP, dead_time)
+        P = axis.tau / (axis.K * (wanted + dead_time))
+        return {"Pgain": P, "Igain": P / axis.tau, "Dgain": 0.0, "derivative_filter": 0.0}
+    total = lag(axis)
+    omega = BANDWIDTH / total
+    return {
+        "Pgain": total * omega**2 * (1.0 + 2.0 * DAMPING) / axis.K,
+        "Igain": total * omega**3 / axis.K,
+        "Dgain": (total * omega * (1.0 + 2.0 * DAMPING) - 1.0) / axis.K,
+        "derivative_filter": total / 8.0,
+    }

@@ -1,0 +1,31 @@
+"""A door: a table from name to module, where a module is imported only when its name is used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
+
+from rds.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Registry:
+    """The library parts of one kind ("controller", "model", ...), by name."""
+
+    kind: str
+    modules: Mapping[str, str]
+
+    def names(self) -> list[str]:
+        """The names behind this door, in the order of the table."""
+        return list(self.modules)
+
+    def module(self, name: str) -> ModuleType:
+        """The module called `name`, imported now if it was not before; InputError lists the known names."""
+        if name not in self.modules:
+            raise InputError(
+                f"there is no {self.kind} {name!r}; known {self.kind}s: {', '.join(self.modules)}, "
+                f"or your own from a file"
+            )
+        return import_module(self.modules[name])
