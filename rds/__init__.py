@@ -1,1 +1,45 @@
-"""RDS: rapid development system for machine-tool axes."""
+"""RDS: the rapid development system for machine-tool axes.
+
+The names below are imported when they are first used, so that `import rds` is light.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_NAMES = {
+    "Experiment": "rds.experiment",
+    "Result": "rds.results",
+    "compare": "rds.results.compare",
+    "open_result": "rds.results",
+    "load_machine": "rds.machines",
+    "machine_names": "rds.machines",
+    "Controller": "rds.core.types",
+    "Model": "rds.core.types",
+    "Reference": "rds.core.types",
+    "LineSegment": "rds.core.types",
+    "ArcSegment": "rds.core.types",
+    "controller": "rds.experiment.student",
+    "sinusoid": "rds.signals",
+    "square": "rds.signals",
+    "triangle": "rds.signals",
+    "user": "rds.signals",
+    "check": "rds.checks",
+    "RdsError": "rds.core.errors",
+    "InputError": "rds.core.errors",
+    "ContractError": "rds.core.errors",
+    "MachineError": "rds.core.errors",
+}
+
+__all__ = list(_NAMES)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _NAMES:
+        raise AttributeError(f"module 'rds' has no attribute {name!r}")
+    return getattr(import_module(_NAMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_NAMES])

@@ -63,7 +63,11 @@ class RealTimeClock:
 
     def start(self) -> None:
         """Sample 0 is due one period from now."""
-        self._origin = self.now() + self.period
+        self.start_at(0)
+
+    def start_at(self, k: int) -> None:
+        """Sample `k` is due one period from now."""
+        self._origin = self.now() + (1 - k) * self.period
         self._late_in_a_row = 0
 
     def taken(self) -> int:

@@ -1,0 +1,141 @@
+"""An experiment: which axes of which machine, driven by what, in which mode. Made in Python or from a TOML file."""
+
+from __future__ import annotations
+
+import datetime
+import secrets
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rds.core.blame import student_error
+from rds.core.errors import ContractError, MachineError, RdsError
+from rds.core.types import Ending
+from rds.experiment.outcome import outcome
+from rds.experiment.resolve import resolve
+from rds.experiment.words import Words
+from rds.modes import load_mode
+from rds.modes.host import Progress, Rows, run_plan
+from rds.results import Result
+from rds.runtime.plan import Plan
+
+
+class Experiment:
+    """One or more axes of a machine, driven by controllers after references, or by voltage signals.
+
+    The arguments are the keys of an experiment file (docs/experiments.md), with these liberties: `controller`
+    may be a library name, the path of a student's .py file, a function `control(t, r, y, state, params)`,
+    `globals()` of a notebook that defines one, a python-control system, an `rds.Controller`, or a table (dict);
+    `model` likewise with `derivatives` or `advance`; `reference` and `signal` a signal (`rds.sinusoid(5.0, 0.2)`),
+    a function of time, or a table. `axis` may be one name or several; with several, `overrides` such as
+    {"Y": {"controller": ...}} differ for one axis. What is wrong raises InputError at once.
+
+        experiment = rds.Experiment(axis="X", reference=rds.sinusoid(5.0, 0.2), controller="my_controller.py")
+        simulated = experiment.run()
+        emulated = experiment.run("emulation")
+    """
+
+    def __init__(
+        self,
+        machine: str = "mini-cnc",
+        axis: str | Sequence[str] = "X",
+        mode: str = "simulation",
+        duration: float = 10.0,
+        sample_period: float | None = None,
+        *,
+        reference: Any = None,
+        controller: Any = None,
+        signal: Any = None,
+        model: Any = None,
+        overrides: Mapping[str, Mapping[str, Any]] | None = None,
+        interface: Mapping[str, bool] | None = None,
+        timing: Mapping[str, Any] | None = None,
+        bus: Mapping[str, Any] | None = None,
+        compiled: bool = False,
+        title: str | None = None,
+    ):
+        given: dict[str, Any] = {
+            "title": title,
+            "machine": machine,
+            "mode": mode,
+            "duration": duration,
+            "sample_period": sample_period,
+            "reference": reference,
+            "controller": controller,
+            "signal": signal,
+            "model": model,
+            "interface": interface,
+            "timing": timing,
+            "bus": bus,
+            "compiled": compiled,
+        }
+        table = {key: value for key, value in given.items() if value is not None}
+        if isinstance(axis, str) and not overrides:
+            table["axis"] = axis
+        else:
+            table["axes"] = [axis] if isinstance(axis, str) else list(axis)
+            if overrides:
+                table["axis"] = {name: dict(own) for name, own in overrides.items()}
+        self._words = Words(table)
+        self._folder = Path.cwd()
+        self.plan()
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Experiment:
+        """The experiment that a file describes; the files that it names are looked for from its own folder."""
+        experiment = cls.__new__(cls)
+        experiment._words = Words.read(path)
+        experiment._folder = Path(path).resolve().parent
+        experiment.plan()
+        return experiment
+
+    @property
+    def mode(self) -> str:
+        """The mode that `run()` takes unless it is told another."""
+        return str(self._words.table.get("mode", "simulation"))
+
+    def plan(self, mode: str | None = None) -> Plan:
+        """What would run: every part made and checked. Raises InputError for what will not do."""
+        return resolve(self._words, self._folder, mode)[0]
+
+    def run(self, mode: str | None = None, *, out: str | Path | None = None, progress: Progress | None = None) -> Result:
+        """Run in `mode` (default: the experiment's own) and return the result.
+
+        With `out`, the result is saved in that folder (CSV, MAT, Parquet); a real-time run keeps its raw record
+        there while it runs, and in a new folder under `runs/` where none is given. `progress(samples taken, samples
+        in all)` is called now and then.
+
+        Raises ContractError if the student's code breaks its contract or raises, and MachineError if the machine
+        was never there; the samples of a real-time run are kept in its record. A run that ended early for another
+        reason says so in the result's `meta["ending"]`.
+        """
+        plan, known = resolve(self._words, self._folder, mode)
+        real_time = load_mode(plan.mode).real_time
+        folder = Path(out) if out is not None else (_new_folder(plan) if real_time else None)
+        rows = self._rows(plan, folder, progress)
+        if rows.ending is Ending.FAULT:
+            raise ContractError(f"{rows.reason} (the samples up to then are in {folder})")
+        if not len(rows.values):
+            raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
+        result = outcome(plan, rows, known)
+        if out is not None:
+            result.save(out)
+        return result
+
+    def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None) -> Rows:
+        if self._words.flag("compiled", False) and not load_mode(plan.mode).real_time:
+            from rds.runtime.compiled import run_compiled
+
+            return run_compiled(plan)
+        try:
+            return run_plan(plan, folder, progress)
+        except (RdsError, KeyboardInterrupt):
+            raise
+        except Exception as error:
+            source = next((p.controller.source for p in plan.axes if p.controller and p.controller.source.path), None)
+            raise ContractError(student_error(error, source)) from error
+
+
+def _new_folder(plan: Plan) -> Path:
+    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+    return Path("runs") / f"{stamp}-{'-'.join(plan.names)}-{plan.mode}-{secrets.token_hex(2)}"

@@ -1,0 +1,114 @@
+"""From the rows that a loop recorded to the result that a user sees."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+import sys
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from rds.core.types import Source
+from rds.modes import load_mode
+from rds.modes.host import Rows, run_plan
+from rds.results import Result
+from rds.runtime.environment import sentence
+from rds.runtime.loop import TIMING_COLUMNS
+from rds.runtime.plan import Plan
+from rds.runtime.timing import Timing, judge, summary
+
+
+def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
+    """The result of a run: its table, and in `meta` all that was known of it."""
+    mode = load_mode(plan.mode)
+    recorded = dict(zip(rows.columns, rows.values.T, strict=True))
+    units = dict(rows.units)
+    sample = recorded["sample"].astype(np.int64)
+    columns: dict[str, np.ndarray] = {"time": sample * plan.T}
+    units["time"] = "s"
+    columns |= {name: values for name, values in recorded.items() if name not in TIMING_COLUMNS}
+    if mode.followed and plan.controlled:
+        columns |= _simulated(plan, sample)
+    meta = _description(plan, rows) | known
+    if mode.real_time:
+        for name in TIMING_COLUMNS[1:]:
+            columns[name] = recorded[name] / 1e3
+            units[name] = "µs"
+        meta |= _judged(plan, rows, recorded)
+    return Result(columns, {name: unit for name, unit in units.items() if name in columns}, meta)
+
+
+def _simulated(plan: Plan, sample: np.ndarray) -> dict[str, np.ndarray]:
+    """Each axis's response in a closed loop of its own: the same plan, simulated."""
+    rows = run_plan(replace(plan, mode="simulation"), None)
+    of = dict(zip(rows.columns, rows.values.T, strict=True))
+    return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
+
+
+def _judged(plan: Plan, rows: Rows, recorded: dict[str, np.ndarray]) -> dict[str, Any]:
+    """The timing summary and the verdict, with the environment that they were measured in."""
+    environment = rows.report.get("environment", {})
+    if not len(recorded["sample"]):
+        return {"verdict": None, "environment": environment}
+    sample = recorded["sample"].astype(np.int64)
+    timing = Timing(sample, *(recorded[name] for name in TIMING_COLUMNS[1:]))
+    period = round(plan.T * 1e9)
+    discarded = int(sample[-1]) + 1 - len(sample)
+    stalls = environment.get("rehearsal", {}).get("stalls", 0)
+    judgement = judge(timing, period, limit=plan.late_limit, discarded=discarded, stalls=stalls)
+    return {
+        "verdict": str(judgement.verdict),
+        "verdict_reason": judgement.reason,
+        "timing": summary(timing, period) | {"discarded": discarded, "late_without_system": judgement.late_without_system},
+        "environment": environment | {"sentence": sentence(environment)} if environment else {},
+        "drivers": rows.report.get("drivers", {}),
+    }
+
+
+def _description(plan: Plan, rows: Rows) -> dict[str, Any]:
+    board = plan.machine.converter
+    return {
+        "mode": plan.mode,
+        "machine": plan.machine.name,
+        "axes": plan.names,
+        "sample_period": plan.T,
+        "duration": plan.samples * plan.T,
+        "voltage_range": board.range,
+        "saturation": plan.saturation,
+        "quantization": plan.quantization,
+        "controller": {
+            p.axis.name: _part(p.controller.source, p.controller.params) for p in plan.axes if p.controller is not None
+        },
+        "model": {p.axis.name: _part(p.model.source, p.model.params) for p in plan.axes},
+        "ending": str(rows.ending),
+        "ending_reason": rows.reason,
+        "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
+        "versions": _versions(),
+    }
+
+
+def _part(source: Source, params: Any) -> dict[str, Any]:
+    plain = {key: _plain(value) for key, value in dict(params).items()}
+    return {"name": source.name, "path": source.path, "sha256": source.sha256, "source": source.text, "params": plain}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value if isinstance(value, bool | int | float | str | None) else repr(value)[:200]
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for name in ("rds", "numpy", "python-can", "numba"):
+        if name in ("rds", "numpy") or name.replace("python-", "") in sys.modules:
+            try:
+                versions[name] = version(name)
+            except PackageNotFoundError:
+                continue
+    return versions

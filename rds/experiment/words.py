@@ -1,0 +1,142 @@
+"""Reading the words of a TOML file: every key is known and every value is of its kind, or an error says where."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from difflib import get_close_matches
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+
+
+class Words:
+    """One table of a file. `done()` at the end refuses the keys that nobody asked for."""
+
+    def __init__(self, table: dict[str, Any], text: str = "", path: str = "", name: str = ""):
+        self.table, self.path, self.name = table, path, name
+        self._text = text
+        self._asked: list[str] = []
+
+    @classmethod
+    def read(cls, path: str | Path) -> Words:
+        """The top table of a TOML file; InputError if it cannot be read or is not TOML."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+            return cls(tomllib.loads(text), text, str(path))
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}; check the path", str(path)) from error
+        except UnicodeDecodeError as error:
+            raise InputError("is not UTF-8 text; save it as UTF-8", str(path)) from error
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"is not valid TOML: {error}", str(path)) from error
+
+    def place(self, key: str | None = None) -> str:
+        """File and line of a key of this table, as far as they are known."""
+        line = _line_of(self._text, self.name, key)
+        inside = f"[{self.name}]" if self.name else ""
+        where = ", ".join(part for part in (self.path, f"line {line}" if line else inside) if part)
+        return where or "experiment"
+
+    def fault(self, key: str, remedy: str) -> InputError:
+        """The error that this value of `key` will not do."""
+        prefix = f"{self.name}." if self.name else ""
+        return InputError(f"{prefix}{key} = {self.table.get(key)!r} {remedy}", self.place(key))
+
+    def __contains__(self, key: str) -> bool:
+        self._asked.append(key)
+        return key in self.table
+
+    def any(self, key: str, default: Any = None) -> Any:
+        """Whatever stands there."""
+        self._asked.append(key)
+        return self.table.get(key, default)
+
+    def number(
+        self, key: str, default: float | None, unit: str, *, more_than: float | None = None, at_most: float | None = None
+    ) -> float:
+        """A finite number in `unit`; without a default it must be there."""
+        value = self.any(key, default)
+        if value is None:
+            raise InputError(f"{key} is missing; give it in {unit}, as in `{key} = 1.0`", self.place())
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            raise self.fault(key, f"must be a number in {unit}, without quotes")
+        if more_than is not None and not value > more_than:
+            raise self.fault(key, f"must be more than {more_than:g} {unit}")
+        if at_most is not None and value > at_most:
+            raise self.fault(key, f"must be at most {at_most:g} {unit}")
+        return float(value)
+
+    def whole(self, key: str, default: int | None, meaning: str, low: int = 0, high: int = 10**9) -> int | None:
+        """A whole number from `low` to `high`."""
+        value = self.any(key, default)
+        if value is None:
+            return None
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise self.fault(key, f"must be a whole number from {low} to {high} ({meaning})")
+        return value
+
+    def flag(self, key: str, default: bool) -> bool:
+        """true or false."""
+        value = self.any(key, default)
+        if not isinstance(value, bool):
+            raise self.fault(key, "must be true or false")
+        return value
+
+    def text(self, key: str, default: str | None = None) -> str | None:
+        """A text in quotes."""
+        value = self.any(key, default)
+        if value is not None and not isinstance(value, str):
+            raise self.fault(key, "must be a text in quotes")
+        return value
+
+    def choice(self, key: str, default: str, choices: Sequence[str]) -> str:
+        """One of several words."""
+        value = self.any(key, default)
+        if value not in choices:
+            raise self.fault(key, f"is unknown; known: {', '.join(choices)}{_near(value, choices)}")
+        return str(value)
+
+    def inner(self, key: str) -> Words | None:
+        """The table under `key`, if there is one."""
+        value = self.any(key)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            raise self.fault(key, f"must be a table, as in `[{key}]`")
+        return Words(value, self._text, self.path, f"{self.name}.{key}" if self.name else key)
+
+    def done(self) -> None:
+        """Refuse keys that have not been asked for."""
+        known = list(dict.fromkeys(self._asked))
+        for key in self.table:
+            if key not in known:
+                table = f" in [{self.name}]" if self.name else ""
+                raise InputError(
+                    f"unknown key '{key}'{table}; known keys: {', '.join(sorted(known))}{_near(key, known)}",
+                    self.place(key),
+                )
+
+
+def _near(word: Any, known: Sequence[str]) -> str:
+    close = get_close_matches(str(word), known, n=1)
+    return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def _line_of(text: str, table: str, key: str | None) -> int | None:
+    """The line on which a table's key (or its header) stands; None if it can't be told."""
+    current, header_line = "", None
+    for number, line in enumerate(text.splitlines(), 1):
+        header = re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line)
+        if header:
+            current = ".".join(part.strip().strip("\"'") for part in header[1].split("."))
+            if current == table:
+                header_line = number
+            if key is not None and current == (f"{table}.{key}" if table else key):
+                return number
+        elif key is not None and current == table and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]", line):
+            return number
+    return header_line

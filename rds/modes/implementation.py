@@ -1,0 +1,28 @@
+"""Implementation: the controllers drive the machine; the models run in parallel on the same voltages."""
+
+from rds.core.clock import LatePolicy
+from rds.core.contracts import Clock, Drivers
+from rds.modes.parts import SimulatedAxes
+from rds.runtime.loop import Loop
+from rds.runtime.mode import Mode, Record, Stop
+from rds.runtime.plan import Plan
+
+
+def build(plan: Plan, clock: Clock, drivers: Drivers | None, record: Record, stop: Stop) -> Loop:
+    """The loop of an implementation, and of a model validation: what drives the axes is the plan's."""
+    assert drivers is not None
+    models = SimulatedAxes(plan)
+    return Loop(
+        plan.samples, clock, drivers.exchange, plan.laws(), drivers.write, models.follow_and_tell, record, stop
+    )
+
+
+# A machine does not wait: what was due while the loop was late is past, and is not caught up.
+MODE = Mode(
+    "implementation",
+    build,
+    drivers="live",
+    drives=("controller",),
+    followed="modelled",
+    late=LatePolicy(discard=True),
+)

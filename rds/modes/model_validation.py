@@ -1,0 +1,14 @@
+"""Model validation: the same voltage signal to the machine and to its model."""
+
+from rds.core.clock import LatePolicy
+from rds.modes.implementation import build
+from rds.runtime.mode import Mode
+
+MODE = Mode(
+    "model-validation",
+    build,
+    drivers="live",
+    drives=("signal",),
+    followed="modelled",
+    late=LatePolicy(discard=True),
+)

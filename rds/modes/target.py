@@ -1,0 +1,98 @@
+"""The target: a process of its own, started fresh for each real-time run, that does nothing but the loop.
+
+    python -m rds.modes.target RUN_DIRECTORY RING
+
+It reads the plan from the run's directory, gets ready, rehearses, runs, and leaves `target.json`: how the run
+ended, and the environment that its timing was measured in. Whatever happens, the axes end at zero volts.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+from rds.core.blame import student_error
+from rds.core.clock import RealTimeClock
+from rds.core.errors import ContractError, MachineError, RdsError
+from rds.core.types import Ending
+from rds.modes import load_mode
+from rds.runtime.environment import prepare, stolen_ticks, surroundings
+from rds.runtime.loop import quiet_memory
+from rds.runtime.plan import Plan, load
+from rds.runtime.record import write_whole
+from rds.runtime.rehearsal import rehearse
+from rds.runtime.ring import Ring
+
+REPORT = "target.json"
+log = logging.getLogger(__name__)
+
+
+def run(plan: Plan, ring: Ring) -> dict[str, Any]:
+    """Take every sample of the plan; returns how it ended, why, and the environment."""
+    from rds.bus.drivers import AxisDrivers
+
+    mode = load_mode(plan.mode)
+    environment = surroundings() | prepare(plan.priority, plan.cpu)
+    clock = RealTimeClock(round(plan.T * 1e9), plan.late)
+    report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
+    stolen = stolen_ticks()
+    drivers = None
+    try:
+        drivers = AxisDrivers.open(plan.bus, plan.machine, plan.names, plan.T, dry_run=mode.drivers == "dry run")
+        drivers.start()
+        ring.beat(1)
+        loop = mode.build(plan, clock, drivers, ring.append, ring.stop_asked)
+        environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
+        ring.beat(2)
+        with quiet_memory():
+            clock.start()
+            report["ending"] = loop.run()
+    except MachineError as error:
+        report |= {"ending": Ending.MACHINE_LOST, "reason": str(error)}
+    except ContractError as error:
+        report["reason"] = str(error)
+    except RdsError as error:
+        report["reason"] = str(error)
+    except BaseException as error:  # the student's code may raise anything, SystemExit included
+        log.exception("the run ended by an exception")
+        report["reason"] = student_error(error, _source(plan))
+    finally:
+        if drivers is not None:
+            report["drivers"] = drivers.statistics()
+            drivers.close()
+        clock.close()
+    after = stolen_ticks()
+    environment["stolen_ticks"] = after - stolen if after is not None and stolen is not None else None
+    report["samples"] = ring.head
+    return report
+
+
+def _source(plan: Plan) -> Any:
+    """The student's file, if there is one, to find the student's own line in a traceback."""
+    for axis in plan.axes:
+        for part in (axis.controller, axis.model):
+            if part is not None and part.source.path:
+                return part.source
+    return None
+
+
+def main(arguments: list[str]) -> int:
+    """Run the plan in a run's directory."""
+    directory, ring_path = Path(arguments[0]), arguments[1]
+    ring = Ring.open(ring_path)
+    # The end of the terminal's session, or a polite kill, is a request to stop: the axes come to rest first.
+    for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        signal.signal(number, lambda *_: ring.ask_to_stop())
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
+    plan = load(directory / "plan.pickle")
+    report = run(plan, ring)
+    write_whole(directory / REPORT, json.dumps(report, default=str).encode())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,38 @@
+"""What a mode states of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from rds.core.clock import LatePolicy
+from rds.core.contracts import Clock, Drivers
+from rds.runtime.loop import Loop
+from rds.runtime.plan import Plan
+
+Record = Callable[[list[float]], None]
+Stop = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode: which parts make its loop.
+
+    `build(plan, clock, drivers, record, stop)` gives the loop. `drivers` says whether the mode needs the machine's
+    drivers: not at all, as a dry run (timed, without effect on the machine) or live. A mode with drivers runs in
+    real time, in the target process. `followed` names the column of what its models give besides. `drives` says
+    what may drive the axes.
+    """
+
+    name: str
+    build: Callable[[Plan, Clock, Drivers | None, Record, Stop], Loop]
+    drivers: Literal["none", "dry run", "live"]
+    drives: tuple[Literal["controller", "signal"], ...]
+    followed: str | None = None
+    late: LatePolicy = field(default_factory=LatePolicy)
+
+    @property
+    def real_time(self) -> bool:
+        """Whether the mode runs against the clock."""
+        return self.drivers != "none"

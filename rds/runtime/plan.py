@@ -1,0 +1,135 @@
+"""What a run consists of, in a form that can be handed to a process of its own."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rds.core.clock import LatePolicy
+from rds.core.types import Controller, Model
+from rds.interface import converter
+from rds.machines import Axis, Machine
+from rds.runtime.laws import ReferenceSamples, controlled, coupled, played
+from rds.runtime.loop import TIMING_COLUMNS, Law
+
+
+@dataclass(frozen=True)
+class AxisPlan:
+    """One axis of a run: its model, and either a controller with a reference or a voltage signal."""
+
+    axis: Axis
+    model: Model
+    controller: Controller | None = None
+    reference: ReferenceSamples | None = None
+    signal: Sequence[float] | None = None  # V at every sample
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run: mode, axes and everything that the loop is built from. Times in s."""
+
+    mode: str
+    machine: Machine
+    axes: tuple[AxisPlan, ...]
+    T: float
+    samples: int
+    saturation: bool = True
+    quantization: bool = True
+    bus: dict[str, Any] = field(default_factory=dict)  # keyword arguments of can.Bus
+    late: LatePolicy = field(default_factory=LatePolicy)
+    late_limit: int = 0
+    priority: int = 80  # of SCHED_FIFO
+    cpu: int | None = None  # pin the target to this processor
+    rehearsal: float = 0.25  # s of clock and I/O without the student's code, before a real-time run
+    import_path: tuple[str, ...] = ()  # folders of the students' files, for what they import from there
+
+    @property
+    def names(self) -> list[str]:
+        """The axes' names, in axis order."""
+        return [plan.axis.name for plan in self.axes]
+
+    @property
+    def controlled(self) -> bool:
+        """Whether controllers drive the axes (otherwise voltage signals do)."""
+        return self.axes[0].signal is None
+
+    def limit(self) -> Callable[[Any], float]:
+        """The converter of this run."""
+        board = self.machine.converter
+        return converter(board.range, board.bits, saturation=self.saturation, quantization=self.quantization)
+
+    def laws(self) -> list[Law]:
+        """What drives the axes, fresh from its initial state."""
+        limit, plans = self.limit(), self.axes
+        first = plans[0].controller
+        if first is not None and first.coupled:
+            references = [plan.reference for plan in plans if plan.reference is not None]
+            return [coupled(range(len(plans)), self.names, first, references, self.T, [limit] * len(plans))]
+        laws = []
+        for i, plan in enumerate(plans):
+            if plan.signal is not None:
+                laws.append(played(i, plan.signal, limit))
+            else:
+                assert plan.controller is not None and plan.reference is not None
+                laws.append(controlled(i, plan.axis.name, plan.controller, plan.reference, self.T, limit))
+        return laws
+
+    def columns(self, followed: str | None) -> tuple[list[str], dict[str, str]]:
+        """The names of a record's columns in the order of the loop's rows, and their units.
+
+        `followed` names what the loop's models give besides ("modelled"), if they give anything.
+        """
+        columns = list(TIMING_COLUMNS)
+        units = {"sample": "", **{name: "ns" for name in TIMING_COLUMNS[1:]}}
+        for plan in self.axes:
+            name, unit = plan.axis.name, plan.axis.unit
+            parts = {"measured": unit, "command": "V"}
+            if self.controlled:
+                rates = {"reference_velocity": f"{unit}/s", "reference_acceleration": f"{unit}/s²"}
+                parts = {"reference": unit, **rates, **parts}
+            for part, part_unit in parts.items():
+                columns.append(f"{name}_{part}")
+                units[columns[-1]] = part_unit
+        for part, part_unit in [("voltage", "V"), *([(followed, "")] if followed else [])]:
+            for plan in self.axes:
+                columns.append(f"{plan.axis.name}_{part}")
+                units[columns[-1]] = part_unit or plan.axis.unit
+        return columns, units
+
+
+def dump(plan: Plan) -> bytes:
+    """The plan as bytes for a process of the same user; a student's functions travel by value."""
+    import cloudpickle
+
+    students = {
+        sys.modules[function.__module__]
+        for axis in plan.axes
+        for function in (axis.controller and axis.controller.control, axis.model.advance)
+        if function is not None and _from_file(function)
+    }
+    for module in students:
+        cloudpickle.register_pickle_by_value(module)
+    try:
+        data: bytes = cloudpickle.dumps(plan)
+        return data
+    finally:
+        for module in students:
+            cloudpickle.unregister_pickle_by_value(module)
+
+
+def load(path: Path) -> Plan:
+    """The plan that `dump` wrote to a file."""
+    import pickle
+
+    plan = pickle.loads(path.read_bytes())
+    assert isinstance(plan, Plan)
+    return plan
+
+
+def _from_file(function: Any) -> bool:
+    """Whether a function's module is known here but can't be imported elsewhere."""
+    module = sys.modules.get(getattr(function, "__module__", None) or "")
+    return module is not None and module.__name__ != "__main__" and getattr(module, "__spec__", None) is None

@@ -1,0 +1,52 @@
+"""What a process may ask of the system to be on time. Every helper is harmless where it isn't supported."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+
+def raise_priority(level: int) -> str:
+    """Schedule this process first-in-first-out at `level` (1 lowest to 99); say what was got.
+
+    Returns "SCHED_FIFO 70", or "normal: " and the reason, e.g. "normal: not permitted".
+    Threads started afterwards inherit it, and so do child processes.
+    """
+    if not hasattr(os, "sched_setscheduler"):
+        return "normal: not supported here"
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(level))
+    except PermissionError:
+        return "normal: not permitted"
+    except OSError as error:
+        return f"normal: {error.strerror}"
+    return f"SCHED_FIFO {level}"
+
+
+def lock_memory() -> bool:
+    """Keep all pages of this process, present and future, in memory (mlockall); true if that was permitted."""
+    if not sys.platform.startswith("linux"):
+        return False
+    current_and_future = 1 | 2  # MCL_CURRENT | MCL_FUTURE, <sys/mman.h>
+    try:
+        import ctypes
+
+        return ctypes.CDLL(None, use_errno=True).mlockall(current_and_future) == 0
+    except (ImportError, OSError, AttributeError):
+        return False
+
+
+def set_timer_slack(nanoseconds: int = 1) -> bool:
+    """Let sleeps of this thread end at most `nanoseconds` late by the kernel's choice (default there: 50 µs).
+
+    Returns true if it was set. Without effect under SCHED_FIFO, whose sleeps have no slack.
+    """
+    if not sys.platform.startswith("linux"):
+        return False
+    set_slack = 29  # PR_SET_TIMERSLACK, <sys/prctl.h>
+    try:
+        import ctypes
+
+        return ctypes.CDLL(None, use_errno=True).prctl(set_slack, ctypes.c_ulong(nanoseconds), 0, 0, 0) == 0
+    except (ImportError, OSError, AttributeError):
+        return False
