@@ -44,11 +44,11 @@ def student_line(exc: BaseException, path: str | Path) -> int | None:
 
 def _is_own(filename: str, path: str | Path | None) -> bool:
     if path is not None:
-        return Path(filename).parent == Path(path).resolve().parent and not _is_installed(filename)
-    return not filename.startswith("<frozen") and not _is_installed(filename)
+        return Path(filename).parent == Path(path).resolve().parent and not is_installed(filename)
+    return not filename.startswith("<frozen") and not is_installed(filename)
 
 
-def _is_installed(filename: str) -> bool:
+def is_installed(filename: str) -> bool:
     """True for a file of this package, of the standard library or of an installed package."""
     parts = sysconfig.get_paths()
     roots = {parts["stdlib"], parts["purelib"], parts["platlib"], str(Path(__file__).resolve().parents[1])}

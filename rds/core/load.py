@@ -209,14 +209,15 @@ def _decode(data: bytes, file: Path) -> str:
         line = data[: data.index(b"\0")].count(b"\n") + 1
         raise InputError("it contains null bytes, so it is not UTF-8 text; save it as UTF-8", f"{file}:{line}")
     try:
-        encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+        try:
+            encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+        except SyntaxError:  # no encoding that Python knows is declared, and the first lines are not UTF-8
+            encoding = "utf-8"
         return data.decode(encoding)
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         bad = data[error.start : error.start + 1]
         raise InputError(f"byte {bad!r} is not UTF-8 text; save it as UTF-8", f"{file}:{line}") from error
-    except SyntaxError as error:  # an unknown encoding, or bytes that are not in it, in the first two lines
-        raise InputError(f"{error.msg}; save it as UTF-8", f"{file}:1") from error
 
 
 def _run(text: str, file: Path) -> dict[str, Any]:

@@ -1,0 +1,63 @@
+"""What a controller's answer must be: a voltage, or one for each axis, and the next state."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from rds.checks import clauses
+from rds.checks.values import is_real, shown
+
+
+def voltage_fault(answer: Any, axes: int = 0) -> tuple[str, str, str] | None:
+    """Clause, what was returned, remedy, if `answer` is no (voltage, next_state); `axes` > 0 for a coupled law."""
+    if not isinstance(answer, tuple | list) or len(answer) != 2:
+        return clauses.PAIR, *_no_pair(answer)
+    return _array_fault(answer[0], axes) if axes else _number_fault(answer[0])
+
+
+def _no_pair(answer: Any) -> tuple[str, str]:
+    if answer is None:
+        return "nothing", "end it with `return voltage, next_state`"
+    if is_real(answer):
+        return (
+            f"{shown(answer)} alone",
+            "end it with `return voltage, next_state`; without memory, return `state` itself",
+        )
+    if hasattr(answer, "__next__"):
+        return "a generator", "use `return voltage, next_state`, not `yield`"
+    if hasattr(answer, "__await__"):
+        return "a coroutine", "write `def`, not `async def`"
+    if isinstance(answer, tuple | list):
+        remedy = "return two: the voltage, and all of the state as one value, as in `return u, [a, b]`"
+        return f"{len(answer)} values, {shown(answer)},", remedy
+    return shown(answer), "end it with `return voltage, next_state`"
+
+
+def _number_fault(u: Any) -> tuple[str, str, str] | None:
+    if is_real(u):
+        if isfinite(u):
+            return None
+        return clauses.VOLTAGE, f"the voltage {u}", "look for a division by zero, a root or a logarithm"
+    said = f"the voltage {shown(u)} ({type(u).__name__})"
+    if isinstance(u, np.ndarray) and u.size == 1:
+        return clauses.VOLTAGE, said, "return one number in V, as in `float(u.item())`"
+    if isinstance(u, np.ndarray | list | tuple | dict):
+        return clauses.VOLTAGE, said, "return one number in V first and the state second: `return voltage, next_state`"
+    return clauses.VOLTAGE, said, "return one real number in V"
+
+
+def _array_fault(u: Any, axes: int) -> tuple[str, str, str] | None:
+    said = f"the voltage {shown(u)}"
+    remedy = f"a coupled controller returns an array of {axes} numbers in V, one for each axis"
+    try:
+        array = np.asarray(u)
+    except ValueError:  # parts of different lengths
+        return clauses.VOLTAGE, said, remedy
+    if array.shape != (axes,) or array.dtype.kind not in "fiu":
+        return clauses.VOLTAGE, said, remedy
+    if not np.isfinite(array).all():
+        return clauses.VOLTAGE, said, "look for a division by zero, a root or a logarithm"
+    return None

@@ -1,0 +1,243 @@
+"""Whether a controller keeps `control(t, r, y, state, params) -> (voltage, next_state)`."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rds.checks import clauses
+from rds.checks.answers import voltage_fault
+from rds.checks.exercise import LinearAxis, references
+from rds.checks.memory import judge_memory
+from rds.checks.replay import Call
+from rds.checks.report import CheckReport, Findings, Timing
+from rds.checks.subject import Subject, subject_of
+from rds.checks.timing import judge_time
+from rds.checks.values import same, shown, size
+from rds.core.blame import student_error
+from rds.core.signature import argument_fault
+from rds.core.types import Controller, Reference
+
+BUDGET = 2.0  # s for each pass over the run: a slow controller is judged by fewer samples
+_LEAST = 5  # samples, whatever they take
+_LARGE_ERROR = 100.0  # mm
+
+
+def check_controller(
+    controller: Any,
+    sample_period: float = 0.001,
+    *,
+    coupled: bool | None = None,
+    axes: int = 2,
+    initial_state: Any = None,
+    params: Mapping[str, Any] | None = None,
+    budget: float = BUDGET,
+) -> CheckReport:
+    """Check a function, a file, a module or namespace, or a `Controller`, in this process.
+
+    It drives a linear axis along sines and steps for 1800 samples of `sample_period` s; a `coupled` one gets
+    arrays of `axes` values. `initial_state` and `params` go before the subject's own. Faults are in the report;
+    InputError is raised for a file that cannot be loaded or holds no controller.
+    """
+    if coupled is None:
+        coupled = isinstance(controller, Controller) and controller.coupled
+    subject = subject_of(controller, "control", initial_state, params)
+    run = _Run(subject, sample_period, axes if coupled else 0, budget)
+    run.check()
+    return run.found.report("controller", subject.name, run.timing)
+
+
+class _Run:
+    """One check: the subject, and what is found of it."""
+
+    def __init__(self, subject: Subject, sample_period: float, axes: int, budget: float):
+        self.found = Findings()
+        self.timing: Timing | None = None
+        self.subject, self.source = subject, subject.student.source
+        self.function = subject.function("control")
+        self.T, self.axes, self.budget = sample_period, axes, budget
+        self.params: dict[str, Any] = {}
+        self.calls: list[Call] = []
+        self.ns: list[int] = []
+        self.sizes: list[int] = []
+        self.busy = 1.0
+
+    def check(self) -> None:
+        found, student = self.found, self.subject.student
+        if fault := argument_fault("control", self.function):
+            return found.fault(clauses.ARGUMENTS, fault)
+        if not isinstance(student.params, Mapping):
+            said = f"params is {shown(student.params)}; write it as a dict of defaults, as in {{'gain': 20.0}}"
+            return found.fault(clauses.PARAMS, said)
+        try:
+            self.params = copy.deepcopy(dict(student.params))
+            self.initial_state = () if student.initial_state is None else copy.deepcopy(student.initial_state)
+        except Exception as error:
+            said = f"{error}: keep numbers, lists, dicts and arrays in initial_state and params"
+            return found.fault(clauses.SAVED_STATE, said)
+        with judge_memory(found, "control()", self.subject, "control", clauses.MEMORY, self.budget) as memory:
+            self._drive()
+            memory.calls, memory.params = self.calls, self.params
+        self._judge_states()
+        if not found.faults:
+            self._probe()
+        best = [min(ns, memory.ns.get(k, ns)) for k, ns in enumerate(self.ns)]
+        first = min(self.ns[0], memory.first_ns or self.ns[0]) if self.ns else 0
+        self.timing = judge_time(found, "control()", best, first, self.busy, self.T)
+
+    def _drive(self) -> None:
+        """Close the loop around it, and keep every call."""
+        params = copy.deepcopy(self.params)
+        state = copy.deepcopy(self.initial_state)
+        table = references(self.T)
+        plants = [LinearAxis(self.T) for _ in range(max(1, self.axes))]
+        end, wall, busy = time.monotonic() + self.budget, 0, 0
+        for k in range(len(table)):
+            if k >= _LEAST and time.monotonic() > end:
+                break
+            t = k * self.T
+            r, y = self._inputs(table, k, plants)
+            try:
+                before = copy.deepcopy((t, r, y, state))
+            except Exception as error:
+                said = (
+                    f"next_state {shown(state)} cannot be copied ({error}); keep numbers, lists, dicts and arrays in it"
+                )
+                return self.found.fault(clauses.SAVED_STATE, said)
+            cpu, started = time.thread_time_ns(), time.perf_counter_ns()
+            try:
+                answer = self.function(t, r, y, state, params)
+            except Exception as error:
+                return self._failed(error, t, before)
+            ended = time.perf_counter_ns()
+            self.ns.append(ended - started)
+            wall, busy = wall + ended - started, busy + time.thread_time_ns() - cpu
+            self.busy = busy / max(wall, 1)
+            if not self._judge_arguments(before, (t, r, y, state), params) or not self._judge_answer(answer, t):
+                return None
+            voltage, state = answer
+            try:
+                self.calls.append(Call(before, copy.deepcopy((voltage, state))))
+            except Exception as error:
+                said = (
+                    f"next_state {shown(state)} cannot be copied ({error}); keep numbers, lists, dicts and arrays in it"
+                )
+                return self.found.fault(clauses.SAVED_STATE, said)
+            self.sizes.append(size(state))
+            for plant, u in zip(plants, np.atleast_1d(np.asarray(voltage, dtype=float)), strict=True):
+                plant.move(float(u))
+        return None
+
+    def _inputs(self, table: np.ndarray, k: int, plants: list[LinearAxis]) -> tuple[Reference, Any]:
+        if not self.axes:
+            return Reference(*table[k].tolist()), plants[0].position
+        rows = np.array([table[(k + 97 * axis) % len(table)] for axis in range(self.axes)])
+        return Reference(*rows.T.copy()), np.array([plant.position for plant in plants])
+
+    def _judge_arguments(self, before: tuple[Any, ...], after: tuple[Any, ...], params: dict[str, Any]) -> bool:
+        for name, old, new in zip(("t", "r", "y", "state"), before, after, strict=True):
+            if not same(old, new):
+                said = f"control() changed its argument `{name}` from {shown(old)} to {shown(new)}"
+                remedy = "make a new one and return that" if name == "state" else "work on a copy"
+                self.found.fault(clauses.UNCHANGED, f"{said}; {remedy}")
+        if not same(self.params, params):
+            keys = [key for key in params if not same(params[key], self.params.get(key))]
+            said = f"control() changed params[{', '.join(map(repr, keys))}]"
+            self.found.fault(clauses.UNCHANGED, f"{said}; params are the settings of a run, keep what changes in state")
+            return False
+        return True
+
+    def _judge_answer(self, answer: Any, t: float) -> bool:
+        fault = voltage_fault(answer, self.axes)
+        if fault is not None:
+            clause, said, remedy = fault
+            if not self.axes and self._works_with_arrays():
+                remedy = "it works with arrays of several axes: check and run it as a coupled controller"
+            self.found.fault(clause, f"control() returned {said} at t = {t:.3f} s; {remedy}")
+        return fault is None
+
+    def _failed(self, error: Exception, t: float, before: tuple[Any, ...]) -> None:
+        said = student_error(error, self.source)
+        if not self.axes and self._works_with_arrays():
+            remedy = "it works with arrays of several axes: check and run it as a coupled controller"
+            return self.found.fault(clauses.RUNS, f"control() fails with one axis's numbers: {said}; {remedy}")
+        if not self.calls:
+            if self.subject.student.initial_state is None and _is_about_state(error):
+                said = f"control() fails with the empty state, and there is no initial_state: {said}"
+                remedy = "define it, as in `initial_state = [0.0]`"
+                return self.found.fault(clauses.INITIAL_STATE, f"{said}; {remedy}")
+            return self.found.fault(clauses.RUNS, f"control() failed in its first call: {said}")
+        if len(self.calls) == 1 and _is_about_state(error) and not _alike(self.initial_state, before[3]):
+            returned = f"control() cannot take the next_state that it returned itself, {shown(before[3])}: {said}"
+            remedy = f"return it in the form of initial_state, {shown(self.initial_state)}"
+            return self.found.fault(clauses.NEXT_STATE, f"{returned}; {remedy}")
+        return self.found.fault(
+            clauses.RUNS, f"control() failed at t = {t:.3f} s with state {shown(before[3])}: {said}"
+        )
+
+    def _works_with_arrays(self) -> bool:
+        state = copy.deepcopy(self.initial_state)
+        try:
+            answer = self.function(
+                0.0,
+                Reference(*np.zeros((3, 2))),
+                np.zeros(2),
+                state,
+                copy.deepcopy(self.params),
+            )
+        except Exception:
+            return False
+        return voltage_fault(answer, 2) is None
+
+    def _judge_states(self) -> None:
+        """A state that only grows makes every run end late; a buffer that fills up and stays is nothing to fear."""
+        n = len(self.sizes)
+        if n < 8:
+            return
+        first, middle, last = self.sizes[0], self.sizes[n // 2], self.sizes[-1]
+        grown = f"the state grew from {first} to {last} values in {n} calls"
+        if first < middle < last and self.sizes[-1 - n // 8] < last:
+            self.found.fault(clauses.NEXT_STATE, f"{grown}; keep sums, or the last few samples, not the whole past")
+        initial = self.subject.student.initial_state
+        final = self.calls[-1].answer[1]
+        if _is_sequence(initial) and size(initial) and _is_sequence(final) and len(initial) != len(final):
+            said = f"next_state has {len(final)} values and initial_state {len(initial)}"
+            self.found.warn(clauses.NEXT_STATE, f"{said}; give both the same form")
+
+    def _probe(self) -> None:
+        """Ordinary moments that the run may not have had: all zero, at rest far from the reference."""
+        for state in (self.initial_state, self.calls[-1].answer[1]):
+            for position, y in ((0.0, 0.0), (_LARGE_ERROR, 0.0), (0.0, _LARGE_ERROR), (-_LARGE_ERROR, 0.0)):
+                values = np.zeros((3, self.axes or 1))
+                values[0] = position
+                measured = np.full(self.axes or 1, y)
+                r = Reference(*values) if self.axes else Reference(*values[:, 0].tolist())
+                given = f"with r.position = {position:g} mm and y = {y:g} mm"
+                try:
+                    answer = self.function(
+                        0.0, r, measured if self.axes else y, copy.deepcopy(state), copy.deepcopy(self.params)
+                    )
+                except Exception as error:
+                    return self.found.fault(
+                        clauses.RUNS, f"control() failed {given}: {student_error(error, self.source)}"
+                    )
+                if fault := voltage_fault(answer, self.axes):
+                    return self.found.fault(fault[0], f"control() returned {fault[1]} {given}; {fault[2]}")
+        return None
+
+
+def _is_about_state(error: Exception) -> bool:
+    return isinstance(error, IndexError | KeyError | TypeError | ValueError | AttributeError)
+
+
+def _is_sequence(value: Any) -> bool:
+    return isinstance(value, list | tuple | np.ndarray) and not (isinstance(value, np.ndarray) and value.ndim == 0)
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """The same form: as many values in the same kind of thing, a list being as good as a tuple."""
+    return size(a) == size(b) and (_is_sequence(a) == _is_sequence(b))

@@ -1,0 +1,70 @@
+"""Recorded calls made again: repeated, in another order, and in a second, freshly loaded copy of the code."""
+
+from __future__ import annotations
+
+import copy
+import random
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from rds.checks.values import same, shown
+from rds.core.blame import student_error
+from rds.core.types import Source
+
+
+class Call(NamedTuple):
+    """What a function was called with, params apart, and what it answered: both copied when it happened."""
+
+    arguments: tuple[Any, ...]
+    answer: Any
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A call that answered differently the second time, as a clause of a sentence."""
+
+    text: str
+
+
+@dataclass
+class Replay:
+    """Calls of one function made again; `ns` gathers the time of each call, by its index."""
+
+    function: Callable[..., Any]
+    params: dict[str, Any]
+    calls: Sequence[Call]
+    source: Source
+    budget: float  # s for one pass; the least number of calls is made even so
+    ns: dict[int, int] = field(default_factory=dict)
+
+    def in_order(self) -> Difference | None:
+        """The calls as they were recorded, from the first; the one that answers differently, if any."""
+        return self._pass(range(len(self.calls)), "when the run was repeated in a fresh copy")
+
+    def out_of_order(self) -> Difference | None:
+        """Backwards and forwards, some twice in a row, as when two axes use the same function."""
+        order = list(range(len(self.calls)))
+        random.Random(1).shuffle(order)
+        return self._pass((k for k in order for _ in range(2)), "when other calls came before it")
+
+    def _pass(self, order: Iterable[int], when: str) -> Difference | None:
+        end = time.monotonic() + self.budget
+        for done, k in enumerate(order):
+            if done >= _LEAST and time.monotonic() > end:
+                break
+            call = self.calls[k]
+            arguments = copy.deepcopy(call.arguments)
+            started = time.perf_counter_ns()
+            try:
+                answer = self.function(*arguments, self.params)
+            except Exception as error:
+                return Difference(f"call {k} failed {when}: {student_error(error, self.source)}")
+            self.ns[k] = min(time.perf_counter_ns() - started, self.ns.get(k, 1 << 62))
+            if not same(answer, call.answer):
+                return Difference(f"call {k} answered {shown(call.answer)} in the run and {shown(answer)} {when}")
+        return None
+
+
+_LEAST = 10

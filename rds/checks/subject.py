@@ -1,0 +1,73 @@
+"""What a check is given: a file, a function, a module or notebook namespace, a controller or a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from rds.core.errors import ContractError
+from rds.core.load import StudentFile, from_function, from_namespace, load_student
+from rds.core.signature import form
+from rds.core.types import Controller, Model
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The student's functions, and where they come from a file, how to load a second copy that remembers nothing."""
+
+    student: StudentFile
+    fresh: Callable[[], StudentFile] | None = None
+
+    @property
+    def name(self) -> str:
+        """The file's or the function's name."""
+        return self.student.source.name
+
+    def function(self, role: str) -> Callable[..., Any]:
+        """The function in `role`; ContractError if the student gave none."""
+        if role not in self.student.functions:
+            raise ContractError(f"it defines no {form(role)}", self.student.source.path or self.name)
+        return self.student.functions[role]
+
+
+def subject_of(thing: Any, role: str, initial_state: Any = None, params: Mapping[str, Any] | None = None) -> Subject:
+    """`thing` as a subject; a bare function plays `role`. `initial_state` and `params` go before its own.
+
+    Raises what `rds.core.load` raises for what cannot be loaded; arguments and params are left to the check.
+    """
+    student = _student(thing, role)
+    if initial_state is not None:
+        student = replace(student, initial_state=initial_state)
+    if params is not None:
+        own = student.params if isinstance(student.params, Mapping) else {}
+        student = replace(student, params={**own, **params})
+    path = student.source.path
+    if path is None or not Path(path).is_file():
+        return Subject(student)
+    return Subject(student, lambda: load_student(path, validate=False))
+
+
+def _student(thing: Any, role: str) -> StudentFile:
+    if isinstance(thing, Subject):
+        return thing.student
+    if isinstance(thing, StudentFile):
+        return thing
+    if isinstance(thing, Controller):
+        return StudentFile(thing.source, {"control": thing.control}, thing.params, thing.initial_state)
+    if isinstance(thing, Model):
+        return StudentFile(thing.source, _model_functions(thing), thing.params, thing.initial_state)
+    if isinstance(thing, str | Path):
+        return load_student(thing, validate=False)
+    if isinstance(thing, Mapping | ModuleType):
+        return from_namespace(thing, validate=False)
+    return from_function(thing, role=role, validate=False)
+
+
+def _model_functions(model: Model) -> dict[str, Callable[..., Any]]:
+    output = model.output
+    if output is None:
+        return {"advance": model.advance}
+    return {"advance": model.advance, "output": lambda t, x, u, params: output(x)}
