@@ -1,1 +1,35 @@
-"""models."""
+"""Plant models, one per file, by name. Each file has `make(**params) -> Model`."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+from rds.core.registry import Registry
+from rds.core.types import Model
+
+LIBRARY = Registry(
+    "model",
+    {
+        "linear-axis": "rds.models.linear_axis",
+        "spindle": "rds.models.spindle",
+    },
+)
+
+
+def model_names() -> list[str]:
+    """Names of the library's models."""
+    return LIBRARY.names()
+
+
+def model_module(name: str) -> ModuleType:
+    """The module of the model called `name`, with its `make`."""
+    return LIBRARY.module(name)
+
+
+def library_model(name: str, **params: Any) -> Model:
+    """The library's model called `name` with the given parameters.
+
+    Raises InputError for an unknown name or parameter, or a value that will not do.
+    """
+    return LIBRARY.module(name).make(**params)

@@ -1,0 +1,167 @@
+"""A student's own model: `derivatives` integrated by fixed-step Runge-Kutta, or an exact `advance`.
+
+`derivatives(t, x, u, params)` is python-control's convention: x and u are 1-D arrays, the answer is dx/dt. Over one
+sample the voltage is constant, and the classical fourth-order Runge-Kutta method takes `substeps` equal steps: no
+step-size control, so every sample costs and errs the same, and a run repeats to the bit. A derivative that jumps, as
+Coulomb friction's does, falls to first order in the sample of the jump: then write `advance` with the exact response.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import ContractError, InputError
+from rds.core.integrate import SUBSTEPS, rk4
+from rds.core.types import Model, Source
+
+Function = Callable[..., Any]
+
+
+def ode_model(
+    derivatives: Function,
+    initial_state: Sequence[float] = (0.0, 0.0),
+    params: Mapping[str, Any] | None = None,
+    output: Function | None = None,
+    substeps: int = SUBSTEPS,
+    source: Source | None = None,
+) -> Model:
+    """A model from `derivatives(t, x, u, params) -> dx/dt` and, optionally, `output(t, x, u, params)`.
+
+    x holds position (mm), velocity (mm/s) and whatever follows; u = [voltage] in V. `Model.advance` starts each
+    sample at t = 0; in motion, t is the time since the run began. Raises InputError for a bad initial state or number
+    of substeps, and, while running, ContractError for derivatives of the wrong size or kind.
+    """
+    if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
+        raise InputError(f"model: substeps = {substeps!r} must be a whole number of 1 or more")
+    start = _initial_state(initial_state)
+    step = partial(_advance_by_rk4, derivatives=derivatives, substeps=substeps)
+    return Model(
+        advance=step,
+        initial_state=start,
+        params=dict(params or {}),
+        output=_output(output, params or {}, len(start)),
+        source=source or Source(_name(derivatives)),
+        motion=partial(OdeMotion, step=step),
+    )
+
+
+def advance_model(
+    advance: Function,
+    initial_state: Sequence[float] = (0.0, 0.0),
+    params: Mapping[str, Any] | None = None,
+    output: Function | None = None,
+    source: Source | None = None,
+) -> Model:
+    """A model from a student's `advance(x, u, T, params) -> next x`, with x a 1-D array and u an array of one voltage.
+
+    So `u` and `u[0]` both work, as they do in `derivatives`. Raises InputError for a bad initial state and, while
+    running, ContractError for a state of the wrong size or kind.
+    """
+    start = _initial_state(initial_state)
+    return Model(
+        advance=partial(_advance_by_student, function=advance),
+        initial_state=start,
+        params=dict(params or {}),
+        output=_output(output, params or {}, len(start)),
+        source=source or Source(_name(advance)),
+    )
+
+
+class OdeMotion:
+    """A student's model in motion, which knows the time since the run began: `contracts.Motion`."""
+
+    def __init__(self, model: Model, T: float, step: Function):
+        self.state = tuple(float(value) for value in model.initial_state)
+        self._model, self._T, self._step = model, T, step
+        self._samples = 0
+
+    def read(self) -> float:
+        """The output now: position, mm, unless the model has its own `output`."""
+        return self._model.output(self.state) if self._model.output else self.state[0]
+
+    def write(self, voltage: float) -> None:
+        """Move on by one sample of constant `voltage`, V."""
+        self.state = self._step(self.state, voltage, self._T, self._model.params, t=self._samples * self._T)
+        self._samples += 1
+
+
+def _advance_by_rk4(
+    x: Sequence[float],
+    u: float,
+    T: float,
+    params: Mapping[str, Any],
+    *,
+    derivatives: Function,
+    substeps: int,
+    t: float = 0.0,
+) -> tuple[float, ...]:
+    state = np.array(x, dtype=float)
+    return tuple(rk4(partial(_checked, derivatives, state.size), t, state, _voltage(u), T, params, substeps).tolist())
+
+
+def _checked(derivatives: Function, size: int, t: float, x: np.ndarray, u: np.ndarray, params: Any) -> np.ndarray:
+    return _vector(derivatives(t, x, u, params), size, "derivatives", "dx/dt")
+
+
+def _advance_by_student(
+    x: Sequence[float], u: float, T: float, params: Mapping[str, Any], *, function: Function
+) -> tuple[float, ...]:
+    state = np.array(x, dtype=float)
+    return tuple(_vector(function(state, _voltage(u), T, params), state.size, "advance", "the next x").tolist())
+
+
+def _voltage(u: Any) -> np.ndarray:
+    return np.array(u, dtype=float).reshape(1)
+
+
+def _vector(answer: Any, size: int, function: str, meaning: str) -> np.ndarray:
+    vector = _flat(answer)
+    if vector.size != size:
+        raise ContractError(
+            f"{function}() returned {answer!r:.200}; it must return {meaning}, {size} number{'s' if size != 1 else ''} "
+            f"as the initial state has"
+        )
+    return vector
+
+
+def _flat(answer: Any) -> np.ndarray:
+    """The answer as a flat array of floats; empty if it is none."""
+    try:
+        return np.asarray(answer, dtype=float).ravel()
+    except (TypeError, ValueError):
+        pass
+    try:
+        # [x[1], (K*u - x[1])/tau] holds a number and an array of one, as u is one.
+        return np.concatenate([np.asarray(part, dtype=float).ravel() for part in answer])
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
+def _output(output: Function | None, params: Mapping[str, Any], size: int) -> Callable[[Sequence[float]], float] | None:
+    return None if output is None else partial(_output_by_student, function=output, params=dict(params))
+
+
+def _output_by_student(x: Sequence[float], *, function: Function, params: Mapping[str, Any]) -> float:
+    # The encoder reads before the voltage of this sample is known, so an output cannot depend on it.
+    answer = function(0.0, np.array(x, dtype=float), np.zeros(1), params)
+    values = _flat(answer)
+    if values.size == 0:
+        raise ContractError(f"output() returned {answer!r:.200}; it must return the measured position, one number")
+    return float(values[0])
+
+
+def _initial_state(values: Sequence[float]) -> tuple[float, ...]:
+    state = _flat(values)
+    if state.size == 0 or not np.isfinite(state).all():
+        raise InputError(
+            f"model: initial_state = {values!r} must hold finite numbers, such as [0.0, 0.0] for position and velocity"
+        )
+    return tuple(state.tolist())
+
+
+def _name(function: Function) -> str:
+    return getattr(function, "__name__", type(function).__name__)
