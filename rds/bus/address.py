@@ -1,0 +1,147 @@
+"""Where the nodes of a channel meet: the user's runtime directory, its sockets and locks.
+
+Nobody but the user may enter the directory (mode 0700, checked), so whoever can connect is the same user. Where
+there are no Unix sockets (Windows; or RDS_BUS_TRANSPORT=tcp) the hub listens on loopback TCP instead, and a file in
+that directory holds its port and a random token.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import socket
+import stat
+from pathlib import Path
+
+_CHANNEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,31}", re.ASCII)
+_LONGEST_PATH = 104  # bytes of a Unix socket's path: 108 on Linux, 104 on macOS, with the final zero
+_SUFFIXES = (".sock", ".tcp")
+
+
+class Address:
+    """The meeting point of one channel.
+
+    A channel's name is 1 to 32 letters, digits, '.', '_' and '-', and begins with a letter or digit (ValueError).
+    """
+
+    def __init__(self, channel: str):
+        if not _CHANNEL.fullmatch(channel):
+            raise ValueError(
+                f"channel {channel!r} must be 1 to 32 letters, digits, '.', '_' or '-', the first a letter or digit"
+            )
+        self.channel = channel
+        self.unix = hasattr(socket, "AF_UNIX") and os.environ.get("RDS_BUS_TRANSPORT") != "tcp"
+        self.directory = runtime_directory()
+        self.path = self.directory / (channel + _SUFFIXES[0 if self.unix else 1])
+        self.lock_path = self.directory / f"{channel}.lock"
+        self.log_path = self.directory / f"{channel}.log"
+        self.token = bytes(32)  # set by listen() and connect() where the transport needs one
+
+    def listen(self) -> socket.socket:
+        """A listening socket at this address. Only the holder of the channel's lock may call it."""
+        self.path.unlink(missing_ok=True)
+        if self.unix:
+            server = socket.socket(socket.AF_UNIX)
+            server.bind(str(self.path))
+        else:
+            import secrets  # here and below: imports of some ms that a hub's start can do without
+
+            server = socket.create_server(("127.0.0.1", 0))
+            self.token = secrets.token_hex(16).encode()
+            draft = self.path.with_suffix(".new")
+            draft.write_bytes(b"%d %s" % (server.getsockname()[1], self.token))
+            draft.replace(self.path)
+        server.listen(128)
+        return server
+
+    def connect(self, timeout: float) -> socket.socket:
+        """A connection to the hub. ConnectionError or FileNotFoundError if there is no hub."""
+        if self.unix:
+            client = socket.socket(socket.AF_UNIX)
+            target: str | tuple[str, int] = str(self.path)
+        else:
+            port, self.token = self.path.read_bytes().split()
+            client = socket.socket(socket.AF_INET)
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            target = ("127.0.0.1", int(port))
+        try:
+            client.settimeout(timeout)
+            client.connect(target)
+        except BaseException:
+            client.close()
+            raise
+        return client
+
+    def lock(self) -> int | None:
+        """The descriptor of the channel's lock, or None if somebody else holds it.
+
+        Whoever starts a hub takes it and hands it on; the hub keeps it for life. So there is never a second hub,
+        and a hub that was killed leaves nothing to clear away.
+        """
+        descriptor = os.open(self.lock_path, os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            _lock(descriptor)
+            if os.fstat(descriptor).st_ino == self.lock_path.stat().st_ino:
+                return descriptor  # not one that a hub has just removed at its end
+        except OSError:
+            pass
+        os.close(descriptor)
+        return None
+
+    def remove(self, with_log: bool = False) -> None:
+        """Take the address away, so that nobody connects any more. Only the holder of the lock may."""
+        self.path.unlink(missing_ok=True)
+        if with_log:
+            self.log_path.unlink(missing_ok=True)
+        with contextlib.suppress(PermissionError):  # Windows keeps files that are open
+            self.lock_path.unlink(missing_ok=True)
+
+
+def _lock(descriptor: int) -> None:
+    """Lock the whole file, or raise OSError at once."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        import msvcrt
+
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+    else:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def runtime_directory() -> Path:
+    """The user's own directory for sockets: XDG_RUNTIME_DIR/rds, else rds-UID in the temporary directory.
+
+    It is made if missing. PermissionError if somebody else could have put something there; OSError if its path
+    leaves no room for a socket's name.
+    """
+    uid = os.getuid() if hasattr(os, "getuid") else 0
+    base = os.environ.get("XDG_RUNTIME_DIR", "")
+    # after `su` the variable may still name the directory of another user
+    if base and os.path.isdir(base) and _owner(base) == uid and len(base) < 60:
+        directory = Path(base, "rds")
+    else:
+        import tempfile
+
+        directory = Path(tempfile.gettempdir(), f"rds-{uid}")
+    directory.mkdir(mode=0o700, exist_ok=True)
+    status = directory.lstat()
+    if hasattr(os, "getuid") and (
+        not stat.S_ISDIR(status.st_mode) or status.st_uid != uid or stat.S_IMODE(status.st_mode) & 0o077
+    ):
+        raise PermissionError(
+            f"{directory} must be a directory that only you can enter (mode 0700); remove it or set XDG_RUNTIME_DIR"
+        )
+    if len(os.fsencode(directory)) + 1 + 32 + 5 >= _LONGEST_PATH:
+        raise OSError(f"the path {directory} is too long for a socket in it; set XDG_RUNTIME_DIR to a shorter one")
+    return directory
+
+
+def channels() -> list[str]:
+    """Names of the channels that have a hub, or had one that was killed."""
+    return sorted(path.stem for path in runtime_directory().iterdir() if path.suffix in _SUFFIXES)
+
+
+def _owner(path: str) -> int:
+    return os.stat(path).st_uid

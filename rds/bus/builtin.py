@@ -1,0 +1,295 @@
+"""The built-in bus: a python-can interface for any number of processes on one machine, without privileges.
+
+`can.Bus(interface="rds", channel="mini-cnc")`. The first bus that opens a channel starts its hub (hub.py), which
+carries all frames in one order and loses none: when a node reads too slowly, senders wait.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import select
+import socket
+import struct
+import threading
+import time
+from collections import deque
+from typing import Any
+
+import can
+
+from rds.bus import connect, wire
+from rds.bus.address import channels
+
+LOG = logging.getLogger(__name__)
+
+_SIZE = wire.RECORD
+_AT_ONCE = getattr(socket, "MSG_DONTWAIT", 0)  # 0 on Windows, where `select` has to tell beforehand
+_WHOLE = socket.MSG_WAITALL
+_HALF_SENT = 10.0  # s to finish a frame of which a part is on its way
+
+
+class BuiltinBus(can.BusABC):
+    """One node of the built-in bus.
+
+    Parameters beside python-can's own: none yet; an unknown one is a ValueError. `channel` is a name of up to 32
+    letters, digits, '.', '_' and '-'. Time stamps are given by the hub: seconds since the epoch by a clock that
+    never steps, the same for all nodes. A bus must not be used in a forked child.
+
+    Raises can.CanInitializationError if the channel can't be joined.
+    """
+
+    def __init__(
+        self,
+        channel: Any = "default",
+        can_filters: Any = None,
+        receive_own_messages: bool = False,
+        **options: Any,
+    ):
+        if options:
+            raise ValueError(
+                f"the built-in bus has no option {', '.join(sorted(options))}; "
+                "it takes channel, can_filters and receive_own_messages (python-can's files and variables count too)"
+            )
+        self._channel = str(channel)
+        self.channel_info = f"built-in bus channel {self._channel!r}"
+        self._can_protocol = can.CanProtocol.CAN_FD
+        self._lost: str | None = None
+        self._early: deque[bytes] = deque()  # frames read while looking for the reason of an end
+        self._stand_in: tuple[socket.socket, socket.socket] | None = None
+        self._sending = threading.Lock()
+        self._pid = os.getpid()
+        try:
+            connection = connect.join(self._channel, receive_own_messages, _as_filters(can_filters))
+        except OSError as error:
+            raise can.CanInitializationError(f"{self.channel_info}: {error}") from error
+        self._sock = connection.sock
+        self._node = connection.node
+        self.hub_pid = connection.hub_pid
+        self._joined = True
+        self._filters = can_filters or None
+        self._periodic_tasks = []
+        self._is_shutdown = False
+
+    def _apply_filters(self, filters: Any) -> None:
+        try:
+            connect.retune(self._channel, self._node, _as_filters(filters))
+        except OSError as error:
+            raise can.CanOperationError(f"{self.channel_info}: filters not set: {error}") from error
+
+    # --- receiving
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        if self._lost is not None:
+            return self._after_the_end()
+        try:
+            record = self._next_record(timeout)
+        except OSError as error:
+            raise self._lose(self._describe(error)) from error
+        if record is None:
+            return None, False
+        if record[12] != wire.FRAME:
+            raise self._lose(f"the hub let this node go: {wire.goodbye_reason(record)}")
+        # frames that were on their way when filters changed are sorted out by python-can
+        return self._message(record), self._filters is None
+
+    def _next_record(self, timeout: float | None) -> bytes | None:
+        """The next record, or None if there is none in time. OSError if the connection broke."""
+        receive = self._sock.recv
+        if timeout is None:
+            record = receive(_SIZE, _WHOLE)
+        elif _AT_ONCE:
+            try:
+                record = receive(_SIZE, _AT_ONCE)
+            except BlockingIOError:
+                if timeout <= 0 or not _wait(self._sock, False, timeout):
+                    return None
+                record = receive(_SIZE, _WHOLE)
+        else:
+            if not _wait(self._sock, False, max(0.0, timeout)):
+                return None
+            record = receive(_SIZE, _WHOLE)
+        while len(record) < _SIZE:  # the rest is on its way: the hub sends whole records
+            more = receive(_SIZE - len(record), _WHOLE) if record else b""
+            if not more:
+                raise ConnectionResetError("the hub has ended")
+            record += more
+        return record
+
+    def _message(self, record: bytes) -> can.Message:
+        stamp, identifier, _, flags, dlc, length = wire.HEADER.unpack_from(record)
+        if not flags:
+            return can.Message(
+                stamp * 1e-9, identifier, False, False, False, self._channel, dlc, bytearray(record[16 : 16 + length])
+            )
+        return can.Message(
+            timestamp=stamp * 1e-9,
+            arbitration_id=identifier,
+            is_extended_id=bool(flags & wire.EXTENDED),
+            is_remote_frame=bool(flags & wire.REMOTE),
+            is_error_frame=bool(flags & wire.ERROR),
+            channel=self._channel,
+            dlc=dlc,
+            data=bytearray(record[16 : 16 + length]),
+            is_fd=bool(flags & wire.FD),
+            is_rx=not flags & wire.OWN,
+            bitrate_switch=bool(flags & wire.BITRATE_SWITCH),
+            error_state_indicator=bool(flags & wire.ERROR_STATE),
+        )
+
+    # --- sending
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Give `msg` to the bus. Waits while a reader lags, up to `timeout` s (None: as long as it takes; 0: not).
+
+        Raises can.CanTimeoutError if it could not be taken in time (then nothing of it was sent),
+        can.CanOperationError if the bus is gone, ValueError for a frame that can't exist.
+        """
+        record = _record(msg)
+        if self._lost is not None:
+            raise can.CanOperationError(self._lost)
+        with self._sending:
+            try:
+                sent = self._send_at_once(record)
+                if sent == 0:
+                    sent = self._send_waiting(record, timeout)
+                if sent < _SIZE:
+                    self._finish(record[sent:])
+            except (BlockingIOError, TimeoutError):
+                raise can.CanTimeoutError(
+                    f"{self.channel_info}: frame {msg.arbitration_id:#x} was not taken within {timeout} s: "
+                    "a node does not read its frames"
+                ) from None
+            except OSError as error:
+                raise self._lose(self._look_for_reason() or self._describe(error)) from error
+
+    def _send_at_once(self, data: bytes) -> int:
+        if not _AT_ONCE and not _wait(self._sock, True, 0.0):
+            return 0
+        try:
+            return self._sock.send(data, _AT_ONCE)
+        except BlockingIOError:
+            return 0
+
+    def _send_waiting(self, data: bytes, timeout: float | None) -> int:
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while True:
+            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            if left == 0.0 or not _wait(self._sock, True, left):
+                raise TimeoutError
+            sent = self._send_at_once(data)
+            if sent:
+                return sent
+
+    def _finish(self, rest: bytes) -> None:
+        """Half a frame would spoil the connection, so its rest may take longer than the caller's timeout."""
+        deadline = time.monotonic() + _HALF_SENT
+        while rest:
+            if not _wait(self._sock, True, max(0.0, deadline - time.monotonic())):
+                raise ConnectionAbortedError("a frame was half sent")
+            rest = rest[self._send_at_once(rest) :]
+
+    # --- the end
+
+    def _after_the_end(self) -> tuple[can.Message, bool]:
+        if self._early:
+            return self._message(self._early.popleft()), self._filters is None
+        raise can.CanOperationError(self._lost or "")
+
+    def _describe(self, error: OSError) -> str:
+        if self._sock.fileno() < 0 or self._is_shutdown:
+            return "this bus has been shut down"
+        return f"the hub (process {self.hub_pid}) ended without a word ({error}); open the bus again"
+
+    def _lose(self, reason: str) -> can.CanOperationError:
+        """Remember that the bus is gone and why, and say so in the log; return the error to raise."""
+        if self._lost is None:
+            self._lost = f"{self.channel_info}: {reason}"
+            if not self._is_shutdown:
+                LOG.error("%s", self._lost)
+                self._silence()
+        return can.CanOperationError(self._lost)
+
+    def _silence(self) -> None:
+        """Put a socket that is never readable under our descriptor: an end would wake an event loop for ever."""
+        if hasattr(socket, "AF_UNIX") and self._stand_in is None:
+            with contextlib.suppress(OSError):
+                self._stand_in = socket.socketpair()
+                os.dup2(self._stand_in[0].fileno(), self._sock.fileno(), inheritable=False)
+
+    def _look_for_reason(self) -> str:
+        """Read what is left, keep the frames for recv(), return the reason at the end of them."""
+        with contextlib.suppress(OSError):
+            while record := self._next_record(0.0):
+                if record[12] != wire.FRAME:
+                    return f"the hub let this node go: {wire.goodbye_reason(record)}"
+                self._early.append(record)
+        return ""
+
+    def shutdown(self) -> None:
+        """Leave the bus. May be called more than once. Frames sent before still reach the others."""
+        if self._is_shutdown:
+            return
+        super().shutdown()
+        if os.getpid() == self._pid and self._lost is None:
+            with contextlib.suppress(OSError):
+                self._sock.shutdown(socket.SHUT_WR)
+                if self._sock.family == socket.AF_INET:  # closing with frames unread would take back those sent
+                    self._sock.settimeout(1.0)
+                    while self._sock.recv(1 << 16):
+                        pass
+                self._sock.shutdown(socket.SHUT_RD)  # wakes a thread that waits in recv()
+        self._sock.close()
+        for stand_in in self._stand_in or ():
+            stand_in.close()
+
+    def fileno(self) -> int:
+        """The socket: readable when a frame waits; one frame per readable event, for event loops. -1 when shut down."""
+        return self._sock.fileno()
+
+    @staticmethod
+    def _detect_available_configs() -> list[Any]:
+        return [{"interface": "rds", "channel": channel} for channel in channels()]
+
+
+def _record(msg: can.Message) -> bytes:
+    data = msg.data
+    length = len(data)
+    flags = 0
+    if msg.is_extended_id:
+        flags = wire.EXTENDED
+    if msg.is_remote_frame:
+        flags |= wire.REMOTE
+    if msg.is_error_frame:
+        flags |= wire.ERROR
+    if msg.is_fd:
+        flags |= wire.FD
+        if msg.bitrate_switch:
+            flags |= wire.BITRATE_SWITCH
+        if msg.error_state_indicator:
+            flags |= wire.ERROR_STATE
+    try:
+        header = wire.HEADER.pack(0, msg.arbitration_id, wire.FRAME, flags, msg.dlc, length)
+        if flags or length > 8 or msg.arbitration_id > 0x7FF or msg.dlc > 8:
+            wire.check_frame(header[wire.KEY_AT])
+    except (wire.WireError, struct.error) as error:
+        raise ValueError(f"no such frame can be sent: {msg!r}: {error}") from None
+    return (header + data).ljust(_SIZE, b"\0")
+
+
+def _as_filters(filters: Any) -> list[wire.Filter]:
+    if filters is None:
+        return []
+    return [wire.Filter(f["can_id"] & 0xFFFFFFFF, f["can_mask"] & 0xFFFFFFFF, f.get("extended")) for f in filters]
+
+
+def _wait(sock: socket.socket, writing: bool, timeout: float | None) -> bool:
+    """Wait until the socket is ready; `select` is exact to the µs, `poll` (for high descriptors) to the ms."""
+    fd = sock.fileno()
+    if fd < 1024 or not hasattr(select, "poll"):
+        ready = select.select([] if writing else [fd], [fd] if writing else [], [], timeout)
+        return bool(ready[0] or ready[1])
+    poller = select.poll()
+    poller.register(fd, select.POLLOUT if writing else select.POLLIN)
+    return bool(poller.poll(None if timeout is None else timeout * 1000.0))

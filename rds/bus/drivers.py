@@ -1,0 +1,305 @@
+"""The host's side of the bus: one tick out, one answer of each module in, through python-can only."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import can
+
+from rds.bus import frames
+from rds.bus.frames import Answer, Kind, Status
+from rds.bus.link import BUILTIN, bus_name, open_bus
+from rds.bus.server import default_channel
+from rds.core.errors import InputError, MachineError
+from rds.machines.machine import Axis, Machine
+
+LOG = logging.getLogger(__name__)
+
+LOST_AFTER = 10  # periods in a row without an answer; then the module has cut its voltage too
+_STARTING = 1.0  # s for all modules to answer at the start
+_STANDSTILL = 20  # ticks in which no encoder moves until the axes count as standing
+_LONGEST_COAST = 3.0  # s until then
+_HALF_TURN = frames.COUNT_TURNS // 2
+
+
+@dataclass
+class Counters:
+    """What went over the bus beside the expected answers."""
+
+    ticks: int = 0  # sent
+    missing: int = 0  # answers that did not come in their period
+    late: int = 0  # answers to an earlier tick
+    lost_ticks: int = 0  # ticks that a module says it did not hear
+    watchdogs: int = 0  # reports that a module's watchdog has cut the voltage
+    foreign: int = 0  # frames that no module of ours sent
+
+
+class _Module:
+    """What the host knows of one module."""
+
+    __slots__ = ("axis", "counts", "expected", "identifier", "missed", "origin", "owed", "seen")
+
+    def __init__(self, axis: Axis):
+        self.axis = axis
+        self.identifier = frames.answer_identifier(axis.node)
+        self.counts = 0
+        self.origin = 0  # counts where the reported position is 0
+        self.expected = 0  # tick count of the answer to the last tick
+        self.owed = 0  # answers to earlier ticks that may still come
+        self.missed = 0  # periods in a row
+        self.seen = False  # it has answered at all
+
+
+class AxisDrivers:
+    """Implements `rds.core.contracts.Drivers` for the `axes` (names; default all) of `machine`.
+
+    Takes an open `bus`, which stays the caller's, or opens one: `interface`, `channel` (default on the built-in bus:
+    the machine's name) and further `options` for it. Voltages and positions are in the order of `axes`; the slots of
+    other axes get 0 V. With `dry_run` the modules answer and apply zero volts. `timeout` is how long exchange() waits
+    for the answers, s (default: one sample period).
+
+    Positions are relative to where the axis stood at start(); a spindle's speed is absolute.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        axes: Sequence[str] | None = None,
+        *,
+        bus: can.BusABC | None = None,
+        interface: str = BUILTIN,
+        channel: str | None = None,
+        sample_period: float | None = None,
+        dry_run: bool = False,
+        timeout: float | None = None,
+        **options: Any,
+    ):
+        names = list(machine.axes)
+        used = [machine.axis(name) for name in (names if axes is None else axes)]
+        if len(names) > frames.SLOTS and max(names.index(axis.name) for axis in used) >= frames.SLOTS:
+            raise InputError(
+                f"a command carries {frames.SLOTS} voltages; {names[frames.SLOTS :]} have none", machine.path
+            )
+        self._modules = [_Module(axis) for axis in used]
+        self._by_identifier = {module.identifier: module for module in self._modules}
+        self._slots = [names.index(axis.name) for axis in used]
+        self._period = machine.sample_period if sample_period is None else sample_period
+        self._setup = frames.encode_setup(self._period)
+        self._timeout = self._period if timeout is None else timeout
+        self._owns_bus = bus is None
+        if bus is None:
+            channel = default_channel(machine, interface, channel)
+            bus = open_bus(interface, channel, sorted(self._by_identifier), **options)
+            self._bus_name = bus_name(interface, channel)
+        else:
+            self._bus_name = bus.channel_info
+        self._machine = machine
+        self._bus = bus
+        self._identifier = frames.DRY_COMMAND if dry_run else frames.COMMAND
+        self._tick = can.Message(arbitration_id=self._identifier, is_extended_id=False, data=bytes(8))
+        self._zero = frames.encode_voltages(())
+        self._waiting = self._zero
+        self._waiting_voltages: tuple[float, ...] = (0.0,) * len(used)
+        self._sent_voltages = self._waiting_voltages
+        self._closed = False
+        self.counters = Counters()
+
+    def start(self) -> None:
+        """Set the sample period, check by zero-volt ticks that every module answers, and take the origins.
+
+        The axes stand when this returns. Raises MachineError naming the modules that don't answer.
+        """
+        self._waiting = self._zero
+        self._waiting_voltages = (0.0,) * len(self._modules)
+        self._send(frames.SETUP, self._setup)
+        deadline = time.monotonic() + _STARTING
+        while not all(module.seen for module in self._modules):
+            if time.monotonic() > deadline:
+                raise self._silent([module for module in self._modules if not module.seen])
+            for module in self._modules:
+                module.missed = 0
+            self.exchange()
+        self._wait_for_standstill()
+        for module in self._modules:
+            module.origin = 0 if module.axis.unit == "rev/min" else module.counts
+        self.counters = Counters()
+
+    def _wait_for_standstill(self) -> None:
+        """An earlier run may have left an axis coasting."""
+        still, before = 0, [module.counts for module in self._modules]
+        deadline = time.monotonic() + _LONGEST_COAST
+        while still < _STANDSTILL and time.monotonic() < deadline:
+            due = time.monotonic() + self._period
+            self.exchange()
+            now = [module.counts for module in self._modules]
+            still = still + 1 if now == before else 0
+            before = now
+            time.sleep(max(0.0, due - time.monotonic()))
+
+    def exchange(self) -> list[float]:
+        """Send the waiting voltages as the tick; return the measured positions at the tick, in axis units.
+
+        An answer that doesn't come in time repeats the last position and is counted. Raises MachineError when a module
+        has not answered for 10 periods in a row, or the bus fails.
+        """
+        deadline = time.monotonic() + self._timeout
+        tick = self._tick
+        tick.data[:] = self._waiting
+        self._sent_voltages = self._waiting_voltages
+        try:
+            self._bus.send(tick, self._timeout * LOST_AFTER)
+            self._count_tick()
+            self._collect(deadline)
+        except can.CanError as error:
+            raise MachineError(f"bus {self._bus_name} failed: {error}") from error
+        return [
+            ((m.counts - m.origin + 0x80000000) % 0x100000000 - 0x80000000) * m.axis.resolution for m in self._modules
+        ]
+
+    def _count_tick(self) -> None:
+        self.counters.ticks += 1
+        for module in self._modules:
+            module.expected = (module.expected + 1) % frames.COUNT_TURNS
+
+    def _collect(self, deadline: float) -> None:
+        """Take answers until all are here or the deadline has passed."""
+        receive, modules, clock = self._bus.recv, self._by_identifier, time.monotonic
+        awaited = set(modules)
+        doubtful: dict[int, Answer] = {}
+        while awaited:
+            left = deadline - clock()
+            message = receive(left if left > 0.0 else 0.0)
+            if message is None:
+                if left <= 0.0 or clock() >= deadline:
+                    break
+                continue
+            module = modules.get(message.arbitration_id)
+            if module is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+                self.counters.foreign += 1
+                continue
+            answer = frames.decode_answer(message.arbitration_id, message.data)
+            if answer.kind != Kind.ANSWER:
+                self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
+            elif self._belongs(module, answer):
+                awaited.discard(module.identifier)
+            else:
+                doubtful[module.identifier] = answer
+        if awaited:
+            self._note_missing(awaited, doubtful)
+
+    def _belongs(self, module: _Module, answer: Answer) -> bool:
+        """Whether this is the answer to the last tick: its tick count says so."""
+        ahead = (answer.ticks - module.expected + _HALF_TURN) % frames.COUNT_TURNS - _HALF_TURN
+        if ahead < 0 and module.owed and module.seen:
+            # the answer to an earlier tick, or to this one from a module that lost one: _note_missing() decides
+            module.owed -= 1
+            self.counters.late += 1
+            return False
+        if ahead < 0 and module.seen:
+            self.counters.lost_ticks -= ahead
+        self._accept(module, answer)
+        return True
+
+    def _accept(self, module: _Module, answer: Answer) -> None:
+        module.expected = answer.ticks
+        module.counts = answer.counts
+        module.owed = 0
+        module.missed = 0
+        module.seen = True
+
+    def _note_missing(self, awaited: set[int], doubtful: dict[int, Answer]) -> None:
+        lost = []
+        for identifier in awaited:
+            module = self._by_identifier[identifier]
+            if identifier in doubtful:
+                # nothing better came: either the module is slow, and its next answer sets the count right, or it
+                # lost a tick, and this is its answer. Either way it lives.
+                self._accept(module, doubtful[identifier])
+                module.owed = 1
+            else:
+                module.owed += 1
+                module.missed += 1
+            self.counters.missing += 1
+            if module.missed >= LOST_AFTER and module.seen:
+                lost.append(module)
+        if lost:
+            raise self._silent(lost)
+
+    def write(self, voltages: Sequence[float]) -> tuple[float, ...]:
+        """Take the voltages (V) that the next tick sends; return those of the last tick, which act from it on.
+
+        What is returned is what was sent, in whole units of 20/65536 V. InputError outside ±10 V.
+        """
+        if len(voltages) != len(self._slots):
+            raise InputError(f"{len(voltages)} voltages for {len(self._slots)} axes")
+        command = [0.0] * frames.SLOTS
+        for slot, voltage in zip(self._slots, voltages, strict=True):
+            command[slot] = voltage
+        self._waiting = frames.encode_voltages(command)
+        sent = frames.decode_voltages(self._identifier, self._waiting)
+        self._waiting_voltages = tuple(sent[slot] for slot in self._slots)
+        return self._sent_voltages
+
+    def stop(self) -> None:
+        """Zero volts on all axes, now. If the bus is broken, the modules' watchdogs do it; the log says so."""
+        self._waiting = self._zero
+        self._waiting_voltages = (0.0,) * len(self._modules)
+        try:
+            self._send(self._identifier, self._zero)
+            self._sent_voltages = self._waiting_voltages
+            self._count_tick()
+            for module in self._modules:
+                module.owed += 1
+        except MachineError as error:
+            LOG.error("zero volts could not be sent (%s); the modules' watchdogs cut the voltage", error)
+
+    def close(self) -> None:
+        """Zero volts, then let go of the bus (a bus that was handed in stays open)."""
+        if self._closed:
+            return
+        self._closed = True
+        self.stop()
+        if self._owns_bus:
+            self._bus.shutdown()
+
+    def _send(self, identifier: int, data: bytes) -> None:
+        try:
+            self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data), 0.5)
+        except (can.CanError, OSError) as error:
+            raise MachineError(f"bus {self._bus_name} failed: {error}") from error
+
+    def _silent(self, modules: Sequence[_Module]) -> MachineError:
+        names = ", ".join(f"{module.axis.name} (node {module.axis.node})" for module in modules)
+        return MachineError(
+            f"no answer from {names} on bus {self._bus_name}; start the machine (rds machine serve "
+            f"{self._machine.name}), or check [bus], power and cable"
+        )
+
+
+def find_machine(
+    machine: Machine, interface: str = BUILTIN, channel: str | None = None, timeout: float = 0.2, **options: Any
+) -> list[str]:
+    """Names of the machine's axes whose modules answer a call on this bus within `timeout` s; nothing else happens.
+
+    Raises MachineError if the bus can't be opened or fails.
+    """
+    channel = default_channel(machine, interface, channel)
+    names = {frames.answer_identifier(axis.node): axis.name for axis in machine.axes.values()}
+    found = set()
+    bus = open_bus(interface, channel, sorted(names), **options)
+    try:
+        bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), timeout)
+        deadline = time.monotonic() + timeout
+        while len(found) < len(names) and (left := deadline - time.monotonic()) > 0:
+            message = bus.recv(left)
+            if message is not None and message.arbitration_id in names:
+                found.add(names[message.arbitration_id])
+    except can.CanError as error:
+        raise MachineError(f"bus {bus_name(interface, channel)} failed: {error}") from error
+    finally:
+        bus.shutdown()
+    return [name for name in machine.axes if name in found]

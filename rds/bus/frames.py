@@ -1,0 +1,133 @@
+"""The frames between host and axis modules: identifiers, and pure codecs from bytes to words.
+
+All frames are standard (11-bit) and little-endian:
+
+| identifier | from   | bytes | content                                                                              |
+| ---------- | ------ | ----- | ------------------------------------------------------------------------------------ |
+| 0x010      | host   | 8     | cycle command and tick: four int16, voltages in 20/65536 V, slots in axis order      |
+| 0x011      | host   | 8     | the same as a dry run: modules answer, and apply zero volts                           |
+| 0x012      | host   | 8     | set-up: uint32 sample period in µs, uint32 reserved                                   |
+| 0x013      | host   | 0     | call: every module reports, nothing else happens                                      |
+| 0x020+node | module | 8     | int32 position counts, uint8 status, uint8 kind, uint16 count of ticks heard          |
+
+The lower identifier wins arbitration: a tick is never delayed by an answer. The voltage's unit makes the levels of a
+12-bit ±10 V converter (and of any other of up to 16 bits) exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum, IntFlag
+from struct import Struct
+from typing import NamedTuple
+
+from rds.core.errors import InputError, MachineError
+
+COMMAND = 0x010
+DRY_COMMAND = 0x011
+SETUP = 0x012
+CALL = 0x013
+ANSWER = 0x020  # + node
+
+SLOTS = 4  # voltages in a command
+NODES = range(1, 0x60)  # so that answers end below 0x080, where CANopen's emergency and process data begin
+VOLTS_PER_UNIT = 20.0 / 65536.0
+HIGHEST_VOLTAGE = 10.0  # V; sent as 10 V less one unit, for an int16 ends there
+COUNT_TURNS = 1 << 16  # the tick count starts again at 0
+
+_VOLTAGES = Struct(f"<{SLOTS}h")
+_SETUP = Struct("<II")
+_ANSWER = Struct("<iBBH")
+_LONGEST_PERIOD = 0xFFFFFFFF  # µs
+
+
+class Status(IntFlag):
+    """What a module says about itself."""
+
+    NONE = 0
+    ENABLED = 1  # it applies the voltage of its slot
+    WATCHDOG = 2  # no command for 10 periods: zero volts until the next one
+    DRY_RUN = 4  # the last command was a dry run: zero volts
+    FAULT = 8  # it cannot do its part
+
+
+class Kind(IntEnum):
+    """Why a module speaks."""
+
+    ANSWER = 0  # to a tick: the position is that at the tick
+    REPORT = 1  # by itself or to a call: the position is that of now
+
+
+class Answer(NamedTuple):
+    """What a module says."""
+
+    counts: int  # encoder counts (a spindle's speed in counts)
+    status: int  # bits of Status
+    kind: int  # Kind
+    ticks: int  # ticks heard, modulo 65536
+
+
+def encode_voltages(voltages: Sequence[float]) -> bytes:
+    """Data of a command with up to four voltages in V, each rounded to the next unit; missing slots get 0 V.
+
+    Raises InputError for one that is not a number from -10 to 10, or for more than four.
+    """
+    units = [0] * SLOTS
+    if len(voltages) > SLOTS:
+        raise InputError(f"{len(voltages)} voltages; one command carries {SLOTS}")
+    for slot, voltage in enumerate(voltages):
+        if not -HIGHEST_VOLTAGE <= voltage <= HIGHEST_VOLTAGE:  # false for NaN too
+            raise InputError(f"voltage {voltage!r} V of slot {slot} must be from -10 to 10 V; limit it before")
+        units[slot] = min(round(voltage / VOLTS_PER_UNIT), 32767)
+    return _VOLTAGES.pack(*units)
+
+
+def decode_voltages(identifier: int, data: bytes | bytearray) -> tuple[float, ...]:
+    """The four voltages of a command, V. MachineError if the length is wrong."""
+    if len(data) != _VOLTAGES.size:
+        raise _wrong(identifier, data, "a command", _VOLTAGES.size)
+    return tuple(unit * VOLTS_PER_UNIT for unit in _VOLTAGES.unpack(data))
+
+
+def encode_setup(sample_period: float) -> bytes:
+    """Data of a set-up frame; `sample_period` in s, 1 µs to 4294 s (InputError)."""
+    microseconds = round(sample_period * 1e6) if sample_period == sample_period else 0
+    if not 1 <= microseconds <= _LONGEST_PERIOD:
+        raise InputError(f"sample period {sample_period!r} s must be from 1e-6 to 4294 s")
+    return _SETUP.pack(microseconds, 0)
+
+
+def decode_setup(identifier: int, data: bytes | bytearray) -> float:
+    """The sample period in a set-up frame, s. MachineError if the length is wrong or the period is 0."""
+    if len(data) != _SETUP.size:
+        raise _wrong(identifier, data, "a set-up", _SETUP.size)
+    microseconds, _ = _SETUP.unpack(data)
+    if microseconds == 0:
+        raise MachineError(f"frame {identifier:#05x} sets a sample period of 0 µs")
+    return microseconds * 1e-6
+
+
+def answer_identifier(node: int) -> int:
+    """The identifier with which `node` (1 to 95) speaks; InputError for another."""
+    if node not in NODES:
+        raise InputError(f"node {node!r} must be from {NODES[0]} to {NODES[-1]}")
+    return ANSWER + node
+
+
+def encode_answer(answer: Answer) -> bytes:
+    """Data of an answer; the position wraps round as a 32-bit counter does, the tick count as a 16-bit one."""
+    counts, status, kind, ticks = answer
+    return _ANSWER.pack((counts + 0x80000000) % 0x100000000 - 0x80000000, status, kind, ticks % COUNT_TURNS)
+
+
+def decode_answer(identifier: int, data: bytes | bytearray) -> Answer:
+    """What a module says. MachineError if the length is wrong."""
+    if len(data) != _ANSWER.size:
+        raise _wrong(identifier, data, "an answer", _ANSWER.size)
+    return Answer(*_ANSWER.unpack(data))
+
+
+def _wrong(identifier: int, data: bytes | bytearray, what: str, size: int) -> MachineError:
+    return MachineError(
+        f"frame {identifier:#05x} carries {len(data)} bytes ({bytes(data).hex(' ') or 'none'}); {what} has {size}"
+    )

@@ -1,0 +1,42 @@
+"""Opening a bus: any python-can interface, errors in the words of the machine's user."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import can
+
+from rds.core.errors import MachineError
+
+BUILTIN = "rds"  # the built-in bus's name among python-can's interfaces
+
+
+def bus_name(interface: str, channel: str | None) -> str:
+    """How messages call a bus."""
+    return f"{interface}:{channel}" if channel else interface
+
+
+def open_bus(
+    interface: str, channel: str | None, identifiers: Sequence[int] | None = None, mask: int = 0x7FF, **options: Any
+) -> can.BusABC:
+    """An open bus that receives the standard frames whose identifier, masked, is one of `identifiers` (None: all).
+
+    `options` go to the interface as they are (bitrate, fd...). Raises MachineError if the bus can't be opened.
+    """
+    filters = None
+    if identifiers is not None:
+        filters = [{"can_id": wanted, "can_mask": mask, "extended": False} for wanted in identifiers]
+    try:
+        return can.Bus(
+            interface=interface,
+            channel=channel,
+            can_filters=filters,
+            # what a user's python-can files say of real buses (a bit rate...) isn't meant for the built-in one
+            ignore_config=interface == BUILTIN,
+            **options,
+        )
+    except (can.CanError, OSError, ValueError, TypeError, NotImplementedError) as error:
+        raise MachineError(
+            f"bus {bus_name(interface, channel)} can't be opened: {error}; check interface, channel and options of [bus]"
+        ) from error
