@@ -3,16 +3,22 @@
 Light to import: pandas, pyarrow, scipy and matplotlib are imported by the functions that need them.
 """
 
+from rds.results.compare import AxisComparison, Comparison, compare
 from rds.results.files import open_result, save_all, save_result
 from rds.results.metrics import axis_metrics, metric_notes, metric_units
+from rds.results.report import write_report
 from rds.results.result import Result
 
 __all__ = [
+    "AxisComparison",
+    "Comparison",
     "Result",
     "axis_metrics",
+    "compare",
     "metric_notes",
     "metric_units",
     "open_result",
     "save_all",
     "save_result",
+    "write_report",
 ]

@@ -33,9 +33,12 @@ def number(value: Any) -> str:
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "", note: str = "") -> str:
-    """A table of escaped cells: numbers right-aligned, the rest to the left."""
-    head = "".join(f'<th scope="col">{escape(str(column))}</th>' for column in columns)
-    body = "".join(f"<tr>{''.join(_cell(value) for value in row)}</tr>" for row in rows)
+    """A table of escaped cells: columns that hold numbers are right-aligned."""
+    rows = [list(row) for row in rows]
+    right = [any(map(_is_number, cells)) for cells in zip(*rows, strict=False)]
+    right += [False] * (len(columns) - len(right))
+    head = "".join(_cell(column, to, 'th scope="col"') for column, to in zip(columns, right, strict=False))
+    body = "".join(f"<tr>{''.join(_cell(*cell) for cell in zip(row, right, strict=False))}</tr>" for row in rows)
     caption = f"<caption>{escape(title)}</caption>" if title else ""
     below = f'<p class="note">{escape(note)}</p>' if note else ""
     return (
@@ -43,9 +46,15 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = ""
     )
 
 
-def _cell(value: Any) -> str:
-    style = ' class="number"' if isinstance(value, int | float) and not isinstance(value, bool) else ""
-    return f"<td{style}>{escape(number(value))}</td>"
+_NUMBER = ' class="number"'
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _cell(value: Any, right: bool, tag: str = "td") -> str:
+    return f"<{tag}{_NUMBER if right else ''}>{escape(number(value))}</{tag.split()[0]}>"
 
 
 def metrics_rows(result: Result) -> tuple[list[str], list[list[Any]]]:
@@ -63,13 +72,14 @@ def metrics_rows(result: Result) -> tuple[list[str], list[list[Any]]]:
     return ["", *result.axes], rows
 
 
-def verdict_line(result: Result) -> str:
-    """The verdict with its reason, as a paragraph; "" where there is none."""
+def verdict_line(result: Result, label: str = "") -> str:
+    """The verdict with its reason, as a paragraph led by `label`; "" where there is none."""
     if not result.verdict:
         return ""
     kind = result.verdict if result.verdict in ("met", "missed", "void") else "other"
     reason = str(result.meta.get("verdict_reason") or "")
-    return f'<p class="verdict {kind}"><strong>{escape(result.verdict)}</strong> {escape(reason)}</p>'
+    lead = f"{escape(label)}: " if label else ""
+    return f'<p class="verdict {kind}">{lead}<strong>{escape(str(result.verdict))}</strong> {escape(reason)}</p>'
 
 
 def notes_list(notes: Iterable[str]) -> str:
@@ -90,13 +100,14 @@ def result_fragment(result: Result) -> str:
 
 def key_values(values: Mapping[str, Any], title: str = "") -> str:
     """A mapping as a table of two columns; nested mappings as `a.b`."""
-    return table(["", ""], [[key, value] for key, value in _flat(values)], title) if values else ""
+    return table(["", ""], [[key, value] for key, value in flat(values)], title) if values else ""
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
+def flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
+    """Names and values of a mapping, with nested mappings as `a.b` and lists as text."""
     for key, value in values.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
+            yield from flat(value, f"{prefix}{key}.")
         elif isinstance(value, list | tuple):
             yield f"{prefix}{key}", ", ".join(number(item) for item in value)
         else:

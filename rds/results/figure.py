@@ -1,0 +1,93 @@
+"""What all plots share: a figure that needs no display and no pyplot, colours, axis labels.
+
+The colours are those of Okabe and Ito, "Color Universal Design" (2008): told apart with any kind of colour
+vision; line styles differ as well.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DPI = 128
+WIDTH = 10.0  # inches: 1280 pixels
+
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILLION, PURPLE = (
+    "#000000",
+    "#E69F00",
+    "#56B4E9",
+    "#009E73",
+    "#0072B2",
+    "#D55E00",
+    "#CC79A7",
+)
+GREY = "#8A8A8A"
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+
+RESPONSES: dict[str, dict[str, Any]] = {
+    "reference": {"color": GREY, "linewidth": 3.0, "alpha": 0.55},
+    "measured": {"color": BLUE, "linewidth": 1.3},
+    "modelled": {"color": VERMILLION, "linewidth": 1.3, "linestyle": (0, (5, 2))},
+    "simulated": {"color": GREEN, "linewidth": 1.3, "linestyle": (0, (1, 1.5))},
+}
+
+
+class Picture(Figure):
+    """A figure that shows itself in a notebook without pyplot's global state."""
+
+    def __init__(self, height: float, width: float = WIDTH):
+        super().__init__(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
+
+    def png(self) -> bytes:
+        """The picture as PNG, 128 pixels per inch."""
+        stream = BytesIO()
+        self.savefig(stream, format="png", metadata={"Software": None})
+        return stream.getvalue()
+
+    def _repr_png_(self) -> bytes:
+        return self.png()
+
+
+def dress(axes: Axes, y: str, x: str | None = "time [s]") -> None:
+    """Labels with units, a quiet grid, no box."""
+    axes.set_ylabel(y)
+    if x is not None:
+        axes.set_xlabel(x)
+    axes.grid(True, color="#E2E2E2", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.01)
+
+
+def legend(axes: Axes, columns: int = 4) -> None:
+    """The legend above the axes, where it covers no line; `columns` entries side by side."""
+    handles, labels = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    drawn = axes.legend(
+        handles,
+        labels,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        handlelength=1.6,
+        handletextpad=0.5,
+        columnspacing=0.9,
+        borderaxespad=0.2,
+    )
+    # a legend wider than its axes would make the layout shrink them; a blank title keeps just the height free
+    drawn.set_in_layout(False)
+    axes.set_title("\n".join([" "] * -(-len(handles) // columns)), fontsize="small")
+
+
+def quantity(axis: str, unit: str) -> str:
+    """The label of an axis's response: what it measures, with the unit."""
+    what = {"rev/min": "speed", "°": "angle", "deg": "angle"}.get(unit, "position")
+    return f"{axis} {what} [{unit}]" if unit else f"{axis} {what}"

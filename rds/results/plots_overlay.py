@@ -1,0 +1,104 @@
+"""Pictures of several results over each other: two compared, or one experiment in all its modes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from rds.core.errors import InputError
+from rds.results.figure import BLUE, CYCLE, GREEN, GREY, ORANGE, RESPONSES, VERMILLION, Picture, dress, legend, quantity
+from rds.results.metrics import error_metrics, settled, tracking_error
+from rds.results.result import Result
+
+if TYPE_CHECKING:
+    from rds.results.compare import Comparison
+
+# a later one is drawn over an earlier one: narrower and dashed, so that equal lines show as two colours
+_MODES: dict[str, dict[str, Any]] = {
+    "implementation": {"color": BLUE, "linewidth": 1.0},
+    "simulation": {"color": ORANGE, "linewidth": 3.0, "alpha": 0.7},
+    "emulation": {"color": GREEN, "linewidth": 1.5, "linestyle": (0, (4, 3))},
+}
+_ROW_HEIGHT = 2.7  # inches
+
+
+def modes(results: Sequence[Result], labels: Sequence[str] | None = None) -> Picture:
+    """One experiment in several modes: a row per axis, measured responses to the left, tracking errors to the right.
+
+    `labels` names the results (default: their modes). Raises InputError if there are no results, or if they have no
+    axis in common.
+    """
+    if not results:
+        raise InputError("there are no results to draw; give at least one")
+    names = list(labels) if labels is not None else [result.mode or f"run {i + 1}" for i, result in enumerate(results)]
+    shared = [axis for axis in results[0].axes if all(f"{axis}_measured" in result for result in results)]
+    if not shared:
+        raise InputError("the results have no axis in common: " + "; ".join(", ".join(r.axes) for r in results))
+    picture = Picture(_ROW_HEIGHT * len(shared) + 0.4)
+    grid = picture.subplots(len(shared), 2, squeeze=False, sharex=True)
+    for row, axis in enumerate(shared):
+        left, right = grid[row]
+        unit = results[0].units.get(f"{axis}_measured", "")
+        _reference(left, results, axis)
+        right.plot([], [], linestyle="none", label=f"mean |error| [{unit}]:")
+        for result, name, style in _ordered(results, names):
+            left.plot(result["time"], result[f"{axis}_measured"], label=name, **style)
+            error = tracking_error(result, axis)
+            if error is not None:
+                mean = error_metrics(error[settled(result, axis)])["mean_abs_error"]
+                right.plot(result["time"], error, label="–" if mean is None else f"{mean:.4f}", **style)
+        x = "time [s]" if row == len(shared) - 1 else None
+        dress(left, quantity(axis, unit), x)
+        dress(right, f"{axis} tracking error [{unit}]", x)
+        right.axhline(0.0, color=GREY, linewidth=0.8)
+        legend(right, columns=1 + len(results))
+    handles, texts = grid[0, 0].get_legend_handles_labels()
+    picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
+    picture.align_ylabels()
+    return picture
+
+
+def comparison(compared: Comparison) -> Picture:
+    """Two results: per axis both measured responses to the left and their difference, b - a, to the right."""
+    from rds.results.comparison_text import labels
+
+    names = labels(compared)
+    picture = Picture(_ROW_HEIGHT * len(compared.axes) + 0.4)
+    grid = picture.subplots(len(compared.axes), 2, squeeze=False, sharex=True)
+    for row, (axis, about) in enumerate(compared.axes.items()):
+        left, right = grid[row]
+        column = f"{axis}_measured"
+        _reference(left, [compared.a, compared.b], axis)
+        left.plot(compared.a["time"], compared.a[column], label=names[0], color=ORANGE, linewidth=2.4, alpha=0.9)
+        left.plot(compared.b["time"], compared.b[column], label=names[1], color=BLUE, linewidth=1.2)
+        time, difference = compared.difference(axis)
+        right.plot(
+            time, difference, color=VERMILLION, linewidth=0.9, label=f"RMS {about.rms_difference:.4g} {about.unit}"
+        )
+        right.axhline(0.0, color=GREY, linewidth=0.8)
+        x = "time [s]" if row == len(grid) - 1 else None
+        dress(left, quantity(axis, about.unit), x)
+        dress(right, f"{axis} difference, b − a [{about.unit}]", x)
+        legend(left)
+        legend(right)
+    picture.align_ylabels()
+    return picture
+
+
+def _reference(axes: Any, results: Sequence[Result], axis: str) -> None:
+    for result in results:
+        if f"{axis}_reference" in result:
+            axes.plot(result["time"], result[f"{axis}_reference"], label="reference", **RESPONSES["reference"])
+            return
+
+
+def _ordered(results: Sequence[Result], names: Sequence[str]) -> list[tuple[Result, str, dict[str, Any]]]:
+    """Results with their styles, in the order in which they are to be drawn."""
+    known = [*_MODES]
+    several = len({result.mode for result in results}) < len(results)
+    drawn = []
+    for i, (result, name) in enumerate(zip(results, names, strict=True)):
+        style = {"color": CYCLE[i % len(CYCLE)], "linewidth": 1.2} if several else _MODES.get(result.mode or "")
+        rank = i if several or result.mode not in known else known.index(result.mode)
+        drawn.append((rank, i, result, name, style or {"color": CYCLE[i % len(CYCLE)], "linewidth": 1.2}))
+    return [(result, name, style) for _, _, result, name, style in sorted(drawn, key=lambda entry: entry[:2])]
