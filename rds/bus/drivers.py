@@ -80,13 +80,11 @@ class AxisDrivers:
     ):
         names = list(machine.axes)
         used = [machine.axis(name) for name in (names if axes is None else axes)]
-        if len(names) > frames.SLOTS and max(names.index(axis.name) for axis in used) >= frames.SLOTS:
-            raise InputError(
-                f"a command carries {frames.SLOTS} voltages; {names[frames.SLOTS :]} have none", machine.path
-            )
         self._modules = [_Module(axis) for axis in used]
         self._by_identifier = {module.identifier: module for module in self._modules}
         self._slots = [names.index(axis.name) for axis in used]
+        if max(self._slots, default=0) >= frames.SLOTS:
+            raise InputError(f"a command carries the voltages of {', '.join(names[: frames.SLOTS])} only", machine.path)
         self._period = machine.sample_period if sample_period is None else sample_period
         self._setup = frames.encode_setup(self._period)
         self._timeout = self._period if timeout is None else timeout
@@ -289,7 +287,7 @@ def find_machine(
     """
     channel = default_channel(machine, interface, channel)
     names = {frames.answer_identifier(axis.node): axis.name for axis in machine.axes.values()}
-    found = set()
+    found: set[str] = set()
     bus = open_bus(interface, channel, sorted(names), **options)
     try:
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), timeout)

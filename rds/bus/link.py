@@ -38,5 +38,5 @@ def open_bus(
         )
     except (can.CanError, OSError, ValueError, TypeError, NotImplementedError) as error:
         raise MachineError(
-            f"bus {bus_name(interface, channel)} can't be opened: {error}; check interface, channel and options of [bus]"
+            f"bus {bus_name(interface, channel)} can't be opened: {error}; check the [bus] table"
         ) from error

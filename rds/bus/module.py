@@ -13,7 +13,7 @@ from math import floor
 
 from rds.bus import frames
 from rds.bus.frames import Answer, Kind, Status
-from rds.core.errors import MachineError
+from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Axis
 from rds.models.machine_axis import MachineAxis, MachineParameters
 
@@ -27,6 +27,8 @@ class AxisModule:
     """The module of one axis; `slot` is the place of its voltage in a command, `start` the bus time now, s."""
 
     def __init__(self, axis: Axis, slot: int, sample_period: float, start: float):
+        if slot >= frames.SLOTS:
+            raise InputError(f"axis {axis.name} is number {slot + 1}; a command carries {frames.SLOTS} voltages")
         self.name = axis.name
         self.identifier = frames.answer_identifier(axis.node)
         self.motion = MachineAxis(machine_parameters(axis), start, axis.unit == SPINDLE_UNIT)

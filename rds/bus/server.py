@@ -161,9 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--interface", default=BUILTIN)
     parser.add_argument("--channel", default=None)
     parser.add_argument("--axes", default=None, help="names, separated by commas (default: all)")
-    parser.add_argument(
-        "--option", action="append", default=[], metavar="KEY=VALUE", help="of the python-can interface"
-    )
+    parser.add_argument("--option", action="append", default=[], metavar="KEY=VALUE", help="of the interface")
     parser.add_argument(
         "--exit-with-stdin",
         action="store_true",
@@ -202,7 +200,7 @@ def _watch_stdin() -> threading.Event:
     ended = threading.Event()
 
     def read_to_end() -> None:
-        while sys.stdin.buffer.raw.read(4096):  # type: ignore[attr-defined]
+        while sys.stdin.buffer.read(1):
             pass
         ended.set()
 
