@@ -1,4 +1,4 @@
-"""When samples are due: a clock for virtual time and one for real time. Both are handed to the loop."""
+"""When samples are due in real time, and what is done about the late ones."""
 
 from __future__ import annotations
 
@@ -23,30 +23,6 @@ class LatePolicy:
     discard: bool = False
     keep_phase: bool = True
     stop_after: int = 0
-
-
-class VirtualClock:
-    """Time that stands still while the loop computes: every sample is on time."""
-
-    def now(self) -> int:
-        """Always 0 ns: nothing takes time."""
-        return 0
-
-    def taken(self) -> int:
-        """Always 0 ns."""
-        return 0
-
-    def wait(self, k: int) -> int:
-        """Sample `k` is due."""
-        return k
-
-    def lateness(self, k: int, at: int) -> int:
-        """Always 0 ns."""
-        return 0
-
-    def finish(self, k: int, at: int) -> bool:
-        """Never ends the run."""
-        return False
 
 
 class RealTimeClock:

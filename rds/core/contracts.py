@@ -30,22 +30,3 @@ class Drivers(Protocol):
 
     def close(self) -> None:
         """Zero volts, then let go of the bus."""
-
-
-class Clock(Protocol):
-    """When each sample is due."""
-
-    def now(self) -> int:
-        """Nanoseconds; always 0 where time is virtual."""
-
-    def taken(self) -> int:
-        """Nanoseconds so far in which this thread was ready to run and the system ran something else."""
-
-    def wait(self, k: int) -> int:
-        """Wait until sample `k` is due; return the sample to take now, later than `k` if periods were discarded."""
-
-    def lateness(self, k: int, at: int) -> int:
-        """Nanoseconds from the due time of sample `k` to the instant `at`."""
-
-    def finish(self, k: int, at: int) -> bool:
-        """Sample `k` was complete at the instant `at`; true if the late policy ends the run here."""

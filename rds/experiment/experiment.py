@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import secrets
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,11 +95,19 @@ class Experiment:
         """The mode that `run()` takes unless it is told another."""
         return str(self._words.table.get("mode", "simulation"))
 
+    @property
+    def title(self) -> str | None:
+        """What the user calls it."""
+        title = self._words.table.get("title")
+        return None if title is None else str(title)
+
     def plan(self, mode: str | None = None) -> Plan:
         """What would run: every part made and checked. Raises InputError for what will not do."""
         return resolve(self._words, self._folder, mode)[0]
 
-    def run(self, mode: str | None = None, *, out: str | Path | None = None, progress: Progress | None = None) -> Result:
+    def run(
+        self, mode: str | None = None, *, out: str | Path | None = None, progress: Progress | None = None
+    ) -> Result:
         """Run in `mode` (default: the experiment's own) and return the result.
 
         With `out`, the result is saved in that folder (CSV, MAT, Parquet); a real-time run keeps its raw record
@@ -111,7 +120,7 @@ class Experiment:
         """
         plan, known = resolve(self._words, self._folder, mode)
         real_time = load_mode(plan.mode).real_time
-        folder = Path(out) if out is not None else (_new_folder(plan) if real_time else None)
+        folder = Path(out) if out is not None else (new_folder(plan) if real_time else None)
         rows = self._rows(plan, folder, progress)
         if rows.ending is Ending.FAULT:
             raise ContractError(f"{rows.reason} (the samples up to then are in {folder})")
@@ -123,12 +132,17 @@ class Experiment:
         return result
 
     def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None) -> Rows:
-        if self._words.flag("compiled", False) and not load_mode(plan.mode).real_time:
-            from rds.runtime.compiled import run_compiled
+        note = None
+        if self._words.flag("compiled", False):
+            from rds.experiment.compiled import obstacle, run_compiled
 
-            return run_compiled(plan)
+            note = obstacle(plan)
+            if note is None:
+                return run_compiled(plan)
+            note = f"not compiled: {note}"
         try:
-            return run_plan(plan, folder, progress)
+            rows = run_plan(plan, folder, progress)
+            return replace(rows, notes=(note,)) if note else rows
         except (RdsError, KeyboardInterrupt):
             raise
         except Exception as error:
@@ -136,6 +150,7 @@ class Experiment:
             raise ContractError(student_error(error, source)) from error
 
 
-def _new_folder(plan: Plan) -> Path:
+def new_folder(plan: Plan) -> Path:
+    """Where a run's results go when nobody says: a new folder under `runs/`."""
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
     return Path("runs") / f"{stamp}-{'-'.join(plan.names)}-{plan.mode}-{secrets.token_hex(2)}"

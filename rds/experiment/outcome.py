@@ -16,8 +16,8 @@ from rds.modes import load_mode
 from rds.modes.host import Rows, run_plan
 from rds.results import Result
 from rds.runtime.environment import sentence
-from rds.runtime.loop import TIMING_COLUMNS
 from rds.runtime.plan import Plan
+from rds.runtime.stopwatch import TIMING_COLUMNS
 from rds.runtime.timing import Timing, judge, summary
 
 
@@ -29,12 +29,12 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     sample = recorded["sample"].astype(np.int64)
     columns: dict[str, np.ndarray] = {"time": sample * plan.T}
     units["time"] = "s"
-    columns |= {name: values for name, values in recorded.items() if name not in TIMING_COLUMNS}
+    columns |= {name: values for name, values in recorded.items() if name not in ("sample", *TIMING_COLUMNS)}
     if mode.followed and plan.controlled:
         columns |= _simulated(plan, sample)
     meta = _description(plan, rows) | known
     if mode.real_time:
-        for name in TIMING_COLUMNS[1:]:
+        for name in TIMING_COLUMNS:
             columns[name] = recorded[name] / 1e3
             units[name] = "µs"
         meta |= _judged(plan, rows, recorded)
@@ -54,7 +54,7 @@ def _judged(plan: Plan, rows: Rows, recorded: dict[str, np.ndarray]) -> dict[str
     if not len(recorded["sample"]):
         return {"verdict": None, "environment": environment}
     sample = recorded["sample"].astype(np.int64)
-    timing = Timing(sample, *(recorded[name] for name in TIMING_COLUMNS[1:]))
+    timing = Timing(sample, *(recorded[name] for name in TIMING_COLUMNS))
     period = round(plan.T * 1e9)
     discarded = int(sample[-1]) + 1 - len(sample)
     stalls = environment.get("rehearsal", {}).get("stalls", 0)
@@ -62,7 +62,8 @@ def _judged(plan: Plan, rows: Rows, recorded: dict[str, np.ndarray]) -> dict[str
     return {
         "verdict": str(judgement.verdict),
         "verdict_reason": judgement.reason,
-        "timing": summary(timing, period) | {"discarded": discarded, "late_without_system": judgement.late_without_system},
+        "timing": summary(timing, period)
+        | {"discarded": discarded, "late_without_system": judgement.late_without_system},
         "environment": environment | {"sentence": sentence(environment)} if environment else {},
         "drivers": rows.report.get("drivers", {}),
     }
@@ -85,6 +86,7 @@ def _description(plan: Plan, rows: Rows) -> dict[str, Any]:
         "model": {p.axis.name: _part(p.model.source, p.model.params) for p in plan.axes},
         "ending": str(rows.ending),
         "ending_reason": rows.reason,
+        "notes": list(rows.notes),
         "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
         "versions": _versions(),
     }

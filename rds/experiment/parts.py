@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +100,7 @@ def make_drive(words: Words, key: str, setting: Setting, unit: str) -> Signal:
     kind = table.text("kind")
     options = {name: table.any(name) for name in table.table if name != "kind"}
     if kind is None:
-        raise InputError(f"kind is missing; as in `kind = \"sinusoid\"` (amplitudes in {unit})", table.place())
+        raise InputError(f'kind is missing; as in `kind = "sinusoid"` (amplitudes in {unit})', table.place())
     if isinstance(options.get("file"), str):
         options["file"] = str(setting.path(options["file"]))
     with _named(table):

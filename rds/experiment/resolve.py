@@ -145,7 +145,7 @@ def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tup
         words.done() if words.name.startswith("axis.") else None
         return plan, signal.period
     if "reference" not in words:
-        raise InputError(f"axis {axis.name} has no [reference]; as in `kind = \"sinusoid\"`", words.place())
+        raise InputError(f'axis {axis.name} has no [reference]; as in `kind = "sinusoid"`', words.place())
     reference = make_drive(words, "reference", setting, axis.unit)
     signal_place = words.place("reference")
     position, velocity, acceleration = reference.reference(times)

@@ -56,7 +56,13 @@ class Words:
         return self.table.get(key, default)
 
     def number(
-        self, key: str, default: float | None, unit: str, *, more_than: float | None = None, at_most: float | None = None
+        self,
+        key: str,
+        default: float | None,
+        unit: str,
+        *,
+        more_than: float | None = None,
+        at_most: float | None = None,
     ) -> float:
         """A finite number in `unit`; without a default it must be there."""
         value = self.any(key, default)

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from rds.core.contracts import Clock, Drivers
-from rds.modes.parts import SimulatedAxes
+from rds.core.contracts import Drivers
+from rds.modes.parts import SimulatedAxes, loop
 from rds.runtime.loop import Loop
-from rds.runtime.mode import Mode, Record, Stop
+from rds.runtime.mode import Mode
 from rds.runtime.plan import Plan
 
 
-def build(plan: Plan, clock: Clock, drivers: Drivers | None, record: Record, stop: Stop) -> Loop:
+def build(plan: Plan, drivers: Drivers | None) -> Loop:
     """The loop of an emulation."""
     assert drivers is not None
     axes = SimulatedAxes(plan)
@@ -19,11 +19,13 @@ def build(plan: Plan, clock: Clock, drivers: Drivers | None, record: Record, sto
         exchange()
         return measure()
 
+    full_scale = plan.machine.converter.range
+
     def write(voltages: Sequence[float]) -> Sequence[float]:
-        hand_out(voltages)
+        hand_out(voltages if plan.saturation else [max(-full_scale, min(full_scale, u)) for u in voltages])
         return voltages
 
-    return Loop(plan.samples, clock, read, plan.laws(), write, axes.follow, record, stop)
+    return loop(plan, read, write, axes.follow)
 
 
 # Every period is processed, late or not, so that emulation repeats simulation sample for sample.

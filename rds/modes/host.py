@@ -5,19 +5,18 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
-import struct
 import subprocess
 import sys
 import tempfile
 import time
+from array import array
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rds.core.clock import VirtualClock
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.machine import machine_behind
@@ -25,6 +24,7 @@ from rds.runtime.plan import Plan, dump
 from rds.runtime.record import read_ending, read_raw, write_ending, write_whole
 from rds.runtime.recorder import Recorder
 from rds.runtime.ring import Ring
+from rds.runtime.stopwatch import TIMING_COLUMNS
 
 Progress = Callable[[int, int], None]  # samples taken, samples in all
 
@@ -43,6 +43,7 @@ class Rows:
     ending: Ending
     reason: str
     report: dict[str, Any]
+    notes: tuple[str, ...] = ()
 
 
 def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = None) -> Rows:
@@ -62,28 +63,22 @@ def _here(plan: Plan, progress: Progress | None) -> Rows:
     """A simulation, in this process and in virtual time."""
     mode = load_mode(plan.mode)
     columns, units = plan.columns(mode.followed)
-    row = struct.Struct(f"<{len(columns)}d")
-    memory = bytearray(row.size * plan.samples)
-    pack, size, offset = row.pack_into, row.size, 0
-
-    def record(values: list[float]) -> None:
-        nonlocal offset
-        pack(memory, offset, *values)
-        offset += size
-
-    loop = mode.build(plan, VirtualClock(), None, record, lambda: False)
+    recorded = array("d")
+    loop = replace(mode.build(plan, None), record=recorded.extend)
     ending = None
     while ending is None:
         ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
         if progress:
             progress(loop.k, plan.samples)
-    values = np.frombuffer(memory, dtype="<f8").reshape(-1, len(columns))
+    values = np.frombuffer(recorded).reshape(-1, len(columns))
     return Rows(columns, units, values, ending, "", {})
 
 
 def _in_target(plan: Plan, directory: Path, progress: Progress | None) -> Rows:
     mode = load_mode(plan.mode)
     columns, units = plan.columns(mode.followed)
+    columns[1:1] = TIMING_COLUMNS
+    units |= dict.fromkeys(TIMING_COLUMNS, "ns")
     directory.mkdir(parents=True, exist_ok=True)
     write_whole(directory / "plan.pickle", dump(plan))
     about = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}

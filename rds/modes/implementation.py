@@ -1,20 +1,18 @@
 """Implementation: the controllers drive the machine; the models run in parallel on the same voltages."""
 
 from rds.core.clock import LatePolicy
-from rds.core.contracts import Clock, Drivers
-from rds.modes.parts import SimulatedAxes
+from rds.core.contracts import Drivers
+from rds.modes.parts import SimulatedAxes, loop
 from rds.runtime.loop import Loop
-from rds.runtime.mode import Mode, Record, Stop
+from rds.runtime.mode import Mode
 from rds.runtime.plan import Plan
 
 
-def build(plan: Plan, clock: Clock, drivers: Drivers | None, record: Record, stop: Stop) -> Loop:
+def build(plan: Plan, drivers: Drivers | None) -> Loop:
     """The loop of an implementation, and of a model validation: what drives the axes is the plan's."""
     assert drivers is not None
     models = SimulatedAxes(plan)
-    return Loop(
-        plan.samples, clock, drivers.exchange, plan.laws(), drivers.write, models.follow_and_tell, record, stop
-    )
+    return loop(plan, drivers.exchange, drivers.write, models.follow_and_tell)
 
 
 # A machine does not wait: what was due while the loop was late is past, and is not caught up.

@@ -1,39 +1,59 @@
-"""The parts that modes are built from: models in motion behind encoders."""
+"""The parts that modes are built from: models in motion behind encoders, and the loop in virtual time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rds.core.contracts import Motion
-from rds.core.types import Model
+from rds.core.types import Ending, Model
 from rds.interface import encoder
+from rds.runtime.loop import Loop
 from rds.runtime.plan import Plan
 
 
 class SimulatedAxes:
-    """The models of all axes in motion."""
+    """The models of all axes in motion.
+
+    `measure()` gives what the encoders read, in axis order. `follow(acting)` moves the models on by one sample; with
+    no voltages given, the last ones are held.
+    """
 
     def __init__(self, plan: Plan):
         self.motions = [start(axis.model, plan.T) for axis in plan.axes]
-        self._encoders = [encoder(axis.axis.resolution) for axis in plan.axes] if plan.quantization else []
-        self._acting: Sequence[float] = [0.0] * len(self.motions)
+        reads = [
+            _measured(motion, axis.axis.resolution, plan.quantization)
+            for motion, axis in zip(self.motions, plan.axes, strict=True)
+        ]
+        writes = [motion.write for motion in self.motions]
+        held: Sequence[float] = [0.0] * len(writes)
 
-    def measure(self) -> list[float]:
-        """What the encoders read, in axis order."""
-        positions = [motion.read() for motion in self.motions]
-        if self._encoders:
-            return [measure(position) for measure, position in zip(self._encoders, positions, strict=True)]
-        return positions
+        def measure() -> Sequence[float]:
+            return [read() for read in reads]
 
-    def follow(self, acting: Sequence[float]) -> tuple[()]:
-        """Move on by one sample; with no voltages given, the last ones are held."""
-        self._acting = acting = acting or self._acting
-        for motion, voltage in zip(self.motions, acting, strict=True):
-            motion.write(voltage)
-        return ()
+        def follow(acting: Sequence[float]) -> tuple[()]:
+            nonlocal held
+            held = acting or held
+            for write, voltage in zip(writes, held, strict=True):
+                write(voltage)
+            return ()
+
+        self.measure, self.follow = measure, follow
+        if len(reads) == 1:  # the most frequent case by far, and twice as fast without the loops
+            (read,), (write,) = reads, writes
+
+            def measure_one() -> Sequence[float]:
+                return (read(),)
+
+            def follow_one(acting: Sequence[float]) -> tuple[()]:
+                nonlocal held
+                held = acting or held
+                write(held[0])
+                return ()
+
+            self.measure, self.follow = measure_one, follow_one
 
     def follow_and_tell(self, acting: Sequence[float]) -> list[float]:
-        """The same; returns the outputs as they were before."""
+        """`follow`, returning the outputs as they were before."""
         outputs = [motion.read() for motion in self.motions]
         self.follow(acting)
         return outputs
@@ -63,6 +83,16 @@ def start(model: Model, T: float) -> Motion:
     return motion
 
 
+def loop(
+    plan: Plan,
+    read: Callable[[], Sequence[float]],
+    write: Callable[[Sequence[float]], Sequence[float]],
+    follow: Callable[[Sequence[float]], Sequence[float]],
+) -> Loop:
+    """The loop of these parts in virtual time, its rows going nowhere."""
+    return Loop(plan.samples, _due, read, plan.laws(), write, follow, _dropped, _going_on)
+
+
 def at_once(voltages: Sequence[float]) -> Sequence[float]:
     """Without drivers, voltages act at once."""
     return voltages
@@ -71,3 +101,21 @@ def at_once(voltages: Sequence[float]) -> Sequence[float]:
 def nothing(acting: Sequence[float]) -> tuple[()]:
     """No model runs along."""
     return ()
+
+
+def _measured(motion: Motion, resolution: float, quantization: bool) -> Callable[[], float]:
+    """What the encoder reads of a motion."""
+    measure, read = encoder(resolution, quantization=quantization), motion.read
+    return read if measure is None else lambda: measure(read())
+
+
+def _due(k: int) -> int:
+    return k
+
+
+def _dropped(row: list[float]) -> None:
+    return None
+
+
+def _going_on(k: int) -> Ending | None:
+    return None

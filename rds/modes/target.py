@@ -12,6 +12,8 @@ import json
 import logging
 import signal
 import sys
+from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +23,11 @@ from rds.core.errors import ContractError, MachineError, RdsError
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.runtime.environment import prepare, stolen_ticks, surroundings
-from rds.runtime.loop import quiet_memory
 from rds.runtime.plan import Plan, load
 from rds.runtime.record import write_whole
 from rds.runtime.rehearsal import rehearse
 from rds.runtime.ring import Ring
+from rds.runtime.stopwatch import Stopwatch, quiet_memory
 
 REPORT = "target.json"
 log = logging.getLogger(__name__)
@@ -33,6 +35,7 @@ log = logging.getLogger(__name__)
 
 def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     """Take every sample of the plan; returns how it ended, why, and the environment."""
+    from rds.bus.command import Command
     from rds.bus.drivers import AxisDrivers
 
     mode = load_mode(plan.mode)
@@ -41,11 +44,16 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()
     drivers = None
+    stack = ExitStack()
     try:
-        drivers = AxisDrivers.open(plan.bus, plan.machine, plan.names, plan.T, dry_run=mode.drivers == "dry run")
+        if plan.bus["interface"] == "rds":
+            stack.enter_context(Command(plan.bus["channel"]))
+        drivers = AxisDrivers(
+            plan.machine, plan.names, sample_period=plan.T, dry_run=mode.drivers == "dry run", **plan.bus
+        )
         drivers.start()
         ring.beat(1)
-        loop = mode.build(plan, clock, drivers, ring.append, ring.stop_asked)
+        loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
         ring.beat(2)
         with quiet_memory():
@@ -62,8 +70,9 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
         report["reason"] = student_error(error, _source(plan))
     finally:
         if drivers is not None:
-            report["drivers"] = drivers.statistics()
+            report["drivers"] = asdict(drivers.counters)
             drivers.close()
+        stack.close()
         clock.close()
     after = stolen_ticks()
     environment["stolen_ticks"] = after - stolen if after is not None and stolen is not None else None

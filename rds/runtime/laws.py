@@ -10,6 +10,7 @@ import numpy as np
 
 from rds.core.errors import ContractError
 from rds.core.types import Controller, Reference
+from rds.interface import as_voltage
 from rds.runtime.loop import Law
 
 
@@ -47,12 +48,13 @@ def controlled(
         answer = control(k * T, r, y, state, params)
         try:
             u, state = answer
+            if type(u) is not float:
+                u = as_voltage(u)
             voltages.append(limit(u))
         except (TypeError, ValueError, ContractError):
             raise BrokenContract(_fault(answer, k * T, name)) from None
         row += r
-        row.append(y)
-        row.append(float(u))
+        row += (y, u)
 
     return law
 
@@ -94,8 +96,7 @@ def played(axis: int, signal: Sequence[float], limit: Callable[[Any], float]) ->
     def law(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
         u = signal[k]
         voltages.append(limit(u))
-        row.append(positions[axis])
-        row.append(u)
+        row += (positions[axis], u)
 
     return law
 

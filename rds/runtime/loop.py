@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from rds.core.contracts import Clock
 from rds.core.types import Ending
-
-TIMING_COLUMNS = ("sample", "lateness", "io", "compute", "model", "taken")
 
 Law = Callable[[int, Sequence[float], list[float], list[float]], None]
 
@@ -18,83 +14,55 @@ Law = Callable[[int, Sequence[float], list[float], list[float]], None]
 class Loop:
     """The parts of a run and how far it has come.
 
+    - `wait(k) -> k`: waits until sample `k` is due; returns the sample to take, later than `k` where the late
+      policy discarded periods.
     - `read() -> positions`: the measured position of each axis, in axis order.
     - `laws`: each is called with (sample, positions, row, voltages); it appends what it wants recorded to the row
       and its limited voltages to the list. See `runtime.laws`.
     - `write(voltages) -> acting`: hands the voltages out; returns those that act on the axes from this sample on.
-    - `follow(acting) -> outputs`: the models move on by one sample; returns what is to be recorded of them, as it
-      was at this sample.
-    - `record(row)`: takes the row: the `TIMING_COLUMNS` (times in ns), what the laws appended, the acting voltages, what the models gave.
-    - `stop() -> bool`: whether somebody asked for the end.
+    - `follow(acting) -> outputs`: the models move on by one sample (holding the last voltages when none are given);
+      returns what is to be recorded of them, as it was at this sample.
+    - `record(row)`: takes the row: the sample's number, what the laws appended, the acting voltages, the outputs.
+    - `finish(k) -> ending`: sample `k` is complete; how the run ends here, if it does.
     """
 
     samples: int
-    clock: Clock
+    wait: Callable[[int], int]
     read: Callable[[], Sequence[float]]
     laws: Sequence[Law]
     write: Callable[[Sequence[float]], Sequence[float]]
     follow: Callable[[Sequence[float]], Sequence[float]]
-    record: Callable[[list[float]], None]
-    stop: Callable[[], bool]
-    k: int = field(default=0)
+    record: Callable[[list[float]], object]
+    finish: Callable[[int], Ending | None]
+    k: int = 0
 
     def run(self, until: int | None = None) -> Ending | None:
         """Take the samples up to `until` (default: all); None means that there are more to take."""
-        clock = self.clock
-        now, wait, finish, lateness, taken = clock.now, clock.wait, clock.finish, clock.lateness, clock.taken
-        read, laws, write, follow = self.read, self.laws, self.write, self.follow
-        record, stop, samples = self.record, self.stop, self.samples
+        wait, read, laws, write = self.wait, self.read, self.laws, self.write
+        follow, record, finish, samples = self.follow, self.record, self.finish, self.samples
         until = samples if until is None else min(until, samples)
         k = self.k
         while k < until:
             due = wait(k)
-            if due != k:  # the late policy discarded the periods from k to due - 1: the models lived through them
+            if due != k:
                 for _ in range(k, min(due, samples)):
-                    follow(())
+                    follow(())  # the models live through the discarded periods
                 if due >= samples:
-                    k = samples
                     break
                 k = due
-            started = now()
             positions = read()
-            have_read = now()
-            taken_before = taken()
-            row: list[float] = [k, 0, 0, 0, 0, 0]
+            row: list[float] = [k]
             voltages: list[float] = []
             for law in laws:
                 law(k, positions, row, voltages)
-            computed = now()
             acting = write(voltages)
-            written = now()
             row += acting
             row += follow(acting)
-            ended = now()
-            row[1] = lateness(k, started)
-            row[2] = have_read - started + written - computed
-            row[3] = computed - have_read
-            row[4] = ended - written
-            row[5] = taken() - taken_before
             record(row)
-            late_too_often = finish(k, ended)
+            ending = finish(k)
             k += 1
-            if late_too_often:
+            if ending is not None:
                 self.k = k
-                return Ending.OVERLOADED
-            if stop():
-                self.k = k
-                return Ending.STOPPED
+                return ending
         self.k = k
-        return Ending.DONE if k >= samples else None
-
-
-class quiet_memory:
-    """Garbage collection frozen for as long as the loop runs: a collection pause is a late sample."""
-
-    def __enter__(self) -> None:
-        gc.collect()
-        gc.freeze()
-        gc.disable()
-
-    def __exit__(self, *_: object) -> None:
-        gc.enable()
-        gc.unfreeze()
+        return None if k < samples and until < samples else Ending.DONE

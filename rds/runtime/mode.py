@@ -7,26 +7,24 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from rds.core.clock import LatePolicy
-from rds.core.contracts import Clock, Drivers
+from rds.core.contracts import Drivers
 from rds.runtime.loop import Loop
 from rds.runtime.plan import Plan
-
-Record = Callable[[list[float]], None]
-Stop = Callable[[], bool]
 
 
 @dataclass(frozen=True)
 class Mode:
     """A mode: which parts make its loop.
 
-    `build(plan, clock, drivers, record, stop)` gives the loop. `drivers` says whether the mode needs the machine's
+    `build(plan, drivers)` gives the loop, in virtual time and without a record; `runtime.stopwatch` puts it under a
+    clock. `drivers` says whether the mode needs the machine's
     drivers: not at all, as a dry run (timed, without effect on the machine) or live. A mode with drivers runs in
     real time, in the target process. `followed` names the column of what its models give besides. `drives` says
     what may drive the axes.
     """
 
     name: str
-    build: Callable[[Plan, Clock, Drivers | None, Record, Stop], Loop]
+    build: Callable[[Plan, Drivers | None], Loop]
     drivers: Literal["none", "dry run", "live"]
     drives: tuple[Literal["controller", "signal"], ...]
     followed: str | None = None

@@ -13,7 +13,7 @@ from rds.core.types import Controller, Model
 from rds.interface import converter
 from rds.machines import Axis, Machine
 from rds.runtime.laws import ReferenceSamples, controlled, coupled, played
-from rds.runtime.loop import TIMING_COLUMNS, Law
+from rds.runtime.loop import Law
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ class Plan:
 
         `followed` names what the loop's models give besides ("modelled"), if they give anything.
         """
-        columns = list(TIMING_COLUMNS)
-        units = {"sample": "", **{name: "ns" for name in TIMING_COLUMNS[1:]}}
+        columns = ["sample"]
+        units = {"sample": ""}
         for plan in self.axes:
             name, unit = plan.axis.name, plan.axis.unit
             parts = {"measured": unit, "command": "V"}

@@ -1,0 +1,57 @@
+"""Who commands a channel of the built-in bus: one run at a time, so that two never drive the same axes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+
+from rds.bus.address import lock_file, runtime_directory
+from rds.core.errors import MachineError
+
+
+class Command:
+    """The command of a channel, held from acquire() to release() or the end of the process."""
+
+    def __init__(self, channel: str):
+        self.channel = channel
+        self._path = runtime_directory() / f"{channel}.command"
+        self._descriptor: int | None = None
+
+    def acquire(self) -> bool:
+        """Take the command; False if another run has it."""
+        while True:
+            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o600)
+            try:
+                lock_file(descriptor)
+            except OSError:
+                os.close(descriptor)
+                return False
+            with contextlib.suppress(OSError):
+                if os.fstat(descriptor).st_ino == self._path.stat().st_ino:
+                    self._descriptor = descriptor
+                    return True
+            os.close(descriptor)  # the holder before took this file away
+
+    def release(self) -> None:
+        """Give the command back."""
+        if self._descriptor is not None:
+            with contextlib.suppress(OSError):
+                self._path.unlink()
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def __enter__(self) -> Command:
+        if not self.acquire():
+            raise MachineError(f"another run commands the machine on channel {self.channel!r}; wait for it, or stop it")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def commanded(channel: str) -> bool:
+    """Whether a run commands the channel now."""
+    command = Command(channel)
+    free = command.acquire()
+    command.release()
+    return not free

@@ -1,0 +1,202 @@
+"""The command line: thin over the rest. What takes long to import is imported by the command that needs it.
+
+Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained on stderr.
+"""
+
+from __future__ import annotations
+
+import json as json_text
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Rapid development system for machine-tool axes: one controller file in simulation, emulation and "
+    "implementation.",
+)
+machine_app = typer.Typer(no_args_is_help=True, help="Machines: list them, or serve one on a CAN bus.")
+app.add_typer(machine_app, name="machine")
+
+Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
+Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]
+
+
+@app.command()
+def demo(out: Out = None, json: Json = False) -> None:
+    """Track a sine on X, Y and Z in all three modes, and show the published numbers beside ours."""
+    with refusals():
+        from rds.demo import run_demo
+
+        with progress_bars() as bar:
+            outcome = run_demo(out or Path("demo"), bar)
+    if json:
+        print_json(outcome.to_json())
+    else:
+        from rds.console import show_demo
+
+        show_demo(outcome)
+    for result in outcome.results.values():
+        explain(result)
+    raise typer.Exit(outcome.exit_code)
+
+
+@app.command()
+def run(
+    experiment: Annotated[Path, typer.Argument(help="The experiment, a TOML file.")],
+    mode: Annotated[
+        str | None, typer.Option("--mode", "-m", help="Run in this mode instead of the file's own.")
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+) -> None:
+    """Run an experiment and save its results: tables, plots and a report."""
+    with refusals():
+        from rds.experiment.report import exit_code, run_and_save, run_json
+
+        with progress_bars() as bar:
+            result, files = run_and_save(experiment, mode, out, bar(mode or "run"))
+    if json:
+        print_json(run_json(result, files))
+    else:
+        from rds.console import show_result
+
+        show_result(result, files)
+    code = exit_code(result)
+    explain(result)
+    raise typer.Exit(code)
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(help="A file with control(), derivatives(), advance() or interpolate().")],
+    sample_period: Annotated[float, typer.Option(help="Sample period that a call must fit into, s.")] = 0.001,
+    json: Json = False,
+) -> None:
+    """Say which interface a file fills, and whether it keeps it."""
+    with refusals():
+        from rds.checks import check_file
+
+        report = check_file(file, sample_period)
+    if json:
+        print_json(report.to_json())
+    else:
+        typer.echo(str(report))
+    raise typer.Exit(0 if report.ok else 1)
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="A saved result: a folder or a CSV, MAT or Parquet file.")],
+    b: Annotated[Path, typer.Argument(help="Another one.")],
+    json: Json = False,
+) -> None:
+    """Compare two saved results without running them again."""
+    with refusals():
+        from rds.results import open_result
+        from rds.results.compare import compare as compare_results
+
+        comparison = compare_results(open_result(a), open_result(b))
+    if json:
+        print_json(comparison.to_json())
+    else:
+        typer.echo(str(comparison))
+
+
+@machine_app.command("list")
+def machine_list(json: Json = False) -> None:
+    """The machines that come with the package."""
+    from rds.machines import load_machine, machine_names
+
+    machines = [load_machine(name) for name in machine_names()]
+    if json:
+        print_json({m.name: {"title": m.title, "axes": list(m.axes), "file": m.path} for m in machines})
+        return
+    for machine in machines:
+        typer.echo(f"{machine.name}: {machine.title}")
+        for axis in machine.axes.values():
+            low, high = axis.travel
+            typer.echo(f"  {axis.name:8} node {axis.node}, {low:g} to {high:g} {axis.unit}")
+
+
+@machine_app.command("serve")
+def machine_serve(
+    name: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
+    interface: Annotated[str, typer.Option(help="python-can interface.")] = "rds",
+    channel: Annotated[str | None, typer.Option(help="Channel of the bus; by default the machine's name.")] = None,
+) -> None:
+    """Run the machine's axis modules as CAN nodes, until Ctrl-C."""
+    with refusals():
+        from rds.bus.server import serve
+        from rds.machines import load_machine
+
+        machine = load_machine(name)
+        place = channel or machine.name
+
+        def ready() -> None:
+            typer.echo(
+                f"{machine.name}: {', '.join(machine.axes)} on {interface} channel {place}; Ctrl-C ends", err=True
+            )
+
+        serve(machine, interface, place, ready=ready)
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Errors that a user can act on go to stderr as a sentence, with exit code 2."""
+    from rds.core.errors import RdsError
+
+    try:
+        yield
+    except RdsError as error:
+        typer.echo(f"rds: {error}", err=True)
+        raise typer.Exit(2) from error
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
+    """Makes a progress function for a named stage: a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda name: lambda done, of: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+
+        def bar(name: str) -> Callable[[int, int], None]:
+            task = bars.add_task(name, total=None)
+            return lambda done, of: bars.update(task, completed=done, total=of)
+
+        yield bar
+
+
+def print_json(value: Any) -> None:
+    """One JSON object on stdout."""
+    typer.echo(json_text.dumps(value, allow_nan=False))
+
+
+def explain(result: Any) -> None:
+    """Say on stderr why a run that failed or is void is so."""
+    if result.meta.get("ending") != "done":
+        typer.echo(f"rds: the run ended early ({result.meta['ending']}): {result.meta.get('ending_reason')}", err=True)
+    if result.verdict in ("missed", "void"):
+        typer.echo(f"rds: timing {result.verdict}: {result.meta.get('verdict_reason')}", err=True)
+    for note in result.meta.get("notes", ()):
+        typer.echo(f"rds: note: {note}", err=True)
+
+
+def main() -> None:
+    """The console command `rds`."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""The machine behind the bus of a run: one that is there already, or one started for this run."""
+
+from __future__ import annotations
+
+import secrets
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from rds.core.errors import MachineError
+from rds.runtime.plan import Plan
+
+BUILTIN = "rds"
+
+
+@contextmanager
+def machine_behind(plan: Plan) -> Iterator[Plan]:
+    """The plan with its bus settled.
+
+    On a bus other than the built-in one, the machine is what is connected there. On the built-in bus, a machine
+    that is served on the channel (by default the machine's name) is used; where there is none, or another run
+    commands it, one is started for this run, on a channel of its own unless the channel was given.
+    """
+    bus = {"interface": BUILTIN, **plan.bus}
+    if bus["interface"] != BUILTIN:
+        yield replace(plan, bus=bus)
+        return
+    from rds.bus.address import channels
+    from rds.bus.command import commanded
+    from rds.bus.drivers import find_machine
+
+    given = bus.get("channel")
+    channel = str(given or plan.machine.name)
+    is_served = channel in channels() and bool(find_machine(plan.machine, BUILTIN, channel))
+    if is_served and (given or not commanded(channel)):
+        yield replace(plan, bus=bus | {"channel": channel})
+        return
+    if given is None:
+        channel = f"{plan.machine.name[:20]}-{secrets.token_hex(4)}"
+    server = _serve(plan.machine.path, channel)
+    try:
+        yield replace(plan, bus=bus | {"channel": channel})
+    finally:
+        server.terminate()
+        try:
+            server.wait(5)
+        except subprocess.TimeoutExpired:
+            server.kill()
+            server.wait()
+        for pipe in (server.stdin, server.stdout):
+            assert pipe is not None
+            pipe.close()
+
+
+def _serve(machine: str, channel: str) -> subprocess.Popen[bytes]:
+    """Start the machine's modules in a process of their own, and wait until they are on the bus."""
+    server = subprocess.Popen(
+        [sys.executable, "-m", "rds.bus.server", machine, "--channel", channel, "--exit-with-stdin"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    assert server.stdout is not None
+    line = server.stdout.readline()
+    if not line.startswith(b"ready"):
+        server.kill()
+        server.wait()
+        raise MachineError(f"the machine behind the built-in bus did not start: {line.decode(errors='replace')!r}")
+    return server
