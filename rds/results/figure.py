@@ -84,7 +84,7 @@ def legend(axes: Axes, columns: int = 4) -> None:
     )
     # a legend wider than its axes would make the layout shrink them; a blank title keeps just the height free
     drawn.set_in_layout(False)
-    axes.set_title("\n".join([" "] * -(-len(handles) // columns)), fontsize="small")
+    axes.set_title("\n".join([" "] * -(-len(handles) // columns)), fontsize="small", pad=9)
 
 
 def quantity(axis: str, unit: str) -> str:

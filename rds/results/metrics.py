@@ -56,7 +56,9 @@ def error_metrics(error: np.ndarray) -> dict[str, float | None]:
     if not len(error):
         return dict.fromkeys(ERROR_METRICS)
     size = np.abs(error)
-    values = (error.mean(), error.std(), size.mean(), size.std(), size.max(), math.sqrt(float(np.mean(error**2))))
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not defined, and comes out as None
+        rms = math.sqrt(float(np.mean(error**2)))
+        values = (error.mean(), error.std(), size.mean(), size.std(), size.max(), rms)
     return {name: _finite(value) for name, value in zip(ERROR_METRICS, values, strict=True)}
 
 
@@ -64,8 +66,10 @@ def fit_percent(measured: np.ndarray, modelled: np.ndarray) -> float | None:
     """100·(1 - ‖y - ŷ‖ / ‖y - mean(y)‖) in per cent; None if `measured` is constant or empty."""
     if not len(measured) or np.ptp(measured) == 0:
         return None
-    spread = float(np.linalg.norm(measured - np.mean(measured)))
-    return _finite(100.0 * (1.0 - float(np.linalg.norm(measured - modelled)) / spread)) if spread else None
+    with np.errstate(over="ignore", invalid="ignore"):
+        spread = float(np.linalg.norm(measured - np.mean(measured)))
+        miss = float(np.linalg.norm(measured - modelled))
+    return _finite(100.0 * (1.0 - miss / spread)) if spread else None
 
 
 def settled(result: Result, axis: str) -> slice:

@@ -1,0 +1,150 @@
+"""Every picture has something in it, units on its axes, and needs neither pyplot nor a display."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from made_results import make_result
+from matplotlib.image import imread
+
+from rds.core.errors import InputError
+from rds.results import Result, compare, plots, plots_overlay, plots_timing
+from rds.results.figure import CYCLE, Picture
+
+MODES = [make_result("simulation", "XY"), make_result("emulation", "XY"), make_result("implementation", "XY")]
+PICTURES: dict[str, Any] = {
+    "overview": lambda: MODES[2].plot("X"),
+    "overview of all axes": lambda: MODES[2].plot(),
+    "response": lambda: plots.response(MODES[2], "X"),
+    "error": lambda: plots.error(MODES[2], "Y"),
+    "voltage": lambda: plots.voltage(MODES[2]),
+    "timing": lambda: plots_timing.timing(MODES[2]),
+    "modes": lambda: plots_overlay.modes(MODES),
+    "comparison": lambda: compare(MODES[0], MODES[2]).plot(),
+}
+
+
+def drawn(picture: Picture, tmp_path: Any) -> np.ndarray:
+    (tmp_path / "picture.png").write_bytes(picture.png())
+    return imread(tmp_path / "picture.png")
+
+
+@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.filterwarnings("error")
+def test_a_picture_is_labelled_and_not_cut_off(name: str, tmp_path: Any) -> None:
+    picture = PICTURES[name]()
+    pixels = drawn(picture, tmp_path)[:, :, :3]
+    assert pixels.shape[1] >= 1280
+    assert pixels.min(axis=2).std() > 0.02, "nearly blank"
+    for axes in picture.axes:
+        assert axes.lines or axes.patches
+        assert axes.get_ylabel() == "number of samples" or "[" in axes.get_ylabel(), "no unit"
+        assert axes.get_xlabel() == "" or "[" in axes.get_xlabel()
+        box = axes.get_position()
+        assert box.width > 0.2 and box.height > 0.1, "squeezed"
+        legend = axes.get_legend()
+        if legend is not None:
+            assert legend.get_window_extent().x1 <= picture.bbox.x1, "legend cut off"
+            assert legend.get_window_extent().y1 <= picture.bbox.y1, "legend cut off"
+    assert any("[" in axes.get_xlabel() for axes in picture.axes)
+
+
+def labels(picture: Picture) -> str:
+    return " ".join(text for axes in picture.axes for text in axes.get_legend_handles_labels()[1])
+
+
+def test_the_response_shows_all_four(result: Result) -> None:
+    assert labels(plots.response(result)).split() == ["reference", "measured", "modelled", "simulated"]
+
+
+def test_the_error_shows_means_and_late_samples(result: Result) -> None:
+    said = labels(plots.error(result))
+    assert "mean |error| 0.0283" in said
+    assert "late: 3" in said
+
+
+def test_the_voltage_shows_the_limits(result: Result) -> None:
+    assert "limit ±10 V" in labels(plots.voltage(result))
+    without = Result(result.columns, result.units, {k: v for k, v in result.meta.items() if k != "voltage_range"})
+    assert "limit" not in labels(plots.voltage(without))
+
+
+def test_the_timing_marks_period_and_late_samples(result: Result) -> None:
+    said = labels(plots_timing.timing(result))
+    assert "period 1000 µs" in said
+    assert "late: 3 of 10000 samples" in said
+    assert "lateness (system)" in said and "I/O (bus)" in said and "compute (controller)" in said
+
+
+def test_the_first_sample_is_never_late() -> None:
+    columns = {"time": [0.0, 0.1, 0.2], "lateness": [5e5, 1e5, 1e5], "io": [0.0, 0.0, 1.0]}
+    result = Result(columns, meta={"axes": ["X"], "sample_period": 0.1})
+    from rds.results.late import late_samples
+
+    late = late_samples(result)
+    assert late is not None and late.tolist() == [False, False, True]
+
+
+def test_model_validation_shows_the_models_error() -> None:
+    full = make_result("model-validation", seconds=1.0)
+    columns = {k: v for k, v in full.columns.items() if "reference" not in k and "simulated" not in k}
+    picture = Result(columns, meta=full.meta).plot("X")
+    assert [axes.get_ylabel() for axes in picture.axes] == [
+        "X position [mm]",
+        "X measured − modelled [mm]",
+        "X voltage [V]",
+    ]
+
+
+def test_a_spindle_is_drawn_in_its_unit() -> None:
+    columns = {"time": [0.0, 0.1], "spindle_measured": [0.0, 900.0]}
+    meta = {"axes": ["spindle"], "sample_period": 0.1}
+    picture = Result(columns, {"spindle_measured": "rev/min"}, meta).plot()
+    assert picture.axes[0].get_ylabel() == "spindle speed [rev/min]"
+
+
+def test_a_few_samples_or_none_are_drawn_without_a_warning() -> None:
+    import warnings
+
+    for seconds in (0.0, 0.001, 0.002):
+        result = make_result("implementation", seconds=seconds)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            result.plot().png()
+            plots_timing.timing(result).png()
+
+
+def test_what_cannot_be_drawn_is_refused(result: Result) -> None:
+    with pytest.raises(InputError, match="no axis 'Q'; it has X"):
+        result.plot("Q")
+    with pytest.raises(InputError, match=r"simulation.*has no timing"):
+        plots_timing.timing(make_result("simulation", seconds=0.1))
+    with pytest.raises(InputError, match="at least one"):
+        plots_overlay.modes([])
+    with pytest.raises(InputError, match="nothing to draw of X"):
+        Result({"time": [0.0]}, meta={"axes": ["X"], "sample_period": 1}).plot()
+
+
+def test_pictures_are_drawn_in_any_thread_and_show_themselves(result: Result) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        pictures = list(pool.map(lambda _: result.plot()._repr_png_(), range(4)))
+    assert len(set(pictures)) == 1
+    assert pictures[0].startswith(b"\x89PNG")
+
+
+def test_no_pyplot() -> None:
+    modules = "plots, plots_timing, plots_overlay"
+    program = f"import sys; from rds.results import {modules}; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_the_colours_are_distinct_when_grey() -> None:
+    from matplotlib.colors import to_rgb
+
+    greys = sorted(float(np.dot(to_rgb(colour), [0.299, 0.587, 0.114])) for colour in CYCLE[:3])
+    assert np.diff(greys).min() > 0.01
