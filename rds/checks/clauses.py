@@ -33,6 +33,7 @@ END = "ends at the segment's end"
 PATH = "stays on the path"
 VELOCITY = "velocity agrees with position"
 FEED = "takes the time that the feed rate gives"
+SWEEP = "goes round the arc in its direction"
 SEGMENTS = "kinds of segments"
 NO_GLOBALS = "keep no memory between calls"
 

@@ -18,7 +18,7 @@ from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
 from rds.checks.values import same, shown, size
-from rds.core.blame import student_error
+from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
 
@@ -111,7 +111,7 @@ class _Run:
             cpu, started = time.thread_time_ns(), time.perf_counter_ns()
             try:
                 answer = self.function(t, r, y, state, params)
-            except Exception as error:
+            except STUDENT_ERRORS as error:
                 return self._failed(error, t, before)
             ended = time.perf_counter_ns()
             self.ns.append(ended - started)
@@ -160,7 +160,7 @@ class _Run:
             self.found.fault(clause, f"control() returned {said} at t = {t:.3f} s; {remedy}")
         return fault is None
 
-    def _failed(self, error: Exception, t: float, before: tuple[Any, ...]) -> None:
+    def _failed(self, error: BaseException, t: float, before: tuple[Any, ...]) -> None:
         said = student_error(error, self.source)
         if not self.axes and self._works_with_arrays():
             remedy = "it works with arrays of several axes: check and run it as a coupled controller"
@@ -189,7 +189,7 @@ class _Run:
                 state,
                 copy.deepcopy(self.params),
             )
-        except Exception:
+        except STUDENT_ERRORS:
             return False
         return voltage_fault(answer, 2) is None
 
@@ -221,7 +221,7 @@ class _Run:
                     answer = self.function(
                         0.0, r, measured if self.axes else y, copy.deepcopy(state), copy.deepcopy(self.params)
                     )
-                except Exception as error:
+                except STUDENT_ERRORS as error:
                     return self.found.fault(
                         clauses.RUNS, f"control() failed {given}: {student_error(error, self.source)}"
                     )
@@ -230,7 +230,7 @@ class _Run:
         return None
 
 
-def _is_about_state(error: Exception) -> bool:
+def _is_about_state(error: BaseException) -> bool:
     return isinstance(error, IndexError | KeyError | TypeError | ValueError | AttributeError)
 
 

@@ -69,7 +69,9 @@ def judge_memory(
         found.fault(clauses.DETERMINISTIC, _chance(what, difference, function))
     else:
         where = f", in {places[0]}" if places else ""
-        found.fault(clause, f"{what} remembers something else{where}: {difference.text}; {REMEDIES[clause]}")
+        found.fault(
+            clause, f"{what} remembers something outside its arguments{where}: {difference.text}; {REMEDIES[clause]}"
+        )
 
 
 def _chance(what: str, difference: Difference, function: Any) -> str:

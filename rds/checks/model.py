@@ -17,13 +17,14 @@ from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
 from rds.checks.values import same, shown
 from rds.checks.vectors import is_ragged, output_fault, vector_fault, vector_of
-from rds.core.blame import student_error
+from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.signature import argument_fault
 from rds.core.types import Model
 
 BUDGET = 2.0  # s for each pass over the run
 SUBSTEPS = 2  # of RK4 in each sample: the check wants the path's kind, not its digits
 _LEAST = 5
+_MOST_STATES = 6
 _REST, _PUSH, _SWING = 50, 200, 200  # samples without voltage, at each of ±5 V, and of a 5 Hz sine
 _VOLTAGE = 5.0  # V
 _RUNAWAY = 1e9  # a state beyond it is unstable, or stiffer than RK4 can follow
@@ -102,27 +103,26 @@ class _Check:
         return None
 
     def _has_initial_state(self) -> bool:
+        """Whether the run can begin: with what the student gave, else with [0.0, 0.0]."""
         given = self.subject.student.initial_state
-        if given is None:
-            return self._fits_default_state()
-        vector = vector_of(given)
+        vector = self.x0 if given is None else vector_of(given)
         if vector is None or not vector.size or not np.isfinite(vector).all():
             remedy = "write a list of finite numbers, as in `initial_state = [0.0, 0.0]`"
             self.found.fault(clauses.INITIAL_STATE, f"initial_state is {shown(given)}; {remedy}")
             return False
         self.x0 = vector
-        return True
-
-    def _fits_default_state(self) -> bool:
-        """Whether [0.0, 0.0] will do; if not, how many states would."""
-        if self._size_for(2) == 2:
+        if self._size_for(vector.size) == vector.size:
             return True
-        for n in (3, 1, 4, 5, 6):
-            if self._size_for(n) == n:
-                said = f"there is no initial_state, and {self.role}() works with {n} states, not with the default 2"
-                self.found.fault(clauses.INITIAL_STATE, f"{said}; define initial_state = {[0.0] * n}")
-                return False
-        return True  # it works with no number of states: the run says why
+        fitting = [n for n in range(1, _MOST_STATES + 1) if self._size_for(n) == n]
+        if not fitting:
+            return True  # it works with no number of states: the run says why
+        said = "there is no initial_state" if given is None else f"initial_state has {_count(vector.size)}"
+        remedy = f"define initial_state = {[0.0] * fitting[0]}"
+        if "control" in self.subject.student.functions:
+            remedy += ", and put the controller, whose state it is, into a file of its own"
+        message = f"{said}, and {self.role}() works with {_count(fitting[0])}"
+        self.found.fault(clauses.INITIAL_STATE, f"{message}; {remedy}")
+        return False
 
     def _size_for(self, n: int) -> int:
         subject = self.subject
@@ -130,7 +130,7 @@ class _Check:
         function = subject.fresh().functions[self.role] if subject.fresh else self.function
         try:
             answer = vector_of(function(*self._arguments(0.0, np.zeros(n), 0.0), copy.deepcopy(self.params)))
-        except Exception:
+        except STUDENT_ERRORS:
             return 0
         return 0 if answer is None else answer.size
 
@@ -184,7 +184,7 @@ class _Check:
         started = time.perf_counter_ns()
         try:
             answer = self.function(*arguments, params)
-        except Exception as error:
+        except STUDENT_ERRORS as error:
             self.found.fault(clauses.RUNS, f"{self.role}() failed {situation}: {student_error(error, self.source)}")
             return None
         self.ns.append(time.perf_counter_ns() - started)
@@ -209,7 +209,7 @@ class _Check:
         try:
             answers = [self.output(t, given, np.zeros(1), self.params) for _ in range(2)]
             other = self.output(t, x.copy(), np.array([u]), self.params)
-        except Exception as error:
+        except STUDENT_ERRORS as error:
             self.found.fault(clauses.RUNS, f"output() failed {situation}: {student_error(error, self.source)}")
             return False
         if fault := output_fault(answers[0]):
@@ -250,7 +250,7 @@ class _Check:
             twice = vector_of(self.function(once, voltage, self.T, self.params))
             both = vector_of(self.function(x.copy(), voltage, 2 * self.T, self.params))
             assert twice is not None and both is not None
-        except Exception as error:
+        except STUDENT_ERRORS as error:
             said = f"advance() failed over 2T: {student_error(error, self.source)}"
             return self.found.warn(clauses.SAMPLE_TIME, said)
         moved = np.abs(twice - x).max()
@@ -259,6 +259,10 @@ class _Check:
             remedy = "use T in it, or keep to the sample period that it was made for"
             self.found.warn(clauses.SAMPLE_TIME, f"{said}; {remedy}")
         return None
+
+
+def _count(states: int) -> str:
+    return f"{states} state{'s' if states != 1 else ''}"
 
 
 def _voltages(T: float) -> np.ndarray:

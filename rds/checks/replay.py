@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rds.checks.values import same, shown
-from rds.core.blame import student_error
+from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.types import Source
 
 
@@ -59,7 +59,7 @@ class Replay:
             started = time.perf_counter_ns()
             try:
                 answer = self.function(*arguments, self.params)
-            except Exception as error:
+            except STUDENT_ERRORS as error:
                 return Difference(f"call {k} failed {when}: {student_error(error, self.source)}")
             self.ns[k] = min(time.perf_counter_ns() - started, self.ns.get(k, 1 << 62))
             if not same(answer, call.answer):

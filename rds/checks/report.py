@@ -44,6 +44,7 @@ class CheckReport:
     faults: tuple[Fault, ...] = ()
     warnings: tuple[Fault, ...] = ()
     timing: Timing | None = None
+    notes: tuple[str, ...] = ()  # what it does and does not do, neither good nor bad
 
     @property
     def ok(self) -> bool:
@@ -64,6 +65,7 @@ class CheckReport:
             "ok": self.ok,
             "faults": [{"clause": f.clause, "message": f.message} for f in self.faults],
             "warnings": [{"clause": f.clause, "message": f.message} for f in self.warnings],
+            "notes": list(self.notes),
             "timing": timing,
         }
 
@@ -72,6 +74,7 @@ class CheckReport:
         lines = [f"{self.name}: the {self.interface} {verdict}"]
         lines += [f"  fault: {fault}" for fault in self.faults]
         lines += [f"  warning: {warning}" for warning in self.warnings]
+        lines += [f"  {note}" for note in self.notes]
         if self.timing:
             lines.append(f"  time: {self.timing}")
         return "\n".join(lines)
@@ -79,10 +82,14 @@ class CheckReport:
 
 @dataclass(frozen=True)
 class FileReport:
-    """The verdict on a student's file: one report for each interface that it fills."""
+    """The verdict on a student's file (or function, or notebook): one report for each interface that it fills.
+
+    A file that was not even loaded when its process ended has one report on the interface "file".
+    """
 
     path: str
     reports: tuple[CheckReport, ...]
+    warnings: tuple[Fault, ...] = ()
 
     @property
     def interfaces(self) -> tuple[str, ...]:
@@ -96,10 +103,16 @@ class FileReport:
 
     def to_json(self) -> dict[str, Any]:
         """As plain dicts, lists, strings and numbers."""
-        return {"path": self.path, "ok": self.ok, "reports": [report.to_json() for report in self.reports]}
+        return {
+            "path": self.path,
+            "interfaces": list(self.interfaces),
+            "ok": self.ok,
+            "reports": [report.to_json() for report in self.reports],
+            "warnings": [{"clause": f.clause, "message": f.message} for f in self.warnings],
+        }
 
     def __str__(self) -> str:
-        return "\n".join(map(str, self.reports))
+        return "\n".join([*map(str, self.reports), *(f"warning: {warning}" for warning in self.warnings)])
 
 
 class Findings:
@@ -108,6 +121,7 @@ class Findings:
     def __init__(self) -> None:
         self.faults: list[Fault] = []
         self.warnings: list[Fault] = []
+        self.notes: list[str] = []
 
     def fault(self, clause: str, message: str) -> None:
         """Note a broken clause."""
@@ -119,7 +133,7 @@ class Findings:
 
     def report(self, interface: str, name: str, timing: Timing | None = None) -> CheckReport:
         """All of it."""
-        return CheckReport(interface, name, tuple(self.faults), tuple(self.warnings), timing)
+        return CheckReport(interface, name, tuple(self.faults), tuple(self.warnings), timing, tuple(self.notes))
 
 
 def _add(found: list[Fault], clause: str, message: str) -> None:
@@ -133,15 +147,18 @@ def read_report(data: Any) -> CheckReport:
         raise ValueError(f"a report is a table, not {data!r:.80}")
     timing = data.get("timing")
     if timing is not None:
-        if not isinstance(timing, dict) or not all(_is_number(timing.get(key)) for key in ("p50", "p99", "max")):
+        keys = ("calls", "p50", "p99", "max")
+        if not isinstance(timing, dict) or not all(_is_number(timing.get(key)) for key in keys):
             raise ValueError(f"timing is {timing!r:.80}")
-        timing = Timing(int(timing.get("calls", 0)), timing["p50"], timing["p99"], timing["max"])
-    return CheckReport(
-        _text(data, "interface"), _text(data, "name"), _faults(data, "faults"), _faults(data, "warnings"), timing
-    )
+        timing = Timing(*(timing[key] for key in keys))
+    notes = data.get("notes", [])
+    if not isinstance(notes, list) or not all(isinstance(note, str) for note in notes):
+        raise ValueError(f"notes is {notes!r:.80}")
+    faults, warnings = read_faults(data, "faults"), read_faults(data, "warnings")
+    return CheckReport(_text(data, "interface"), _text(data, "name"), faults, warnings, timing, tuple(notes))
 
 
-def _faults(data: dict[str, Any], key: str) -> tuple[Fault, ...]:
+def read_faults(data: dict[str, Any], key: str) -> tuple[Fault, ...]:
     entries = data.get(key)
     if not isinstance(entries, Sequence) or isinstance(entries, str) or not all(isinstance(e, dict) for e in entries):
         raise ValueError(f"{key} is {entries!r:.80}")

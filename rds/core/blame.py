@@ -9,6 +9,9 @@ from traceback import extract_tb
 
 from rds.core.types import Source
 
+STUDENT_ERRORS = (Exception, SystemExit)
+"""What a student's code may raise and its caller answers for; Ctrl-C is the user's."""
+
 _LONGEST = 300  # characters of an exception's own text; some print whole arrays
 
 

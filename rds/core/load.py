@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rds.core.blame import student_error, student_line
+from rds.core.blame import STUDENT_ERRORS, student_error, student_line
 from rds.core.errors import ContractError, InputError
 from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
 from rds.core.types import Controller, Reference, Source
@@ -160,7 +160,7 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
             "define initial_state, as in `initial_state = [0.0]`",
             source.path or source.name,
         ) from error
-    except Exception:
+    except STUDENT_ERRORS:
         return  # not for want of a state: whoever runs it reports it
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.blame import student_error
+from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import ContractError
 from rds.core.load import StudentFile
 from rds.core.signature import form
@@ -51,7 +51,7 @@ def _check_default_state(
     except (IndexError, TypeError, ValueError) as error:
         said = student_error(error, student.source)
         raise ContractError(f"{missing}: {said}; define initial_state with one number for each state", where) from error
-    except Exception:
+    except STUDENT_ERRORS:
         return  # not for want of a state: whoever runs it reports it
     if size != len(DEFAULT_STATE):
         raise ContractError(f"{missing}: it returns {size} values; define initial_state = {[0.0] * size}", where)
