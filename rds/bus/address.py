@@ -81,13 +81,26 @@ class Address:
         """
         descriptor = os.open(self.lock_path, os.O_RDWR | os.O_CREAT, 0o600)
         try:
-            _lock(descriptor)
+            lock_file(descriptor)
             if os.fstat(descriptor).st_ino == self.lock_path.stat().st_ino:
                 return descriptor  # not one that a hub has just removed at its end
         except OSError:
             pass
         os.close(descriptor)
         return None
+
+    def sign(self, lock: int) -> None:
+        """Write this process's id into the lock's file, for whoever wonders who holds it."""
+        os.lseek(lock, 0, os.SEEK_SET)
+        os.truncate(lock, 0)
+        os.write(lock, b"%d\n" % os.getpid())
+
+    def holder(self) -> int | None:
+        """The process id of the hub, if it lives or was killed."""
+        try:
+            return int(self.lock_path.read_text())
+        except (OSError, ValueError):
+            return None
 
     def remove(self, with_log: bool = False) -> None:
         """Take the address away, so that nobody connects any more. Only the holder of the lock may."""
@@ -98,7 +111,7 @@ class Address:
             self.lock_path.unlink(missing_ok=True)
 
 
-def _lock(descriptor: int) -> None:
+def lock_file(descriptor: int) -> None:
     """Lock the whole file, or raise OSError at once."""
     try:
         import fcntl

@@ -7,6 +7,7 @@ carries all frames in one order and loses none: when a node reads too slowly, se
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import os
 import select
@@ -52,6 +53,7 @@ class BuiltinBus(can.BusABC):
                 f"the built-in bus has no option {', '.join(sorted(options))}; "
                 "it takes channel, can_filters and receive_own_messages (python-can's files and variables count too)"
             )
+        can_filters = list(can_filters or ()) or None
         self._channel = str(channel)
         self.channel_info = f"built-in bus channel {self._channel!r}"
         self._can_protocol = can.CanProtocol.CAN_FD
@@ -68,7 +70,7 @@ class BuiltinBus(can.BusABC):
         self._node = connection.node
         self.hub_pid = connection.hub_pid
         self._joined = True
-        self._filters = can_filters or None
+        self._filters = can_filters
         self._periodic_tasks = []
         self._is_shutdown = False
 
@@ -287,6 +289,8 @@ def _as_filters(filters: Any) -> list[wire.Filter]:
 def _wait(sock: socket.socket, writing: bool, timeout: float | None) -> bool:
     """Wait until the socket is ready; `select` is exact to the µs, `poll` (for high descriptors) to the ms."""
     fd = sock.fileno()
+    if fd < 0:
+        raise OSError(errno.EBADF, "closed")
     if fd < 1024 or not hasattr(select, "poll"):
         ready = select.select([] if writing else [fd], [fd] if writing else [], [], timeout)
         return bool(ready[0] or ready[1])

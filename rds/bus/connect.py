@@ -50,7 +50,7 @@ def join(channel: str, receive_own: bool, filters: Sequence[wire.Filter], timeou
                 _start_hub_on_windows(address, deadline)
         elif time.monotonic() > deadline:
             raise TimeoutError(
-                f"channel {channel!r} has a hub that does not listen; end the process that holds {address.lock_path}"
+                f"channel {channel!r} has a hub that does not listen; end process {address.holder() or 'unknown'}"
             )
         else:
             time.sleep(_RETRY)
@@ -89,7 +89,9 @@ def _attempt(address: Address, hello: wire.Hello, filters: Sequence[wire.Filter]
         return None
     except TimeoutError:
         sock.close()
-        raise TimeoutError(f"the hub of channel {address.channel!r} does not answer; is it stopped?") from None
+        raise TimeoutError(
+            f"the hub of channel {address.channel!r} does not answer; is process {address.holder()} stopped?"
+        ) from None
     except wire.WireError as error:
         sock.close()
         raise ConnectionRefusedError(f"the hub of channel {address.channel!r} refused: {error}") from error

@@ -43,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     if options.detach and not _detach(address):
         os._exit(0)  # the starter's wait is over: the hub listens
+    address.sign(lock)
     _serve(hub)
     return 0
 

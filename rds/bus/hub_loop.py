@@ -298,7 +298,8 @@ class Hub:
             if node.state is State.GREETING and now - node.moved_at > GREETING * SECOND:
                 self._expel(node, "no hello came")
         if not self._address.path.exists():
-            raise RuntimeError(f"its address {self._address.path} was removed")
+            log(f"{self._address.path} is gone: nobody new could come in, and a second hub might start")
+            raise RuntimeError("the channel's address was removed")
         return bool(self._members) or now - self._left_at < self._linger
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import gc
 import logging
+import os
 import signal
 import sys
 import threading
@@ -200,7 +201,7 @@ def _watch_stdin() -> threading.Event:
     ended = threading.Event()
 
     def read_to_end() -> None:
-        while sys.stdin.buffer.read(1):
+        while os.read(0, 4096):  # not sys.stdin: a thread in its lock would spoil the interpreter's end
             pass
         ended.set()
 

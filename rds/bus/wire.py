@@ -80,7 +80,7 @@ def decode_hello(data: bytes) -> Hello:
         raise WireError(f"the first record is of kind {data[12]} instead of a hello")
     magic, purpose, receive_own, filters, node, token = _HELLO.unpack_from(data, HEADER.size)
     if magic != _MAGIC:
-        raise WireError(f"the hello begins with {magic!r} instead of {_MAGIC!r}: another program or version")
+        raise WireError("a hello of another program or version")
     if purpose not in (JOIN, RETUNE):
         raise WireError(f"the hello's purpose {purpose} is unknown")
     return Hello(purpose, bool(receive_own), filters, node, token)

@@ -1,0 +1,280 @@
+"""Nodes and hubs that are killed, stopped or talk rubbish: a clear error where it belongs, nothing elsewhere."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+
+from rds.bus import wire
+
+from .conftest import FORK, wait_for
+
+Opener = Callable[..., can.BusABC]
+
+
+def numbered(k: int) -> can.Message:
+    return can.Message(arbitration_id=1, is_extended_id=False, data=k.to_bytes(8, "little"))
+
+
+def sit(ready: Any) -> None:
+    """A node that reads nothing."""
+    bus = can.Bus(interface="rds", channel="test")
+    ready.set()
+    time.sleep(60)
+    bus.shutdown()
+
+
+def read_to_the_end(ready: Any, result: Any) -> None:
+    """Count frames until the bus ends; send back the count and the error."""
+    logging.disable(logging.CRITICAL)
+    count = 0
+    with can.Bus(interface="rds", channel="test") as bus:
+        ready.set()
+        try:
+            while True:
+                count += bus.recv(1.0) is not None
+        except can.CanOperationError as error:
+            result.put((count, str(error)))
+
+
+def fill(bus: can.BusABC) -> int:
+    """Send until the bus takes no more; return how many frames it took."""
+    sent = 0
+    try:
+        while sent < 100_000:
+            bus.send(numbered(sent), timeout=0.1)
+            sent += 1
+    except can.CanTimeoutError:
+        return sent
+    raise AssertionError("the bus never filled")
+
+
+def test_a_killed_reader_holds_nobody_up(
+    start: Callable[..., Any], hub: Callable[..., Any], open_bus: Opener
+) -> None:
+    hub("test", "--queue", "8000")
+    ready = FORK.Event()
+    reader = start(sit, ready)
+    ready.wait()
+    bus = open_bus()
+    fill(bus)
+    reader.kill()
+    for k in range(2000):
+        bus.send(numbered(k), timeout=1.0)
+
+
+def test_a_stopped_reader_is_let_go_and_told_why(
+    start: Callable[..., Any], hub: Callable[..., Any], open_bus: Opener
+) -> None:
+    process = hub("test", "--queue", "8000", "--stall", "0.5")
+    ready, result = FORK.Event(), FORK.Queue()
+    reader = start(read_to_the_end, ready, result)
+    ready.wait()
+    os.kill(reader.pid, signal.SIGSTOP)
+    bus, witness = open_bus(), open_bus()
+    seen: list[int] = []
+
+    def read() -> None:
+        while (message := witness.recv(1.0)) is not None:
+            seen.append(int.from_bytes(message.data, "little"))
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    sent = fill(bus)
+    begin = time.monotonic()
+    bus.send(numbered(sent), timeout=2.0)
+    assert time.monotonic() - begin < 1.0
+    thread.join()
+    assert seen == list(range(sent + 1))
+    os.kill(reader.pid, signal.SIGCONT)
+    count, error = result.get(timeout=5)
+    assert "read nothing for 0.5 s while others waited" in error
+    assert 0 < count < sent
+    process.terminate()
+    assert "read nothing for 0.5 s" in process.communicate(timeout=5)[1]
+
+
+def test_a_node_that_was_let_go_learns_it_when_it_sends(
+    hub: Callable[..., Any], open_bus: Opener, caplog: pytest.LogCaptureFixture
+) -> None:
+    hub("test", "--queue", "8000", "--stall", "0.3")
+    bus, lazy = open_bus(), open_bus()
+    fill(bus)
+    bus.send(numbered(0), timeout=2.0)
+    with pytest.raises(can.CanOperationError, match="read nothing for 0.3 s"):
+        lazy.send(numbered(0))
+    assert "read nothing" in caplog.text
+    received = 0
+    with pytest.raises(can.CanOperationError, match="read nothing"):
+        while lazy.recv(0) is not None:
+            received += 1
+    assert received > 100, "what had arrived stays readable"
+
+
+def send_for_ever() -> None:
+    with can.Bus(interface="rds", channel="test", can_filters=[{"can_id": 0, "can_mask": 0x7FF}]) as bus:
+        k = 0
+        while True:
+            bus.send(numbered(k))
+            k += 1
+
+
+def test_a_killed_sender_leaves_whole_frames(start: Callable[..., Any], open_bus: Opener) -> None:
+    bus, other = open_bus(), open_bus(can_filters=[{"can_id": 2, "can_mask": 0x7FF}])
+    sender = start(send_for_ever)
+    for k in range(2000):
+        message = bus.recv(2.0)
+        assert message is not None and int.from_bytes(message.data, "little") == k
+    sender.kill()
+    k = 2000
+    while (message := bus.recv(0.2)) is not None:
+        assert int.from_bytes(message.data, "little") == k
+        k += 1
+    bus.send(can.Message(arbitration_id=2, is_extended_id=False))
+    assert other.recv(1.0) is not None
+
+
+def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest.LogCaptureFixture) -> None:
+    first, second, third = open_bus(), open_bus(), open_bus()
+    waiting: list[BaseException] = []
+
+    def wait() -> None:
+        try:
+            third.recv(None)
+        except can.CanOperationError as error:
+            waiting.append(error)
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    os.kill(first.hub_pid, signal.SIGKILL)
+    with pytest.raises(can.CanOperationError, match=rf"hub \(process {first.hub_pid}\) ended without a word"):
+        first.recv(1.0)
+    with pytest.raises(can.CanOperationError, match="ended without a word"):
+        second.send(numbered(0))
+    thread.join(1.0)
+    assert len(waiting) == 1
+    assert caplog.text.count("ended without a word") >= 3
+    for bus in (first, second, third):
+        with pytest.raises(can.CanOperationError):
+            bus.recv(0)
+    again, other = open_bus(), open_bus()
+    again.send(numbered(5))
+    assert other.recv(1.0) is not None
+
+
+def test_a_hub_that_is_told_to_end_says_so(hub: Callable[..., Any], open_bus: Opener) -> None:
+    process = hub()
+    bus = open_bus()
+    process.terminate()
+    with pytest.raises(can.CanOperationError, match="the hub was told to end"):
+        bus.recv(1.0)
+
+
+def test_an_address_that_was_removed_ends_the_bus_loudly(open_bus: Opener, runtime_directory: Path) -> None:
+    bus = open_bus()
+    (runtime_directory / "rds" / "test.sock").unlink()
+    with pytest.raises(can.CanOperationError, match="was removed"):
+        bus.recv(3.0)
+
+
+def test_an_event_loop_hears_of_the_end_once(open_bus: Opener) -> None:
+    bus = open_bus()
+    errors: list[str] = []
+
+    async def watch() -> None:
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, context: errors.append(str(context["exception"])))
+        notifier = can.Notifier(bus, [can.AsyncBufferedReader()], timeout=0.1, loop=loop)
+        os.kill(bus.hub_pid, signal.SIGKILL)
+        await asyncio.sleep(0.2)
+        notifier.stop()
+
+    asyncio.run(watch())
+    assert len(errors) == 1 and "ended without a word" in errors[0]
+
+
+def test_a_stopped_hub_is_named(hub: Callable[..., Any], open_bus: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    process = hub()
+    os.kill(process.pid, signal.SIGSTOP)
+    monkeypatch.setattr("rds.bus.connect.join.__defaults__", (0.3,))
+    with pytest.raises(can.CanInitializationError, match="does not answer"):
+        open_bus()
+
+
+HELLO = wire.encode_hello(wire.Hello(wire.JOIN, False, 0, 0, bytes(32)))
+
+
+@pytest.mark.parametrize(
+    "rubbish, reason",
+    [
+        (b"GET / HTTP/1.0\r\n" * 5, "instead of a hello"),
+        (wire.record(wire.HELLO, b"x" * 60), "another program or version"),
+        (wire.encode_hello(wire.Hello(7, False, 0, 0, bytes(32))), "purpose 7 is unknown"),
+        (wire.encode_hello(wire.Hello(wire.RETUNE, False, 0, 99, bytes(32))), "no node 99"),
+        (wire.encode_hello(wire.Hello(wire.JOIN, False, 0, 0, b"y" * 32)), "token is wrong"),
+        (wire.encode_hello(wire.Hello(wire.JOIN, False, 1, 0, bytes(32))) * 2, "instead of filters"),
+        (HELLO * 2, "only frames may come"),
+        (HELLO + wire.HEADER.pack(0, 0x800, wire.FRAME, 0, 0, 0) + bytes(64), "too large for 11 bits"),
+        (HELLO + wire.HEADER.pack(0, 1, wire.FRAME, 0, 9, 9) + bytes(64), "no length of a CAN frame"),
+        (HELLO + wire.HEADER.pack(0, 1, wire.FRAME, wire.FD, 63, 63) + bytes(64), "no length of a CAN FD frame"),
+        (HELLO + wire.HEADER.pack(0, 1, wire.FRAME, wire.OWN, 0, 0) + bytes(64), "contradict"),
+        (HELLO + bytes(range(256)) * 200, ""),
+    ],
+    ids=range(12),
+)
+def test_rubbish_ends_only_its_own_connection(
+    open_bus: Opener, runtime_directory: Path, rubbish: bytes, reason: str
+) -> None:
+    first, second = open_bus(), open_bus()
+    with socket.socket(socket.AF_UNIX) as visitor:
+        visitor.settimeout(2.0)
+        visitor.connect(str(runtime_directory / "rds" / "test.sock"))
+        try:
+            visitor.sendall(rubbish)
+        except OSError:
+            assert reason == ""  # it was thrown out while it still talked
+        answer = b""
+        try:
+            while more := visitor.recv(4096):
+                answer += more
+        except ConnectionResetError:
+            pass
+    assert reason.encode() in answer
+    first.send(numbered(1))
+    assert second.recv(1.0) is not None
+
+
+@pytest.mark.parametrize("part", [b"", HELLO[:50], HELLO + HELLO[:79]])
+def test_partial_records_hurt_nobody(open_bus: Opener, runtime_directory: Path, part: bytes) -> None:
+    first, second = open_bus(), open_bus()
+    with socket.socket(socket.AF_UNIX) as visitor:
+        visitor.connect(str(runtime_directory / "rds" / "test.sock"))
+        visitor.sendall(part)
+        first.send(numbered(1))
+        assert second.recv(1.0) is not None
+    first.send(numbered(2))
+    assert second.recv(1.0) is not None
+
+
+def test_many_connections_that_say_nothing(open_bus: Opener, runtime_directory: Path) -> None:
+    first, second = open_bus(), open_bus()
+    visitors = [socket.socket(socket.AF_UNIX) for _ in range(300)]
+    for visitor in visitors:
+        visitor.settimeout(2.0)
+        visitor.connect(str(runtime_directory / "rds" / "test.sock"))
+    first.send(numbered(1))
+    assert second.recv(1.0) is not None
+    for visitor in visitors:
+        visitor.close()
+    wait_for(lambda: first.send(numbered(2)) is None and second.recv(1.0) is not None)

@@ -1,0 +1,149 @@
+"""What any python-can interface does: one suite for the built-in bus and python-can's own `virtual`."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+from uuid import uuid4
+
+import can
+import pytest
+
+Opener = Callable[..., can.BusABC]
+
+
+@pytest.fixture(params=["rds", "virtual"])
+def opener(request: pytest.FixtureRequest) -> Iterator[Opener]:
+    channel = uuid4().hex
+    with ExitStack() as stack:
+        yield lambda **options: stack.enter_context(can.Bus(interface=request.param, channel=channel, **options))
+
+
+def frame(identifier: int, data: bytes = b"", **fields: Any) -> can.Message:
+    return can.Message(arbitration_id=identifier, data=data, is_extended_id=fields.pop("extended", False), **fields)
+
+
+MESSAGES = [
+    frame(0),
+    frame(0x7FF, b"12345678"),
+    frame(0x1FFFFFFF, b"\x00\xff", extended=True),
+    frame(0x123, extended=True),  # fits 11 bits, and is extended all the same
+    frame(0x20, dlc=8, is_remote_frame=True),
+    frame(0x1, b"\x01", is_error_frame=True),
+    frame(0x5, bytes(range(64)), is_fd=True, bitrate_switch=True),
+    frame(0x6, bytes(12), is_fd=True, error_state_indicator=True),
+    frame(0x7, is_fd=True, extended=True),
+]
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=str)
+def test_all_fields_arrive(opener: Opener, message: can.Message) -> None:
+    sender, receiver = opener(), opener()
+    before = time.time()
+    sender.send(message)
+    received = receiver.recv(2.0)
+    assert received is not None
+    assert received.equals(message, timestamp_delta=None, check_channel=False)
+    assert abs(received.timestamp - before) < 1.0
+    assert received.is_rx
+
+
+def test_a_node_does_not_hear_itself_unless_it_asks(opener: Opener) -> None:
+    deaf, hearing, other = opener(), opener(receive_own_messages=True), opener()
+    deaf.send(frame(1))
+    hearing.send(frame(2))
+    seen = [(m.arbitration_id, m.is_rx) for m in (hearing.recv(1.0), hearing.recv(1.0)) if m]
+    assert seen == [(1, True), (2, False)]
+    assert [m.arbitration_id for m in (other.recv(1.0), other.recv(1.0)) if m] == [1, 2]
+    heard = deaf.recv(1.0)
+    assert heard is not None and heard.arbitration_id == 2
+    assert deaf.recv(0) is None
+
+
+@pytest.mark.parametrize(
+    "filters, passing",
+    [
+        (None, [0x10, 0x11, 0x110, 0x10010]),
+        ([], [0x10, 0x11, 0x110, 0x10010]),
+        ([{"can_id": 0x10, "can_mask": 0x7FF}], [0x10, 0x10010]),  # without "extended" only masked bits count
+        ([{"can_id": 0x10, "can_mask": 0x1FFFFFFF, "extended": False}], [0x10]),
+        ([{"can_id": 0x10, "can_mask": 0x0F, "extended": True}], [0x10010]),
+        ([{"can_id": 0x11, "can_mask": 0x7FF}, {"can_id": 0x100, "can_mask": 0x700, "extended": False}], [0x11, 0x110]),
+        ([{"can_id": k, "can_mask": 0x1FFFFFFF} for k in range(0x11, 0x40)], [0x11]),
+    ],
+)
+def test_filters(opener: Opener, filters: Any, passing: list[int]) -> None:
+    sender, at_open, later = opener(), opener(can_filters=filters), opener(can_filters=[{"can_id": 9, "can_mask": 9}])
+    later.set_filters(filters)
+    for identifier in (0x10, 0x11, 0x110, 0x10010):
+        sender.send(frame(identifier, extended=identifier > 0x7FF))
+    for bus in (at_open, later):
+        received = []
+        while (message := bus.recv(0.05)) is not None:
+            received.append(message.arbitration_id)
+        assert received == passing
+
+
+def test_filters_hold_for_what_waits_already(opener: Opener) -> None:
+    sender, receiver = opener(), opener()
+    for identifier in (1, 2, 3):
+        sender.send(frame(identifier))
+    time.sleep(0.05)
+    receiver.set_filters([{"can_id": 3, "can_mask": 0x7FF}])
+    message = receiver.recv(1.0)
+    assert message is not None and message.arbitration_id == 3
+
+
+def test_recv_waits_as_long_as_asked(opener: Opener) -> None:
+    bus = opener()
+    for timeout in (0, 0.001, 0.05):
+        start = time.perf_counter()
+        assert bus.recv(timeout) is None
+        assert timeout <= time.perf_counter() - start + 1e-4 < timeout + 0.05
+
+
+def test_periodic_sending(opener: Opener) -> None:
+    sender, receiver = opener(), opener()
+    task = sender.send_periodic(frame(7), 0.01)
+    messages = [receiver.recv(1.0) for _ in range(5)]
+    task.stop()
+    assert all(m is not None and m.arbitration_id == 7 for m in messages)
+
+
+def test_notifier_thread(opener: Opener) -> None:
+    sender, receiver = opener(), opener()
+    listener = can.BufferedReader()
+    notifier = can.Notifier(receiver, [listener], timeout=0.1)
+    for identifier in range(100):
+        sender.send(frame(identifier))
+    seen = [message.arbitration_id for _ in range(100) if (message := listener.get_message(1.0))]
+    notifier.stop()
+    assert seen == list(range(100))
+
+
+def test_notifier_with_asyncio(opener: Opener) -> None:
+    sender, receiver = opener(), opener()
+
+    async def receive() -> list[int]:
+        reader = can.AsyncBufferedReader()
+        notifier = can.Notifier(receiver, [reader], timeout=0.1, loop=asyncio.get_running_loop())
+        for identifier in range(100):
+            sender.send(frame(identifier))
+        seen = [(await asyncio.wait_for(reader.get_message(), 1.0)).arbitration_id for _ in range(100)]
+        notifier.stop()
+        return seen
+
+    assert asyncio.run(receive()) == list(range(100))
+
+
+def test_shutdown_may_be_repeated_and_ends_the_bus(opener: Opener) -> None:
+    bus = opener()
+    bus.shutdown()
+    bus.shutdown()
+    with pytest.raises(can.CanOperationError):
+        bus.send(frame(1))
+    with pytest.raises(can.CanOperationError):
+        bus.recv(0.01)
