@@ -28,8 +28,8 @@ class AxisComparison:
     measured responses, b - a; `fit_percent` is that of b's measured response to a's (None where a's never moves).
     `identical` says that reference, measured, command and voltage, so far as both have them, are equal bit for bit;
     `first_difference` is the time of the first sample that is not. `same_controller` compares the hashes of the
-    controllers' files, `same_params` their parameters, `same_reference` the references; None where either result
-    does not say.
+    controllers' files (the names of library laws, which have none), `same_params` their parameters and
+    `same_reference` the references; None where either result does not say.
     """
 
     axis: str
@@ -47,7 +47,7 @@ class AxisComparison:
     same_params: bool | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """Two results side by side; see `compare`."""
 
@@ -87,6 +87,10 @@ class Comparison:
         from rds.results.plots_overlay import comparison
 
         return comparison(self)
+
+    def __repr__(self) -> str:
+        same = ", identical" if self.identical else ""
+        return f"<Comparison of {self.a!r} with {self.b!r}: {', '.join(self.axes)}{same}>"
 
     def __str__(self) -> str:
         from rds.results.comparison_text import text
@@ -178,14 +182,26 @@ def _one_axis(
         identical=not differs.any(),
         first_difference=None if first is None else float(first),
         same_reference=bool(np.array_equal(a[reference][at_a], b[reference][at_b])) if reference in columns else None,
-        same_controller=_same(a, b, axis, "sha256"),
-        same_params=_same(a, b, axis, "params"),
+        same_controller=_same_controller(_controller(a, axis), _controller(b, axis)),
+        same_params=_same(_controller(a, axis), _controller(b, axis), "params"),
     )
 
 
-def _same(a: Result, b: Result, axis: str, key: str) -> bool | None:
-    left, right = (((r.meta.get("controller") or {}).get(axis) or {}).get(key) for r in (a, b))
-    return None if left is None or right is None else left == right
+def _controller(result: Result, axis: str) -> dict[str, Any]:
+    return (result.meta.get("controller") or {}).get(axis) or {}
+
+
+def _same_controller(left: dict[str, Any], right: dict[str, Any]) -> bool | None:
+    """By the hash of the file; a law of the library has none and goes by its name."""
+    if left.get("sha256") is None and right.get("sha256") is None:
+        return _same(left, right, "name")
+    return _same(left, right, "sha256")
+
+
+def _same(left: dict[str, Any], right: dict[str, Any], key: str) -> bool | None:
+    if left.get(key) is None or right.get(key) is None:
+        return None
+    return left[key] == right[key]
 
 
 def _notes(a: Result, b: Result, compared: dict[str, AxisComparison], common: int) -> list[str]:
@@ -214,5 +230,4 @@ def _what(result: Result) -> dict[str, Any]:
 
 
 def _controllers(result: Result) -> dict[str, Any]:
-    given = result.meta.get("controller") or {}
-    return {axis: {k: (about or {}).get(k) for k in ("name", "sha256")} for axis, about in given.items()}
+    return {axis: {key: _controller(result, axis).get(key) for key in ("name", "sha256")} for axis in result.axes}

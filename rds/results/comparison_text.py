@@ -54,9 +54,9 @@ def _controller(axis: AxisComparison) -> str:
     if axis.same_controller is None:
         return "controller: not known whether it is the same"
     if not axis.same_controller:
-        return "controller: different files"
+        return "controller: not the same"
     return (
-        "controller: same file"
+        "controller: the same"
         + {True: ", same parameters", False: ", different parameters", None: ""}[axis.same_params]
     )
 

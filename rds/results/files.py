@@ -10,6 +10,7 @@ from rds.core.errors import InputError
 from rds.results.atomic import write_files
 from rds.results.foreign import from_table
 from rds.results.header import assemble
+from rds.results.killed import from_record
 from rds.results.result import Result
 
 # in the order in which a directory's files are preferred
@@ -58,7 +59,7 @@ def open_result(path: str | Path) -> Result:
         if path.is_dir():
             path = _choose(path)
         if path.name == _RECORD:
-            return _open_record(path)
+            return from_record(path.parent)
         if not path.exists():
             raise InputError("there is no such file; give a saved result (.parquet, .csv, .mat) or its directory")
         columns, header = _format(path).read(path)
@@ -99,10 +100,3 @@ def _choose(directory: Path) -> Path:
 
 def _holds_result(directory: Path) -> bool:
     return any(f.name == _RECORD or (f.stem == _STEM and f.suffix in _FORMATS) for f in directory.iterdir())
-
-
-def _open_record(path: Path) -> Result:
-    # imported here: a saved result opens without the runtime
-    record = import_module("rds.runtime.record")
-    columns, units, meta = record.read_record(path.parent)
-    return Result(columns, units, meta)

@@ -54,7 +54,10 @@ def _is_number(value: Any) -> bool:
 
 
 def _cell(value: Any, right: bool, tag: str = "td") -> str:
-    return f"<{tag}{_NUMBER if right else ''}>{escape(number(value))}</{tag.split()[0]}>"
+    text = escape(number(value))
+    if "\n" in text:  # a controller's source keeps its lines
+        text = f"<pre>{text}</pre>"
+    return f"<{tag}{_NUMBER if right else ''}>{text}</{tag.split()[0]}>"
 
 
 def metrics_rows(result: Result) -> tuple[list[str], list[list[Any]]]:
@@ -90,12 +93,22 @@ def notes_list(notes: Iterable[str]) -> str:
 def result_fragment(result: Result) -> str:
     """How a result shows itself in a notebook: what it is, its verdict, its metrics."""
     what = f"{result.mode or 'run'} of {', '.join(result.axes)}, {len(result)} samples of {result.sample_period:g} s"
-    ending = result.meta.get("ending")
-    if ending and ending != "done":
-        what += f", ended: {ending}"
+    if result.meta.get("ending") not in (None, "done"):
+        what += f", ended: {ending(result)}"
     columns, rows = metrics_rows(result)
     shown = table(columns, rows) if rows else ""
-    return f"<p>{escape(what)}</p>{verdict_line(result)}{shown}{notes_list(metric_notes(result))}"
+    return f"<p>{escape(what)}</p>{verdict_line(result)}{shown}{notes_list(all_notes(result))}"
+
+
+def ending(result: Result) -> str:
+    """How the run came to its end, with the reason where it gave one."""
+    reason = str(result.meta.get("ending_reason") or "")
+    return str(result.meta.get("ending")) + (f" ({reason})" if reason else "")
+
+
+def all_notes(result: Result) -> list[str]:
+    """The run's own notes and those on its metrics."""
+    return [*map(str, result.meta.get("notes") or []), *metric_notes(result)]
 
 
 def key_values(values: Mapping[str, Any], title: str = "") -> str:

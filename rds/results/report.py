@@ -14,7 +14,7 @@ from rds.core.errors import InputError
 from rds.results import html
 from rds.results.atomic import write_files
 from rds.results.late import total_time
-from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_notes, metric_units
+from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_units
 from rds.results.result import Result
 from rds.results.units import heading
 
@@ -101,7 +101,7 @@ def _runs(results: Sequence[Result], labels: Sequence[str]) -> str:
             len(result),
             result.sample_period * 1e3,
             len(result) * result.sample_period,
-            result.meta.get("ending"),
+            html.ending(result) if result.meta.get("ending") else None,
             result.verdict,
             (result.meta.get("timing") or {}).get("late"),
         ]
@@ -127,7 +127,7 @@ def _metrics(results: Sequence[Result], labels: Sequence[str]) -> str:
                 rows.append([heading(html.METRIC_TITLES[key], unit), *(m.get(axis, {}).get(key) for m in metrics)])
         if rows:
             tables.append(html.table(["", *labels], rows, f"Axis {axis}"))
-    notes = dict.fromkeys(note for result in results for note in metric_notes(result))
+    notes = dict.fromkeys(note for result in results for note in html.all_notes(result))
     return f'<div class="row">{"".join(tables)}</div>{html.notes_list(notes)}'
 
 
@@ -167,8 +167,10 @@ def _environment(result: Result) -> str:
     environment = result.meta.get("environment")
     if not isinstance(environment, Mapping) or not environment:
         return ""
-    said = [f"{name.replace('_', ' ')} {html.number(value)}" for name, value in html.flat(environment)]
-    return f'<p class="note">Measured with: {escape(" · ".join(said))}</p>'
+    said = environment.get("sentence") or " · ".join(
+        f"{name.replace('_', ' ')} {html.number(value)}" for name, value in html.flat(environment)
+    )
+    return f'<p class="note">Ran with: {escape(str(said))}</p>{_details("Environment", environment)}'
 
 
 def _timing(result: Result) -> str:
@@ -239,6 +241,7 @@ tbody tr:nth-child(even) { background: var(--band); }
 .verdict.met { border-color: var(--met); } .verdict.missed { border-color: var(--missed); }
 .verdict.void { border-color: var(--void); }
 .met strong { color: var(--met); } .missed strong { color: var(--missed); } .void strong { color: var(--void); }
+pre { margin: 0; font-size: .85rem; }
 img { display: block; width: 100%; height: auto; margin: .6rem 0; background: #ffffff; border-radius: 6px; }
 details { margin: .5rem 0; } summary { cursor: pointer; font-weight: 600; }
 @media print { body { max-width: none; padding: 0; } section { break-inside: avoid-page; } }

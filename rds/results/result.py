@@ -33,8 +33,9 @@ class Result:
 
     `meta` describes the run in JSON's own types. `axes` (their names) and `sample_period` (s) are needed;
     `mode`, `machine`, `duration` (s), `period` ({axis: s or None}, of a periodic reference), `verdict`,
-    `verdict_reason`, `ending`, `timing`, `environment`, `controller` ({axis: {name, sha256, params}}), `model`,
-    `versions`, `started` and `voltage_range` (V, of the converter) are used where they are there.
+    `verdict_reason`, `ending`, `ending_reason`, `notes` (sentences), `timing` (per stage), `environment`,
+    `controller` ({axis: {name, sha256, params}}), `model`, `versions`, `started` and `voltage_range` (V, of the
+    converter) are used where they are there.
 
     Raises InputError for columns of different lengths, other than real numbers, or not finite, for a time that
     does not increase, and for a meta that lacks its needed keys. Only a `..._command` column may hold NaN or
@@ -102,7 +103,7 @@ class Result:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences that the reader of the metrics needs to know."""
+        """Sentences that the reader of the metrics needs to know; those of the run itself are in `meta["notes"]`."""
         from rds.results.metrics import metric_notes
 
         return metric_notes(self)

@@ -68,9 +68,10 @@ def test_controllers_are_told_apart() -> None:
 
     same = compare(run("a", 1.0), run("a", 2.0)).axes["X"]
     assert (same.same_controller, same.same_params) == (True, False)
-    assert "same file, different parameters" in str(compare(run("a", 1.0), run("a", 2.0)))
+    assert "the same, different parameters" in str(compare(run("a", 1.0), run("a", 2.0)))
     assert compare(run("a", 1.0), run("b", 1.0)).axes["X"].same_controller is False
     assert compare(run("a", 1.0), run(None, 1.0)).axes["X"].same_controller is None
+    assert compare(run(None, 1.0), run(None, 1.0)).axes["X"].same_controller is True  # both the library's "p"
 
 
 @pytest.mark.parametrize(

@@ -323,21 +323,41 @@ def test_bad_columns_are_refused_when_made() -> None:
 # --- a run that could not save ------------------------------------------------------------------------------------
 
 
-def test_the_record_of_a_killed_run_reopens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: Result) -> None:
-    from rds.runtime import record
-
-    (tmp_path / "record.rds").write_bytes(b"what the runtime wrote")
-
-    def read_record(directory):  # type: ignore[no-untyped-def]
-        assert Path(directory) == tmp_path
-        return result.columns, result.units, result.meta
-
-    monkeypatch.setattr(record, "read_record", read_record, raising=False)
-    assert_same(open_result(tmp_path), result)
-    assert_same(open_result(tmp_path / "record.rds"), result)
+def test_the_record_of_a_killed_run_reopens(tmp_path: Path) -> None:
+    """Two whole rows and a torn third, as a kill leaves them; then the ending that a live run would have noted."""
+    about = {
+        "columns": ["sample", "lateness", "X_reference", "X_measured"],
+        "units": {"lateness": "ns", "X_reference": "mm", "X_measured": "mm"},
+        "axes": ["X"],
+        "mode": "emulation",
+        "sample_period": 0.001,
+        "samples": 10,
+    }
+    rows = np.array([[0, 1500, 1.0, 0.5], [1, 2500, 1.0, 0.75], [2, 0, 0, 0]])
+    data = b"RDS record 1\n" + json.dumps(about).encode() + b"\n" + rows.tobytes()
+    (tmp_path / "record.rds").write_bytes(data[:-9])
+    result = open_result(tmp_path)
+    assert result["time"].tolist() == [0.0, 0.001]
+    assert result["lateness"].tolist() == [1.5, 2.5]
+    assert result.units["lateness"] == "µs"
+    assert result.metrics["X"]["mean_error"] == 0.375
+    assert result.meta["ending"] == "killed"
+    assert "2 of 10 samples" in result._repr_html_()
+    (tmp_path / "ending.json").write_text(json.dumps({"ending": "stopped", "reason": "asked to"}))
+    assert open_result(tmp_path / "record.rds").meta["ending"] == "stopped"
     other = make_result(seconds=1.0)
     save_all(other, tmp_path)
     assert_same(open_result(tmp_path), other)
+
+
+def test_a_broken_record_is_refused(tmp_path: Path) -> None:
+    for data, message in [
+        (b"", "is not a run's record"),
+        (b"RDS record 1\n{}\n", "header"),
+        (b'RDS record 1\n{"columns": ["sample"]}\n', "header lacks 'units'"),
+    ]:
+        (tmp_path / "record.rds").write_bytes(data)
+        refused(tmp_path, message)
 
 
 def test_reopening_is_quick(tmp_path: Path) -> None:
