@@ -25,8 +25,8 @@ from math import ceil, exp, expm1, inf, isfinite, log1p
 
 from rds.core.errors import InputError
 
-# 1/40 of the shortest time constant here (10 ms). Against substeps of 1 µs the position differs by less than 1e-5 mm
-# (a hundredth of an encoder count) in a full reversal, and a module's four substeps per ms cost some µs.
+# 1/40 of the shortest time constant here (10 ms). Against substeps of 1 µs the position differs by less than 1e-6 mm
+# (a thousandth of an encoder count) over several reversals; a module's four substeps per ms cost 4 µs.
 SUBSTEP = 0.25e-3  # s
 
 
