@@ -54,10 +54,11 @@ def _place(A: np.ndarray, B: np.ndarray, poles: Sequence[complex]) -> np.ndarray
     """K with the eigenvalues of A - B K at `poles`; InputError where python-control cannot place them."""
     import control
 
+    # Ackermann's formula takes poles that coincide, as place() does not with one input; it is exact for small systems.
+    closed_form = B.shape[1] == 1 and (len(poles) <= 2 or len(set(poles)) < len(poles))
     try:
-        if B.shape[1] == 1 and len(set(poles)) < len(poles):
-            return np.asarray(control.acker(A, B, poles))  # place() takes no repeated pole with one input
-        return np.asarray(control.place(A, B, poles))
+        gains = control.acker(A, B, poles) if closed_form else control.place(A, B, poles)
+        return np.asarray(gains, dtype=float).reshape(B.shape[1], A.shape[0])
     except (ValueError, np.linalg.LinAlgError, control.ControlDimension) as error:
         shown = ", ".join(f"{pole:g}" for pole in poles)
         raise InputError(f"design: the poles {shown} cannot be placed: {error}; choose other poles") from error

@@ -15,7 +15,7 @@ from math import exp
 from typing import Any
 
 from rds.controllers.axis_data import axis_data
-from rds.controllers.tuning import pid_gains
+from rds.controllers.tuning import pid_gains, set_point_weight
 from rds.controllers.words import BIAS, ERROR_LIMITS, FILTER, GAINS, OUTPUT_LIMIT, limit_or_none, output_limit
 from rds.core.options import Option, read_options
 from rds.core.types import Controller, Reference, Source
@@ -67,12 +67,12 @@ def make(
 ) -> Controller:
     """Modified PID control of one axis; see `rds.controllers.library_controller` and `OPTIONS`.
 
-    Defaults: gains of `tuning.pid_gains`, b = 0.6, c = 0, no limits.
+    Defaults: gains of `tuning.pid_gains`, b of `tuning.set_point_weight` (0.61 on a position axis), c = 0, no limits.
     """
     owner = f"controller {NAME!r}"
     given = read_options(options, OPTIONS, owner)
     axis = axis_data(axis_model, T, converter_range, unit, owner)
-    gains = dict.fromkeys(OPTIONS, 0.0) | pid_gains(axis) | {"b": 0.6, "c": 0.0} | given
+    gains = dict.fromkeys(OPTIONS, 0.0) | pid_gains(axis) | {"b": set_point_weight(axis)} | given
     q = exp(-axis.T / gains["derivative_filter"]) if gains["derivative_filter"] > 0.0 else 0.0
     coefficients = (
         axis.T,
