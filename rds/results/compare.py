@@ -27,9 +27,9 @@ class AxisComparison:
     `metrics_a` and `metrics_b` are those of each whole result; `max_difference` and `rms_difference` are of the
     measured responses, b - a; `fit_percent` is that of b's measured response to a's (None where a's never moves).
     `identical` says that reference, measured, command and voltage, so far as both have them, are equal bit for bit;
-    `first_difference` is the time of the first sample that is not. `same_controller` compares the hashes of the
-    controllers' files (the names of library laws, which have none), `same_params` their parameters and
-    `same_reference` the references; None where either result does not say.
+    `first_difference` is the time of the first sample that is not, in one of `differing_columns`.
+    `same_controller` compares the hashes of the controllers' files (the names of library laws, which have none),
+    `same_params` their parameters and `same_reference` the references; None where either result does not say.
     """
 
     axis: str
@@ -42,6 +42,7 @@ class AxisComparison:
     fit_percent: float | None
     identical: bool
     first_difference: float | None
+    differing_columns: tuple[str, ...]
     same_reference: bool | None
     same_controller: bool | None
     same_params: bool | None
@@ -165,11 +166,9 @@ def _one_axis(
     y_a, y_b = a[measured][at_a], b[measured][at_b]
     difference = np.asarray(y_b - y_a, dtype=float)
     columns = [axis + ending for ending in _ENDINGS if axis + ending in a and axis + ending in b]
-    differs = np.zeros(len(at_a), dtype=bool)
-    for name in columns:
-        left, right = a[name][at_a], b[name][at_b]
-        differs |= (left != right) & ~(np.isnan(left) & np.isnan(right))
-    first = a["time"][at_a][int(np.argmax(differs))] if differs.any() else None
+    differing = {name: _differs(a[name][at_a], b[name][at_b]) for name in columns}
+    differing = {name: where for name, where in differing.items() if where.any()}
+    firsts = [int(np.argmax(where)) for where in differing.values()]
     return AxisComparison(
         axis=axis,
         unit=unit,
@@ -179,12 +178,18 @@ def _one_axis(
         max_difference=float(np.abs(difference).max()),
         rms_difference=math.sqrt(float(np.mean(difference**2))),
         fit_percent=fit_percent(y_a, y_b),
-        identical=not differs.any(),
-        first_difference=None if first is None else float(first),
+        identical=not differing,
+        first_difference=float(a["time"][at_a][min(firsts)]) if firsts else None,
+        differing_columns=tuple(differing),
         same_reference=bool(np.array_equal(a[reference][at_a], b[reference][at_b])) if reference in columns else None,
         same_controller=_same_controller(_controller(a, axis), _controller(b, axis)),
         same_params=_same(_controller(a, axis), _controller(b, axis), "params"),
     )
+
+
+def _differs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Where two columns differ; not a number is the same as not a number."""
+    return (left != right) & ~(np.isnan(left) & np.isnan(right))
 
 
 def _controller(result: Result, axis: str) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def findings(axis: AxisComparison) -> list[str]:
     if axis.identical:
         said.append("identical sample for sample")
     else:
-        said.append(f"first difference at {number(axis.first_difference)} s")
+        said.append(f"first difference at {number(axis.first_difference)} s, in {', '.join(axis.differing_columns)}")
     said.append(_controller(axis))
     return said
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -46,10 +47,14 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = ""
     )
 
 
+_NUMERAL = re.compile(r"[-+−]?\d+([.,]\d+)?([eE][-+]?\d+)?")
 _NUMBER = ' class="number"'
 
 
 def _is_number(value: Any) -> bool:
+    """Whether a cell is a number, or the text of one that somebody has rounded already."""
+    if isinstance(value, str):
+        return _NUMERAL.fullmatch(value.strip()) is not None
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

@@ -94,10 +94,10 @@ def metric_notes(result: Result) -> list[str]:
         if first is None:
             note = f"the run is not longer than one period of the reference ({period:g} s): the metrics use all of it"
         else:
-            rest = len(result) - first
+            rest = result.length - float(result["time"][first] - result["time"][0])
             note = f"the metrics leave out the first period of the reference ({period:g} s)"
-            if rest * result.sample_period < period - result.sample_period / 2:
-                note += f"; only {rest * result.sample_period:g} s of the second are there"
+            if rest < period - result.sample_period / 2:
+                note += f"; only {rest:g} s of the second are there"
         notes.setdefault(note, []).append(axis)
     return [f"{', '.join(axes)}: {note}." for note, axes in notes.items()]
 

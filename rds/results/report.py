@@ -100,7 +100,7 @@ def _runs(results: Sequence[Result], labels: Sequence[str]) -> str:
             ", ".join(result.axes),
             len(result),
             result.sample_period * 1e3,
-            len(result) * result.sample_period,
+            result.length,
             html.ending(result) if result.meta.get("ending") else None,
             result.verdict,
             (result.meta.get("timing") or {}).get("late"),

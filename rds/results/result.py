@@ -95,6 +95,12 @@ class Result:
         return self.meta["sample_period"]
 
     @property
+    def length(self) -> float:
+        """Seconds from the first sample to the end of the last, with the periods that were discarded between."""
+        time = self.columns["time"]
+        return float(time[-1] - time[0]) + self.sample_period if len(time) else 0.0
+
+    @property
     def metrics(self) -> dict[str, dict[str, float | None]]:
         """Metrics per axis; see `axis_metrics` for what each is."""
         from rds.results.metrics import axis_metrics

@@ -59,6 +59,7 @@ def test_one_bit_is_a_difference() -> None:
     axis = compare(a, Result(columns, a.units, a.meta)).axes["X"]
     assert not axis.identical
     assert axis.first_difference == pytest.approx(1.234)
+    assert axis.differing_columns == ("X_voltage",)
     assert axis.max_difference == 0.0
 
 

@@ -143,3 +143,13 @@ def test_importing_results_is_light() -> None:
     program = f"import sys, rds.results; sys.exit(str({heavy} & set(sys.modules)) if {heavy} & set(sys.modules) else 0)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_discarded_periods_do_not_shorten_a_run() -> None:
+    """Samples 1, 2 and 5 were discarded: the run is as long as if they were there, and time decides what is used."""
+    time = np.array([0, 3, 4, 6, 7]) * 0.1
+    meta = {"axes": ["X"], "sample_period": 0.1, "period": {"X": 0.4}}
+    result = Result({"time": time, "X_reference": [9, 9, 1, 1, 1], "X_measured": [0.0] * 5}, meta=meta)
+    assert result.length == pytest.approx(0.8)
+    assert result.metrics["X"]["max_abs_error"] == 1.0
+    assert "only" not in result.notes[0]
