@@ -131,14 +131,21 @@ def _vector(answer: Any, size: int, function: str, meaning: str) -> np.ndarray:
 def _flat(answer: Any) -> np.ndarray:
     """The answer as a flat array of floats; empty if it is none."""
     try:
-        return np.asarray(answer, dtype=float).ravel()
+        return _numbers(answer)
     except (TypeError, ValueError):
         pass
     try:
         # [x[1], (K*u - x[1])/tau] holds a number and an array of one, as u is one.
-        return np.concatenate([np.asarray(part, dtype=float).ravel() for part in answer])
+        return np.concatenate([_numbers(part) for part in answer])
     except (TypeError, ValueError):
         return np.empty(0)
+
+
+def _numbers(answer: Any) -> np.ndarray:
+    array = np.asarray(answer)
+    if array.dtype.kind not in "fiub":  # None, which numpy would take for NaN, text, complex numbers
+        raise TypeError
+    return array.astype(float, copy=False).ravel()
 
 
 def _output(output: Function | None, params: Mapping[str, Any], size: int) -> Callable[[Sequence[float]], float] | None:

@@ -2,8 +2,8 @@
 
 A function gives the value alone, or position, velocity and acceleration. From the value alone the other two are the
 derivatives of the polynomial of fourth degree through five values 1 ms apart, about the time in question (from 0
-onwards near the start, so that the function is not asked for negative times): 4th-order accurate for a smooth
-function; for one that jumps, the jump is a peak of a few ms.
+onwards near the start, so that the function is not asked for negative times): for a smooth function
+their error falls with the third power of that 1 ms or faster; a jump of the function becomes a peak of a few ms.
 """
 
 from __future__ import annotations

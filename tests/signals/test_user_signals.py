@@ -1,0 +1,163 @@
+"""A user's function of time, and a user's CSV file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rds.core.errors import ContractError, InputError
+from rds.signals import make_signal, sample, sinusoid, user
+
+T = 1e-3
+
+
+def write(folder, text, name="signal.csv"):
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def wave_rows(columns, seconds=5.0, step=0.01):
+    t = np.arange(0, seconds + step / 2, step)
+    parts = [t, *sinusoid(5, 0.2).reference(t)][:columns]
+    return "\n".join(",".join(f"{value:.10g}" for value in row) for row in zip(*parts, strict=True))
+
+
+def test_function_gets_the_derivatives_of_its_values():
+    wave = sinusoid(5, 2.0)
+    built = sample(user(lambda t: 5 * np.sin(2 * np.pi * 2.0 * t)), T, 1000)
+    exact = sample(wave, T, 1000)
+    np.testing.assert_allclose(built.position, exact.position, atol=1e-12)
+    np.testing.assert_allclose(built.velocity, exact.velocity, atol=1e-6)
+    np.testing.assert_allclose(built.acceleration, exact.acceleration, atol=2e-3)
+
+
+def test_function_is_not_asked_for_negative_times():
+    built = sample(user(lambda t: np.sqrt(t + 1e-6) if t >= 0 else 1 / 0), T, 10)
+    assert np.isfinite(built.velocity).all()
+
+
+def test_function_may_bring_its_own_derivatives():
+    built = sample(user(lambda t: (t**2, 2 * t, 2.0)), T, 100)
+    t = np.arange(100) * T
+    np.testing.assert_allclose([built.position, built.velocity, built.acceleration], [t**2, 2 * t, 2 + 0 * t])
+
+
+@pytest.mark.parametrize("answer", ["up", None, float("nan"), [1.0, 2.0], [1.0, 2.0, float("inf")]])
+def test_functions_that_give_no_number_break_the_contract(answer):
+    with pytest.raises(ContractError, match="one finite number"):
+        user(lambda t: answer).value(0.5)
+
+
+def test_functions_that_fail_are_named_with_the_time():
+    def broken(t):
+        return 1 / (t - 0.5)
+
+    with pytest.raises(ContractError, match=r"broken\(t\) fails at t = 0.5 s: ZeroDivisionError"):
+        user(broken).value([0.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    "header", ["", "time,value\n", "t (s), position (mm)\n", "# my data\n\ntime,value\n", "\ufeff"]
+)
+def test_rows_of_time_and_value_make_a_smooth_reference(tmp_path, header):
+    signal = make_signal("user", file=str(write(tmp_path, header + wave_rows(2))))
+    built, exact = sample(signal, T, 5000), sample(sinusoid(5, 0.2), T, 5000)
+    np.testing.assert_allclose(built.position, exact.position, atol=1e-6)
+    np.testing.assert_allclose(built.velocity, exact.velocity, atol=1e-4)
+    np.testing.assert_allclose(built.acceleration, exact.acceleration, atol=2e-2)
+
+
+def test_a_voltage_runs_straight_between_its_rows_and_nowhere_beyond_them(tmp_path):
+    signal = user(file=write(tmp_path, "0,0\n1,2\n2,2\n3,-2\n"))
+    np.testing.assert_allclose(signal.value([0, 0.5, 1, 1.5, 2.5, 3, 9]), [0, 1, 2, 2, 0, -2, -2])
+
+
+def test_hold_and_linear_rule_voltage_and_reference_alike(tmp_path):
+    file = write(tmp_path, "1,3\n2,5\n4,1\n")
+    held = user(file=file, interpolation="hold")
+    np.testing.assert_allclose(held.value([0, 1, 1.999, 2, 3.9, 4, 5]), [3, 3, 3, 5, 5, 1, 1])
+    assert held.reference(3.0) == (5.0, 0.0, 0.0)
+    linear = user(file=file, interpolation="linear")
+    assert linear.reference(3.0) == (3.0, -2.0, 0.0)
+    assert linear.reference(9.0) == (1.0, 0.0, 0.0)
+
+
+def test_rows_are_reached_at_their_sample_in_spite_of_rounding(tmp_path):
+    text = "\n".join(f"{k * 0.1:.1f},{k}" for k in range(50))
+    held = user(file=write(tmp_path, text), interpolation="hold")
+    np.testing.assert_array_equal(held.value(np.arange(50) * 0.1), np.arange(50))
+
+
+def test_rows_repeat_with_a_period(tmp_path):
+    signal = user(file=write(tmp_path, "0,0\n1,2\n2,0\n"), period=2.0)
+    np.testing.assert_allclose(signal.value([0.5, 2.5, 3.0, 7.0]), [1, 1, 2, 2])
+    with pytest.raises(InputError, match="longer than period"):
+        user(file=write(tmp_path, "0,0\n1,2\n2,0\n"), period=1.0)
+
+
+def test_rows_with_velocity_and_acceleration_are_kept(tmp_path):
+    file = write(tmp_path, "time,position,velocity,acceleration\n" + wave_rows(4, step=0.05))
+    built, exact = sample(user(file=file), T, 5000), sample(sinusoid(5, 0.2), T, 5000)
+    np.testing.assert_allclose(built.position, exact.position, atol=1e-7)
+    np.testing.assert_allclose(built.velocity, exact.velocity, atol=1e-6)
+    np.testing.assert_allclose(built.acceleration, exact.acceleration, atol=1e-4)
+
+
+def test_a_trapezoidal_profile_belongs_together_though_its_acceleration_jumps(tmp_path):
+    user(file=write(tmp_path, "0,0,0,10\n0.1,0.05,1,10\n0.2,0.15,1,0\n0.3,0.25,1,0\n0.4,0.3,0,-10\n"))
+
+
+@pytest.mark.parametrize(
+    "text, line, fault",
+    [
+        ("time,value\n0,1\n1,x\n", 3, "value = 'x' must be a finite number"),
+        ("0,1\n1,nan\n", 2, "finite"),
+        ("0,1\n1,inf\n", 2, "finite"),
+        ("0,1\n0,2\n", 2, "must increase"),
+        ("0,1\n2,1\n1,2\n", 3, "must increase"),
+        ("0,1\n1,2,3,4\n", 2, "4 columns, the ones before it 2"),
+        ("0,1,2\n", 1, "3 columns; it needs time,value or"),
+        ("0;1\n1;2\n", 1, "1 column; it needs"),
+        ("value,time\n1,0\n", 1, "the first column is 'value'"),
+        ("0,0,1,0\n1,1,1,0\n2,5,1,0\n", 3, "must belong together"),
+        ("0,0,0,0\n1,0.5,1,0\n2,2,2,0\n", 2, "must belong together"),
+        ("0,1\n", None, "1 rows of numbers; a signal needs at least two"),
+        ("time,value\n", None, "0 rows"),
+        ("", None, "0 rows"),
+    ],
+)
+def test_bad_files_are_refused_with_file_and_line(tmp_path, text, line, fault):
+    file = write(tmp_path, text)
+    with pytest.raises(InputError) as error:
+        make_signal("user", file=str(file))
+    assert str(error.value).startswith(f"{file}:{line}: " if line else f"{file}: ")
+    assert fault in str(error.value)
+
+
+def test_files_that_cannot_be_read_are_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        user(file=tmp_path / "none.csv")
+    with pytest.raises(InputError, match="cannot be read"):
+        user(file=tmp_path)
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"\xff\xfe0,1")
+    with pytest.raises(InputError, match="UTF-8"):
+        user(file=binary)
+
+
+@pytest.mark.parametrize(
+    "options, fault",
+    [
+        ({"function": np.sin, "file": "a.csv"}, "not both"),
+        ({"function": "sin"}, "must be a function"),
+        ({"file": 5}, "name of a CSV file"),
+        ({"function": np.sin, "interpolation": "linear"}, "is for a file"),
+        ({"file": "a.csv", "interpolation": "cubic"}, "known ones: spline, linear, hold"),
+        ({"function": np.sin, "period": 0}, "more than 0"),
+    ],
+)
+def test_bad_options_are_refused(options, fault):
+    with pytest.raises(InputError) as error:
+        user(**options)
+    assert fault in str(error.value)
