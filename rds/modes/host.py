@@ -21,7 +21,7 @@ from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.machine import machine_behind
 from rds.runtime.plan import Plan, dump
-from rds.runtime.record import read_ending, read_raw, write_ending, write_whole
+from rds.runtime.record import clear, read_ending, read_raw, write_ending, write_whole
 from rds.runtime.recorder import Recorder
 from rds.runtime.ring import Ring
 from rds.runtime.stopwatch import TIMING_COLUMNS
@@ -80,6 +80,7 @@ def _in_target(plan: Plan, directory: Path, progress: Progress | None) -> Rows:
     columns[1:1] = TIMING_COLUMNS
     units |= dict.fromkeys(TIMING_COLUMNS, "ns")
     directory.mkdir(parents=True, exist_ok=True)
+    clear(directory)
     write_whole(directory / "plan.pickle", dump(plan))
     about = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
     about |= {"sample_period": plan.T, "samples": plan.samples}

@@ -19,6 +19,7 @@ from rds.core.errors import InputError
 
 NAME = "record.rds"
 ENDING = "ending.json"
+PROCESSES = "processes.json"  # while a run goes on: the numbers of its processes
 _FIRST_LINE = b"RDS record 1\n"
 
 
@@ -53,6 +54,20 @@ class RecordFile:
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
+
+
+def clear(directory: Path) -> None:
+    """Make room for a new record: take away that of an earlier run; InputError while that one is still going."""
+    processes = directory / PROCESSES
+    try:
+        pids = json.loads(processes.read_text())
+        os.kill(int(pids["recorder"]), 0)
+    except (OSError, ValueError, KeyError, TypeError):
+        pass  # no run, or one whose recorder is gone
+    else:
+        raise InputError(f"a run is recording there (process {pids['recorder']}); give another folder", str(directory))
+    for name in (NAME, ENDING, PROCESSES, "target.json", "target.log"):
+        (directory / name).unlink(missing_ok=True)
 
 
 def write_whole(path: Path, data: bytes) -> None:

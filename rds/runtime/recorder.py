@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.types import Ending
-from rds.runtime.record import RecordFile, write_ending
+from rds.runtime.record import PROCESSES, RecordFile, write_ending
 from rds.runtime.ring import Ring
 
 DRAIN_EVERY = 0.05  # s
@@ -103,7 +103,7 @@ def main(arguments: list[str]) -> int:
         hung = watch(target, recorder, ring.about["sample_period"])
     recorder.close()
     write_ending(directory, conclude(directory, ring.head, target.returncode, hung))
-    for name in ("plan.pickle", "target.json", "processes.json"):
+    for name in ("plan.pickle", "target.json", PROCESSES):
         with contextlib.suppress(OSError):
             (directory / name).unlink()
     ring.close()
@@ -114,7 +114,7 @@ def main(arguments: list[str]) -> int:
 
 def write_pids(directory: Path, **pids: int) -> None:
     """Leave the process numbers where a user in trouble finds them."""
-    (directory / "processes.json").write_text(json.dumps(pids))
+    (directory / PROCESSES).write_text(json.dumps(pids))
 
 
 if __name__ == "__main__":
