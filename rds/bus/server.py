@@ -14,7 +14,8 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -26,12 +27,13 @@ from rds.bus.module_node import LISTEN_MASK, LISTENS_TO, ModuleNode
 from rds.bus.poller import READ, make_poller
 from rds.core.errors import InputError, RdsError
 from rds.machines import Machine, load_machine
+from rds.runtime.scheduling import lock_memory, raise_priority
 
 LOG = logging.getLogger(__name__)
 
 PRIORITY = 60  # below the target's 80 and the hub's 70
 _LONGEST_SLEEP = 0.2  # s, so that a stop is noticed
-_AFTERLIFE = 10.0  # s without a command until a machine ends whose starter has gone
+AFTERLIFE = 10.0  # s without a command until a machine ends whose starter has gone
 
 
 def serve(
@@ -39,16 +41,18 @@ def serve(
     interface: str = BUILTIN,
     channel: str | None = None,
     axes: Sequence[str] | None = None,
-    ready: Callable[[str], Any] | None = None,
+    ready: Callable[[], Any] | None = None,
     stop: threading.Event | None = None,
     orphaned: threading.Event | None = None,
+    afterlife: float = AFTERLIFE,
     **options: Any,
 ) -> None:
     """Serve the modules of `machine` (or of its `axes`), each a node of its own, until `stop` is set.
 
     `channel` defaults to the machine's name on the built-in bus; `options` go to the python-can interface. `ready` is
-    called with the bus's name when all nodes are on it. Once `orphaned` is set, the machine also ends when nobody has
-    commanded it for 10 s. A bus that fails later is reported in the log and opened again; the axes go on meanwhile.
+    called when all nodes are on the bus. Once `orphaned` is set, the machine also ends when nobody has commanded it
+    for `afterlife` s. A bus that fails later is reported in the log and opened again; the axes go on meanwhile.
+    In a process's main thread it takes real-time priority where permitted, and ends on SIGTERM and SIGINT.
 
     Raises MachineError if the bus can't be opened at the start, InputError for an unknown axis.
     """
@@ -62,13 +66,14 @@ def serve(
         for slot, axis in enumerate(machine.axes.values()):
             if axes is None or axis.name in axes:
                 nodes.append(ModuleNode(partial(AxisModule, axis, slot, machine.sample_period), opener))
-        if ready is not None:
-            ready(bus_name(interface, channel))
-        keep_on = _until(stop, orphaned, nodes)
-        if all(_descriptor(node.bus) >= 0 for node in nodes):
-            _serve_by_descriptor(nodes, keep_on)
-        else:
-            _serve_by_threads(nodes, keep_on)
+        with _as_process(stop):
+            if ready is not None:
+                ready()
+            keep_on = _until(stop, orphaned, afterlife, nodes)
+            if all(_descriptor(node.bus) >= 0 for node in nodes):
+                _serve_by_descriptor(nodes, keep_on)
+            else:
+                _serve_by_threads(nodes, keep_on)
     finally:
         for node in nodes:
             node.close()
@@ -79,7 +84,27 @@ def default_channel(machine: Machine, interface: str, channel: str | None) -> st
     return channel if channel is not None or interface != BUILTIN else machine.name
 
 
-def _until(stop: threading.Event, orphaned: threading.Event | None, nodes: Sequence[ModuleNode]) -> Callable[[], bool]:
+@contextmanager
+def _as_process(stop: threading.Event) -> Iterator[None]:
+    """Where the whole process is the machine's: be on time, and end when told."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    LOG.info("%s; memory locked: %s", raise_priority(PRIORITY), lock_memory())
+    before = [(number, signal.signal(number, lambda *_: stop.set())) for number in (signal.SIGTERM, signal.SIGINT)]
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        for number, handler in before:
+            signal.signal(number, handler)
+
+
+def _until(
+    stop: threading.Event, orphaned: threading.Event | None, afterlife: float, nodes: Sequence[ModuleNode]
+) -> Callable[[], bool]:
     """A function that says whether to keep on serving."""
     heard = (-1, time.monotonic())
 
@@ -89,7 +114,7 @@ def _until(stop: threading.Event, orphaned: threading.Event | None, nodes: Seque
             ticks = sum(node.module.ticks for node in nodes)
             if ticks != heard[0]:
                 heard = (ticks, time.monotonic())
-            elif time.monotonic() - heard[1] > _AFTERLIFE:
+            elif time.monotonic() - heard[1] > afterlife:
                 LOG.warning("the starter has gone and nobody commands: end")
                 return False
         return not stop.is_set()
@@ -166,33 +191,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--exit-with-stdin",
         action="store_true",
-        help=f"when stdin ends (the starter has gone), end once nobody has commanded for {_AFTERLIFE:g} s",
+        help="when stdin ends (the starter has gone), end once nobody has commanded for the time of --afterlife",
     )
+    parser.add_argument("--afterlife", type=float, default=AFTERLIFE, metavar="SECONDS")
     options = parser.parse_args(arguments)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
     orphaned = _watch_stdin() if options.exit_with_stdin else None
     axes = options.axes.split(",") if options.axes else None
     try:
         machine = load_machine(options.machine)
         bus_options = dict(_pair(text) for text in options.option)
-        prepare = partial(_get_ready, machine)
-        serve(machine, options.interface, options.channel, axes, prepare, stop, orphaned, **bus_options)
+        bus = bus_name(options.interface, default_channel(machine, options.interface, options.channel))
+        ready = partial(_say, f"ready {machine.name} on {bus}: {', '.join(axes or machine.axes)}\n")
+        serve(
+            machine,
+            options.interface,
+            options.channel,
+            axes,
+            ready,
+            orphaned=orphaned,
+            afterlife=options.afterlife,
+            **bus_options,
+        )
     except RdsError as error:
         sys.stderr.write(f"{error}\n")
         return 2 if isinstance(error, InputError) else 1
     return 0
 
 
-def _get_ready(machine: Machine, bus: str) -> None:
-    from rds.runtime.scheduling import lock_memory, raise_priority
-
-    LOG.info("%s on %s; %s; memory locked: %s", machine.name, bus, raise_priority(PRIORITY), lock_memory())
-    gc.collect()
-    gc.freeze()
-    sys.stdout.write(f"ready {machine.name} on {bus}: {', '.join(machine.axes)}\n")
+def _say(line: str) -> None:
+    sys.stdout.write(line)
     sys.stdout.flush()
 
 

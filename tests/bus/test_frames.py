@@ -40,9 +40,7 @@ def test_five_voltages_are_too_many() -> None:
         frames.encode_voltages([0.0] * 5)
 
 
-@given(
-    st.integers(-(2**31), 2**31 - 1), st.integers(0, 15).map(Status), st.sampled_from(Kind), st.integers(0, 65535)
-)
+@given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 15).map(Status), st.sampled_from(Kind), st.integers(0, 65535))
 def test_answers_come_back(counts: int, status: Status, kind: Kind, ticks: int) -> None:
     answer = Answer(counts, status, kind, ticks)
     assert frames.decode_answer(0x22, frames.encode_answer(answer)) == answer
@@ -78,7 +76,9 @@ def test_nodes_out_of_range_are_refused(node: int) -> None:
         frames.answer_identifier(node)
 
 
-filters = st.builds(wire.Filter, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.sampled_from([None, True, False]))
+filters = st.builds(
+    wire.Filter, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1), st.sampled_from([None, True, False])
+)
 
 
 @given(st.lists(filters, max_size=40))

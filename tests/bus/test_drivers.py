@@ -1,0 +1,308 @@
+"""Host and machine over a bus: the built-in one between processes, `virtual` between threads."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+from uuid import uuid4
+
+import can
+import pytest
+
+from rds.bus import frames
+from rds.bus.drivers import AxisDrivers, find_machine
+from rds.bus.frames import Answer, Kind, Status
+from rds.bus.server import serve
+from rds.core.errors import InputError, MachineError
+from rds.machines import load_machine
+
+MACHINE = load_machine("mini-cnc")
+# a period with room for a busy test computer
+SLOW = replace(MACHINE, sample_period=0.01)
+
+
+@pytest.fixture(params=["rds", "virtual"])
+def served(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
+    where = {"interface": request.param, "channel": uuid4().hex}
+    stop, ready = threading.Event(), threading.Event()
+    thread = threading.Thread(target=lambda: serve(SLOW, **where, ready=ready.set, stop=stop))
+    thread.start()
+    assert ready.wait(5.0)
+    yield where
+    stop.set()
+    thread.join(5.0)
+    assert not thread.is_alive()
+
+
+@pytest.fixture
+def machine_process(program: Callable[..., Any]) -> Callable[..., Any]:
+    def starter(*arguments: str) -> Any:
+        process = program("rds.bus.server", "mini-cnc", "--channel", "m", *arguments)
+        line = process.stdout.readline()
+        assert line.startswith("ready mini-cnc on rds:m"), line + process.stderr.read()
+        return process
+
+    return starter
+
+
+def drive(drivers: AxisDrivers, cycles: int, voltages: list[float], period: float) -> list[float]:
+    positions: list[float] = []
+    due = time.monotonic()
+    for _ in range(cycles):
+        positions = drivers.exchange()
+        drivers.write(voltages)
+        due += period
+        time.sleep(max(0.0, due - time.monotonic()))
+    return positions
+
+
+def test_a_voltage_moves_its_axis_and_no_other(served: dict[str, Any]) -> None:
+    drivers = AxisDrivers(SLOW, ["Y", "X", "spindle"], **served)
+    try:
+        drivers.start()
+        assert drivers.exchange() == [0.0, 0.0, 0.0]
+        y, x, spindle = drive(drivers, 20, [-5.0, 0.0, 3.0], 0.01)
+        assert -2.0 < y < -0.8 and x == 0.0 and 1000 < spindle < 2900
+    finally:
+        drivers.close()
+
+
+def test_positions_count_from_the_start_and_the_spindle_does_not(served: dict[str, Any]) -> None:
+    drivers = AxisDrivers(SLOW, ["X", "spindle"], **served)
+    drivers.start()
+    drive(drivers, 20, [5.0, 5.0], 0.01)
+    drivers.start()
+    assert drivers.exchange() == [0.0, 0.0], "start() waits until the axes stand"
+    drivers.close()
+
+
+def test_write_returns_what_acts_from_this_tick_on(served: dict[str, Any]) -> None:
+    drivers = AxisDrivers(SLOW, ["X"], **served)
+    drivers.start()
+    for sent, before in ((1.25, 0.0), (2.5, 1.25), (0.1, 2.5)):
+        drivers.exchange()
+        assert drivers.write([sent]) == (before,)
+    drivers.exchange()
+    assert drivers.write([0.0])[0] == pytest.approx(0.1, abs=20 / 65536 / 2), "in units of the frame"
+    for bad in ([11.0], [float("nan")], [1.0, 2.0]):
+        with pytest.raises(InputError):
+            drivers.write(bad)
+    drivers.close()
+    drivers.close()
+
+
+def test_a_dry_run_moves_nothing(served: dict[str, Any]) -> None:
+    drivers = AxisDrivers(SLOW, **served, dry_run=True)
+    drivers.start()
+    assert drive(drivers, 10, [9.0] * 4, 0.01) == [0.0] * 4
+    drivers.close()
+
+
+def test_stop_cuts_the_voltage_at_once(served: dict[str, Any]) -> None:
+    drivers = AxisDrivers(SLOW, ["X"], **served)
+    drivers.start()
+    drive(drivers, 10, [5.0], 0.01)
+    drivers.stop()
+    time.sleep(0.08)  # 8 time constants, less than the watchdog's 10 periods
+    here = drivers.exchange()
+    time.sleep(0.02)
+    assert drivers.exchange() == here
+    assert drivers.counters.watchdogs == 0
+    drivers.close()
+
+
+def test_silence_trips_the_watchdog_and_the_next_command_clears_it(served: dict[str, Any]) -> None:
+    drivers = AxisDrivers(SLOW, ["X"], **served)
+    drivers.start()
+    drive(drivers, 5, [5.0], 0.01)
+    time.sleep(0.25)
+    here = drivers.exchange()
+    assert drivers.counters.watchdogs == 1
+    assert drivers.exchange()[0] == pytest.approx(here[0], abs=0.01), "it stood until this tick"
+    drivers.close()
+
+
+def test_find_machine(served: dict[str, Any]) -> None:
+    assert find_machine(SLOW, **served) == list(SLOW.axes)
+
+
+def test_no_machine_is_found_on_an_empty_bus() -> None:
+    assert find_machine(SLOW, channel="empty", timeout=0.05) == []
+
+
+def test_an_unplugged_machine_is_named_with_its_remedy() -> None:
+    drivers = AxisDrivers(MACHINE, ["X", "Z"], channel="nobody")
+    with pytest.raises(MachineError, match=r"X \(node 2\), Z \(node 4\) on bus rds:nobody.*rds machine serve mini-cnc"):
+        drivers.start()
+    drivers.close()
+
+
+def test_one_unplugged_module_is_named(machine_process: Callable[..., Any]) -> None:
+    machine_process("--axes", "X,Y")
+    drivers = AxisDrivers(MACHINE, ["X", "Y", "Z"], channel="m")
+    with pytest.raises(MachineError, match=r"no answer from Z \(node 4\) on"):
+        drivers.start()
+    drivers.close()
+    assert find_machine(MACHINE, channel="m") == ["X", "Y"]
+
+
+def test_an_unknown_interface_or_axis_is_bad_input() -> None:
+    with pytest.raises(MachineError, match="nonsense:1 can't be opened"):
+        AxisDrivers(MACHINE, interface="nonsense", channel="1")
+    with pytest.raises(InputError, match="no axis 'W'"):
+        AxisDrivers(MACHINE, ["W"], channel="m")
+
+
+def test_a_machine_killed_while_running_is_lost_after_ten_periods(machine_process: Callable[..., Any]) -> None:
+    process = machine_process()
+    drivers = AxisDrivers(SLOW, ["X", "Y"], channel="m")
+    drivers.start()
+    last = drive(drivers, 10, [2.0, 2.0], 0.01)
+    process.kill()
+    cycles = 0
+    with pytest.raises(MachineError, match=r"X \(node 2\), Y \(node 3\)"):
+        while cycles < 20:
+            assert drivers.exchange() == pytest.approx(last, abs=0.1), "the last position is repeated"
+            cycles += 1
+    assert 8 <= cycles <= 10
+    drivers.close()
+
+
+def test_a_machine_that_stood_still_a_while_is_caught_up_with(machine_process: Callable[..., Any]) -> None:
+    process = machine_process()
+    drivers = AxisDrivers(SLOW, ["X", "Y"], channel="m")
+    drivers.start()
+    drive(drivers, 10, [2.0, 2.0], 0.01)
+    os.kill(process.pid, signal.SIGSTOP)
+    drive(drivers, 4, [2.0, 2.0], 0.01)
+    os.kill(process.pid, signal.SIGCONT)
+    drive(drivers, 20, [2.0, 2.0], 0.01)
+    counters = drivers.counters
+    assert 3 * 2 <= counters.missing <= 6 * 2 and counters.late >= 3 * 2 and counters.lost_ticks == 0
+    before = replace(counters)
+    drive(drivers, 10, [2.0, 2.0], 0.01)
+    assert (counters.missing, counters.late) == (before.missing, before.late), "in step again"
+    drivers.close()
+
+
+def test_a_killed_hub_ends_the_run_and_the_machine_comes_back(machine_process: Callable[..., Any]) -> None:
+    process = machine_process()
+    bus = can.Bus(interface="rds", channel="m")
+    drivers = AxisDrivers(SLOW, ["X"], bus=bus)
+    drivers.start()
+    os.kill(bus.hub_pid, signal.SIGKILL)  # type: ignore[attr-defined]
+    with pytest.raises(MachineError, match=r"failed.*ended without a word"):
+        drive(drivers, 20, [1.0], 0.01)
+    drivers.stop()
+    drivers.close()
+    bus.shutdown()
+    deadline = time.monotonic() + 5.0
+    while len(find_machine(MACHINE, channel="m")) < 4:
+        assert time.monotonic() < deadline
+    process.terminate()
+    assert process.wait(3) == 0
+    report = process.stderr.read()
+    assert "module X lost its bus" in report and "module X is back on its bus" in report
+
+
+class Puppet(can.BusABC):
+    """A bus whose answers the test writes."""
+
+    def __init__(self) -> None:
+        self.answers: list[list[can.Message]] = []
+        self.inbox: list[can.Message] = []
+        super().__init__("puppet")
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if msg.arbitration_id == frames.COMMAND and self.answers:
+            self.inbox += self.answers.pop(0)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        if self.inbox:
+            return self.inbox.pop(0), False
+        time.sleep(timeout or 0)
+        return None, False
+
+
+def answer(ticks: int, counts: int = 0, kind: Kind = Kind.ANSWER, status: Status = Status.ENABLED) -> can.Message:
+    data = frames.encode_answer(Answer(counts, status, kind, ticks))
+    return can.Message(arbitration_id=0x22, is_extended_id=False, data=data)
+
+
+@pytest.fixture
+def puppet() -> Iterator[tuple[Puppet, AxisDrivers]]:
+    with Puppet() as bus:
+        drivers = AxisDrivers(MACHINE, ["X"], bus=bus)
+        bus.answers = [[answer(65530)]]
+        drivers.exchange()
+        drivers.counters.__init__()  # type: ignore[misc]
+        yield bus, drivers
+
+
+def test_the_tick_count_wraps_round(puppet: tuple[Puppet, AxisDrivers]) -> None:
+    bus, drivers = puppet
+    bus.answers = [[answer((65531 + k) % 65536, k)] for k in range(20)]
+    assert [round(drivers.exchange()[0] * 1000) for _ in range(20)] == list(range(20))
+    assert (drivers.counters.late, drivers.counters.lost_ticks, drivers.counters.missing) == (0, 0, 0)
+
+
+def test_a_late_answer_is_not_taken_for_the_next(puppet: tuple[Puppet, AxisDrivers]) -> None:
+    bus, drivers = puppet
+    bus.answers = [[], [answer(65531, 1), answer(65532, 2)], [answer(65533, 3)]]
+    assert [round(drivers.exchange()[0] * 1000) for _ in range(3)] == [0, 2, 3]
+    assert (drivers.counters.missing, drivers.counters.late) == (1, 1)
+
+
+def test_a_lost_tick_is_noticed(puppet: tuple[Puppet, AxisDrivers]) -> None:
+    bus, drivers = puppet
+    bus.answers = [[], [answer(65531, 1)], [answer(65532, 2)], [answer(65533, 3)]]
+    assert [round(drivers.exchange()[0] * 1000) for _ in range(4)] == [0, 1, 2, 3]
+    bus.answers = [[answer(65533, 4)]]
+    drivers.exchange()
+    assert drivers.counters.lost_ticks == 1
+
+
+def test_other_frames_are_ignored_and_counted(puppet: tuple[Puppet, AxisDrivers]) -> None:
+    bus, drivers = puppet
+    report = answer(65530, 9, Kind.REPORT, Status.WATCHDOG)
+    foreign = can.Message(arbitration_id=0x22, is_extended_id=True), can.Message(arbitration_id=0x23)
+    bus.answers = [[report, *foreign, answer(65531, 1)]]
+    assert drivers.exchange() == [0.001]
+    assert (drivers.counters.watchdogs, drivers.counters.foreign) == (1, 2)
+
+
+def test_the_server_says_what_is_wrong(program: Callable[..., Any]) -> None:
+    for arguments, code, words in (
+        (["nonsense"], 2, "no machine 'nonsense'"),
+        (["mini-cnc", "--axes", "X,Q"], 2, "no axis 'Q'"),
+        (["mini-cnc", "--option", "bitrate=5"], 1, "no option bitrate"),
+        (["mini-cnc", "--interface", "nonsense"], 1, "can't be opened"),
+    ):
+        process = program("rds.bus.server", *arguments)
+        out, err = process.communicate(timeout=10)
+        assert process.returncode == code and words in err and out == "" and "Traceback" not in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_the_server_ends_cleanly_on_signals(machine_process: Callable[..., Any]) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT):
+        process = machine_process()
+        process.send_signal(number)
+        assert process.wait(3) == 0
+
+
+def test_an_orphaned_machine_ends_when_nobody_commands_it(machine_process: Callable[..., Any]) -> None:
+    process = machine_process("--exit-with-stdin", "--afterlife", "1")
+    process.stdin.close()
+    drivers = AxisDrivers(SLOW, ["X"], channel="m")
+    drivers.start()
+    drive(drivers, 50, [0.0], 0.01)
+    drivers.close()
+    assert process.poll() is None
+    assert process.wait(3) == 0

@@ -1,0 +1,132 @@
+"""The virtual module: latched at the tick, right in bus time however late it runs, safe without commands."""
+
+from __future__ import annotations
+
+from math import exp
+
+import pytest
+
+from rds.bus import frames
+from rds.bus.frames import Answer, Kind, Status
+from rds.bus.module import AxisModule, machine_parameters
+from rds.core.errors import InputError
+from rds.machines import Axis, load_machine
+
+T = 0.001
+AXIS = Axis("X", 2, "mm", (-75.0, 75.0), 0.001, machine={"tau": 0.01, "K": 2.0, "delay": 0.0002})
+
+
+def command(*voltages: float) -> bytes:
+    return frames.encode_voltages(voltages)
+
+
+def make(slot: int = 0) -> AxisModule:
+    return AxisModule(AXIS, slot, T, start=100.0)
+
+
+def decode(answers: list[bytes]) -> list[Answer]:
+    return [frames.decode_answer(0x22, data) for data in answers]
+
+
+def test_answers_with_the_position_at_the_stamp() -> None:
+    module = make()
+    (first,) = decode(module.receive(frames.COMMAND, command(5.0), 100.0))
+    assert first == Answer(0, Status.ENABLED, Kind.ANSWER, 1)
+    (second,) = decode(module.receive(frames.COMMAND, command(5.0), 100.005))
+    moved = 5.0 - 0.2  # ms, after the delay
+    position = 10.0 * (moved - 10.0 * (1 - exp(-moved / 10.0)))  # µm, 10 mm/s at 5 V, τ = 10 ms
+    assert second == Answer(round(position), Status.ENABLED, Kind.ANSWER, 2)
+
+
+def test_takes_its_own_slot() -> None:
+    module = make(slot=2)
+    module.receive(frames.COMMAND, command(9.0, 9.0, -4.0, 9.0), 100.0)
+    module.motion.advance(100.001)
+    assert module.motion.voltage == pytest.approx(-4.0, abs=1e-3)
+
+
+def test_a_dry_run_answers_and_does_not_move() -> None:
+    module = make()
+    module.receive(frames.DRY_COMMAND, command(9.0), 100.0)
+    (answer,) = decode(module.receive(frames.DRY_COMMAND, command(9.0), 100.009))
+    assert answer == Answer(0, Status.DRY_RUN, Kind.ANSWER, 2)
+
+
+def test_ten_periods_without_a_command_cut_the_voltage_at_that_instant() -> None:
+    module = make()
+    module.receive(frames.COMMAND, command(5.0), 100.0)
+    assert module.expires == pytest.approx(100.010)
+    assert module.expire(100.0099) == []
+    (report,) = decode(module.expire(100.010001))
+    assert report.status == Status.WATCHDOG and report.kind == Kind.REPORT and report.ticks == 1
+    assert module.expires is None
+    assert module.expire(200.0) == []
+    (called,) = decode(module.receive(frames.CALL, b"", 101.0))
+    assert called.status == Status.WATCHDOG
+    (answer,) = decode(module.receive(frames.COMMAND, command(0.0), 102.0))
+    assert answer.status == Status.ENABLED, "the next command clears it"
+
+
+@pytest.mark.parametrize("found_out_at", [100.0101, 100.5, 200.0])
+def test_found_out_late_it_still_was_zero_volts_from_that_instant(found_out_at: float) -> None:
+    module = make()
+    module.receive(frames.COMMAND, command(5.0), 100.0)
+    report, answer = decode(module.receive(frames.COMMAND, command(0.0), found_out_at))
+    assert report.status == Status.WATCHDOG and answer.status == Status.ENABLED
+    moved = 0.0098
+    speed = 10.0 * (1 - exp(-moved / 0.01))
+    at_cut = 10.0 * moved - 0.01 * speed
+    coast = 0.01 * speed * (1 - exp(-(found_out_at - 100.010) / 0.01))
+    assert report.counts == round(at_cut / 0.001)
+    assert answer.counts == round((at_cut + coast) / 0.001)
+
+
+def test_set_up_sets_the_period_that_the_watchdog_counts_in() -> None:
+    module = make()
+    module.receive(frames.SETUP, frames.encode_setup(0.005), 100.0)
+    module.receive(frames.COMMAND, command(5.0), 100.0)
+    assert module.expires == pytest.approx(100.05)
+
+
+@pytest.mark.parametrize(
+    "identifier, data",
+    [
+        (frames.COMMAND, b""),
+        (frames.COMMAND, b"1234567"),
+        (frames.SETUP, b"x"),
+        (frames.SETUP, bytes(8)),
+        (0x7FF, b"?"),
+    ],
+)
+def test_bad_frames_change_nothing(identifier: int, data: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    module = make()
+    module.receive(frames.COMMAND, command(5.0), 100.0)
+    expires = module.expires
+    assert module.receive(identifier, data, 100.001) == []
+    assert module.ticks == 1 and module.expires == expires
+    assert identifier == 0x7FF or "ignored a frame" in caplog.text
+
+
+def test_the_machine_of_the_package_makes_modules() -> None:
+    for slot, axis in enumerate(load_machine("mini-cnc").axes.values()):
+        module = AxisModule(axis, slot, T, 0.0)
+        assert module.identifier == 0x20 + axis.node
+
+
+def test_a_spindle_reports_its_speed() -> None:
+    axis = load_machine("mini-cnc").axis("spindle")
+    module = AxisModule(axis, 3, T, 0.0)
+    for k in range(2000):
+        answers = module.receive(frames.COMMAND, command(0, 0, 0, 5.0), k * T)
+    final = (975.0 * 5.0 - 40.0) / 1.01
+    assert decode(answers)[0].counts == pytest.approx(final, abs=2.0)
+
+
+def test_without_a_machine_table_the_machine_is_its_model() -> None:
+    axis = Axis("X", 2, "mm", (-1, 1), 0.001, model={"name": "linear-axis", "tau": 0.01, "K": 1.5})
+    assert machine_parameters(axis).K == 1.5
+
+
+def test_a_fifth_axis_has_no_slot() -> None:
+    with pytest.raises(InputError, match="number 5"):
+        make(slot=4)
