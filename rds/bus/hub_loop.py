@@ -82,10 +82,13 @@ class Hub:
         """Tell everybody why, and let go of everything."""
         self._address.remove(remove_log)
         for node in list(self._nodes.values()):
-            if node.state is not State.LEAVING:
+            if node.state is State.JOINED:
+                self._forget_member(node)
                 node.say_goodbye(reason)
-            self._flush(node)
-            self._part(node)
+                self._flush(node)
+            # one that was still greeting sees the end without a word, and looks for the next hub
+            if node.state is not State.GONE:
+                self._part(node)
         self._listener.close()
         self._poller.close()
 
