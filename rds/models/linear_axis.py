@@ -84,7 +84,7 @@ def coefficients(params: Mapping[str, Any], T: float) -> tuple[float, ...]:
 class LinearAxisMotion:
     """The axis in motion in a loop with a fixed sample period: `contracts.Motion`."""
 
-    __slots__ = ("_constants", "velocity", "position")
+    __slots__ = ("_constants", "position", "velocity")
 
     def __init__(self, model: Model, T: float):
         self.position, self.velocity = (float(value) for value in model.initial_state)
