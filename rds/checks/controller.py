@@ -129,7 +129,7 @@ class _Run:
                 return self.found.fault(clauses.SAVED_STATE, said)
             self.sizes.append(size(state))
             for plant, u in zip(plants, np.atleast_1d(np.asarray(voltage, dtype=float)), strict=True):
-                plant.move(float(u))
+                plant.move(t, float(u))
         return None
 
     def _inputs(self, table: np.ndarray, k: int, plants: list[LinearAxis]) -> tuple[Reference, Any]:
@@ -155,23 +155,23 @@ class _Run:
         fault = voltage_fault(answer, self.axes)
         if fault is not None:
             clause, said, remedy = fault
-            if not self.axes and self._works_with_arrays():
-                remedy = "it works with arrays of several axes: check and run it as a coupled controller"
+            if not self.axes and not self.calls and self._works_with_arrays():
+                remedy += "; or, as it works with arrays of several axes, check and run it as a coupled controller"
             self.found.fault(clause, f"control() returned {said} at t = {t:.3f} s; {remedy}")
         return fault is None
 
     def _failed(self, error: BaseException, t: float, before: tuple[Any, ...]) -> None:
         said = student_error(error, self.source)
-        if not self.axes and self._works_with_arrays():
+        if not self.axes and not self.calls and _is_about_form(error) and self._works_with_arrays():
             remedy = "it works with arrays of several axes: check and run it as a coupled controller"
             return self.found.fault(clauses.RUNS, f"control() fails with one axis's numbers: {said}; {remedy}")
         if not self.calls:
-            if self.subject.student.initial_state is None and _is_about_state(error):
+            if self.subject.student.initial_state is None and _is_about_form(error):
                 said = f"control() fails with the empty state, and there is no initial_state: {said}"
                 remedy = "define it, as in `initial_state = [0.0]`"
                 return self.found.fault(clauses.INITIAL_STATE, f"{said}; {remedy}")
             return self.found.fault(clauses.RUNS, f"control() failed in its first call: {said}")
-        if len(self.calls) == 1 and _is_about_state(error) and not _alike(self.initial_state, before[3]):
+        if len(self.calls) == 1 and _is_about_form(error) and not _alike(self.initial_state, before[3]):
             returned = f"control() cannot take the next_state that it returned itself, {shown(before[3])}: {said}"
             remedy = f"return it in the form of initial_state, {shown(self.initial_state)}"
             return self.found.fault(clauses.NEXT_STATE, f"{returned}; {remedy}")
@@ -230,7 +230,7 @@ class _Run:
         return None
 
 
-def _is_about_state(error: BaseException) -> bool:
+def _is_about_form(error: BaseException) -> bool:
     return isinstance(error, IndexError | KeyError | TypeError | ValueError | AttributeError)
 
 

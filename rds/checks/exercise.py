@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, pi
+from math import exp, pi, sin
 
 import numpy as np
 
@@ -12,7 +12,8 @@ VOLTAGE_LIMIT = 10.0  # V: the converter's; an unstable law stays finite behind 
 _PARTS = ((0.2, 500), (2.0, 700))  # Hz, samples of a sine of _AMPLITUDE
 _STEPS = ((5.0, 250), (-5.0, 250), (0.0, 100))  # mm, samples
 _AMPLITUDE = 5.0  # mm
-_START = 0.25  # mm: from zero, a law that only looks at y would never see anything else
+_START = 0.25  # mm
+_LOAD = 1.0, 3.0  # V, Hz: an unknown load, so that the position changes under a law that gives 0 V, too
 
 
 class LinearAxis:
@@ -23,9 +24,10 @@ class LinearAxis:
         self._decay = exp(-sample_period / TAU)
         self._T = sample_period
 
-    def move(self, voltage: float) -> None:
-        """One sample further, under `voltage` (V) as the converter limits it."""
-        final = GAIN * min(max(voltage, -VOLTAGE_LIMIT), VOLTAGE_LIMIT)
+    def move(self, t: float, voltage: float) -> None:
+        """One sample on from time `t` (s), under `voltage` (V) as the converter limits it and a load."""
+        load = _LOAD[0] * sin(2 * pi * _LOAD[1] * t)
+        final = GAIN * (min(max(voltage, -VOLTAGE_LIMIT), VOLTAGE_LIMIT) + load)
         gained = TAU * (1.0 - self._decay)
         self.position += final * self._T + (self.velocity - final) * gained
         self.velocity = final + (self.velocity - final) * self._decay

@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from rds.checks import clauses
-from rds.checks.paths import ARC, CIRCLE, CLOCKWISE, LINE, LINE_OF_ONE, LINE_OF_THREE, name_of
+from rds.checks.paths import ARC, CIRCLE, CLOCKWISE, LINE, LINE_BACK, LINE_OF_ONE, LINE_OF_THREE, name_of
 from rds.checks.places import changed, outside_sources, remembered
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.rows import Trace, alternate, trace
@@ -24,6 +25,7 @@ from rds.core.types import Segment
 
 BUDGET = 3.0  # s for each segment
 _LEAST = 20  # rows, whatever they take
+_OTHER: Mapping[Segment, Segment] = MappingProxyType({LINE: LINE_BACK, ARC: CLOCKWISE})
 
 
 def check_interpolator(
@@ -117,7 +119,7 @@ class _Check:
         """More axes, the other way round: what goes wrong in silence is a fault, an error is worth a warning."""
         segments: list[Segment] = []
         for each in good:
-            segments += [LINE_OF_THREE, LINE_OF_ONE] if each.segment is LINE else [CLOCKWISE, CIRCLE]
+            segments += [LINE_BACK, LINE_OF_THREE, LINE_OF_ONE] if each.segment is LINE else [CLOCKWISE, CIRCLE]
         for segment in segments:
             result = self._trace(segment)
             if result.fault is not None and result.fault[0] == clauses.RUNS:
@@ -128,9 +130,9 @@ class _Check:
     def _judge_memory(self, good: list[Trace], before: dict[str, Any]) -> None:
         """Repeat the segments in a fresh copy, then take rows of several of them in turn."""
         places = changed(before, remembered(self.function))
-        segments = tuple(trace.segment for trace in good for _ in range(2))
-        expected = [trace.rows for trace in good for _ in range(2)]
-        per_row = 1e-9 * sum(sum(each.ns) for each in good) / sum(len(each.rows) for each in good)
+        pairs = [each for first in good for each in (first, self._trace(_OTHER[first.segment])) if each.fault is None]
+        segments, expected = tuple(each.segment for each in pairs), [each.rows for each in pairs]
+        per_row = 1e-9 * sum(sum(each.ns) for each in pairs) / sum(len(each.rows) for each in pairs)
         most = max(_LEAST, int(self.budget / per_row / len(segments)))
         counts = [min(len(rows), most) for rows in expected]
         functions = [self.function]

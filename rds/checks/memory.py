@@ -13,6 +13,7 @@ from rds.checks.places import changed, outside_sources, remembered
 from rds.checks.replay import Call, Difference, Replay
 from rds.checks.report import Findings
 from rds.checks.subject import Subject
+from rds.checks.values import is_plain
 
 REMEDIES = {
     clauses.MEMORY: "take it from `state` and return it in next_state",
@@ -52,15 +53,20 @@ def judge_memory(
     difference: Difference | None = None
     copies = [function]
     if subject.fresh is not None:
-        again = Replay(subject.fresh().functions[role], copy.deepcopy(params), calls, source, budget, memory.ns)
-        unlike = again.in_order()
+        other = subject.fresh()
+        is_transferable = all(is_plain(call.arguments[3:]) for call in calls)
+        again = Replay(other.functions[role], copy.deepcopy(params), calls, source, budget, memory.ns)
+        unlike = again.in_order() if is_transferable else again.in_order(other.initial_state, chained=True)
         memory.first_ns = memory.ns.get(0)
         if unlike is not None:
             return found.fault(clauses.DETERMINISTIC, _chance(what, unlike, function))
-        copies.append(subject.fresh().functions[role])
+        if is_transferable:  # for a state of the student's classes, the first copy has to do
+            copies.append(subject.fresh().functions[role])
     for each in copies:
         replay = Replay(each, copy.deepcopy(params), calls, source, budget, memory.ns)
         difference = difference or replay.out_of_order()
+    # A sum may be back where it was at the end of the run, but not at the end of its calls in another order.
+    places = places or changed(before, remembered(function))
     if difference is None:
         if places:
             said = f"{what} changes {places[0]} from call to call, though its answers do not depend on it"

@@ -10,6 +10,7 @@ from rds.core.types import ArcSegment, LineSegment, Segment
 
 FEED = 20.0  # mm/s
 LINE = LineSegment((1.0, 2.0), (9.0, -4.0), FEED)
+LINE_BACK = LineSegment((-3.0, 1.0), (-7.0, 4.0), FEED)
 LINE_OF_ONE = LineSegment((4.0,), (-3.0,), FEED)
 LINE_OF_THREE = LineSegment((1.0, 2.0, -1.0), (5.0, -4.0, 3.0), FEED)
 ARC = ArcSegment((7.0, 1.0), (2.0, 6.0), (2.0, 1.0), FEED)

@@ -38,16 +38,20 @@ def subject_of(thing: Any, role: str, initial_state: Any = None, params: Mapping
 
     Raises what `rds.core.load` raises for what cannot be loaded; arguments and params are left to the check.
     """
-    student = _student(thing, role)
+    student = _with(_student(thing, role), initial_state, params)
+    path = student.source.path
+    if path is None or not Path(path).is_file():
+        return Subject(student)
+    return Subject(student, lambda: _with(load_student(path, validate=False), initial_state, params))
+
+
+def _with(student: StudentFile, initial_state: Any, params: Mapping[str, Any] | None) -> StudentFile:
     if initial_state is not None:
         student = replace(student, initial_state=initial_state)
     if params is not None:
         own = student.params if isinstance(student.params, Mapping) else {}
         student = replace(student, params={**own, **params})
-    path = student.source.path
-    if path is None or not Path(path).is_file():
-        return Subject(student)
-    return Subject(student, lambda: load_student(path, validate=False))
+    return student
 
 
 def _student(thing: Any, role: str) -> StudentFile:

@@ -8,7 +8,7 @@ from rds.checks import clauses
 from rds.checks.report import Findings, Timing
 
 COMFORT = 0.5  # of the period: above it, too little is left for input, output and the system
-MOSTLY_WAITING = 0.5  # of a call's time in which the processor did nothing for it
+WORKING = 0.2  # of a call's time: with less work than that it waits, even on a machine that others use
 
 
 def judge_time(
@@ -25,7 +25,7 @@ def judge_time(
     timing = Timing(len(us), us[len(us) // 2], us[min(len(us) - 1, int(0.99 * len(us)))], us[-1])
     period = sample_period * 1e6
     if timing.p50 > period:
-        waits = busy < MOSTLY_WAITING
+        waits = busy < WORKING
         remedy = "it waits: remove sleep, input and file access" if waits else "compute less, or once, outside of it"
         message = f"{what} takes {timing.p50:.0f} µs of a sample period of {period:.0f} µs; {remedy}"
         found.fault(clauses.TIME, message)

@@ -62,18 +62,24 @@ def _same_arrays(a: Any, b: Any, depth: int) -> bool:
 
 
 def _parts(value: Any) -> Any:
-    """What an object consists of: its attributes, or else what it would be rebuilt from."""
-    if hasattr(value, "__dict__"):
-        own = dict(vars(value))
-        if own or not hasattr(type(value), "__slots__"):
-            return own
-    slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
-    if slots:
-        return {name: getattr(value, name, None) for name in slots}
+    """What an object would be rebuilt from, or else its attributes."""
     try:
         return list(value.__reduce_ex__(4)[1:])
-    except Exception:  # an iterator of the system's or the like: nothing can be said about it
-        return None
+    except Exception:  # an iterator of the system's, or an object with a lock or a file in it
+        return getattr(value, "__dict__", None)
+
+
+def is_plain(value: Any, depth: int = 0) -> bool:
+    """Whether it consists of numbers, texts, lists, tuples, dicts and arrays, with no class of a student's in it."""
+    if value is None or type(value) in (bool, int, float, complex, str, bytes) or isinstance(value, np.generic):
+        return True
+    if type(value) is np.ndarray:
+        return bool(value.dtype.kind in "fcbiu")
+    if depth > _DEEPEST:
+        return False
+    if type(value) in (list, tuple, deque):
+        return all(is_plain(part, depth + 1) for part in value)
+    return type(value) is dict and all(is_plain(part, depth + 1) for pair in value.items() for part in pair)
 
 
 def size(value: Any, depth: int = 0) -> int:

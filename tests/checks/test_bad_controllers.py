@@ -1,0 +1,322 @@
+"""Controllers known to be bad, each with the clause that it breaks."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rds.checks import check_controller, clauses
+
+total = 0.0
+history: list[float] = []
+counter = itertools.count()
+rng = np.random.default_rng(1)
+
+
+def global_memory(t, r, y, state, params):
+    global total
+    total += r.position - y
+    return total, state
+
+
+def list_memory(t, r, y, state, params):
+    history.append(y)
+    return history[-2] - y if len(history) > 1 else 0.0, state
+
+
+def helper_memory(t, r, y, state, params):
+    return _accumulate(r.position - y), state
+
+
+def _accumulate(error, memory={"sum": 0.0}):  # noqa: B006 - the fault to be found
+    memory["sum"] += error
+    return memory["sum"]
+
+
+def default_memory(t, r, y, state, params, memory=[0.0]):  # noqa: B006
+    memory[0] += y
+    return memory[0], state
+
+
+def attribute_memory(t, r, y, state, params):
+    attribute_memory.last = getattr(attribute_memory, "last", 0.0) + y
+    return attribute_memory.last, state
+
+
+def iterator_memory(t, r, y, state, params):
+    return 0.001 * next(counter), state
+
+
+def _closure_memory():
+    last = 0.0
+
+    def control(t, r, y, state, params):
+        nonlocal last
+        u, last = 10.0 * (y - last), y
+        return u, state
+
+    return control
+
+
+class _Object:
+    def __init__(self):
+        self.integral = 0.0
+
+    def control(self, t, r, y, state, params):
+        self.integral += r.position - y
+        return self.integral, state
+
+
+class _Class:
+    integral = 0.0
+
+    @classmethod
+    def step(cls, error):
+        cls.integral += error
+        return cls.integral
+
+
+def class_memory(t, r, y, state, params):
+    return _Class.step(r.position - y), state
+
+
+def reset_at_start_memory(t, r, y, state, params):
+    global total
+    total = 0.0 if t == 0.0 else total + y
+    return total, state
+
+
+def chance(t, r, y, state, params):
+    return random.gauss(0.0, 1.0), state
+
+
+def clock(t, r, y, state, params):
+    return (time.perf_counter() % 1.0) * (r.position - y), state
+
+
+def seeded_chance(t, r, y, state, params):
+    return rng.normal(), state
+
+
+def voltage_alone(t, r, y, state, params):
+    return 5.0 * (r.position - y)
+
+
+def nothing(t, r, y, state, params):
+    5.0 * (r.position - y)  # forgot to return it
+
+
+def three_values(t, r, y, state, params):
+    return 0.0, 0.0, 0.0
+
+
+def swapped(t, r, y, state, params):
+    return state, 5.0 * (r.position - y)
+
+
+def generator(t, r, y, state, params):
+    yield 0.0, state
+
+
+def text(t, r, y, state, params):
+    return "1.5", state
+
+
+def boolean(t, r, y, state, params):
+    return r.position > y, state
+
+
+def complex_number(t, r, y, state, params):
+    return (y + 0j) ** 0.5, state
+
+
+def no_number(t, r, y, state, params):
+    return None, state
+
+
+def array_of_several(t, r, y, state, params):
+    return np.array([1.0, 2.0]), state
+
+
+def array_of_one(t, r, y, state, params):
+    return np.array([r.position - y]), state
+
+
+def not_a_number(t, r, y, state, params):
+    return float("nan") if t > 0.5 else 0.0, state
+
+
+def infinite(t, r, y, state, params):
+    return np.float64(np.inf), state
+
+
+def divides_by_zero(t, r, y, state, params):
+    return 1.0 / r.position, state
+
+
+def fails_far_away(t, r, y, state, params):
+    table = [0.0] * 20
+    return table[int(abs(r.position - y))], state
+
+
+def grows(t, r, y, state, params):
+    return 5.0 * (r.position - y), [*state, y]
+
+
+def number_for_list(t, r, y, state, params):
+    integral = state[0] + r.position - y
+    return integral, integral
+
+
+def changes_state(t, r, y, state, params):
+    state[0] += r.position - y
+    return state[0], state
+
+
+def changes_params(t, r, y, state, params):
+    params["sum"] = params.get("sum", 0.0) + y
+    return 0.0, state
+
+
+def generator_state(t, r, y, state, params):
+    return 0.0, (value for value in (1, 2))
+
+
+@dataclass
+class _Handle:
+    name: str
+
+
+def identity_state(t, r, y, state, params):
+    handle = state if isinstance(state, _Handle) else _Handle("a")
+    known = getattr(identity_state, "known", {})
+    identity_state.known = known
+    known[id(handle)] = known.get(id(handle), 0.0) + y
+    return known[id(handle)], handle
+
+
+def slow(t, r, y, state, params):
+    end = time.perf_counter() + 1.5e-3
+    while time.perf_counter() < end:
+        pass
+    return 0.0, state
+
+
+def sleeps(t, r, y, state, params):
+    time.sleep(1.2e-3)
+    return 0.0, state
+
+
+def exits(t, r, y, state, params):
+    raise SystemExit(1)
+
+
+def four_arguments(t, r, y, state):
+    return 0.0, state
+
+
+def wrong_order(t, y, r, state, params):
+    return 0.0, state
+
+
+BAD = [
+    (global_memory, clauses.MEMORY, "global `total`"),
+    (list_memory, clauses.MEMORY, "global `history`"),
+    (helper_memory, clauses.MEMORY, "default argument `memory` of _accumulate()"),
+    (default_memory, clauses.MEMORY, "default argument `memory`"),
+    (attribute_memory, clauses.MEMORY, "attribute `attribute_memory.last`"),
+    (iterator_memory, clauses.MEMORY, "`counter`"),
+    (_closure_memory(), clauses.MEMORY, "variable `last` around control()"),
+    (_Object().control, clauses.MEMORY, "object of _Object.control()"),
+    (class_memory, clauses.MEMORY, "class attribute `_Class.integral`"),
+    (reset_at_start_memory, clauses.MEMORY, "global `total`"),
+    (seeded_chance, clauses.MEMORY, "global `rng`"),
+    (identity_state, clauses.MEMORY, "known"),
+    (chance, clauses.DETERMINISTIC, "`random`"),
+    (clock, clauses.DETERMINISTIC, "`perf_counter`"),
+    (voltage_alone, clauses.PAIR, "alone"),
+    (nothing, clauses.PAIR, "returned nothing"),
+    (three_values, clauses.PAIR, "3 values"),
+    (generator, clauses.PAIR, "not `yield`"),
+    (swapped, clauses.VOLTAGE, "the state second"),
+    (text, clauses.VOLTAGE, "'1.5' (str)"),
+    (boolean, clauses.VOLTAGE, "(bool)"),
+    (complex_number, clauses.VOLTAGE, "(complex)"),
+    (no_number, clauses.VOLTAGE, "None"),
+    (array_of_several, clauses.VOLTAGE, "one number"),
+    (array_of_one, clauses.VOLTAGE, "u.item()"),
+    (not_a_number, clauses.VOLTAGE, "nan at t = 0.501 s"),
+    (infinite, clauses.VOLTAGE, "inf"),
+    (divides_by_zero, clauses.RUNS, "ZeroDivisionError"),
+    (fails_far_away, clauses.RUNS, "y = 0 mm: test_bad_controllers.py, line"),
+    (grows, clauses.NEXT_STATE, "grew"),
+    (number_for_list, clauses.NEXT_STATE, "in the form of initial_state, [0.0]"),
+    (changes_state, clauses.UNCHANGED, "`state`"),
+    (changes_params, clauses.UNCHANGED, "'sum'"),
+    (generator_state, clauses.SAVED_STATE, "cannot be copied"),
+    (slow, clauses.TIME, "compute less"),
+    (sleeps, clauses.TIME, "it waits"),
+    (exits, clauses.RUNS, "SystemExit"),
+    (four_arguments, clauses.ARGUMENTS, "params missing"),
+    (wrong_order, clauses.ARGUMENTS, "`y` in place 2"),
+]
+
+
+@pytest.mark.parametrize(("bad", "clause", "detail"), BAD, ids=[getattr(b[0], "__name__", str(b[0])) for b in BAD])
+def test_the_broken_clause_is_named(bad, clause, detail):
+    report = check_controller(bad, initial_state=[0.0], budget=0.5)
+    assert not report.ok
+    assert clause in [fault.clause for fault in report.faults], str(report)
+    assert detail in str(report)
+
+
+def test_one_broken_clause_is_one_fault():
+    """What follows from a fault is not reported as further ones."""
+    for bad in (global_memory, chance, voltage_alone, text, grows, changes_state, exits):
+        assert len(check_controller(bad, initial_state=[0.0]).faults) == 1, bad.__name__
+
+
+def test_missing_initial_state_is_named():
+    def control(t, r, y, state, params):
+        return state[0], state
+
+    report = check_controller(control)
+    assert [fault.clause for fault in report.faults] == [clauses.INITIAL_STATE]
+    assert "there is no initial_state" in str(report)
+
+
+def test_params_must_be_a_dict():
+    namespace = {"control": lambda t, r, y, state, params: (0.0, state), "params": [1.0]}
+    assert [fault.clause for fault in check_controller(namespace).faults] == [clauses.PARAMS]
+
+
+def contour(t, r, y, state, params):
+    error = r.position - y
+    return 3.0 * error + 0.5 * error[::-1], state
+
+
+def test_a_law_for_arrays_gets_the_hint_to_couple_it():
+    assert "coupled" in str(check_controller(contour))
+    assert check_controller(contour, coupled=True).ok
+
+
+@pytest.mark.parametrize(
+    "voltage", [1.0, [1.0, 2.0, 3.0], np.array([1.0, np.nan]), np.array([[1.0, 2.0]]), ["1", "2"], [1.0, [2.0]]]
+)
+def test_a_coupled_law_returns_one_voltage_for_each_axis(voltage):
+    report = check_controller(lambda t, r, y, state, params: (voltage, state), coupled=True)
+    assert [fault.clause for fault in report.faults] == [clauses.VOLTAGE]
+
+
+def test_a_coupled_law_must_not_write_to_its_arrays():
+    def control(t, r, y, state, params):
+        y -= r.position
+        return -3.0 * y, state
+
+    report = check_controller(control, coupled=True)
+    assert [fault.clause for fault in report.faults] == [clauses.UNCHANGED]

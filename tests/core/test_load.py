@@ -1,0 +1,233 @@
+"""A student's file, function or namespace loaded: what it fills, and every way in which it can be wrong."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+from rds.core.errors import ContractError, InputError
+from rds.core.load import from_function, from_namespace, load_student, student_error
+
+CONTROL = "def control(t, r, y, state, params):\n    return 0.0, state\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write a file into a folder of its own, and give its path."""
+
+    def write(text: str | bytes, name: str = "mine.py") -> Path:
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+def failure(path) -> str:
+    with pytest.raises(InputError) as caught:
+        load_student(path)
+    return str(caught.value)
+
+
+def test_the_file_is_known_by_its_path_text_and_digest(write):
+    path = write(CONTROL)
+    student = load_student(path)
+    assert student.interfaces == ("controller",)
+    assert student.source.path == str(path.resolve())
+    assert student.source.text == CONTROL
+    assert student.source.sha256 == hashlib.sha256(CONTROL.encode()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("text", "interfaces"),
+    [
+        (CONTROL, ("controller",)),
+        ("def derivatives(t, x, u, params): return [x[1], u[0]]", ("model",)),
+        ("def advance(x, u, T, params): return x\ndef output(t, x, u, params): return x[0]", ("model",)),
+        ("def interpolate(segment, T, params): yield", ("interpolator",)),
+        (CONTROL + "def interpolate(segment, T, params): yield", ("controller", "interpolator")),
+        ("import control\nfrom scipy import interpolate\ndef derivatives(t, x, u, params): return x", ("model",)),
+        ("control = lambda t, r, y, state, params: (0.0, state)", ("controller",)),
+        ("from functools import partial\ncontrol = partial(max, key=None)\n" + CONTROL, ("controller",)),
+    ],
+)
+def test_interfaces_are_told_by_their_functions(write, text, interfaces):
+    assert load_student(write(text)).interfaces == interfaces
+
+
+def test_a_helper_with_the_name_of_an_interface_is_left_alone(write):
+    student = load_student(write(CONTROL + "def interpolate(table, x): return table[x]\ndef output(u): return u\n"))
+    assert student.interfaces == ("controller",)
+    assert set(student.misfits) == {"interpolate", "output"}
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("x = 1\ny = (2\n", ["mine.py:2", "syntax error", "never closed", "`y = (2`"]),
+        ("x = 1\n\0", ["mine.py:2", "null bytes"]),
+        (b"x = 1\ny = 2\nz = '\xff'\n", ["mine.py:3", "UTF-8"]),
+        (b"z = '\xe9'\n", ["mine.py:1", "UTF-8"]),
+        ("def f():\n    return 1 / 0\n\nf()\n", ["mine.py:2", "in f: ZeroDivisionError", "`return 1 / 0`"]),
+        ("import sys\nsys.exit(3)\n", ["mine.py:2", "remove the exit"]),
+        ("import no_such_module_here\n", ["mine.py:1", "install no_such_module_here"]),
+        ("", ["mine.py", "control(t, r, y, state, params)", "interpolate(segment, T, params)"]),
+        (CONTROL.replace("control", "controll"), ["controll(); did you mean control()?"]),
+        (CONTROL.replace("control", "Control"), ["Control(); did you mean control()?"]),
+        ("def derivative(t, x, u, params): return x", ["did you mean derivatives()?"]),
+        ("class Law:\n    def control(self, t, r, y, state, params): return 0, state\n", ["class Law has a method"]),
+        ("import control\n", ["imported module"]),
+        ("control = 3.0\n", ["control` is 3.0, not a function"]),
+        (
+            "def control(t, r, y, state): return 0, state",
+            ["mine.py:1", "params missing", "def control(t, r, y, state, "],
+        ),
+        ("def control(t, r, y, s, p, extra): return 0, s", ["mine.py:1", "'extra'"]),
+        ("def control(t, r, y, state, *, params): return 0, s", ["mine.py:1", "cannot be called"]),
+        ("def derivatives(x, t, u, params): return x", ["`x` in place 1, where it will be given `t`"]),
+        ("params = [1.0]\n" + CONTROL, ["params is [1.0] (list)", "dict of defaults"]),
+        ("def output(t): return t\ndef derivatives(t, x, u, params): return x", ["output(t) cannot be called"]),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_place(write, text, parts):
+    message = failure(write(text))
+    assert all(part in message for part in parts), message
+
+
+def test_a_missing_file_a_folder_and_a_notebook_are_refused(tmp_path, write):
+    assert "no such file" in failure(tmp_path / "none.py")
+    assert "a directory" in failure(tmp_path)
+    assert "notebook" in failure(write("{}", "mine.ipynb"))
+
+
+def test_a_byte_order_mark_and_a_declared_encoding_are_read(write):
+    assert load_student(write(b"\xef\xbb\xbf" + CONTROL.encode())).interfaces
+    assert load_student(write(b"# -*- coding: latin-1 -*-\ns = '\xe9'\n" + CONTROL.encode())).interfaces
+
+
+def test_each_load_is_a_fresh_copy_and_leaves_nothing_in_the_way(write):
+    write("count = 0\n", "helper_of_mine.py")
+    path = write("import helper_of_mine\nhelper_of_mine.count += 1\nn = helper_of_mine.count\n" + CONTROL)
+    search_path = list(sys.path)
+    first, second = load_student(path), load_student(path)
+    assert first.functions["control"].__globals__["n"] == second.functions["control"].__globals__["n"] == 1
+    assert first.functions["control"].__module__ != second.functions["control"].__module__
+    assert "helper_of_mine" not in sys.modules and "mine" not in sys.modules
+    assert sys.path == search_path
+    assert not list(path.parent.glob("__pycache__"))
+
+
+def test_a_file_of_the_student_does_not_shadow_a_library(write):
+    write("raise RuntimeError('shadowed')\n", "statistics.py")
+    write("raise RuntimeError('shadowed')\n", "numpy.py")
+    path = write("import numpy, statistics\nparams = {'mean': statistics.mean([1.0, 3.0])}\n" + CONTROL)
+    sys.modules.pop("statistics", None)
+    assert load_student(path).params == {"mean": 2.0}
+
+
+def test_the_search_path_is_restored_after_an_error(write):
+    search_path = list(sys.path)
+    failure(write("import sys\nsys.path.insert(0, 'x')\n1 / 0\n"))
+    assert sys.path == search_path
+    assert not [name for name in sys.modules if name.startswith("rds_student_mine") and "1 / 0" in name]
+
+
+def test_dataclasses_with_postponed_annotations_work(write):
+    text = "from __future__ import annotations\nfrom dataclasses import dataclass\n\n"
+    text += "@dataclass\nclass State:\n    z: float = 0.0\n\ninitial_state = State()\n" + CONTROL
+    assert load_student(write(text)).controller().initial_state.z == 0.0
+
+
+def test_a_controller_has_its_own_params_and_state(write):
+    student = load_student(write("params = {'gain': [1.0]}\ninitial_state = [0.0]\n" + CONTROL))
+    law = student.controller(params={"gain": [2.0]})
+    assert law.params == {"gain": [2.0]} and law.source.sha256 == student.source.sha256
+    law.initial_state.append(1.0)
+    assert student.initial_state == [0.0] and student.params == {"gain": [1.0]}
+
+
+def test_an_unknown_parameter_lists_the_known_ones(write):
+    student = load_student(write("params = {'gain': 1.0, 'limit': 10.0}\n" + CONTROL))
+    with pytest.raises(InputError, match="'gian'; known parameters: gain, limit"):
+        student.controller(params={"gian": 2.0})
+
+
+def test_a_missing_initial_state_is_noticed_before_the_run(write):
+    text = "def control(t, r, y, state, params):\n    return state[0], state\n"
+    with pytest.raises(ContractError, match=r"no initial_state.*line 2, in control.*define initial_state"):
+        load_student(write(text)).controller()
+    assert load_student(write("initial_state = [0.0]\n" + text)).controller().initial_state == [0.0]
+
+
+def test_there_is_no_controller_in_a_model(write):
+    with pytest.raises(ContractError, match="no controller"):
+        load_student(write("def derivatives(t, x, u, params): return x")).controller()
+
+
+def law_of_a_cell(t, r, y, state, params):
+    return params["gain"] * (r.position - y), state
+
+
+def test_a_function_from_a_cell():
+    student = from_function(law_of_a_cell, params={"gain": 2.0})
+    law = student.controller()
+    assert law.params == {"gain": 2.0} and law.control is law_of_a_cell
+    assert "def law_of_a_cell" in student.source.text
+    assert student.source.sha256 == hashlib.sha256(student.source.text.encode()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("function", "interface"),
+    [
+        (lambda t, x, u, params: x, "model"),
+        (lambda x, u, T, params: x, "model"),
+        (lambda a, b, c: (), "interpolator"),
+    ],
+)
+def test_an_unnamed_function_is_told_by_its_arguments(function, interface):
+    assert from_function(function).interfaces == (interface,)
+
+
+@pytest.mark.parametrize("function", [lambda a, b: 0, lambda a, b, c, d: 0])
+def test_a_function_that_could_be_anything_is_refused(function):
+    with pytest.raises(ContractError, match="cannot tell which interface"):
+        from_function(function)
+
+
+def test_a_namespace_and_a_module():
+    namespace = {"control": law_of_a_cell, "params": {"gain": 2.0}, "initial_state": [0.0], "other": 3}
+    module = types.ModuleType("lesson")
+    vars(module).update(namespace)
+    for given in (namespace, module):
+        student = from_namespace(given)
+        assert student.interfaces == ("controller",) and student.initial_state == [0.0]
+        assert "law_of_a_cell" in student.source.text
+
+
+def test_an_error_is_reduced_to_the_students_line(write):
+    write("def halve(x):\n    return x / 0\n", "parts_of_mine.py")
+    text = "import json\nfrom parts_of_mine import halve\n\n\ndef control(t, r, y, state, params):\n"
+    path = write(text + "    if t > 1:\n        json.loads('{')\n    return halve(y), state\n")
+    control = load_student(path).functions["control"]
+    with pytest.raises(ValueError) as caught:
+        control(2.0, None, 1.0, (), {})
+    said = student_error(caught.value, path)
+    assert said.startswith("mine.py, line 7, in control: JSONDecodeError: ") and said.endswith("`json.loads('{')`")
+    with pytest.raises(ZeroDivisionError) as division:
+        control(0.0, None, 1.0, (), {})
+    assert student_error(division.value, path).startswith("parts_of_mine.py, line 2, in halve: ZeroDivisionError")
+    assert student_error(division.value).startswith("parts_of_mine.py, line 2")
+
+
+def test_an_error_without_a_line_or_a_message_still_says_what_it_is():
+    class Mute(Exception):
+        def __str__(self):
+            raise RuntimeError
+
+    assert student_error(ValueError("x")) == "ValueError: x"
+    assert "cannot be printed" in student_error(Mute())
+    assert len(student_error(ValueError("x" * 10_000))) < 400
