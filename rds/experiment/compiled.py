@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.types import Ending
+from rds.models.linear_axis import coefficients, respond
 from rds.modes.host import Rows
 from rds.runtime.plan import AxisPlan, Plan
 
@@ -37,66 +38,65 @@ def obstacle(plan: Plan) -> str | None:
 def run_compiled(plan: Plan) -> Rows:
     """What the loop would have recorded of a simulation, to the last bit. See `obstacle` for what can be compiled."""
     columns, units = plan.columns(None)
-    rows = np.zeros((plan.samples, len(columns)))
+    rows = np.empty((plan.samples, len(columns)))
     rows[:, 0] = np.arange(plan.samples)
     board = plan.machine.converter
     step = 2.0 * board.range / 2**board.bits if plan.quantization else 0.0
-    if plan.saturation:
-        low, high = -board.range, board.range - step
-    else:
-        low, high = -np.inf, np.inf
-    of = {name: i for i, name in enumerate(columns)}
+    low, high = (-board.range, board.range - step) if plan.saturation else (-np.inf, np.inf)
     for axis in plan.axes:
         name = axis.axis.name
         resolution = axis.axis.resolution if plan.quantization else 0.0
-        constants = _constants(axis, plan.T)
         start = tuple(float(value) for value in axis.model.initial_state)
-        measured, command, voltage = (np.empty(plan.samples) for _ in range(3))
+        voltage = rows[:, columns.index(f"{name}_voltage")]
+        first = columns.index(f"{name}_reference" if axis.controller else f"{name}_measured")
+        table = rows[:, first : columns.index(f"{name}_command") + 1]
+        interface = (step, low, high, resolution)
+        constants = coefficients(axis.model.params, plan.T)
         if axis.controller is None:
-            command[:] = np.asarray(axis.signal, dtype=float)
-            playing()(command, constants, start, step, low, high, resolution, measured, voltage)
+            playing()(np.asarray(axis.signal, dtype=float), constants, start, interface, table, voltage)
         else:
-            assert axis.reference is not None
-            parts = [np.array(part) for part in _parts(axis)]
-            for part, values in zip(("reference", "reference_velocity", "reference_acceleration"), parts, strict=True):
-                rows[:, of[f"{name}_{part}"]] = values
-            law, state = _law(axis), tuple(float(value) for value in axis.controller.initial_state)
-            assert law is not None
-            coefficients = tuple(axis.controller.params["coefficients"])
+            reference, law = axis.reference, _law(axis)
+            assert reference is not None and law is not None
+            parts = (reference.position, reference.velocity, reference.acceleration)
             tracking = controlled(law)
             tracking(
-                *parts, coefficients, state, constants, start, step, low, high, resolution, measured, command, voltage
+                *(np.asarray(part, dtype=float) for part in parts),
+                tuple(axis.controller.params["coefficients"]),
+                tuple(float(value) for value in axis.controller.initial_state),
+                constants,
+                start,
+                interface,
+                table,
+                voltage,
             )
-        for part, values in (("measured", measured), ("command", command), ("voltage", voltage)):
-            rows[:, of[f"{name}_{part}"]] = values
     return Rows(columns, units, rows, Ending.DONE, "", {})
 
 
 @lru_cache
 def controlled(law: Callable[..., Any]) -> Callable[..., None]:
-    """The compiled loop of one axis under `law`, filling the arrays `measured`, `command` and `voltage`."""
+    """The compiled loop of one axis under `law`, filling its columns from the reference to the command, and voltage."""
     from numba import njit
 
-    from rds.models.linear_axis import respond
-
-    law, respond = njit(law), njit(respond)
+    law, move = njit(law), njit(respond)
 
     @njit
-    def simulate(
-        p, v, a, coefficients, state, constants, start, step, low, high, resolution, measured, command, voltage
-    ):
+    def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage):
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
+        step, low, high, resolution = interface
         for k in range(len(p)):
             y = round(x / resolution) * resolution if resolution > 0.0 else x
             u, state = law(p[k], v[k], a[k], y, state, coefficients)
-            measured[k] = y
-            command[k] = u
+            table[k, 0] = p[k]
+            table[k, 1] = v[k]
+            table[k, 2] = a[k]
+            table[k, 3] = y
+            table[k, 4] = u
             u = min(max(u, low), high)
             if step > 0.0:
                 u = round(u / step) * step
             voltage[k] = u
-            x, w = respond(x, w, u, T, decay, reach, tau, K, plus, minus)
+            x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
 
     compiled: Callable[..., None] = simulate
     return compiled
@@ -104,24 +104,24 @@ def controlled(law: Callable[..., Any]) -> Callable[..., None]:
 
 @lru_cache
 def playing() -> Callable[..., None]:
-    """The compiled loop of one axis under a voltage signal, filling the arrays `measured` and `voltage`."""
+    """The compiled loop of one axis under a voltage signal, filling its columns measured and command, and voltage."""
     from numba import njit
 
-    from rds.models.linear_axis import respond
-
-    respond = njit(respond)
+    move = njit(respond)
 
     @njit
-    def simulate(command, constants, start, step, low, high, resolution, measured, voltage):
+    def simulate(command, constants, start, interface, table, voltage):
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
+        step, low, high, resolution = interface
         for k in range(len(command)):
-            measured[k] = round(x / resolution) * resolution if resolution > 0.0 else x
+            table[k, 0] = round(x / resolution) * resolution if resolution > 0.0 else x
+            table[k, 1] = command[k]
             u = min(max(command[k], low), high)
             if step > 0.0:
                 u = round(u / step) * step
             voltage[k] = u
-            x, w = respond(x, w, u, T, decay, reach, tau, K, plus, minus)
+            x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
 
     compiled: Callable[..., None] = simulate
     return compiled
@@ -135,15 +135,3 @@ def _law(axis: AxisPlan) -> Callable[..., Any] | None:
     if not module.startswith("rds.controllers.") or axis.controller.coupled:
         return None
     return getattr(import_module(module), "law", None)
-
-
-def _constants(axis: AxisPlan, T: float) -> tuple[float, ...]:
-    from rds.models.linear_axis import coefficients
-
-    return coefficients(axis.model.params, T)
-
-
-def _parts(axis: AxisPlan) -> tuple[Any, Any, Any]:
-    reference = axis.reference
-    assert reference is not None
-    return reference.position, reference.velocity, reference.acceleration

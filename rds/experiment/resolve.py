@@ -158,7 +158,7 @@ def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tup
         )
     controller = make_controller(words, setting, model)
     words.done() if words.name.startswith("axis.") else None
-    samples_of = ReferenceSamples.of(position, velocity, acceleration)
+    samples_of = ReferenceSamples(position, velocity, acceleration)
     return AxisPlan(axis, model, controller, samples_of), reference.period
 
 

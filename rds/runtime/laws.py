@@ -16,16 +16,11 @@ from rds.runtime.loop import Law
 
 @dataclass(frozen=True)
 class ReferenceSamples:
-    """The reference of one axis at every sample: three sequences of floats in mm, mm/s, mm/s²."""
+    """The reference of one axis at every sample: arrays in mm, mm/s, mm/s²."""
 
-    position: Sequence[float]
-    velocity: Sequence[float]
-    acceleration: Sequence[float]
-
-    @classmethod
-    def of(cls, position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> ReferenceSamples:
-        """From arrays: plain floats are several times faster to work with one by one."""
-        return cls(*(np.asarray(column, dtype=float).tolist() for column in (position, velocity, acceleration)))
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
 
 
 class BrokenContract(ContractError):
@@ -38,7 +33,8 @@ def controlled(
     """One axis under its own controller; records reference, measured position and command voltage."""
     control, params = controller.control, dict(controller.params)
     state = controller.initial_state
-    p, v, a = reference.position, reference.velocity, reference.acceleration
+    columns = (reference.position, reference.velocity, reference.acceleration)
+    p, v, a = (column.tolist() for column in columns)  # plain floats are several times faster one by one
     make = Reference._make
 
     def law(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
