@@ -43,7 +43,7 @@ clean: ## remove the environment, caches and results of the demo
 # The stamp lies inside the environment, so that it goes when the environment goes.
 $(DONE): pyproject.toml requirements.lock
 ifneq ($(UV),)
-	@test -x $(BIN)/python || "$(UV)" venv --quiet $(if $(PYTHON),--python "$(PYTHON)",--python ">=3.11") $(VENV)
+	@$(BIN)/python $(is_new_enough) || "$(UV)" venv --quiet --clear --python "$(or $(PYTHON),>=3.11)" $(VENV)
 	@$(call new_enough,$(BIN)/python)
 	"$(UV)" pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock
 	"$(UV)" pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
@@ -59,13 +59,13 @@ is_new_enough = -c "import sys; sys.exit(sys.version_info < (3, 11))" 2>/dev/nul
 define new_enough
 $(1) $(is_new_enough) || { \
 	echo "$(1) is `$(1) --version 2>&1`; RDS needs Python 3.11 or newer." >&2; \
-	echo "Install one (python.org, your system's packages, or uv), then: make clean && make PYTHON=/path/to/python3.11 $(MAKECMDGOALS)" >&2; \
+	echo "Install one (python.org, your system's packages, or uv), then: make PYTHON=/path/to/python3.11 $(MAKECMDGOALS)" >&2; \
 	exit 2; }
 endef
 
-# An environment that has no pip (made by uv, or half made) is made anew.
+# An environment without pip (made by uv, or half made) or with an old Python is made anew.
 define make_venv
-if ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
+if ! { $(BIN)/python $(is_new_enough) && $(BIN)/python -m pip --version >/dev/null 2>&1; }; then \
 	python="$(PYTHON)"; \
 	for name in python3 python3.14 python3.13 python3.12 python3.11 python; do \
 		if [ -z "$$python" ] && $$name $(is_new_enough); then python=$$name; fi; \

@@ -34,7 +34,7 @@ def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
     """One table; every column but the first is aligned to the right."""
     table = Table(title=escape(title), title_justify="left", caption=escape(note) or None, caption_justify="left")
     for i, column in enumerate(columns):
-        table.add_column(escape(column), justify="left" if i == 0 else "right")
+        table.add_column(escape(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     console().print(table)
