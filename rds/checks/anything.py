@@ -12,6 +12,8 @@ from rds.checks.file import check_file
 from rds.checks.interpolator import check_interpolator
 from rds.checks.model import check_model
 from rds.checks.report import CheckReport, FileReport
+from rds.core.adapt import is_control_system
+from rds.core.errors import InputError
 from rds.core.load import StudentFile, from_function, from_namespace
 from rds.core.types import Controller, Model
 
@@ -28,6 +30,9 @@ def check(thing: Any, sample_period: float = 0.001) -> FileReport:
         return FileReport(thing.source.name, (check_controller(thing, sample_period),))
     if isinstance(thing, Model):
         return FileReport(thing.source.name, (check_model(thing, sample_period),))
+    if is_control_system(thing):
+        said = f"a system of python-control, {type(thing).__name__}, may be a controller or a model"
+        raise InputError(f"{said}; use check_controller or check_model")
     student = _student(thing)
     checks: dict[str, Callable[..., CheckReport]] = {
         "controller": check_controller,

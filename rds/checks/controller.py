@@ -18,6 +18,7 @@ from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
 from rds.checks.values import same, shown, size
+from rds.core.adapt import as_controller, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
@@ -37,12 +38,14 @@ def check_controller(
     params: Mapping[str, Any] | None = None,
     budget: float = BUDGET,
 ) -> CheckReport:
-    """Check a function, a file, a module or namespace, or a `Controller`, in this process.
+    """Check a function, a file, a module or namespace, a `Controller` or a system of python-control, in this process.
 
     It drives a linear axis along sines and steps for 1800 samples of `sample_period` s; a `coupled` one gets
     arrays of `axes` values. `initial_state` and `params` go before the subject's own. Faults are in the report;
     InputError is raised for a file that cannot be loaded or holds no controller.
     """
+    if is_control_system(controller):
+        controller = as_controller(controller, sample_period)
     if coupled is None:
         coupled = isinstance(controller, Controller) and controller.coupled
     subject = subject_of(controller, "control", initial_state, params)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -40,9 +41,16 @@ def subject_of(thing: Any, role: str, initial_state: Any = None, params: Mapping
     """
     student = _with(_student(thing, role), initial_state, params)
     path = student.source.path
-    if path is None or not Path(path).is_file():
-        return Subject(student)
+    if path is None or isinstance(thing, Model) or not _is_unchanged(path, student.source.sha256):
+        return Subject(student)  # a Model's functions are not those of its file
     return Subject(student, lambda: _with(load_student(path, validate=False), initial_state, params))
+
+
+def _is_unchanged(path: str, sha256: str | None) -> bool:
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest() == sha256
+    except OSError:  # it is gone
+        return False
 
 
 def _with(student: StudentFile, initial_state: Any, params: Mapping[str, Any] | None) -> StudentFile:

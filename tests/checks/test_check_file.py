@@ -213,6 +213,23 @@ def test_one_door_takes_anything(write):
         check(lambda a, b: 0)
 
 
+def test_a_model_made_from_a_file_is_checked_as_it_is(write):
+    from rds.core.load import load_student
+    from rds.models.student import student_model
+
+    student = load_student(write("def derivatives(t, x, u, params): return [x[1], 177.0 * u[0] - 100.0 * x[1]]\n"))
+    report = check(student_model(student))
+    assert report.ok and report.interfaces == ("model",)
+
+
+def test_a_file_that_was_edited_meanwhile_is_not_taken_for_a_copy(write):
+    from rds.core.load import load_student
+
+    student = load_student(write(with_body("pass")))
+    write("def other(): pass\n")
+    assert check(student).ok
+
+
 @pytest.mark.parametrize("change", [{"faults": 3}, {"name": None}, {"timing": {"p50": "x"}}, {"notes": [1]}])
 def test_a_report_is_not_trusted_blindly(change):
     good = {"interface": "controller", "name": "x", "faults": [], "warnings": [], "timing": None, "notes": []}

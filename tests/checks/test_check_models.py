@@ -10,7 +10,8 @@ import control
 import numpy as np
 import pytest
 
-from rds.checks import check_model, clauses
+from rds.checks import check, check_controller, check_model, clauses
+from rds.core.errors import InputError
 from rds.models import library_model
 
 TAU, K = 9.943e-3, 1.764
@@ -231,3 +232,12 @@ def test_what_is_odd_but_allowed_is_a_warning(model, clause, detail):
     assert report.ok, str(report)
     assert [warning.clause for warning in report.warnings] == [clause]
     assert detail in str(report)
+
+
+def test_a_system_of_python_control_is_a_model_or_a_controller():
+    plant = control.ss([[0, 1], [0, -1 / TAU]], [[0], [K / TAU]], [[1, 0]], 0)
+    report = check_model(plant)
+    assert report.ok and not report.warnings, str(report)
+    assert check_controller(control.tf([20.0], [1.0])).ok
+    with pytest.raises(InputError, match="check_controller or check_model"):
+        check(plant)
