@@ -60,7 +60,7 @@ def is_installed(filename: str) -> bool:
 
 def _text(exc: BaseException) -> str:
     try:
-        text = str(exc)
+        text = " ".join(str(exc).split())
     except Exception:  # an exception class of the student's own may fail to print itself
         text = "(its message cannot be printed)"
     return text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
