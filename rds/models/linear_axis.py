@@ -10,17 +10,18 @@ one crossing and no solver: a general ODE solver chatters about v = 0 or steps o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import exp, expm1, isfinite, log1p
+from math import exp, expm1, log1p
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.options import Option, read_options
 from rds.core.types import Model, Source
 
 PARAMETERS = {
-    "tau": "time constant, s",
-    "K": "gain, (mm/s)/V",
-    "friction_plus": "Coulomb friction F₊ while moving forward, mm/s, not negative",
-    "friction_minus": "Coulomb friction F₋ while moving backward, mm/s, not positive",
+    "tau": Option("time constant, s", more_than=0.0),
+    "K": Option("gain, (mm/s)/V"),
+    "friction_plus": Option("Coulomb friction F₊ while moving forward, mm/s", at_least=0.0),
+    "friction_minus": Option("Coulomb friction F₋ while moving backward, mm/s, not positive"),
 }
 
 
@@ -37,7 +38,7 @@ def respond(x, v, u, T, decay, reach, tau, K, plus, minus):
         if end >= 0.0:
             return x + final * T + (v - final) * reach, end
         # Velocity reaches zero inside the sample, at the instant when final + (v - final) e^(-t/τ) = 0.
-        stop = tau * log1p(-v / final)
+        stop = min(tau * log1p(-v / final), T)  # rounding must not put it behind the end
         x += final * stop + v * tau
         if drive >= minus:
             return x, 0.0
@@ -47,7 +48,7 @@ def respond(x, v, u, T, decay, reach, tau, K, plus, minus):
         end = final + (v - final) * decay
         if end <= 0.0:
             return x + final * T + (v - final) * reach, end
-        stop = tau * log1p(-v / final)
+        stop = min(tau * log1p(-v / final), T)
         x += final * stop + v * tau
         if drive <= plus:
             return x, 0.0
@@ -104,31 +105,13 @@ def make(**params: Any) -> Model:
 
     Raises InputError for an unknown, missing or impossible parameter.
     """
-    values = {"friction_plus": 0.0, "friction_minus": 0.0} | params
-    for name in values:
-        if name not in PARAMETERS:
-            raise InputError(f"linear-axis has no parameter {name!r}; it has {', '.join(PARAMETERS)}")
-    for name, meaning in PARAMETERS.items():
-        value = values.get(name)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise InputError(f"linear-axis needs a number for {name} ({meaning}), not {value!r}")
-    if values["tau"] <= 0:
-        raise InputError(f"linear-axis: tau = {values['tau']!r} s must be more than 0")
-    if values["friction_plus"] < 0 or values["friction_minus"] > 0:
+    values = {"friction_plus": 0.0, "friction_minus": 0.0} | read_options(params, PARAMETERS, "linear-axis")
+    for name, option in PARAMETERS.items():
+        if name not in values:
+            raise InputError(f"linear-axis needs {name} ({option.meaning})")
+    if values["friction_minus"] > 0.0:
         raise InputError(
-            f"linear-axis: friction opposes motion, so friction_plus >= 0 >= friction_minus, "
-            f"not {values['friction_plus']!r} and {values['friction_minus']!r} mm/s"
+            f"linear-axis: friction_minus = {values['friction_minus']!r} mm/s must not be positive: "
+            f"friction opposes motion, so friction_plus >= 0 >= friction_minus"
         )
-    return Model(
-        advance=advance,
-        initial_state=(0.0, 0.0),
-        params={name: float(value) for name, value in values.items()},
-        source=Source("linear-axis"),
-        motion=_motion,
-    )
-
-
-def _motion(model: Model, T: float) -> LinearAxisMotion:
-    return LinearAxisMotion(model, T)
-
-
+    return Model(advance, (0.0, 0.0), values, source=Source("linear-axis"), motion=LinearAxisMotion)
