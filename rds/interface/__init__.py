@@ -1,6 +1,6 @@
 """What stands between the computer and the machine."""
 
 from rds.interface.converter import as_voltage, converter
-from rds.interface.encoder import encoder
+from rds.interface.encoder import diverged, encoder
 
-__all__ = ["as_voltage", "converter", "encoder"]
+__all__ = ["as_voltage", "converter", "diverged", "encoder"]

@@ -15,12 +15,15 @@ def as_voltage(value: Any) -> float:
 
     Raises ContractError unless it is one finite real number (a float, an int, or a numpy scalar or array of one).
     """
-    size = getattr(value, "size", None)
-    if size == 1 and getattr(value, "dtype", None) is not None and value.dtype.kind in "fiu":
-        value = value.reshape(-1)[0].item()
-    if isinstance(value, Real) and not isinstance(value, bool) and isfinite(value):
-        return float(value)
-    raise ContractError(f"control() gave {value!r} as the voltage; it must be one finite number in V")
+    number = value
+    if getattr(value, "size", None) == 1 and getattr(getattr(value, "dtype", None), "kind", "") in ("f", "i", "u"):
+        number = value.reshape(-1)[0].item()
+    try:
+        if isinstance(number, Real) and not isinstance(number, bool) and isfinite(number):
+            return float(number)
+    except OverflowError:  # an int of hundreds of digits
+        pass
+    raise ContractError(f"control() gave {value!r:.200} as the voltage; it must be one finite number in V")
 
 
 def converter(
@@ -34,6 +37,7 @@ def converter(
     step = 2.0 * full_scale / 2**bits
     low = -full_scale
     high = full_scale - step if quantization else full_scale
+    coarse = step * 2.0**52  # from here on a float is a whole number of steps
 
     def both(u: Any) -> float:
         if type(u) is not float:
@@ -54,7 +58,8 @@ def converter(
         return high if u > high else low
 
     def quantize(u: Any) -> float:
-        return round(as_voltage(u) / step) * step
+        u = as_voltage(u)
+        return round(u / step) * step if abs(u) < coarse else u
 
     if saturation:
         return both if quantization else saturate

@@ -4,16 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from rds.core.errors import ContractError
+
 
 def encoder(resolution: float, *, quantization: bool = True) -> Callable[[float], float] | None:
     """The function from true to measured position for `resolution` units per count; None where nothing changes.
 
-    The measured position is the nearest whole count times the resolution.
+    The measured position is the nearest whole count times the resolution. A position that is no finite number
+    raises ContractError: the model has diverged.
     """
     if not quantization:
         return None
 
     def measure(position: float) -> float:
-        return round(position / resolution) * resolution
+        try:
+            return round(position / resolution) * resolution
+        except (ValueError, OverflowError):
+            raise diverged(position) from None
 
     return measure
+
+
+def diverged(position: float) -> ContractError:
+    """The error that a model's position is no finite number."""
+    return ContractError(
+        f"the model's position became {position!r}; it must stay finite: check the model's derivatives() or "
+        f"advance(), its time constants against the sample period, and that the loop is stable"
+    )
