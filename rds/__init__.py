@@ -35,7 +35,7 @@ _NAMES = {
     "MachineError": "rds.core.errors",
 }
 
-__all__ = list(_NAMES)  # noqa: PLE0605
+__all__ = list(_NAMES)
 
 
 def __getattr__(name: str) -> Any:

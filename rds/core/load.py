@@ -23,6 +23,7 @@ from rds.core.types import Controller, Reference, Source
 
 __all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "student_error"]
 
+STUDENT_MODULE = "rds_student_"  # how the names of modules begin that a student's file was loaded as
 _LARGEST = 10_000_000  # bytes; a file of data, not of code
 
 
@@ -222,7 +223,7 @@ def _decode(data: bytes, file: Path) -> str:
 
 def _run(text: str, file: Path) -> dict[str, Any]:
     """Variables of the module that `text` makes when it runs; the module's name is new each time."""
-    module = types.ModuleType(f"rds_student_{file.stem}_{uuid.uuid4().hex[:12]}")
+    module = types.ModuleType(f"{STUDENT_MODULE}{file.stem}_{uuid.uuid4().hex[:12]}")
     module.__file__ = str(file)
     sys.modules[module.__name__] = module  # dataclasses and pickle look it up there
     try:

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rds.core.blame import student_error
 from rds.core.errors import ContractError, MachineError, RdsError
 from rds.core.types import Ending
 from rds.experiment.outcome import outcome
@@ -123,7 +122,8 @@ class Experiment:
         folder = Path(out) if out is not None else (new_folder(plan) if real_time else None)
         rows = self._rows(plan, folder, progress)
         if rows.ending is Ending.FAULT:
-            raise ContractError(f"{rows.reason} (the samples up to then are in {folder})")
+            kept = f" (the samples up to then are in {folder})" if len(rows.values) else ""
+            raise ContractError(f"{rows.reason}{kept}")
         if not len(rows.values):
             raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
         result = outcome(plan, rows, known)
@@ -140,14 +140,8 @@ class Experiment:
             if note is None:
                 return run_compiled(plan)
             note = f"not compiled: {note}"
-        try:
-            rows = run_plan(plan, folder, progress)
-            return replace(rows, notes=(note,)) if note else rows
-        except (RdsError, KeyboardInterrupt):
-            raise
-        except Exception as error:
-            source = next((p.controller.source for p in plan.axes if p.controller and p.controller.source.path), None)
-            raise ContractError(student_error(error, source)) from error
+        rows = run_plan(plan, folder, progress)
+        return replace(rows, notes=(note,)) if note else rows
 
 
 def new_folder(plan: Plan) -> Path:

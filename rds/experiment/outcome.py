@@ -6,17 +6,20 @@ import datetime
 import platform
 import sys
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
 
-from rds.core.types import Source
+from rds.core.types import Ending, Source
 from rds.modes import load_mode
 from rds.modes.host import Rows, run_plan
+from rds.modes.second_look import own_times
 from rds.results import Result
 from rds.runtime.environment import sentence
 from rds.runtime.plan import Plan
+from rds.runtime.record import table
 from rds.runtime.stopwatch import TIMING_COLUMNS
 from rds.runtime.timing import Timing, judge, summary
 
@@ -24,21 +27,14 @@ from rds.runtime.timing import Timing, judge, summary
 def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     """The result of a run: its table, and in `meta` all that was known of it."""
     mode = load_mode(plan.mode)
-    recorded = dict(zip(rows.columns, rows.values.T, strict=True))
-    units = dict(rows.units)
-    sample = recorded["sample"].astype(np.int64)
-    columns: dict[str, np.ndarray] = {"time": sample * plan.T}
-    units["time"] = "s"
-    columns |= {name: values for name, values in recorded.items() if name not in ("sample", *TIMING_COLUMNS)}
+    columns, units = table(rows.columns, rows.units, rows.values, plan.T)
+    sample = rows.values[:, 0].astype(np.int64)
     if mode.followed and plan.controlled:
         columns |= _simulated(plan, sample)
     meta = _description(plan, rows) | known
     if mode.real_time:
-        for name in TIMING_COLUMNS:
-            columns[name] = recorded[name] / 1e3
-            units[name] = "µs"
-        meta |= _judged(plan, rows, recorded)
-    return Result(columns, {name: unit for name, unit in units.items() if name in columns}, meta)
+        meta |= _judged(plan, rows, sample)
+    return Result(columns, units, meta)
 
 
 def _simulated(plan: Plan, sample: np.ndarray) -> dict[str, np.ndarray]:
@@ -48,22 +44,27 @@ def _simulated(plan: Plan, sample: np.ndarray) -> dict[str, np.ndarray]:
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
 
 
-def _judged(plan: Plan, rows: Rows, recorded: dict[str, np.ndarray]) -> dict[str, Any]:
+def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
     """The timing summary and the verdict, with the environment that they were measured in."""
     environment = rows.report.get("environment", {})
-    if not len(recorded["sample"]):
-        return {"verdict": None, "environment": environment}
-    sample = recorded["sample"].astype(np.int64)
+    recorded = dict(zip(rows.columns, rows.values.T, strict=True))
     timing = Timing(sample, *(recorded[name] for name in TIMING_COLUMNS))
     period = round(plan.T * 1e9)
-    discarded = int(sample[-1]) + 1 - len(sample)
-    stalls = environment.get("rehearsal", {}).get("stalls", 0)
-    judgement = judge(timing, period, limit=plan.late_limit, discarded=discarded, stalls=stalls)
+    passed = plan.samples if rows.ending is Ending.DONE else int(sample[-1]) + 1
+    judgement = judge(
+        timing,
+        period,
+        limit=plan.late_limit,
+        discarded=passed - len(sample),
+        stalls=environment.get("rehearsal", {}).get("stalls", 0),
+        threads=environment.get("threads", 0),
+        again=partial(own_times, plan, rows),
+    )
     return {
         "verdict": str(judgement.verdict),
         "verdict_reason": judgement.reason,
         "timing": summary(timing, period)
-        | {"discarded": discarded, "late_without_system": judgement.late_without_system},
+        | {"discarded": judgement.discarded, "late_without_system": judgement.late_without_system},
         "environment": environment | {"sentence": sentence(environment)} if environment else {},
         "drivers": rows.report.get("drivers", {}),
     }

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import secrets
+import signal
 import subprocess
 import sys
 import tempfile
@@ -17,12 +19,15 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.blame import STUDENT_ERRORS
+from rds.core.errors import ContractError, InputError
 from rds.core.types import Ending
 from rds.modes import load_mode
+from rds.modes.blame import fault
 from rds.modes.machine import machine_behind
 from rds.runtime.plan import Plan, dump
-from rds.runtime.record import clear, read_ending, read_raw, write_ending, write_whole
-from rds.runtime.recorder import Recorder
+from rds.runtime.record import ENDING, UNSTARTED, check_free, read_ending, read_raw, write_whole
+from rds.runtime.recorder import HANG_AFTER, PLAN, PROCESSES, READY, Recorder, finish
 from rds.runtime.ring import Ring
 from rds.runtime.stopwatch import TIMING_COLUMNS
 
@@ -66,28 +71,31 @@ def _here(plan: Plan, progress: Progress | None) -> Rows:
     recorded = array("d")
     loop = replace(mode.build(plan, None), record=recorded.extend)
     ending = None
-    while ending is None:
-        ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
-        if progress:
-            progress(loop.k, plan.samples)
+    try:
+        while ending is None:
+            ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+            if progress:
+                progress(loop.k, plan.samples)
+    except STUDENT_ERRORS as error:
+        raise ContractError(fault(plan, error, loop.k)) from error
     values = np.frombuffer(recorded).reshape(-1, len(columns))
     return Rows(columns, units, values, ending, "", {})
 
 
 def _in_target(plan: Plan, directory: Path, progress: Progress | None) -> Rows:
+    """A real-time run, in a target process that a recorder starts."""
     mode = load_mode(plan.mode)
     columns, units = plan.columns(mode.followed)
     columns[1:1] = TIMING_COLUMNS
     units |= dict.fromkeys(TIMING_COLUMNS, "ns")
-    directory.mkdir(parents=True, exist_ok=True)
-    clear(directory)
-    write_whole(directory / "plan.pickle", dump(plan))
-    about = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
-    about |= {"sample_period": plan.T, "samples": plan.samples}
+    is_new = _make_folder(directory)
+    write_whole(directory / PLAN, dump(plan))
+    about: dict[str, Any] = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
+    about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8), "ready": READY}
     capacity = min(plan.samples, max(_RING_BYTES // (8 * len(columns)), 1000))
-    ring = Ring.create(_ring_path(), columns, capacity, **about)
+    ring = Ring.create(_ring_path(about["run"]), columns, capacity, **about)
     recorder = subprocess.Popen(
-        [sys.executable, "-m", "rds.runtime.recorder", str(directory), str(ring.path), "rds.modes.target"],
+        [sys.executable, "-P", "-m", "rds.runtime.recorder", str(directory), str(ring.path), "rds.modes.target"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -99,14 +107,32 @@ def _in_target(plan: Plan, directory: Path, progress: Progress | None) -> Rows:
         if recorder.poll() is None:
             ring.ask_to_stop()
             recorder.wait()
-        if not read_ending(directory):
+        if recorder.returncode != 0:
             _take_over(directory, ring, plan.T)
+        has_rows = bool(ring.head)
         ring.close()
         with contextlib.suppress(OSError):
             ring.path.unlink()
-    report = read_ending(directory)
-    about, values = read_raw(directory)
-    return Rows(columns, units, values, Ending(report["ending"]), report.get("reason", ""), report)
+    report = read_ending(directory, ENDING if has_rows else UNSTARTED)
+    ending, reason = Ending(report["ending"]), report.get("reason", "")
+    if not has_rows:
+        (directory / UNSTARTED).unlink()
+        if is_new:
+            with contextlib.suppress(OSError):
+                directory.rmdir()
+        return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
+    return Rows(columns, units, read_raw(directory)[1], ending, reason, report)
+
+
+def _make_folder(directory: Path) -> bool:
+    """Make the folder of a run if it isn't there; whether it was made. InputError if it can't be."""
+    try:
+        is_new = not directory.is_dir()
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"this folder cannot be made: {error.strerror}; name another one", str(directory)) from error
+    check_free(directory)
+    return is_new
 
 
 def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress: Progress | None) -> None:
@@ -125,26 +151,43 @@ def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress:
 
 
 def _take_over(directory: Path, ring: Ring, period: float) -> None:
-    """The recorder died: copy what the target still writes until it is quiet, and conclude."""
+    """The recorder died: ask the target for a safe end, copy what it still writes, and conclude."""
     recorder = Recorder(directory, ring)
     ring.ask_to_stop()
-    seen = -1
-    while recorder.drain() != seen:
-        seen = recorder.drain()
-        time.sleep(max(0.5, 3 * period))
+    try:
+        target = int(json.loads((directory / PROCESSES).read_text())["target"])
+    except (OSError, ValueError, KeyError):
+        target = 0  # it died before it started one
+    deadline = time.monotonic() + max(HANG_AFTER, 20 * period)
+    while target and _is_target(target, ring):
+        recorder.drain()
+        if time.monotonic() > deadline:
+            os.kill(target, signal.SIGKILL)
+            break
+        time.sleep(_POLL)
     recorder.close()
-    write_ending(
-        directory,
-        {
-            "ending": Ending.KILLED,
-            "reason": "the recorder process was ended from outside; the samples up to then are kept",
-            "rows": ring.head,
-        },
-    )
+    reason = "the recorder process was ended from outside; the samples up to then are kept"
+    finish(directory, ring, {"ending": Ending.KILLED, "reason": reason, "rows": ring.head})
 
 
-def _ring_path() -> Path:
+def _is_target(process: int, ring: Ring) -> bool:
+    """Whether this process is alive and the target of this run: numbers of processes are used again."""
+    try:
+        return str(ring.path).encode() in Path(f"/proc/{process}/cmdline").read_bytes()
+    except FileNotFoundError:
+        return not Path("/proc").is_dir() and _is_alive(process)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except OSError:
+        return False
+    return True
+
+
+def _ring_path(run: str) -> Path:
     """In memory where the system has a file system for that: a disk that is busy must not stop the loop."""
     shared = Path("/dev/shm")
     folder = shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
-    return folder / f"rds-{secrets.token_hex(8)}.ring"
+    return folder / f"rds-{run}.ring"

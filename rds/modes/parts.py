@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import isfinite
 
 from rds.core.contracts import Motion
 from rds.core.types import Ending, Model
-from rds.interface import encoder
+from rds.interface import diverged, encoder
 from rds.runtime.loop import Loop
 from rds.runtime.plan import Plan
 
@@ -55,6 +56,9 @@ class SimulatedAxes:
     def follow_and_tell(self, acting: Sequence[float]) -> list[float]:
         """`follow`, returning the outputs as they were before."""
         outputs = [motion.read() for motion in self.motions]
+        for output in outputs:
+            if not isfinite(output):
+                raise diverged(output)
         self.follow(acting)
         return outputs
 
@@ -106,7 +110,14 @@ def nothing(acting: Sequence[float]) -> tuple[()]:
 def _measured(motion: Motion, resolution: float, quantization: bool) -> Callable[[], float]:
     """What the encoder reads of a motion."""
     measure, read = encoder(resolution, quantization=quantization), motion.read
-    return read if measure is None else lambda: measure(read())
+
+    def as_it_is() -> float:
+        position = read()
+        if not isfinite(position):
+            raise diverged(position)
+        return position
+
+    return as_it_is if measure is None else lambda: measure(read())
 
 
 def _due(k: int) -> int:

@@ -10,26 +10,28 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import signal
 import sys
+import threading
 from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rds.core.blame import student_error
 from rds.core.clock import RealTimeClock
-from rds.core.errors import ContractError, MachineError, RdsError
+from rds.core.errors import MachineError, RdsError
 from rds.core.types import Ending
 from rds.modes import load_mode
+from rds.modes.blame import fault
 from rds.runtime.environment import prepare, stolen_ticks, surroundings
 from rds.runtime.plan import Plan, load
 from rds.runtime.record import write_whole
+from rds.runtime.recorder import PLAN, READY, REPORT
 from rds.runtime.rehearsal import rehearse
 from rds.runtime.ring import Ring
 from rds.runtime.stopwatch import Stopwatch, quiet_memory
 
-REPORT = "target.json"
 log = logging.getLogger(__name__)
 
 
@@ -43,7 +45,8 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     clock = RealTimeClock(round(plan.T * 1e9), plan.late)
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()
-    drivers = None
+    drivers = loop = None
+    threads = threading.active_count()
     stack = ExitStack()
     try:
         if plan.bus["interface"] == "rds":
@@ -54,21 +57,20 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
         drivers.start()
         ring.beat(1)
         loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
+        threads = threading.active_count()
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
-        ring.beat(2)
+        ring.beat(READY)
         with quiet_memory():
             clock.start()
             report["ending"] = loop.run()
     except MachineError as error:
         report |= {"ending": Ending.MACHINE_LOST, "reason": str(error)}
-    except ContractError as error:
-        report["reason"] = str(error)
-    except RdsError as error:
-        report["reason"] = str(error)
     except BaseException as error:  # the student's code may raise anything, SystemExit included
-        log.exception("the run ended by an exception")
-        report["reason"] = student_error(error, _source(plan))
+        if not isinstance(error, RdsError):
+            log.exception("the run ended by an exception")
+        report["reason"] = fault(plan, error, loop.k if loop else None)
     finally:
+        environment["threads"] = threading.active_count() - threads  # that the student's code left running
         if drivers is not None:
             report["drivers"] = asdict(drivers.counters)
             drivers.close()
@@ -80,16 +82,7 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     return report
 
 
-def _source(plan: Plan) -> Any:
-    """The student's file, if there is one, to find the student's own line in a traceback."""
-    for axis in plan.axes:
-        for part in (axis.controller, axis.model):
-            if part is not None and part.source.path:
-                return part.source
-    return None
-
-
-def main(arguments: list[str]) -> int:
+def main(arguments: list[str]) -> None:
     """Run the plan in a run's directory."""
     directory, ring_path = Path(arguments[0]), arguments[1]
     ring = Ring.open(ring_path)
@@ -97,11 +90,14 @@ def main(arguments: list[str]) -> int:
     for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
         signal.signal(number, lambda *_: ring.ask_to_stop())
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
-    plan = load(directory / "plan.pickle")
+    plan = load(directory / PLAN)
     report = run(plan, ring)
     write_whole(directory / REPORT, json.dumps(report, default=str).encode())
-    return 0
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Not by the usual way: a thread that the student's code started, or a lock that it holds, must not keep this alive.
+    os._exit(0)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main(sys.argv[1:])

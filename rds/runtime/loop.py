@@ -34,7 +34,7 @@ class Loop:
     follow: Callable[[Sequence[float]], Sequence[float]]
     record: Callable[[list[float]], object]
     finish: Callable[[int], Ending | None]
-    k: int = 0
+    k: int = 0  # the sample to take next, or the one that failed
 
     def run(self, until: int | None = None) -> Ending | None:
         """Take the samples up to `until` (default: all); None means that there are more to take."""
@@ -42,27 +42,28 @@ class Loop:
         follow, record, finish, samples = self.follow, self.record, self.finish, self.samples
         until = samples if until is None else min(until, samples)
         k = self.k
-        while k < until:
-            due = wait(k)
-            if due != k:
-                for _ in range(k, min(due, samples)):
-                    follow(())  # the models live through the discarded periods
-                if due >= samples:
-                    break
-                k = due
-            positions = read()
-            row: list[float] = [k]
-            voltages: list[float] = []
-            for law in laws:
-                law(k, positions, row, voltages)
-            acting = write(voltages)
-            row += acting
-            row += follow(acting)
-            record(row)
-            ending = finish(k)
-            k += 1
-            if ending is not None:
-                self.k = k
-                return ending
-        self.k = k
-        return None if k < samples and until < samples else Ending.DONE
+        try:
+            while k < until:
+                due = wait(k)
+                if due != k:
+                    for _ in range(k, min(due, samples)):
+                        follow(())  # the models live through the discarded periods
+                    if due >= samples:
+                        return Ending.DONE
+                    k = due
+                positions = read()
+                row: list[float] = [k]
+                voltages: list[float] = []
+                for law in laws:
+                    law(k, positions, row, voltages)
+                acting = write(voltages)
+                row += acting
+                row += follow(acting)
+                record(row)
+                ending = finish(k)
+                k += 1
+                if ending is not None:
+                    return ending
+            return Ending.DONE if k >= samples else None
+        finally:
+            self.k = k

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.clock import LatePolicy
+from rds.core.load import STUDENT_MODULE
 from rds.core.types import Controller, Model
 from rds.interface import converter
 from rds.machines import Axis, Machine
@@ -101,19 +102,18 @@ class Plan:
 
 
 def dump(plan: Plan) -> bytes:
-    """The plan as bytes for a process of the same user; a student's functions travel by value."""
+    """The plan as bytes for a process of the same user.
+
+    A student's functions travel by value; modules that can be imported here can be imported there as well.
+    """
     import cloudpickle
 
-    students = {
-        sys.modules[function.__module__]
-        for axis in plan.axes
-        for function in (axis.controller and axis.controller.control, axis.model.advance)
-        if function is not None and _from_file(function)
-    }
+    students = [module for name, module in sys.modules.items() if name.startswith(STUDENT_MODULE)]
     for module in students:
         cloudpickle.register_pickle_by_value(module)
     try:
-        data: bytes = cloudpickle.dumps(plan)
+        # Twice: the folders are needed before the rest can be read.
+        data: bytes = cloudpickle.dumps([*plan.import_path, *sys.path]) + cloudpickle.dumps(plan)
         return data
     finally:
         for module in students:
@@ -121,15 +121,12 @@ def dump(plan: Plan) -> bytes:
 
 
 def load(path: Path) -> Plan:
-    """The plan that `dump` wrote to a file."""
+    """The plan that `dump` wrote to a file; its folders come last in `sys.path`."""
     import pickle
 
-    plan = pickle.loads(path.read_bytes())
+    with open(path, "rb") as file:
+        folders = [str(Path(folder).resolve()) for folder in pickle.load(file)]
+        sys.path += [folder for folder in dict.fromkeys(folders) if folder not in sys.path]
+        plan = pickle.load(file)
     assert isinstance(plan, Plan)
     return plan
-
-
-def _from_file(function: Any) -> bool:
-    """Whether a function's module is known here but can't be imported elsewhere."""
-    module = sys.modules.get(getattr(function, "__module__", None) or "")
-    return module is not None and module.__name__ != "__main__" and getattr(module, "__spec__", None) is None

@@ -5,37 +5,45 @@
     rows, little-endian float64, appended as they come
 
 What is known only at the end stands beside it in `ending.json`. A record that was cut short anywhere is read
-up to its last whole row.
+up to its last whole row. While it grows, its writer holds a lock on it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.types import Ending
 
 NAME = "record.rds"
 ENDING = "ending.json"
-PROCESSES = "processes.json"  # while a run goes on: the numbers of its processes
+UNSTARTED = "unstarted.json"  # the ending of a run that took no sample, on its way to the host
 _FIRST_LINE = b"RDS record 1\n"
 
 
 class RecordFile:
-    """Appends rows to a record; takes up where an earlier writer left off."""
+    """Appends rows to the record of one run; takes up where an earlier writer of the same run left off.
+
+    `about` describes the run; `about["run"]` tells it from others, whose record and results in the same directory
+    are removed. Raises InputError where another run is being recorded there.
+    """
 
     def __init__(self, directory: str | Path, about: dict[str, Any]):
         self.path = Path(directory) / NAME
         self._row = 8 * len(about["columns"])
         header = _FIRST_LINE + json.dumps(about).encode() + b"\n"
-        if not self.path.exists():
+        if not _starts_with(self.path, header):
+            clear(directory)
             write_whole(self.path, header)
         self._file = open(self.path, "r+b")  # noqa: SIM115  (open for the life of the object)
-        whole = (self.path.stat().st_size - len(header)) // self._row
-        self.rows = whole
-        self._file.truncate(len(header) + whole * self._row)
+        _lock(self._file.fileno())
+        self.rows = (self.path.stat().st_size - len(header)) // self._row
+        self._file.truncate(len(header) + self.rows * self._row)
         self._file.seek(0, os.SEEK_END)
 
     def append(self, first: int, rows: bytes) -> int:
@@ -56,18 +64,42 @@ class RecordFile:
         self._file.close()
 
 
-def clear(directory: Path) -> None:
-    """Make room for a new record: take away that of an earlier run; InputError while that one is still going."""
-    processes = directory / PROCESSES
+def check_free(directory: str | Path) -> None:
+    """InputError if a run is being recorded in `directory`."""
+    path = Path(directory) / NAME
+    with contextlib.suppress(FileNotFoundError), open(path, "r+b") as file:
+        if not _lock(file.fileno()):
+            raise InputError("another run is being recorded there; wait for it or choose another folder", str(path))
+
+
+def clear(directory: str | Path) -> None:
+    """Remove what an earlier run left in `directory`: its record, its ending and its results."""
+    check_free(directory)
+    directory = Path(directory)
+    for name in (NAME, ENDING, *(entry.name for entry in directory.glob("result.*"))):
+        with contextlib.suppress(FileNotFoundError):
+            (directory / name).unlink()
+
+
+def _starts_with(path: Path, header: bytes) -> bool:
     try:
-        pids = json.loads(processes.read_text())
-        os.kill(int(pids["recorder"]), 0)
-    except (OSError, ValueError, KeyError, TypeError):
-        pass  # no run, or one whose recorder is gone
-    else:
-        raise InputError(f"a run is recording there (process {pids['recorder']}); give another folder", str(directory))
-    for name in (NAME, ENDING, PROCESSES, "target.json", "target.log"):
-        (directory / name).unlink(missing_ok=True)
+        with open(path, "rb") as file:
+            return file.read(len(header)) == header
+    except FileNotFoundError:
+        return False
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open file for as long as it is open; false if somebody else has. True where there are no locks."""
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -80,15 +112,15 @@ def write_whole(path: Path, data: bytes) -> None:
     os.replace(temporary, path)
 
 
-def write_ending(directory: str | Path, ending: dict[str, Any]) -> None:
+def write_ending(directory: str | Path, ending: dict[str, Any], name: str = ENDING) -> None:
     """Write what is known at the end of a run."""
-    write_whole(Path(directory) / ENDING, json.dumps(ending, indent=1).encode())
+    write_whole(Path(directory) / name, json.dumps(ending, indent=1).encode())
 
 
-def read_ending(directory: str | Path) -> dict[str, Any]:
-    """What a run left in `ending.json`, or an empty dict if it left none."""
+def read_ending(directory: str | Path, name: str = ENDING) -> dict[str, Any]:
+    """What a run left at its end, or an empty dict if it left nothing."""
     try:
-        ending = json.loads((Path(directory) / ENDING).read_text())
+        ending = json.loads((Path(directory) / name).read_text())
     except (OSError, ValueError):
         return {}
     return ending if isinstance(ending, dict) else {}
@@ -117,3 +149,44 @@ def read_raw(directory: str | Path) -> tuple[dict[str, Any], Any]:
     body = data[end + 1 :]
     rows = np.frombuffer(body, dtype="<f8", count=len(body) // (8 * width) * width)
     return about, rows.reshape(-1, width)
+
+
+def table(names: Sequence[str], units: Mapping[str, str], rows: Any, T: float) -> tuple[dict[str, Any], dict[str, str]]:
+    """Rows as a loop recorded them as columns with their units: time = sample·T in s, stages of a sample in µs."""
+    columns, of = {}, {}
+    for name, values in zip(names, rows.T, strict=True):
+        if name == "sample":
+            columns["time"], of["time"] = values * T, "s"
+        elif units.get(name) == "ns":
+            columns[name], of[name] = values / 1e3, "µs"
+        else:
+            columns[name], of[name] = values, units.get(name, "")
+    return columns, of
+
+
+def read_record(directory: str | Path) -> tuple[dict[str, Any], dict[str, str], dict[str, Any]]:
+    """Columns, units and description of the record in `directory`, up to its last whole row.
+
+    `ending` is what the run noted itself, else that it was killed. Raises InputError for a record that can't be read.
+    """
+    about, rows = read_raw(directory)
+    left = read_ending(directory)
+    try:
+        units, period, expected = about["units"], about["sample_period"], about["samples"]
+        columns, units = table(about["columns"], units, rows, period)
+        meta = {
+            "axes": about["axes"],
+            "sample_period": period,
+            "duration": expected * period,
+            "mode": about.get("mode"),
+            "machine": about.get("machine"),
+            "ending": left.get("ending", str(Ending.KILLED)),
+            "ending_reason": left.get("reason", ""),
+            "environment": left.get("environment", {}),
+            "notes": [f"read from the run's raw record: {len(rows)} of {expected} samples"],
+        }
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"its header lacks {error}; it was written by another version of rds", str(Path(directory) / NAME)
+        ) from error
+    return columns, units, meta

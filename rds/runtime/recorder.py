@@ -18,25 +18,32 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.types import Ending
-from rds.runtime.record import PROCESSES, RecordFile, write_ending
+from rds.runtime.record import ENDING, UNSTARTED, RecordFile, write_ending
 from rds.runtime.ring import Ring
 
 DRAIN_EVERY = 0.05  # s
 HANG_AFTER = 5.0  # s without a new sample, or 20 periods if that is longer
 READY_WITHIN = 60.0  # s from the start of the target to its first sample
+READY = 2  # heartbeats of the target when its loop begins
+PLAN, REPORT, PROCESSES, LOG = "plan.pickle", "target.json", "processes.json", "target.log"
 
 
 class Recorder:
-    """Copies rows from a ring to the record in `directory`."""
+    """Copies rows from a ring to the record in `directory`, which is made when the first one comes."""
 
     def __init__(self, directory: Path, ring: Ring):
         self.directory, self.ring = directory, ring
-        self._file = RecordFile(directory, ring.about)
-        self._next = self._file.rows
-        self.lost = 0
+        self.lost = 0  # rows that the ring had overwritten before they were copied
+        self._file: RecordFile | None = None
+        self._next = 0
 
     def drain(self) -> int:
         """Copy what is new; returns how many rows have been copied in all."""
+        if self._file is None:
+            if not self.ring.head:
+                return 0
+            self._file = RecordFile(self.directory, self.ring.about)
+            self._next = self._file.rows
         first, rows = self.ring.read(self._next)
         if rows:
             self.lost += self._file.append(first, rows)
@@ -46,75 +53,86 @@ class Recorder:
     def close(self) -> None:
         """Copy the rest; the record is on the disk."""
         self.drain()
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
 
 
 def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) -> str | None:
     """Record until the target ends; if it hangs, kill it and return what happened."""
     hang_after = max(HANG_AFTER, 20 * period)
-    seen, since = -1, time.monotonic()
+    seen, since = (-1, -1), time.monotonic()
     while target.poll() is None:
         time.sleep(DRAIN_EVERY)
-        rows, beat = recorder.drain(), recorder.ring.heartbeat
-        if (rows, beat) != seen:
-            seen, since = (rows, beat), time.monotonic()
-        quiet = time.monotonic() - since
-        if quiet > (hang_after if rows else READY_WITHIN):
+        now = (recorder.drain(), recorder.ring.heartbeat)
+        if now != seen:
+            seen, since = now, time.monotonic()
+        quiet, rows = time.monotonic() - since, now[0]
+        is_running = recorder.ring.heartbeat >= recorder.ring.about["ready"]
+        if quiet > (hang_after if is_running else READY_WITHIN):
             target.kill()
             target.wait()
-            at = rows * period
-            return (
-                f"control() or the model did not return for {quiet:.0f} s at t = {at:.3f} s"
-                if rows
-                else f"the target was not ready within {READY_WITHIN:.0f} s"
-            )
+            if is_running:
+                return (
+                    f"control() or the model did not return for {quiet:.0f} s at t = {rows * period:.3f} s; "
+                    f"look for a loop without an end in it. The target was killed; the watchdogs cut the voltage"
+                )
+            return f"the target was not ready within {READY_WITHIN:.0f} s"
     return None
 
 
 def conclude(directory: Path, rows: int, code: int | None, hung: str | None) -> dict[str, Any]:
     """How the run ended, from the target's own report or from the way it died."""
     try:
-        report: dict[str, Any] = json.loads((directory / "target.json").read_text())
+        report: dict[str, Any] = json.loads((directory / REPORT).read_text())
     except (OSError, ValueError):
-        report = {"ending": Ending.KILLED, "reason": _death(code)}
+        report = {"ending": Ending.KILLED, "reason": _death(directory, code)}
     if hung:
         report |= {"ending": Ending.FAULT, "reason": hung}
     return report | {"rows": rows}
 
 
-def _death(code: int | None) -> str:
+def finish(directory: Path, ring: Ring, ending: dict[str, Any]) -> None:
+    """Write how the run ended, and remove what only its processes needed; of a run without a sample, all the rest."""
+    write_ending(directory, ending, ENDING if ring.head else UNSTARTED)
+    names = [PLAN, REPORT, PROCESSES]
+    with contextlib.suppress(OSError):
+        if not ring.head or not (directory / LOG).stat().st_size:
+            names.append(LOG)
+    for name in names:
+        with contextlib.suppress(OSError):
+            (directory / name).unlink()
+
+
+def _death(directory: Path, code: int | None) -> str:
     if code is not None and code < 0:
         return f"the target process was ended by signal {-code}; its samples up to then are kept"
-    return f"the target process ended with code {code}; see target.log for what it said"
+    said = ""
+    with contextlib.suppress(OSError):
+        lines = (directory / LOG).read_text(errors="replace").strip().splitlines()
+        said = f"; the last that it said: {lines[-1][:300]}" if lines else ""
+    return f"the target process ended with code {code} by itself, as os._exit() does{said}"
 
 
 def main(arguments: list[str]) -> int:
     """Start the target, record it, conclude."""
     directory, ring = Path(arguments[0]), Ring.open(arguments[1])
     recorder = Recorder(directory, ring)
-    with open(directory / "target.log", "wb") as output:
+    with open(directory / LOG, "wb") as output:
         target = subprocess.Popen(
-            [sys.executable, "-m", arguments[2], str(directory), arguments[1]],
+            [sys.executable, "-P", "-m", arguments[2], str(directory), arguments[1]],
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
         )
-        write_pids(directory, recorder=os.getpid(), target=target.pid)
+        # where a user in trouble finds them, and the host if the recorder is killed
+        (directory / PROCESSES).write_text(json.dumps({"recorder": os.getpid(), "target": target.pid}))
         hung = watch(target, recorder, ring.about["sample_period"])
     recorder.close()
-    write_ending(directory, conclude(directory, ring.head, target.returncode, hung))
-    for name in ("plan.pickle", "target.json", PROCESSES):
-        with contextlib.suppress(OSError):
-            (directory / name).unlink()
+    finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
     ring.close()
     with contextlib.suppress(OSError):
         ring.path.unlink()
     return 0
-
-
-def write_pids(directory: Path, **pids: int) -> None:
-    """Leave the process numbers where a user in trouble finds them."""
-    (directory / PROCESSES).write_text(json.dumps(pids))
 
 
 if __name__ == "__main__":
