@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import inf, isfinite, isnan
+from difflib import get_close_matches
+from math import inf, isfinite, isnan, nan
 from numbers import Real
 from typing import Any
 
@@ -25,7 +26,10 @@ class Option:
         place = f"{owner}: {name} = {value!r}"
         if isinstance(value, bool) or not isinstance(value, Real):
             raise InputError(f"{place} must be a number ({self.meaning})")
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:  # an int of hundreds of digits
+            number = nan
         if isnan(number) or not (isfinite(number) or (self.infinite and number == inf)):
             raise InputError(f"{place} must be a finite number ({self.meaning})")
         if number < self.at_least:
@@ -41,7 +45,9 @@ def check_known(given: Iterable[str], known: Iterable[str], owner: str) -> None:
     for name in given:
         if name not in table:
             has = f"it has {', '.join(table)}" if table else "it has none"
-            raise InputError(f"{owner} has no option {name!r}; {has}")
+            close = get_close_matches(str(name), table, n=1)
+            hint = f"; did you mean {close[0]!r}?" if close else ""
+            raise InputError(f"{owner} has no option {name!r}; {has}{hint}")
 
 
 def read_options(given: Mapping[str, Any], options: Mapping[str, Option], owner: str) -> dict[str, float]:

@@ -93,7 +93,7 @@ def controlled(law: Callable[..., Any]) -> Callable[..., None]:
             table[k, 3] = y
             table[k, 4] = u
             u = min(max(u, low), high)
-            if step > 0.0:
+            if step > 0.0 and abs(u) < step * 2.0**52:
                 u = round(u / step) * step
             voltage[k] = u
             x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
@@ -118,7 +118,7 @@ def playing() -> Callable[..., None]:
             table[k, 0] = round(x / resolution) * resolution if resolution > 0.0 else x
             table[k, 1] = command[k]
             u = min(max(command[k], low), high)
-            if step > 0.0:
+            if step > 0.0 and abs(u) < step * 2.0**52:
                 u = round(u / step) * step
             voltage[k] = u
             x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rds.controllers import library_controller
+from rds.controllers import controller_names, library_controller
 from rds.core.adapt import as_controller, as_model, is_control_system
 from rds.core.errors import InputError
+from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, from_function, from_namespace, load_student
 from rds.core.types import Controller, Model
 from rds.experiment.words import Words
 from rds.machines import Axis
-from rds.models import library_model
+from rds.models import library_model, model_names
 from rds.models.student import student_model
-from rds.signals import Signal, make_signal, user
+from rds.signals import Signal, make_signal, signal_kinds, user
 
 
 @dataclass(frozen=True)
@@ -42,22 +44,16 @@ def make_model(words: Words, setting: Setting) -> Model:
         return given
     if is_control_system(given):
         return as_model(given, setting.T)
-    if isinstance(given, str):
-        given = {"file": given} if given.endswith(".py") else {"name": given}
-    student = _student(given, words, setting)
+    table, student = _table_or_student(words, "model", setting)
     if student is not None:
-        table, found = student
-        substeps = table.whole("substeps", 10, "steps of RK4 in each sample", 1, 10_000)
+        substeps = table.whole("substeps", SUBSTEPS, "steps of RK4 in each sample", 1, 10_000)
         params = _params(table)
         table.done()
         with _named(table):
-            return student_model(found, params=params, substeps=substeps or 10)
-    table = _table(given, words, "model")
-    name = str(table.text("name"))
-    options = {key: table.any(key) for key in table.table if key != "name"}
-    same = {} if name != default.pop("name", None) else default
+            return student_model(student, params, substeps or SUBSTEPS)
+    name, options = _name_and_options(table, "model", model_names())
     with _named(table):
-        return library_model(name, **(same | options))
+        return library_model(name, **((default if name == default.pop("name", None) else {}) | options))
 
 
 def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
@@ -65,76 +61,80 @@ def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
     given = words.any("controller")
     if given is None:
         raise InputError(
-            "controller is missing; add `[controller]` with `name` or `file`, or a `[signal]` to drive without one",
+            f"controller of axis {setting.axis.name} is missing; add `[controller]` with `name` or `file`, or a "
+            f"`[signal]` to drive without one",
             words.place(),
         )
     if isinstance(given, Controller):
         return given
     if is_control_system(given):
         return as_controller(given, setting.T)
-    if isinstance(given, str):
-        given = {"file": given} if given.endswith(".py") else {"name": given}
-    student = _student(given, words, setting)
+    table, student = _table_or_student(words, "controller", setting)
     if student is not None:
-        table, found = student
         is_coupled, params = table.flag("coupled", False), _params(table)
         table.done()
         with _named(table):
-            return found.controller(coupled=is_coupled, params=params)
-    table = _table(given, words, "controller")
-    name = str(table.text("name"))
-    options = {key: table.any(key) for key in table.table if key != "name"}
+            return student.controller(coupled=is_coupled, params=params)
+    name, options = _name_and_options(table, "controller", controller_names())
     design = model.params if {"tau", "K"} <= set(model.params) else setting.axis.model
     with _named(table):
         return library_controller(name, design, setting.T, setting.limit, unit=setting.axis.unit, **options)
 
 
 def make_drive(words: Words, key: str, setting: Setting, unit: str) -> Signal:
-    """The reference or the voltage signal of an axis, in `unit`."""
+    """The reference or the voltage signal of an axis, in `unit`. InputError if sampling is too slow for it."""
     given = words.any(key)
+    table = words.inner(key) if not isinstance(given, Signal) and not callable(given) else None
+    with _named(table or words.table_of(key, {})):
+        signal = _signal(given, table, setting, unit)
+        signal.check_sampling(setting.T)
+    return signal
+
+
+def _signal(given: Any, table: Words | None, setting: Setting, unit: str) -> Signal:
     if isinstance(given, Signal):
         return given
-    if callable(given):
+    if table is None:
         return user(function=given)
-    table = _table(given, words, key)
-    kind = table.text("kind")
+    if "kind" not in table:
+        raise InputError(f'kind is missing; as in `kind = "sinusoid"` (amplitudes in {unit})')
+    kind = table.choice("kind", "", signal_kinds())
     options = {name: table.any(name) for name in table.table if name != "kind"}
-    if kind is None:
-        raise InputError(f'kind is missing; as in `kind = "sinusoid"` (amplitudes in {unit})', table.place())
     if isinstance(options.get("file"), str):
         options["file"] = str(setting.path(options["file"]))
-    with _named(table):
-        return make_signal(kind, **options)
+    return make_signal(kind, **options)
 
 
-def _student(given: Any, words: Words, setting: Setting) -> tuple[Words, StudentFile] | None:
-    """The student's functions, if that is what was given: a file, a function, or the variables of a notebook."""
+def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, StudentFile | None]:
+    """The table that was given under `key`, and the student's functions if it was a file, or these themselves."""
+    given = words.any(key)
+    nameless = words.table_of(key, {})
     if isinstance(given, StudentFile):
-        return Words({}), given
-    if callable(given):
-        return Words({}), from_function(given)
-    if not isinstance(given, dict):
-        return None
-    if any(callable(given.get(name)) for name in ("control", "derivatives", "advance")):
-        return Words({}), from_namespace(given)
-    table = _table(given, words, "")
+        return nameless, given
+    if isinstance(given, str):
+        given = {"file" if given.endswith(".py") else "name": given}
+    elif isinstance(given, dict) and any(callable(given.get(name)) for name in ("control", "derivatives", "advance")):
+        with _named(nameless):
+            return nameless, from_namespace(given)
+    elif callable(given):
+        with _named(nameless):
+            return nameless, from_function(given)
+    elif not isinstance(given, dict):
+        raise words.fault(key, f"must be a table, as in `[{key}]`")
+    table = words.table_of(key, given)
     if "file" not in table:
-        return None
+        return table, None
     if "name" in table:
         raise InputError("name and file both say what to take; give one of them", table.place("name"))
-    file = table.text("file")
-    return table, load_student(setting.path(str(file)))
+    return table, load_student(setting.path(str(table.text("file"))))
 
 
-def _table(given: Any, words: Words, key: str) -> Words:
-    if not isinstance(given, dict):
-        raise words.fault(key, f"must be a table, as in `[{key}]`")
-    for name in ("model", "controller", "reference", "signal"):
-        if words.table.get(name) is given:
-            inner = words.inner(name)
-            assert inner is not None
-            return inner
-    return Words(given, name=key)
+def _name_and_options(table: Words, kind: str, known: Sequence[str]) -> tuple[str, dict[str, Any]]:
+    """The library part that a table names, and the rest of the table."""
+    if "name" not in table:
+        raise InputError(f"{kind} needs `name` ({', '.join(known)}) or `file`", table.place())
+    name = table.choice("name", "", known)
+    return name, {key: table.any(key) for key in table.table if key != "name"}
 
 
 def _params(table: Words) -> dict[str, Any] | None:
@@ -153,4 +153,6 @@ class _named:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: Any) -> None:
         if isinstance(error, InputError) and error.where is None and (self._table.path or self._table.name):
-            raise type(error)(str(error), self._table.place()) from error
+            text = str(error)
+            key = next((key for key in self._table.table if f"{key} = " in text or repr(key) in text), None)
+            raise type(error)(text, self._table.place(key)) from error

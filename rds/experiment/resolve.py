@@ -14,12 +14,14 @@ from rds.experiment.parts import Setting, make_controller, make_drive, make_mode
 from rds.experiment.words import Words
 from rds.machines import Axis, Machine, load_machine
 from rds.modes import load_mode, mode_names
+from rds.modes.machine import BUILTIN
 from rds.runtime.laws import ReferenceSamples
 from rds.runtime.mode import Mode
 from rds.runtime.plan import AxisPlan, Plan
 
 MOST_SAMPLES = 20_000_000
-_AXIS_WORDS = ("reference", "signal", "controller", "model")
+PERIODS = (1e-6, 1000.0)  # s: the shortest and the longest sample period
+AXIS_WORDS = ("reference", "signal", "controller", "model")
 
 
 def resolve(words: Words, folder: Path, mode_name: str | None = None) -> tuple[Plan, dict[str, Any]]:
@@ -31,24 +33,20 @@ def resolve(words: Words, folder: Path, mode_name: str | None = None) -> tuple[P
     machine = _machine(words, folder)
     written = words.choice("mode", "simulation", mode_names())
     mode = load_mode(mode_name or written)
-    T = words.number("sample_period", machine.sample_period, "s", more_than=0)
-    duration = words.number("duration", None, "s", more_than=0)
-    samples = round(duration / T)
-    if not 1 <= samples <= MOST_SAMPLES:
-        raise words.fault("duration", f"s makes {samples} samples of {T:g} s; it takes 1 to {MOST_SAMPLES}")
+    T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
+    samples = _samples(words, T)
     words.flag("compiled", False)
-    saturation, quantization = _interface(words)
+    saturation, quantization = _interface(words, mode)
     limit = machine.converter.range if saturation else inf
-    timing, bus = _timing(words, mode), words.inner("bus")
-    axes, periods = [], {}
+    timing = _timing(words, mode)
     driven = _drive(words, mode)
+    axes, periods = [], {}
     for axis, own in _axes(words, machine):
-        plan, period = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
-        axes.append(plan)
-        periods[axis.name] = period
-    words.any("axis")
+        made, periods[axis.name] = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
+        axes.append(made)
+    bus = _bus(words)
     words.done()
-    _check_coupling(axes)
+    _check_coupling(axes, words)
     plan = Plan(
         mode=mode.name,
         machine=machine,
@@ -57,11 +55,21 @@ def resolve(words: Words, folder: Path, mode_name: str | None = None) -> tuple[P
         samples=samples,
         saturation=saturation,
         quantization=quantization,
-        bus=dict(bus.table) if bus else {},
+        bus=bus,
         import_path=_import_path(axes),
         **timing,
     )
     return plan, {"period": periods}
+
+
+def _samples(words: Words, T: float) -> int:
+    duration = words.number("duration", None, "s", 0.0, 1e9)
+    samples = round(duration / T)
+    if duration < T * (1.0 - 1e-9):
+        raise words.fault("duration", f"s must be at least one sample period, {T:g} s")
+    if samples > MOST_SAMPLES:
+        raise words.fault("duration", f"s makes {samples} samples of {T:g} s; it takes at most {MOST_SAMPLES}")
+    return samples
 
 
 def _machine(words: Words, folder: Path) -> Machine:
@@ -74,8 +82,11 @@ def _machine(words: Words, folder: Path) -> Machine:
 
 def _axes(words: Words, machine: Machine) -> list[tuple[Axis, Words]]:
     """Each axis of the run with its words: its own tables over the general ones."""
-    given = words.table.get("axis")
-    several = words.any("axes")
+    given, several = words.any("axis"), words.any("axes")
+    if given is not None and not isinstance(given, str | dict):
+        raise words.fault(
+            "axis", f"must be the name of an axis in quotes; {machine.name} has {', '.join(machine.axes)}"
+        )
     if several is None:
         if not isinstance(given, str):
             raise InputError('axis is missing; as in `axis = "X"`, or `axes = ["X", "Y"]` for several', words.place())
@@ -86,35 +97,31 @@ def _axes(words: Words, machine: Machine) -> list[tuple[Axis, Words]]:
         raise words.fault("axes", f"must be a list of axis names; {machine.name} has {', '.join(machine.axes)}")
     if len(set(several)) != len(several):
         raise words.fault("axes", "names an axis twice")
-    own = words.inner("axis") if isinstance(given, dict) else None
-    for name in own.table if own else ():
-        if name not in several:
-            raise InputError(f"[axis.{name}] is for an axis that does not run; axes = {several}", words.place("axes"))
-    chosen = []
+    key = "axes" if "axes" in words.table else "axis"
     for name in several:
         if name not in machine.axes:
-            key = "axes" if "axes" in words.table else "axis"
-            raise words.fault(key, f": machine {machine.name!r} has no axis {name!r}; it has {', '.join(machine.axes)}")
-        inner = own.inner(name) if own else None
-        chosen.append((machine.axes[name], _merged(words, inner)))
-    return chosen
+            remedy = f"names {name!r}, which machine {machine.name!r} does not have; it has {', '.join(machine.axes)}"
+            raise words.fault(key, remedy)
+    for key in AXIS_WORDS:
+        _ = key in words  # known even where every axis has its own
+    overrides = words.inner("axis") if isinstance(given, dict) else None
+    for name in overrides.table if overrides else ():
+        if name not in several:
+            text = f"[axis.{name}] is for an axis that does not run; axes = {several}"
+            raise InputError(text, overrides.place(name) if overrides else None)
+    return [(machine.axes[name], _own_words(words, overrides, name)) for name in several]
 
 
-def _merged(words: Words, own: Words | None) -> Words:
-    """The axis's own words, and the general ones where it has none."""
-    if own is None:
-        return words
-    for key in _AXIS_WORDS:
-        if key not in own and key in words:
-            own.table[key] = words.table[key]
-    return own
+def _own_words(words: Words, overrides: Words | None, name: str) -> Words:
+    own = overrides.inner(name) if overrides else None
+    return own.over(words, AXIS_WORDS) if own else words
 
 
 def _drive(words: Words, mode: Mode) -> str:
     """Whether controllers or voltage signals drive this run."""
     overrides = words.table.get("axis")
     tables = [words.table, *(overrides.values() if isinstance(overrides, dict) else ())]
-    has = {key: any(isinstance(table, dict) and key in table for table in tables) for key in _AXIS_WORDS}
+    has = {key: any(isinstance(table, dict) and key in table for table in tables) for key in AXIS_WORDS}
     controlled = has["reference"] or has["controller"]
     if controlled and has["signal"]:
         raise InputError(
@@ -136,39 +143,67 @@ def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tup
     axis = setting.axis
     times = np.arange(samples) * setting.T
     model = make_model(words, setting)
+    period: float | None
     if driven == "signal":
         if "signal" not in words:
             raise InputError(f"axis {axis.name} has no [signal]", words.place())
         signal = make_drive(words, "signal", setting, "V")
-        signal.check_sampling(setting.T)
-        plan = AxisPlan(axis, model, signal=signal.value(times).tolist())
-        words.done() if words.name.startswith("axis.") else None
-        return plan, signal.period
-    if "reference" not in words:
-        raise InputError(f'axis {axis.name} has no [reference]; as in `kind = "sinusoid"`', words.place())
-    reference = make_drive(words, "reference", setting, axis.unit)
-    signal_place = words.place("reference")
-    position, velocity, acceleration = reference.reference(times)
+        plan, period = AxisPlan(axis, model, signal=signal.value(times).tolist()), signal.period
+    else:
+        if "reference" not in words:
+            raise InputError(f'axis {axis.name} has no [reference]; as in `kind = "sinusoid"`', words.place())
+        reference = make_drive(words, "reference", setting, axis.unit)
+        samples_of = ReferenceSamples(*(np.asarray(part, dtype=float) for part in reference.reference(times)))
+        _check_travel(samples_of, axis, words)
+        plan = AxisPlan(axis, model, make_controller(words, setting, model), samples_of)
+        period = reference.period
+    if words.name:
+        words.done()
+    return plan, period
+
+
+def _check_travel(reference: ReferenceSamples, axis: Axis, words: Words) -> None:
     low, high = axis.travel
-    if position.min() < low or position.max() > high:
+    lowest, highest = reference.position.min(), reference.position.max()
+    if lowest < low or highest > high:
         raise InputError(
-            f"the reference goes from {position.min():g} to {position.max():g} {axis.unit}, "
+            f"the reference goes from {lowest:g} to {highest:g} {axis.unit}, "
             f"but axis {axis.name} travels from {low:g} to {high:g} {axis.unit}; reduce the amplitude",
-            signal_place,
+            words.place("reference"),
         )
-    controller = make_controller(words, setting, model)
-    words.done() if words.name.startswith("axis.") else None
-    samples_of = ReferenceSamples(position, velocity, acceleration)
-    return AxisPlan(axis, model, controller, samples_of), reference.period
 
 
-def _interface(words: Words) -> tuple[bool, bool]:
+def _interface(words: Words, mode: Mode) -> tuple[bool, bool]:
+    """Whether the simulated converter saturates, and whether it and the encoder quantize."""
     table = words.inner("interface")
     if table is None:
         return True, True
     flags = table.flag("saturation", True), table.flag("quantization", True)
     table.done()
+    for key, on in zip(("saturation", "quantization"), flags, strict=True):
+        if not on and mode.drivers == "live":
+            raise table.fault(
+                key, f"cannot be in mode {mode.name}: the machine has its own converter and encoders; remove it"
+            )
     return flags
+
+
+def _bus(words: Words) -> dict[str, Any]:
+    """The keyword arguments of can.Bus; python-can itself knows which options an interface has."""
+    table = words.inner("bus")
+    if table is None:
+        return {}
+    interface = table.text("interface", BUILTIN) or BUILTIN
+    channel = table.any("channel")
+    if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
+        raise table.fault("channel", "must be the name or the number of a channel")
+    if interface == BUILTIN:
+        table.done()
+        return dict(table.table)
+    from can.interfaces import VALID_INTERFACES
+
+    table.choice("interface", "", sorted(VALID_INTERFACES))
+    return dict(table.table)
 
 
 def _timing(words: Words, mode: Mode) -> dict[str, Any]:
@@ -187,10 +222,17 @@ def _timing(words: Words, mode: Mode) -> dict[str, Any]:
     return settings
 
 
-def _check_coupling(axes: list[AxisPlan]) -> None:
-    coupled = [plan.axis.name for plan in axes if plan.controller and plan.controller.coupled]
-    if coupled and len(coupled) != len(axes):
-        raise InputError("a coupled controller drives all axes of the run; give it in the general [controller] table")
+def _check_coupling(axes: list[AxisPlan], words: Words) -> None:
+    controllers = [plan.controller for plan in axes if plan.controller is not None]
+    if not any(controller.coupled for controller in controllers):
+        return
+    first = controllers[0]
+    same = all(c.coupled and c.source == first.source and c.params == first.params for c in controllers)
+    if not same:
+        raise InputError(
+            "a coupled controller drives all axes of the run; give it in the general [controller] table only",
+            words.place("controller"),
+        )
 
 
 def _import_path(axes: list[AxisPlan]) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ import re
 import tomllib
 from collections.abc import Sequence
 from difflib import get_close_matches
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,22 @@ from rds.core.errors import InputError
 
 
 class Words:
-    """One table of a file. `done()` at the end refuses the keys that nobody asked for."""
+    """One table of a file. `done()` at the end refuses the keys that nobody asked for.
 
-    def __init__(self, table: dict[str, Any], text: str = "", path: str = "", name: str = ""):
+    With `general`, keys that the table lacks are looked for in that one, among those in `shared`.
+    """
+
+    def __init__(
+        self,
+        table: dict[str, Any],
+        text: str = "",
+        path: str = "",
+        name: str = "",
+        general: Words | None = None,
+        shared: Sequence[str] = (),
+    ):
         self.table, self.path, self.name = table, path, name
-        self._text = text
+        self._text, self._general, self._shared = text, general, shared
         self._asked: list[str] = []
 
     @classmethod
@@ -36,6 +46,9 @@ class Words:
 
     def place(self, key: str | None = None) -> str:
         """File and line of a key of this table, as far as they are known."""
+        owner = self._owner(key)
+        if owner is not self:
+            return owner.place(key)
         line = _line_of(self._text, self.name, key)
         inside = f"[{self.name}]" if self.name else ""
         where = ", ".join(part for part in (self.path, f"line {line}" if line else inside) if part)
@@ -43,37 +56,46 @@ class Words:
 
     def fault(self, key: str, remedy: str) -> InputError:
         """The error that this value of `key` will not do."""
-        prefix = f"{self.name}." if self.name else ""
-        return InputError(f"{prefix}{key} = {self.table.get(key)!r} {remedy}", self.place(key))
+        owner = self._owner(key)
+        prefix = f"{owner.name}." if owner.name else ""
+        return InputError(f"{prefix}{key} = {owner.table.get(key)!r:.200} {remedy}", owner.place(key))
 
     def __contains__(self, key: str) -> bool:
+        owner = self._owner(key)
+        owner._asked.append(key)
         self._asked.append(key)
-        return key in self.table
+        return key in owner.table
 
     def any(self, key: str, default: Any = None) -> Any:
         """Whatever stands there."""
-        self._asked.append(key)
-        return self.table.get(key, default)
+        return self._owner(key).table[key] if key in self else default
+
+    def over(self, general: Words, shared: Sequence[str]) -> Words:
+        """This table, and `general` behind it for the keys in `shared`."""
+        return Words(self.table, self._text, self.path, self.name, general, shared)
+
+    def _owner(self, key: str | None) -> Words:
+        """The table in which `key` stands."""
+        if key in self._shared and key not in self.table and self._general is not None and key in self._general.table:
+            return self._general
+        return self
 
     def number(
         self,
         key: str,
         default: float | None,
         unit: str,
-        *,
-        more_than: float | None = None,
-        at_most: float | None = None,
+        low: float,
+        high: float,
     ) -> float:
-        """A finite number in `unit`; without a default it must be there."""
+        """A number in `unit` from `low` to `high`; without a default it must be there."""
         value = self.any(key, default)
         if value is None:
             raise InputError(f"{key} is missing; give it in {unit}, as in `{key} = 1.0`", self.place())
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
             raise self.fault(key, f"must be a number in {unit}, without quotes")
-        if more_than is not None and not value > more_than:
-            raise self.fault(key, f"must be more than {more_than:g} {unit}")
-        if at_most is not None and value > at_most:
-            raise self.fault(key, f"must be at most {at_most:g} {unit}")
+        if not low <= value <= high:
+            raise self.fault(key, f"must be from {low:g} to {high:g} {unit}")
         return float(value)
 
     def whole(self, key: str, default: int | None, meaning: str, low: int = 0, high: int = 10**9) -> int | None:
@@ -102,7 +124,7 @@ class Words:
     def choice(self, key: str, default: str, choices: Sequence[str]) -> str:
         """One of several words."""
         value = self.any(key, default)
-        if value not in choices:
+        if not isinstance(value, str) or value not in choices:
             raise self.fault(key, f"is unknown; known: {', '.join(choices)}{_near(value, choices)}")
         return str(value)
 
@@ -113,7 +135,12 @@ class Words:
             return None
         if not isinstance(value, dict):
             raise self.fault(key, f"must be a table, as in `[{key}]`")
-        return Words(value, self._text, self.path, f"{self.name}.{key}" if self.name else key)
+        return self.table_of(key, value)
+
+    def table_of(self, key: str, table: dict[str, Any]) -> Words:
+        """A table that stands for the value of `key`."""
+        owner = self._owner(key)
+        return Words(table, owner._text, owner.path, f"{owner.name}.{key}" if owner.name else key)
 
     def done(self) -> None:
         """Refuse keys that have not been asked for."""
@@ -133,7 +160,10 @@ def _near(word: Any, known: Sequence[str]) -> str:
 
 
 def _line_of(text: str, table: str, key: str | None) -> int | None:
-    """The line on which a table's key (or its header) stands; None if it can't be told."""
+    """The line on which a table's key (or its header, or the key whose value it is) stands; None if it can't be told.
+
+    Names and lines only, as tomllib tells no places: good enough to find the line in an editor.
+    """
     current, header_line = "", None
     for number, line in enumerate(text.splitlines(), 1):
         header = re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line)
@@ -145,4 +175,7 @@ def _line_of(text: str, table: str, key: str | None) -> int | None:
                 return number
         elif key is not None and current == table and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]", line):
             return number
+    if header_line is None and table:
+        parent, _, name = table.rpartition(".")
+        return _line_of(text, parent, name)
     return header_line
