@@ -6,9 +6,10 @@ Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained
 from __future__ import annotations
 
 import json as json_text
+import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,7 +32,7 @@ Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the re
 @app.command()
 def demo(out: Out = None, json: Json = False) -> None:
     """Track a sine on X, Y and Z in all three modes, and show the published numbers beside ours."""
-    with refusals():
+    with refusals(), stdout_kept(json):
         from rds.demo import run_demo
 
         with progress_bars() as bar:
@@ -57,7 +58,7 @@ def run(
     json: Json = False,
 ) -> None:
     """Run an experiment and save its results: tables, plots and a report."""
-    with refusals():
+    with refusals(), stdout_kept(json):
         from rds.experiment.report import exit_code, run_and_save, run_json
 
         with progress_bars() as bar:
@@ -80,7 +81,7 @@ def check(
     json: Json = False,
 ) -> None:
     """Say which interface a file fills, and whether it keeps it."""
-    with refusals():
+    with refusals(), stdout_kept(json):
         from rds.checks import check_file
 
         report = check_file(file, sample_period)
@@ -157,6 +158,32 @@ def refusals() -> Iterator[None]:
     except RdsError as error:
         typer.echo(f"rds: {error}", err=True)
         raise typer.Exit(2) from error
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        remedy = "check that the folder can be written and that the disk has room"
+        typer.echo(f"rds: {place}{error.strerror or error}; {remedy}", err=True)
+        raise typer.Exit(2) from error
+
+
+@contextmanager
+def stdout_kept(json: bool) -> Iterator[None]:
+    """With `json`, whatever a student's code prints goes to stderr: stdout is for the one JSON object."""
+    if not json:
+        yield
+        return
+    sys.stdout.flush()
+    try:
+        saved = os.dup(1)
+        os.dup2(2, 1)  # what is not printed through Python as well
+    except OSError:
+        saved = -1
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        if saved >= 0:
+            os.dup2(saved, 1)
+            os.close(saved)
 
 
 @contextmanager

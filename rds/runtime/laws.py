@@ -47,8 +47,8 @@ def controlled(
             if type(u) is not float:
                 u = as_voltage(u)
             voltages.append(limit(u))
-        except (TypeError, ValueError, ContractError):
-            raise BrokenContract(_fault(answer, k * T, name)) from None
+        except (TypeError, ValueError, OverflowError, ContractError):
+            raise BrokenContract(_fault(answer, k * T, name), controller.source.path) from None
         row += r
         row += (y, u)
 
@@ -78,8 +78,8 @@ def coupled(
             u, state = answer
             commands = np.asarray(u, dtype=float).reshape(n).tolist()
             voltages += [limit(value) for limit, value in zip(limits, commands, strict=True)]
-        except (TypeError, ValueError, ContractError):
-            raise BrokenContract(_fault(answer, k * T, ", ".join(names), n)) from None
+        except (TypeError, ValueError, OverflowError, ContractError):
+            raise BrokenContract(_fault(answer, k * T, ", ".join(names), n), controller.source.path) from None
         for i in range(n):
             row += (*(float(table[k, i]) for table in tables), float(y[i]), commands[i])
 
