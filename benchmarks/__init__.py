@@ -1,0 +1,1 @@
+"""How fast RDS is, beside others in the same run: `python -m benchmarks`."""

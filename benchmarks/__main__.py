@@ -1,0 +1,78 @@
+"""All benchmarks, each as a table with its targets, or everything as one JSON object.
+
+python -m benchmarks [simulation] [imports] [realtime] [bus] [--json]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+from benchmarks import bus, imports, machine, realtime, simulation
+from benchmarks.figures import TITLES, Figure
+from rds.console import show_table
+
+SUBJECTS = {
+    "simulation": "Ten seconds of the demo's X axis: 10,000 samples",
+    "imports": "Until something can be typed",
+    "realtime": "The real-time loop at 1 kHz beside cyclictest",
+    "bus": "The built-in bus beside python-can's virtual",
+}
+
+
+def run_bus() -> list[Figure]:
+    """The bus, in a process of its own: it raises its priority."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as process:
+        subjects = process.submit(bus.run).result()
+    return [
+        Figure(f"{subject}: {measure}", runs=(float(value),))
+        for subject, values in subjects.items()
+        for measure, value in values.items()
+    ]
+
+
+def main() -> int:
+    """Exit code 0 if every target that could be measured is met, else 1."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("subjects", nargs="*", metavar="SUBJECT", help=f"{', '.join(SUBJECTS)}; all by default")
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout, nothing else")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of each real-time run (default 30)")
+    parser.add_argument("--peer-python", default=sys.executable, help="an interpreter that has bdsim, control and rds")
+    parser.add_argument("--quiet-load", type=float, default=0.5, help="load average to wait for (default 0.5)")
+    parser.add_argument("--patience", type=float, default=60.0, help="s to wait for it before each (default 60)")
+    options = parser.parse_args()
+    if unknown := set(options.subjects) - set(SUBJECTS):
+        parser.error(f"unknown subject {', '.join(sorted(unknown))}; known: {', '.join(SUBJECTS)}")
+    runs: dict[str, Callable[[], list[Figure]]] = {
+        "simulation": lambda: simulation.run(peer_python=options.peer_python),
+        "imports": imports.run,
+        "realtime": lambda: realtime.run(seconds=options.seconds),
+        "bus": run_bus,
+    }
+    report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}
+    for name in options.subjects or SUBJECTS:
+        before = machine.wait_for_quiet(options.quiet_load, options.patience)
+        figures = runs[name]()
+        report["subjects"][name] = {"load_before": before, "figures": [figure.to_json() for figure in figures]}
+        if not options.json:
+            note = "" if before is None else f"load average before: {before:.2f}"
+            show_table(SUBJECTS[name], TITLES, [figure.cells() for figure in figures], note)
+    if options.json:
+        print(json.dumps(report, ensure_ascii=False))
+    else:
+        for title in ("machine", "versions"):
+            rows = [[key, "–" if value is None else str(value)] for key, value in report[title].items()]
+            show_table(title.capitalize(), ("", ""), rows)
+    judged = [figure["met"] for subject in report["subjects"].values() for figure in subject["figures"]]
+    return 1 if False in judged else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
