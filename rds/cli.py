@@ -213,7 +213,8 @@ def print_json(value: Any) -> None:
 def explain(result: Any) -> None:
     """Say on stderr why a run that failed or is void is so."""
     if result.meta.get("ending") != "done":
-        typer.echo(f"rds: the run ended early ({result.meta['ending']}): {result.meta.get('ending_reason')}", err=True)
+        reason = result.meta.get("ending_reason")
+        typer.echo(f"rds: the run ended early ({result.meta['ending']}){f': {reason}' if reason else ''}", err=True)
     if result.verdict in ("missed", "void"):
         typer.echo(f"rds: timing {result.verdict}: {result.meta.get('verdict_reason')}", err=True)
     for note in result.meta.get("notes", ()):

@@ -32,12 +32,16 @@ def console() -> Console:
 
 def show_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], note: str = "") -> None:
     """One table; every column but the first is aligned to the right."""
-    table = Table(title=escape(title), title_justify="left", caption=escape(note) or None, caption_justify="left")
+    table = Table()
     for i, column in enumerate(columns):
         table.add_column(escape(column), justify="left" if i == 0 else "right", no_wrap=i == 0)
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
-    console().print(table)
+    screen = console()
+    screen.print(escape(title), style="bold")  # not the table's own: that would wrap at the table's width
+    screen.print(table)
+    if note:
+        screen.print(escape(note), style="dim")
 
 
 def show_result(result: Result, files: Mapping[str, Path]) -> None:
@@ -46,11 +50,12 @@ def show_result(result: Result, files: Mapping[str, Path]) -> None:
     present = [name for name in _HEADINGS if any(values.get(name) is not None for values in metrics.values())]
     if present:
         rows = [
-            [f"{axis} [{metric_units(result, axis)[present[0]]}]", *(number(values.get(name)) for name in present)]
+            [f"{axis} [{metric_units(result, axis)['mean_error']}]", *(number(values.get(name)) for name in present)]
             for axis, values in metrics.items()
         ]
         headings = [_HEADINGS[name] + (" %" if name == "fit_percent" else "") for name in present]
-        show_table(f"Tracking error, {result.mode}", ["axis", *headings], rows, " ".join(result.notes))
+        title = "Tracking error" if "mean_error" in present else "Fit of the model"
+        show_table(f"{title}, {result.mode}", ["axis", *headings], rows, " ".join(result.notes))
     screen = console()
     if result.verdict is not None:
         screen.print(escape(verdict_line(result)))
@@ -66,7 +71,8 @@ def verdict_line(result: Result) -> str:
     lateness, compute, io = (timing.get(stage, {}) for stage in ("lateness", "compute", "io"))
     return (
         f"timing {result.verdict}: {timing.get('late')} of {timing.get('samples')} samples late; µs at the median and "
-        f"99 %: lateness {_pair(lateness)}, compute {_pair(compute)}, I/O {_pair(io)} ({environment})"
+        f"99 %: lateness {_pair(lateness)}, compute {_pair(compute)}, I/O {_pair(io)}"
+        f"{f' ({environment})' if environment else ''}"
     )
 
 
