@@ -69,7 +69,6 @@ class BuiltinBus(can.BusABC):
         self._sock = connection.sock
         self._node = connection.node
         self.hub_pid = connection.hub_pid
-        self._joined = True
         self._filters = can_filters
         self._periodic_tasks = []
         self._is_shutdown = False

@@ -20,9 +20,9 @@ from rds.bus.hub_node import Node, State
 from rds.bus.medium import UntimedMedium
 from rds.bus.poller import HANGUP, READ, WRITE, make_poller
 
-# 32,768 frames: 6.5 s of a control loop with five frames per millisecond, which is longer than STALL. So a monitor
-# that stands still never holds up such a loop: it is let go in the moment in which its queue is full.
-QUEUE = 32768 * wire.RECORD  # bytes
+# 65,536 frames: 13 s of a control loop with five frames per millisecond, and 5 s with thirteen. So a monitor that
+# stands still never holds up such a loop: it is let go in the moment in which its queue is full.
+QUEUE = 65536 * wire.RECORD  # bytes
 STALL = 5.0  # s
 LINGER = 3.0  # s the hub stays without a node
 GREETING = 5.0  # s for a connection to say who it is
@@ -252,6 +252,8 @@ class Hub:
                 self._flush(node)
             if len(node.out) >= self._queue and node.state is State.JOINED and not node.hung_up:
                 self._full.add(node)
+        if self._full:
+            self._let_go_of_the_stalled(time.monotonic_ns())
         if bool(self._full) != self._holding:
             self._hold(bool(self._full))
 
@@ -292,11 +294,13 @@ class Hub:
 
     # --- upkeep
 
-    def _tidy(self, now: int) -> bool:
-        """Let go of those that stand still; false when the hub itself shall end."""
+    def _let_go_of_the_stalled(self, now: int) -> None:
         for node in list(self._full):
             if now - node.moved_at > self._stall:
                 self._expel(node, f"it read nothing for {self._stall / SECOND:g} s while others waited")
+
+    def _tidy(self, now: int) -> bool:
+        """Let go of those that never say who they are; false when the hub itself shall end."""
         for node in list(self._nodes.values()):
             if node.state is State.GREETING and now - node.moved_at > GREETING * SECOND:
                 self._expel(node, "no hello came")

@@ -24,14 +24,20 @@ def raise_priority(level: int) -> str:
 
 
 def lock_memory() -> bool:
-    """Keep all pages of this process, present and future, in memory (mlockall); true if that was permitted."""
+    """Keep the pages of this process in memory (mlockall); true if that was permitted.
+
+    Future pages are locked too, unless a limit on locked memory would then let a later allocation fail.
+    """
     if not sys.platform.startswith("linux"):
         return False
-    current_and_future = 1 | 2  # MCL_CURRENT | MCL_FUTURE, <sys/mman.h>
+    current, future = 1, 2  # MCL_CURRENT, MCL_FUTURE, <sys/mman.h>
     try:
         import ctypes
+        import resource
 
-        return ctypes.CDLL(None, use_errno=True).mlockall(current_and_future) == 0
+        unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
+        what = current | future if unlimited or os.geteuid() == 0 else current
+        return ctypes.CDLL(None, use_errno=True).mlockall(what) == 0
     except (ImportError, OSError, AttributeError):
         return False
 

@@ -106,7 +106,8 @@ def hub(program: Callable[..., subprocess.Popen[str]], runtime_directory: Path) 
 
     def starter(channel: str = "test", *arguments: str) -> subprocess.Popen[str]:
         process = program("rds.bus.hub", channel, *arguments)
-        wait_for(lambda: (runtime_directory / "rds" / f"{channel}.sock").exists())
+        addresses = [runtime_directory / "rds" / f"{channel}{suffix}" for suffix in (".sock", ".tcp")]
+        wait_for(lambda: any(address.exists() for address in addresses))
         return process
 
     return starter

@@ -276,3 +276,20 @@ def test_many_connections_that_say_nothing(open_bus: Opener, runtime_directory: 
     for visitor in visitors:
         visitor.close()
     wait_for(lambda: first.send(numbered(2)) is None and second.recv(1.0) is not None)
+
+
+def test_one_that_stood_still_long_enough_before_is_let_go_without_a_wait(
+    hub: Callable[..., Any], open_bus: Opener
+) -> None:
+    hub("test", "--queue", "80000", "--stall", "0.5")
+    bus, lazy = open_bus(), open_bus()
+    longest = 0.0
+    for k in range(2000):  # in 2 s; the queue and the socket are full after about 1.3 s
+        begin = time.monotonic()
+        bus.send(numbered(k), timeout=2.0)
+        longest = max(longest, time.monotonic() - begin)
+        time.sleep(0.001)
+    assert longest < 0.1
+    with pytest.raises(can.CanOperationError, match="read nothing"):
+        while True:
+            lazy.recv(0)
