@@ -1,0 +1,90 @@
+"""A report as files: a CSV file per table, a PNG file per picture, one HTML page that holds all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from base64 import b64encode
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from typing import BinaryIO
+
+from rds.reports.content import Report, Table
+from rds.results import html
+from rds.results.atomic import write_files
+
+# the look of the run reports; one page for both, so that it is changed in one place
+from rds.results.report import _PAGE, _POLICY, _STYLE
+
+
+def write(report: Report, folder: str | Path) -> list[Path]:
+    """Write the report into `folder` (made if missing); all files appear together or none does.
+
+    Returns the paths, the page first. Raises InputError where the system refuses to write.
+    """
+    folder = Path(folder)
+    pictures = {name: draw().png() for name, draw in report.figures.items()}
+    contents = {folder / f"{report.kind}.html": page(report, pictures).encode("utf-8")}
+    for name, table in _named(report).items():
+        contents[folder / f"{name}.csv"] = _csv(table)
+    for name, png in pictures.items():
+        contents[folder / f"{report.kind}-{slug(name)}.png"] = png
+    write_files({path: _writer(content) for path, content in contents.items()})
+    return list(contents)
+
+
+def page(report: Report, pictures: dict[str, bytes]) -> str:
+    """The report as one HTML page that fetches nothing; `pictures` are PNG files by name."""
+    settings = {name: value for name, value in report.settings.items() if value is not None}
+    findings = "".join(f"<li>{escape(finding)}</li>" for finding in report.findings)
+    parts = [
+        f'<header><h1>{escape(report.title)}</h1><p class="about">{escape(" · ".join(report.sources))}</p></header>',
+        f"<section><h2>Findings</h2><ul>{findings}</ul></section>" if findings else "",
+        *(
+            f"<section><h2>{escape(table.title)}</h2>{html.table(table.columns, table.shown(), note=table.note)}"
+            "</section>"
+            for table in report.tables
+        ),
+        *(f"<section><h2>{escape(name)}</h2>{_image(png, name)}</section>" for name, png in pictures.items()),
+        f"<details><summary>Options</summary>{html.key_values(settings)}</details>" if settings else "",
+    ]
+    return _PAGE.format(title=escape(report.title), policy=_POLICY, style=_STYLE, body="\n".join(filter(None, parts)))
+
+
+def slug(text: str) -> str:
+    """`text` as a part of a file's name: letters, digits, `-`."""
+    return re.sub(r"[^0-9A-Za-z]+", "-", text).strip("-").lower() or "unnamed"
+
+
+def _named(report: Report) -> dict[str, Table]:
+    """The tables by file name; a number where two titles would make the same."""
+    named: dict[str, Table] = {}
+    for table in report.tables:
+        stem = f"{report.kind}-{slug(table.title)}"
+        name, count = stem, 1
+        while name in named:
+            count += 1
+            name = f"{stem}-{count}"
+        named[name] = table
+    return named
+
+
+def _csv(table: Table) -> bytes:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(table.columns)
+    writer.writerows(["" if cell is None else cell for cell in row] for row in table.to_json()["rows"])
+    return stream.getvalue().encode("utf-8")
+
+
+def _image(png: bytes, text: str) -> str:
+    return f'<img alt="{escape(text)}" src="data:image/png;base64,{b64encode(png).decode("ascii")}">'
+
+
+def _writer(content: bytes) -> Callable[[BinaryIO], None]:
+    def fill(stream: BinaryIO) -> None:
+        stream.write(content)
+
+    return fill
