@@ -1,0 +1,297 @@
+"""A simulated CiA 402 drive: a CANopen node with an axis behind it. It knows frames and bus time, no bus.
+
+Every verb takes an instant of bus time in s and returns the frames to send, as (identifier, data). However late the
+drive learns of a frame, its axis, its deadlines and its faults keep the instants of the frames' time stamps.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+from canopen.sdo import SdoAbortedError
+
+from rds.bus.cia402 import codes
+from rds.bus.cia402.codes import Abort, Nmt, NmtCommand, State
+from rds.bus.cia402.dictionary import Dictionary, Key
+from rds.bus.cia402.errors import Errors
+from rds.bus.cia402.heartbeat import Heartbeats
+from rds.bus.cia402.operation import Operation
+from rds.bus.cia402.pdo import COUNT, Rpdo, Tpdo
+from rds.bus.cia402.sdo import Server
+from rds.bus.cia402.servo import Servo
+from rds.bus.module import machine_parameters
+from rds.core.errors import InputError
+from rds.machines.machine import Axis
+
+Frame = tuple[int, bytes]
+NODES = range(1, 128)
+NMT, HEARTBEAT = 0x000, 0x700
+_MOVING = 2e-3  # s between two looks at an axis under power if no frame comes
+
+
+class Drive:
+    """The drive of `axis`; `node` is its node-ID (default: the axis's), `volts` its full voltage at 1000 ‰ torque."""
+
+    def __init__(self, axis: Axis, start: float, volts: float = 10.0, node: int | None = None):
+        self.name = axis.name
+        self.node = axis.node if node is None else node
+        if self.node not in NODES:
+            raise InputError(f"axis {axis.name}: CANopen node {self.node!r} must be from 1 to 127")
+        self.nmt = Nmt.BOOT_UP
+        self.syncs = 0
+        self._out: list[Frame] = []
+        self.objects = Dictionary(self.node)
+        self.servo = Servo(axis, machine_parameters(axis), start, volts, self._axis_fault)
+        self.errors = Errors(self.objects, self._send)
+        self.operation = Operation(self.objects, self.servo, self.errors.report, self.errors.clear)
+        self.heartbeats = Heartbeats(self.objects, lambda: self.operation.now)
+        self.receive_pdos = [Rpdo(number, self.objects) for number in range(COUNT)]
+        self.transmit_pdos = [Tpdo(number, self.objects) for number in range(COUNT)]
+        self._server = Server(self.node, self.objects, self._send)
+        self.objects.writers[0x1005, 0] = self._check_sync_identifier
+        self.objects.writers[0x1014, 0] = self._check_emergency_identifier
+        self.objects.writers[0x1019, 0] = self._check_sync_counter
+        self._bad_length = False
+        self._reset_values(0x0000, 0xFFFF)
+
+    @property
+    def state(self) -> State:
+        """The state of the power drive system."""
+        return self.operation.machine.state
+
+    @property
+    def listens_to(self) -> frozenset[int]:
+        """The identifiers that mean something to this drive now."""
+        pdos = {pdo.identifier for pdo in self.receive_pdos if pdo.exists}
+        others = {HEARTBEAT + node for node in self.heartbeats.watched}
+        return frozenset({NMT, self.objects[0x1005] & 0x7FF, 0x600 + self.node} | pdos | others)
+
+    @property
+    def expires(self) -> float | None:
+        """The instant until which the drive may sleep if no frame comes, s; None: as long as it likes."""
+        instants = [self.operation.deadline(), self.heartbeats.deadline(), self._event_deadline()]
+        if self.servo.motion is not None or self.servo.torque is not None:
+            instants.append(self.operation.now + _MOVING)
+        return min((instant for instant in instants if instant is not None), default=None)
+
+    def boot(self, at: float) -> list[Frame]:
+        """Switched on: the boot-up message, then PRE-OPERATIONAL."""
+        self._advance(at)
+        self._boot()
+        return self._flush()
+
+    def receive(self, identifier: int, data: bytes | bytearray, at: float, remote: bool = False) -> list[Frame]:
+        """Take a frame stamped `at`. What makes no sense to this drive changes nothing."""
+        self._advance(at)
+        if remote:
+            return self._flush()  # neither node guarding nor PDO requests: both say so in the EDS
+        if identifier == self.objects[0x1005] & 0x7FF:
+            self._sync(data)
+        elif identifier == NMT:
+            if len(data) == 2 and data[1] in (0, self.node):
+                self._command(data[0])
+        elif identifier == 0x600 + self.node:
+            if self.nmt in (Nmt.PRE_OPERATIONAL, Nmt.OPERATIONAL):
+                self._server.on_request(identifier, bytes(data), at)
+        elif identifier > HEARTBEAT and identifier - HEARTBEAT in self.heartbeats.watched:
+            if len(data) == 1 and self.heartbeats.heard(identifier - HEARTBEAT) and self.state is not State.FAULT:
+                self.errors.clear()
+        else:
+            self._take_pdo(identifier, bytes(data))
+        self._send_events()
+        return self._flush()
+
+    def expire(self, now: float) -> list[Frame]:
+        """Time has gone on to `now` without a frame."""
+        self._advance(now)
+        self._send_events()
+        return self._flush()
+
+    def fault(self, code: int, at: float) -> list[Frame]:
+        """Inject a fault by its error code, such as 0x2310 (continuous over-current)."""
+        self._advance(at)
+        self.operation.fault(code)
+        self._send_events()
+        return self._flush()
+
+    # --- time
+
+    def _advance(self, until: float) -> None:
+        """Move on to `until`, through all deadlines on the way."""
+        operation, heartbeats = self.operation, self.heartbeats
+        while True:
+            first = min((d for d in (operation.deadline(), heartbeats.deadline()) if d is not None), default=inf)
+            timeout = min((p.deadline for p in self.receive_pdos if p.deadline is not None), default=inf)
+            instant = min(first, timeout)
+            if instant > until:
+                break
+            operation.advance(instant)
+            if timeout <= instant:
+                self._rpdo_timeout(instant)
+            elif (deadline := operation.deadline()) is not None and deadline <= instant:
+                operation.expire()
+            else:
+                self._heartbeat()
+        operation.advance(until)
+
+    def _heartbeat(self) -> None:
+        if self.heartbeats.due():
+            self._send(HEARTBEAT + self.node, bytes([self.nmt]))
+        if self.heartbeats.lost():
+            behaviour = self.objects.values[0x1029, 1]
+            self.operation.abort_connection(codes.HEARTBEAT_LOST)
+            if behaviour == 2 or (behaviour == 0 and self.nmt is Nmt.OPERATIONAL):
+                self._enter(Nmt.STOPPED if behaviour == 2 else Nmt.PRE_OPERATIONAL)
+
+    def _axis_fault(self, code: int, at: float) -> None:
+        self.operation.fault(code, at)
+
+    # --- NMT
+
+    def _boot(self) -> None:
+        self._send(HEARTBEAT + self.node, b"\0")
+        self.operation.wake()
+        self._enter(Nmt.PRE_OPERATIONAL)
+        self.heartbeats.restart()
+
+    def _command(self, code: int) -> None:
+        if code in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+            self._enter(Nmt.BOOT_UP)
+            highest = 0x1FFF if code == NmtCommand.RESET_COMMUNICATION else 0xFFFF
+            self.operation.control(codes.DISABLE_VOLTAGE)
+            self._reset_values(0x1000, highest)
+            self._boot()
+        elif code == NmtCommand.START:
+            self._enter(Nmt.OPERATIONAL)
+        elif code == NmtCommand.ENTER_PRE_OPERATIONAL:
+            self._enter(Nmt.PRE_OPERATIONAL)
+        elif code == NmtCommand.STOP:
+            if self.nmt is not Nmt.STOPPED and self.objects[0x6007] and self.state is State.OPERATION_ENABLED:
+                self.operation.abort_connection(codes.HEARTBEAT_LOST)
+            self._enter(Nmt.STOPPED)
+
+    def _enter(self, nmt: Nmt) -> None:
+        if nmt is not self.nmt:
+            self.nmt = nmt
+            self.operation.remote = nmt is Nmt.OPERATIONAL
+            for pdo in (*self.receive_pdos, *self.transmit_pdos):
+                pdo.restart()
+            for pdo in self.transmit_pdos:
+                pdo.sent_at = self.operation.now
+
+    def _reset_values(self, lowest: int, highest: int) -> None:
+        self.objects.reset(lowest, highest)
+        if highest > 0x6000:
+            values = self.objects.values
+            turn = round(self.servo.counts_per_unit * (60.0 if self.servo.rotates else 1.0))
+            values[0x608F, 1] = values[0x6092, 1] = turn  # a linear axis has a screw of 1 mm
+            self.operation.power_off()
+        for pdo in (*self.receive_pdos, *self.transmit_pdos):
+            pdo.reset()
+        self.errors.restore()
+
+    # --- process data
+
+    def _sync(self, data: bytes | bytearray) -> None:
+        if self.nmt is not Nmt.OPERATIONAL:
+            return
+        if len(data) != (1 if self.objects[0x1019] else 0):
+            self._complain(0x8240)
+            return
+        self.syncs += 1
+        for received in self.receive_pdos:
+            if received.waiting is not None:
+                waiting, received.waiting = received.waiting, None
+                received.apply(waiting, self._refused)
+        self.operation.sync()
+        for pdo in self.transmit_pdos:
+            if pdo.exists and pdo.synchronous and pdo.due_at_sync():
+                self._transmit(pdo)
+
+    def _take_pdo(self, identifier: int, data: bytes) -> None:
+        if self.nmt is not Nmt.OPERATIONAL:
+            return
+        for pdo in self.receive_pdos:
+            if not pdo.exists or pdo.identifier != identifier:
+                continue
+            if len(data) < pdo.size:
+                self._complain(codes.PDO_TOO_SHORT)
+                continue
+            pdo.deadline = self.operation.now + pdo.event_time if pdo.event_time else None
+            if pdo.synchronous:
+                pdo.waiting = data
+            else:
+                pdo.apply(data, self._refused)
+                self.operation.actuate()
+
+    def _complain(self, code: int) -> None:
+        """A frame was wrong: say so once, not for each of a thousand in a second."""
+        if not self._bad_length:
+            self._bad_length = True
+            self.errors.report(code)
+
+    def _refused(self, key: Key, value: Any) -> None:
+        """A PDO carries what its object refuses: it keeps the value that it has. PDOs have no answer (CiA 301)."""
+
+    def _rpdo_timeout(self, now: float) -> None:
+        for pdo in self.receive_pdos:
+            if pdo.deadline is not None and pdo.deadline <= now:
+                pdo.deadline = None
+                if self.state is State.OPERATION_ENABLED:
+                    self.operation.fault(codes.RPDO_TIMEOUT)
+
+    def _event_deadline(self) -> float | None:
+        if self.nmt is not Nmt.OPERATIONAL:
+            return None
+        instants = [p.sent_at + p.event_time for p in self.transmit_pdos if _by_events(p) and p.event_time]
+        instants += [p.deadline for p in self.receive_pdos if p.deadline is not None]
+        return min(instants, default=None)
+
+    def _send_events(self) -> None:
+        """The event-driven TPDOs whose data has changed, or whose event timer has run out."""
+        if self.nmt is not Nmt.OPERATIONAL:
+            return
+        now = self.operation.now
+        for pdo in self.transmit_pdos:
+            if not _by_events(pdo):
+                continue
+            age = now - pdo.sent_at
+            timed_out = pdo.event_time and age >= pdo.event_time
+            if timed_out or (age >= pdo.inhibit_time and pdo.pack() != pdo.sent):
+                self._transmit(pdo)
+
+    def _transmit(self, pdo: Tpdo) -> None:
+        pdo.sent, pdo.sent_at = pdo.pack(), self.operation.now
+        self._send(pdo.identifier, pdo.sent)
+
+    # --- what is written to communication objects
+
+    def _check_sync_identifier(self, value: int) -> None:
+        if value & ~0x7FF or not value:  # producing SYNC and 29-bit identifiers aren't for us
+            raise SdoAbortedError(Abort.VALUE)
+
+    def _check_emergency_identifier(self, value: int) -> None:
+        if value & 0x7FFFF800 or not 0x80 < value & 0x7FF < 0x700:
+            raise SdoAbortedError(Abort.VALUE)
+
+    def _check_sync_counter(self, value: int) -> None:
+        if value == 1:
+            raise SdoAbortedError(Abort.VALUE)
+        if self.objects[0x1006]:
+            raise SdoAbortedError(Abort.DEVICE_STATE)
+
+    # --- frames
+
+    def _send(self, identifier: int, data: bytes) -> None:
+        if self.nmt is Nmt.STOPPED and not HEARTBEAT < identifier < HEARTBEAT + 0x80:
+            return
+        self._out.append((identifier, data))
+
+    def _flush(self) -> list[Frame]:
+        out, self._out = self._out, []
+        return out
+
+
+def _by_events(pdo: Tpdo) -> bool:
+    return pdo.exists and not pdo.synchronous
