@@ -212,9 +212,6 @@ class Mode(IntEnum):
         return 1 << (self - 1) if self else 0
 
 
-CYCLIC = frozenset({Mode.CYCLIC_POSITION, Mode.CYCLIC_VELOCITY, Mode.CYCLIC_TORQUE})
-
-
 def state_of(statusword: int) -> State | None:
     """The state that a statusword shows; None if it shows none."""
     for state, (mask, value) in STATUS_PATTERNS.items():

@@ -53,6 +53,12 @@ class Drive:
         self.objects.writers[0x1014, 0] = self._check_emergency_identifier
         self.objects.writers[0x1019, 0] = self._check_sync_counter
         self._bad_length = False
+        # what the objects say, looked up once for a thousand frames a second
+        self._sync_identifier = 0x80
+        self._taken: dict[int, list[Rpdo]] = {}
+        self._by_sync: list[Tpdo] = []
+        self._by_events: list[Tpdo] = []
+        self._timed: list[Rpdo] = []
         self._reset_values(0x0000, 0xFFFF)
 
     @property
@@ -63,17 +69,20 @@ class Drive:
     @property
     def listens_to(self) -> frozenset[int]:
         """The identifiers that mean something to this drive now."""
-        pdos = {pdo.identifier for pdo in self.receive_pdos if pdo.exists}
         others = {HEARTBEAT + node for node in self.heartbeats.watched}
-        return frozenset({NMT, self.objects[0x1005] & 0x7FF, 0x600 + self.node} | pdos | others)
+        return frozenset({NMT, self._sync_identifier, 0x600 + self.node, *self._taken} | others)
 
     @property
     def expires(self) -> float | None:
         """The instant until which the drive may sleep if no frame comes, s; None: as long as it likes."""
-        instants = [self.operation.deadline(), self.heartbeats.deadline(), self._event_deadline()]
-        if self.servo.motion is not None or self.servo.torque is not None:
-            instants.append(self.operation.now + _MOVING)
-        return min((instant for instant in instants if instant is not None), default=None)
+        moving = self.servo.motion is not None or self.servo.torque is not None
+        instant = min(
+            self.operation.deadline(),
+            self.heartbeats.deadline(),
+            self._event_deadline(),
+            self.operation.now + _MOVING if moving else inf,
+        )
+        return None if instant == inf else instant
 
     def boot(self, at: float) -> list[Frame]:
         """Switched on: the boot-up message, then PRE-OPERATIONAL."""
@@ -86,7 +95,9 @@ class Drive:
         self._advance(at)
         if remote:
             return self._flush()  # neither node guarding nor PDO requests: both say so in the EDS
-        if identifier == self.objects[0x1005] & 0x7FF:
+        if identifier in self._taken:
+            self._take_pdo(self._taken[identifier], bytes(data))
+        elif identifier == self._sync_identifier:
             self._sync(data)
         elif identifier == NMT:
             if len(data) == 2 and data[1] in (0, self.node):
@@ -94,11 +105,9 @@ class Drive:
         elif identifier == 0x600 + self.node:
             if self.nmt in (Nmt.PRE_OPERATIONAL, Nmt.OPERATIONAL):
                 self._server.on_request(identifier, bytes(data), at)
+                self._look_up()
         elif identifier > HEARTBEAT and identifier - HEARTBEAT in self.heartbeats.watched:
-            if len(data) == 1 and self.heartbeats.heard(identifier - HEARTBEAT) and self.state is not State.FAULT:
-                self.errors.clear()
-        else:
-            self._take_pdo(identifier, bytes(data))
+            self._hear(identifier - HEARTBEAT)
         self._send_events()
         return self._flush()
 
@@ -121,17 +130,16 @@ class Drive:
         """Move on to `until`, through all deadlines on the way."""
         operation, heartbeats = self.operation, self.heartbeats
         while True:
-            first = min((d for d in (operation.deadline(), heartbeats.deadline()) if d is not None), default=inf)
-            timeout = min((p.deadline for p in self.receive_pdos if p.deadline is not None), default=inf)
-            instant = min(first, timeout)
-            if instant > until:
+            decision, beat, timeout = operation.deadline(), heartbeats.deadline(), self._rpdo_deadline()
+            if decision > until and beat > until and timeout > until:
                 break
+            instant = min(decision, beat, timeout)
             operation.advance(instant)
             if timeout <= instant:
                 self._rpdo_timeout(instant)
-            elif (deadline := operation.deadline()) is not None and deadline <= instant:
+            elif operation.deadline() <= instant:
                 operation.expire()
-            else:
+            elif beat <= instant:
                 self._heartbeat()
         operation.advance(until)
 
@@ -143,6 +151,10 @@ class Drive:
             self.operation.abort_connection(codes.HEARTBEAT_LOST)
             if behaviour == 2 or (behaviour == 0 and self.nmt is Nmt.OPERATIONAL):
                 self._enter(Nmt.STOPPED if behaviour == 2 else Nmt.PRE_OPERATIONAL)
+
+    def _hear(self, node: int) -> None:
+        if self.heartbeats.heard(node) and self.state is not State.FAULT:
+            self.errors.clear()
 
     def _axis_fault(self, code: int, at: float) -> None:
         self.operation.fault(code, at)
@@ -190,6 +202,18 @@ class Drive:
         for pdo in (*self.receive_pdos, *self.transmit_pdos):
             pdo.reset()
         self.errors.restore()
+        self._look_up()
+
+    def _look_up(self) -> None:
+        self.operation.look_up()
+        self._sync_identifier = self.objects[0x1005] & 0x7FF
+        self._taken = {}
+        for taken in self.receive_pdos:
+            if taken.exists:
+                self._taken.setdefault(taken.identifier, []).append(taken)
+        self._timed = [pdo for pdo in self.receive_pdos if pdo.exists and pdo.event_time]
+        self._by_sync = [pdo for pdo in self.transmit_pdos if pdo.exists and pdo.synchronous]
+        self._by_events = [pdo for pdo in self.transmit_pdos if pdo.exists and not pdo.synchronous]
 
     # --- process data
 
@@ -205,20 +229,19 @@ class Drive:
                 waiting, received.waiting = received.waiting, None
                 received.apply(waiting, self._refused)
         self.operation.sync()
-        for pdo in self.transmit_pdos:
-            if pdo.exists and pdo.synchronous and pdo.due_at_sync():
+        for pdo in self._by_sync:
+            if pdo.due_at_sync():
                 self._transmit(pdo)
 
-    def _take_pdo(self, identifier: int, data: bytes) -> None:
+    def _take_pdo(self, pdos: list[Rpdo], data: bytes) -> None:
         if self.nmt is not Nmt.OPERATIONAL:
             return
-        for pdo in self.receive_pdos:
-            if not pdo.exists or pdo.identifier != identifier:
-                continue
+        for pdo in pdos:
             if len(data) < pdo.size:
                 self._complain(codes.PDO_TOO_SHORT)
                 continue
-            pdo.deadline = self.operation.now + pdo.event_time if pdo.event_time else None
+            if pdo in self._timed:
+                pdo.deadline = self.operation.now + pdo.event_time
             if pdo.synchronous:
                 pdo.waiting = data
             else:
@@ -235,27 +258,27 @@ class Drive:
         """A PDO carries what its object refuses: it keeps the value that it has. PDOs have no answer (CiA 301)."""
 
     def _rpdo_timeout(self, now: float) -> None:
-        for pdo in self.receive_pdos:
-            if pdo.deadline is not None and pdo.deadline <= now:
-                pdo.deadline = None
+        for pdo in self._timed:
+            if pdo.deadline <= now:
+                pdo.deadline = inf
                 if self.state is State.OPERATION_ENABLED:
                     self.operation.fault(codes.RPDO_TIMEOUT)
 
-    def _event_deadline(self) -> float | None:
+    def _rpdo_deadline(self) -> float:
+        return min([pdo.deadline for pdo in self._timed]) if self._timed else inf
+
+    def _event_deadline(self) -> float:
         if self.nmt is not Nmt.OPERATIONAL:
-            return None
-        instants = [p.sent_at + p.event_time for p in self.transmit_pdos if _by_events(p) and p.event_time]
-        instants += [p.deadline for p in self.receive_pdos if p.deadline is not None]
-        return min(instants, default=None)
+            return inf
+        instants = [pdo.sent_at + pdo.event_time for pdo in self._by_events if pdo.event_time]
+        return min([*instants, self._rpdo_deadline()])
 
     def _send_events(self) -> None:
         """The event-driven TPDOs whose data has changed, or whose event timer has run out."""
-        if self.nmt is not Nmt.OPERATIONAL:
+        if not self._by_events or self.nmt is not Nmt.OPERATIONAL:
             return
         now = self.operation.now
-        for pdo in self.transmit_pdos:
-            if not _by_events(pdo):
-                continue
+        for pdo in self._by_events:
             age = now - pdo.sent_at
             timed_out = pdo.event_time and age >= pdo.event_time
             if timed_out or (age >= pdo.inhibit_time and pdo.pack() != pdo.sent):
@@ -291,7 +314,3 @@ class Drive:
     def _flush(self) -> list[Frame]:
         out, self._out = self._out, []
         return out
-
-
-def _by_events(pdo: Tpdo) -> bool:
-    return pdo.exists and not pdo.synchronous

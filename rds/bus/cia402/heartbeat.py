@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from math import inf
 
 from canopen.sdo import SdoAbortedError
 
@@ -18,7 +19,7 @@ class Heartbeats:
 
     def __init__(self, objects: Dictionary, now: Callable[[], float]):
         self._objects, self._now = objects, now
-        self._next: float | None = None
+        self._next = inf
         self._deadlines: dict[int, float] = {}  # node -> instant by which it has to be heard again
         self._missing: set[int] = set()
         objects.writers[0x1017, 0] = self._set_period
@@ -45,16 +46,13 @@ class Heartbeats:
         self._missing.discard(node)
         return was_missing
 
-    def deadline(self) -> float | None:
-        """The next instant at which to send, or at which a node is missing."""
-        instants = [*self._deadlines.values()]
-        if self._next is not None:
-            instants.append(self._next)
-        return min(instants, default=None)
+    def deadline(self) -> float:
+        """The next instant at which to send, or at which a node is missing, s; infinite if there is none."""
+        return min([self._next, *self._deadlines.values()]) if self._deadlines else self._next
 
     def due(self) -> bool:
         """Whether to send now."""
-        if self._next is None or self._now() < self._next:
+        if self._now() < self._next:
             return False
         period = self._objects[0x1017] * 1e-3
         self._next += period
@@ -71,7 +69,7 @@ class Heartbeats:
         return bool(late)
 
     def _set_period(self, milliseconds: int) -> None:
-        self._next = self._now() + milliseconds * 1e-3 if milliseconds else None
+        self._next = self._now() + milliseconds * 1e-3 if milliseconds else inf
 
     def _watch(self, place: int, value: int) -> None:
         node, time = value >> 16 & 0x7F, value & 0xFFFF

@@ -44,6 +44,8 @@ class Window:
 class OperationMode:
     """No mode: the axis stands, led at speed zero."""
 
+    cyclic = False  # whether its targets have to come with every SYNC
+
     def __init__(self, objects: Dictionary, servo: Servo, now: float):
         self.objects, self.servo = objects, servo
         self.clamped = False
@@ -88,6 +90,8 @@ class OperationMode:
 class CyclicPosition(OperationMode):
     """CSP: bit 12 drive follows, bit 13 following error."""
 
+    cyclic = True
+
     def enter(self, now: float) -> None:
         self._line = Line(self.servo.position, now, 1e-3)
         self.servo.lead(self._line)
@@ -101,6 +105,8 @@ class CyclicPosition(OperationMode):
 
 class CyclicVelocity(OperationMode):
     """CSV: bit 12 drive follows."""
+
+    cyclic = True
 
     def enter(self, now: float) -> None:
         self.servo.lead(Constant(0.0))
@@ -117,6 +123,8 @@ class CyclicVelocity(OperationMode):
 
 class CyclicTorque(OperationMode):
     """CST: bit 12 drive follows."""
+
+    cyclic = True
 
     def enter(self, now: float) -> None:
         self.servo.command(0.0, now)
@@ -213,7 +221,7 @@ class HomingMode(OperationMode):
     """HM: controlword bit 4 start, 8 halt; status bits 10 target reached, 12 attained, 13 error."""
 
     def enter(self, now: float) -> None:
-        self._new = True
+        self._new = False  # bit 4 is a level here: 1 starts, or goes on
         self._homing: Homing | None = None
         self._failed = False
         self.servo.guarded = False

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from typing import Any
 
 from canopen.sdo import SdoAbortedError
 
 from rds.bus.cia402 import codes
-from rds.bus.cia402.codes import CYCLIC, Abort, Mode, State
+from rds.bus.cia402.codes import Abort, Mode, State
 from rds.bus.cia402.dictionary import Dictionary
 from rds.bus.cia402.homing import METHODS
 from rds.bus.cia402.modes import MODES, TARGETS, OperationMode
@@ -49,6 +50,8 @@ class Operation:
         self._written = False  # a cyclic target that doesn't act yet
         self._fresh = self._synced = 0.0  # s: when a cyclic target began to act; last SYNC
         self._is_old = False
+        self.period = 1e-3  # s between two SYNCs
+        self._patience = 2.5, 10.5  # periods
         self._connect()
 
     def _connect(self) -> None:
@@ -86,12 +89,11 @@ class Operation:
         """The mode of operation, 0x6061."""
         return Mode(self.objects[0x6060])
 
-    @property
-    def period(self) -> float:
-        """Time between two SYNCs, s: 0x1006 where given, else the interpolation time period 0x60C2."""
-        cycle = self.objects[0x1006]
-        values = self.objects.values
-        return cycle * 1e-6 if cycle else values[0x60C2, 1] * 10.0 ** values[0x60C2, 2]
+    def look_up(self) -> None:
+        """Work with what the objects say now: `period` is 0x1006 where given, else the interpolation time 0x60C2."""
+        cycle, values = self.objects[0x1006], self.objects.values
+        self.period = cycle * 1e-6 if cycle else values[0x60C2, 1] * 10.0 ** values[0x60C2, 2]
+        self._patience = values[0x2000, 1] + 0.5, values[0x2000, 2] + 0.5
 
     def wake(self) -> None:
         """The self-test after switching on is over."""
@@ -168,14 +170,11 @@ class Operation:
 
     # --- what time brings
 
-    def deadline(self) -> float | None:
-        """The next instant at which something has to be decided, s."""
-        if self._stop is not None:
-            return self._stop_ends
-        if self._mode is None or self.mode not in CYCLIC:
-            return None
-        periods = self.objects.values[0x2000, 2 if self._is_old else 1]
-        return self._fresh + (periods + 0.5) * self.period
+    def deadline(self) -> float:
+        """The next instant at which something has to be decided, s; infinite if there is none."""
+        if self._mode is not None:
+            return self._fresh + self._patience[self._is_old] * self.period if self._mode.cyclic else inf
+        return self._stop_ends if self._stop is not None else inf
 
     def expire(self) -> None:
         """The deadline is now."""
@@ -283,9 +282,9 @@ class Operation:
 
     def _take_target(self, index: int, modes: set[Mode], value: Any) -> None:
         self.objects.values[index, 0] = value  # which the mode looks at
-        if self._mode is None or self.mode not in modes:
+        if self._mode is None or self.objects[0x6060] not in modes:
             return
-        if self.mode in CYCLIC:
+        if self._mode.cyclic:
             self._written = True
         else:
             self._mode.target(self.now)

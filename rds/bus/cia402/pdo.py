@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from struct import Struct
 from typing import Any
 
@@ -190,7 +191,7 @@ class Rpdo(Pdo):
     def __init__(self, number: int, dictionary: Dictionary):
         super().__init__(number, dictionary)
         self.waiting: bytes | None = None  # data that the next SYNC makes act
-        self.deadline: float | None = None  # s, by the event timer
+        self.deadline = inf  # s, by the event timer
 
     def apply(self, data: bytes, refused: Callable[[Key, Any], None]) -> None:
         """Write the mapped objects; `data` is at least `size` bytes."""
@@ -202,4 +203,4 @@ class Rpdo(Pdo):
                 refused((index, subindex), value)
 
     def restart(self) -> None:
-        self.waiting = self.deadline = None
+        self.waiting, self.deadline = None, inf
