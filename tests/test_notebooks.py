@@ -1,0 +1,51 @@
+"""The notebooks run from top to bottom, and are stored without outputs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from tests.documents import ROOT
+
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_runs(path: Path, alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("JUPYTER_PREFER_ENV_PATH", "1")  # the kernel of this environment, not one of the user's
+    monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(alone / "jupyter"))
+    notebook = nbformat.read(path, as_version=4)
+    place = {"metadata": {"path": str(alone)}}
+    NotebookClient(notebook, timeout=120, kernel_name="python3", resources=place).execute()
+    if path.stem == "01_first_axis":
+        _check_first_axis(notebook)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_is_stored_without_outputs(path: Path) -> None:
+    for cell in nbformat.read(path, as_version=4).cells:
+        if cell.cell_type == "code":
+            assert cell.outputs == [] and cell.execution_count is None
+
+
+def _check_first_axis(notebook: nbformat.NotebookNode) -> None:
+    """What the text says of its results is so."""
+    outputs = [_said(cell) for cell in notebook.cells if cell.cell_type == "code"]
+    said = "\n".join(outputs)
+    assert said.count("keeps its interface") == 2
+    assert any(text.rstrip().endswith("True") for text in outputs)  # emulated is identical to simulated
+    assert (
+        sum("image/png" in output.get("data", {}) for cell in notebook.cells for output in cell.get("outputs", ())) == 6
+    )
+    fits = [
+        float(line.split(":")[1].split("%")[0]) for line in said.splitlines() if line.startswith("fit of the model")
+    ]
+    assert fits[1] > 80.0 > fits[0]  # %: friction makes the difference
+
+
+def _said(cell: nbformat.NotebookNode) -> str:
+    return "\n".join(output.get("text") or output.get("data", {}).get("text/plain", "") for output in cell.outputs)

@@ -1,0 +1,146 @@
+"""The README is true: its files, commands and code are run in order, in an empty folder, as its reader would."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+
+import can
+import pytest
+
+from tests.documents import ROOT, Block, blocks, environment, is_real_time, run, save, shorten
+
+BLOCKS = blocks("README.md")
+ELSEWHERE = ("make ", "python3 -m venv", ".venv/bin/pip", ".venv/bin/rds demo", "jupyter lab")  # not run by this test
+SHORT = 1.0  # s, of real-time runs
+
+
+@pytest.mark.realtime
+def test_the_first_ten_minutes(alone: Path) -> None:
+    ran = 0
+    server = None
+    try:
+        for block in BLOCKS:
+            save([block], alone)
+            if block.language == "python" and block.words == "run":
+                _run_python(block)
+            for command, output in _commands(block):
+                if command.startswith(ELSEWHERE):
+                    continue
+                words = shlex.split(command)
+                assert words[0] == "rds", command
+                if words[1:3] == ["machine", "serve"]:
+                    server = _serve(words[1:])
+                else:
+                    _run_command(words[1:], output)
+                ran += 1
+    finally:
+        if server is not None:
+            server.send_signal(signal.SIGINT)
+            assert server.wait(10) == 0
+    assert ran >= 11
+
+
+def test_its_files_are_the_examples() -> None:
+    files = {block.file: block.text for block in BLOCKS if block.file}
+    for name in ("my_controller.py", "my_model.py", "experiment.toml"):
+        assert files[name] == (ROOT / "examples" / name).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "block", [b for b in BLOCKS if b.words == "bus"], ids=lambda b: re.findall(r'"(\w+)"', b.text)[0]
+)
+def test_bus_tables_are_what_python_can_takes(block: Block) -> None:
+    import tomllib
+
+    table = tomllib.loads(block.text)["bus"]
+    module, name = can.interfaces.BACKENDS[table.pop("interface")]
+    parameters = inspect.signature(getattr(import_module(module), name)).parameters
+    assert set(table) <= set(parameters)
+
+
+def test_make_targets_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = [command.split()[1] for block in BLOCKS for command, _ in _commands(block) if command.startswith("make ")]
+    assert targets == ["demo", "test"]
+    assert all(re.search(rf"^{target}:.*##", makefile, re.MULTILINE) for target in targets)
+
+
+@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/experiments.md"])
+def test_links_lead_somewhere(document: str) -> None:
+    text = (ROOT / document).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if target.startswith("http"):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (ROOT / document).parent / path if path else ROOT / document
+        assert file.exists(), target
+        if anchor:
+            assert anchor in _anchors(file), target
+
+
+def _commands(block: Block) -> list[tuple[str, list[str]]]:
+    """The commands of a console block, each with the lines of output shown after it."""
+    found: list[tuple[str, list[str]]] = []
+    if block.language == "console":
+        for line in block.text.splitlines():
+            if line.startswith("$ "):
+                found.append((line[2:], []))
+            elif line:
+                found[-1][1].append(line)
+    return found
+
+
+def _run_command(words: list[str], output: list[str]) -> None:
+    real_time = words[0] == "run" and is_real_time(words)
+    if real_time:
+        shorten(Path(words[1]), SHORT)
+    done = run(["-m", "rds.cli", *words])
+    assert "ended early" not in done.stderr
+    # a machine that is busy with other tests may be late; everything else must be as the README says
+    assert done.returncode in ((0, 1) if real_time else (0,)), done.stderr
+    said = [line.rstrip() for line in done.stdout.splitlines()]
+    for line in output:
+        assert line.rstrip() in said
+
+
+def _run_python(block: Block) -> None:
+    script, changes = re.subn(r"duration=[\d.]+", f"duration={SHORT}", block.text)
+    assert changes == 1
+    Path("script.py").write_text(script, encoding="utf-8")
+    done = run(["script.py"])
+    assert done.returncode == 0, done.stderr
+    assert Path("x.png").stat().st_size > 10_000
+
+
+def _serve(words: list[str]) -> subprocess.Popen[bytes]:
+    log = Path("server.log")
+    with open(log, "wb") as output:
+        server = subprocess.Popen(
+            [sys.executable, "-m", "rds.cli", *words], env=environment(), stdout=output, stderr=output
+        )
+    until = time.monotonic() + 30
+    while b"Ctrl-C" not in log.read_bytes():
+        assert server.poll() is None and time.monotonic() < until, log.read_text()
+        time.sleep(0.05)
+    return server
+
+
+def _anchors(file: Path) -> set[str]:
+    """The anchors that GitHub gives to the headings of a Markdown file."""
+    text = re.sub(r"^```.*?^```$", "", file.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    anchors: set[str] = set()
+    for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE):
+        anchor = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        number = 0
+        while (name := f"{anchor}-{number}" if number else anchor) in anchors:
+            number += 1
+        anchors.add(name)
+    return anchors
