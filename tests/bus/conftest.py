@@ -41,6 +41,7 @@ def runtime_directory(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture(autouse=True)
 def nothing_left_open(runtime_directory: Path) -> Iterator[None]:
     """Fails the test that leaves a bus open or a child process running."""
+    gc.freeze()  # so that only what the test made is searched
     yield
     children = multiprocessing.active_children()
     for child in children:
@@ -48,6 +49,7 @@ def nothing_left_open(runtime_directory: Path) -> Iterator[None]:
         child.join()
     gc.collect()
     buses = [thing for thing in gc.get_objects() if isinstance(thing, can.BusABC) and not thing._is_shutdown]
+    gc.unfreeze()
     for bus in buses:
         bus.shutdown()
     assert not children, f"left running: {children}"
