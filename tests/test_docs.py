@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from documents import ROOT, Block, blocks, save
 
 import rds
 from rds.bus import frames
@@ -24,7 +25,6 @@ from rds.modes import mode_names
 from rds.results.metrics import ERROR_METRICS
 from rds.signals import make_signal, signal_kinds
 from rds.signals import user as user_signal
-from tests.documents import ROOT, Block, blocks, save
 
 DOCUMENT = "docs/experiments.md"
 TEXT = (ROOT / DOCUMENT).read_text(encoding="utf-8")

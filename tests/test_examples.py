@@ -6,10 +6,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+from documents import ROOT, shorten
 
 import rds
 from rds.checks import check_file
-from tests.documents import ROOT, shorten
 
 EXAMPLES = ROOT / "examples"
 RUNS = (

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from documents import ROOT
 from nbclient import NotebookClient
-
-from tests.documents import ROOT
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import can
 import pytest
-
-from tests.documents import ROOT, Block, blocks, environment, is_real_time, run, save, shorten
+from documents import ROOT, Block, blocks, environment, is_real_time, run, save, shorten
 
 BLOCKS = blocks("README.md")
 ELSEWHERE = ("make ", "python3 -m venv", ".venv/bin/pip", ".venv/bin/rds demo", "jupyter lab")  # not run by this test
