@@ -38,8 +38,8 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
 
 
 def _simulated(plan: Plan, sample: np.ndarray) -> dict[str, np.ndarray]:
-    """Each axis's response in a closed loop of its own: the same plan, simulated."""
-    rows = run_plan(replace(plan, mode="simulation"), None)
+    """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
+    rows = run_plan(replace(plan, mode="simulation", samples=int(sample[-1]) + 1), None)
     of = dict(zip(rows.columns, rows.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
 

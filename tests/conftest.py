@@ -1,0 +1,69 @@
+"""What tests of whole runs share: a place of their own, and proof that they leave nothing behind."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
+
+
+@pytest.fixture
+def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
+    """A directory to run in, and a runtime directory that no other run shares.
+
+    Fails the test that leaves a process or a ring in shared memory behind.
+    """
+    runtime = Path(tempfile.mkdtemp(prefix="rds", dir="/tmp"))  # short, because a socket's path is
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
+    monkeypatch.chdir(tmp_path)
+    rings = set(_rings())
+    yield tmp_path
+    for process, command in _processes(runtime).items():
+        if "rds.bus.hub" in command:  # it would stay some seconds for the next run: no need to wait for that
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGTERM)
+    deadline = time.monotonic() + LINGER
+    while (left := _processes(runtime)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    for process in left:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
+    shutil.rmtree(runtime, ignore_errors=True)
+    forgotten = [ring for ring in _rings() if ring not in rings and not _is_mapped(ring)]
+    assert not left, f"left running: {left}"
+    assert not forgotten, f"left in shared memory: {forgotten}"
+
+
+def _rings() -> list[str]:
+    return [str(path) for path in Path("/dev/shm").glob("rds-*.ring")] if Path("/dev/shm").is_dir() else []
+
+
+def _is_mapped(ring: str) -> bool:
+    """Whether a process, of whichever test or user, still has it."""
+    for maps in Path("/proc").glob("[0-9]*/maps"):
+        with contextlib.suppress(OSError):
+            if ring in maps.read_text():
+                return True
+    return False
+
+
+def _processes(runtime: Path) -> dict[int, str]:
+    """Processes that have this runtime directory in their environment, but for this one and what is ending."""
+    found = {}
+    for environ in Path("/proc").glob("[0-9]*/environ"):
+        number = int(environ.parent.name)
+        with contextlib.suppress(OSError):
+            if number != os.getpid() and str(runtime).encode() in environ.read_bytes():
+                command = (environ.parent / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+                if command:
+                    found[number] = command
+    return found

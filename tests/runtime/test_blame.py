@@ -1,0 +1,125 @@
+"""Verdicts of real runs: the slow are blamed, the stalled are not. `met` is asserted nowhere: computers are busy."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from misbehaviour import busy, every, send
+
+import rds
+
+pytestmark = pytest.mark.realtime
+
+Maker = Callable[..., rds.Experiment]
+
+
+@pytest.mark.parametrize(("samples", "mode"), [(1, "emulation"), (50, "emulation"), (1, "implementation")])
+@pytest.mark.parametrize("wait", [busy, time.sleep], ids=["computes", "sleeps"])
+def test_two_milliseconds_of_one_are_missed(experiment: Maker, samples: int, mode: str, wait: Any) -> None:
+    result = experiment(every(samples, lambda: wait(0.002)), duration=0.5).run(mode)
+    assert result.verdict == "missed"
+    assert "control() and the model took 2." in result.meta["verdict_reason"]
+    assert result.meta["ending"] == "done"
+    assert result.meta["timing"]["compute"]["max"] >= 2000.0
+
+
+def test_a_slow_model_is_missed(experiment: Maker) -> None:
+    def advance(x: Any, u: Any, T: float, params: Any) -> Any:
+        busy(0.0015)
+        return x
+
+    assert experiment(model=advance, duration=0.5).run("emulation").verdict == "missed"
+
+
+def test_a_single_slow_call_comes_back_when_it_is_made_again(experiment: Maker) -> None:
+    result = experiment(every(700, lambda: busy(0.004)), duration=1.0).run("emulation")
+    assert result.verdict == "missed"
+
+
+def test_a_thread_that_takes_the_processor_is_missed(experiment: Maker) -> None:
+    def spin() -> None:
+        while True:
+            pass
+
+    def start() -> None:
+        threading.Thread(target=spin, daemon=True).start()
+
+    result = experiment(every(80, start), duration=0.1).run("emulation")
+    if result.meta["environment"]["rehearsal"]["stalls"] == 0:
+        assert result.verdict == "missed"
+    assert result.meta["environment"]["threads"] >= 1
+
+
+def test_who_is_stopped_is_not_blamed(experiment: Maker, alone: Path) -> None:
+    stops = []
+
+    def stop_now_and_then(samples: int, of: int) -> None:
+        if samples > 200 * (len(stops) + 1) and len(stops) < 6:
+            stops.append(samples)
+            send(alone / "run", "target", signal.SIGSTOP)
+            time.sleep(0.05)
+            send(alone / "run", "target", signal.SIGCONT)
+
+    result = experiment().run("emulation", out=alone / "run", progress=stop_now_and_then)
+    assert len(stops) >= 3
+    assert result.verdict == "void"
+    assert result.meta["timing"]["late"] >= 3 * 40
+    assert "repeat it on a quieter machine" in result.meta["verdict_reason"]
+
+
+def test_who_is_stopped_and_slow_is_blamed(experiment: Maker, alone: Path) -> None:
+    stops = []
+
+    def stop_now_and_then(samples: int, of: int) -> None:
+        if len(stops) < 6 and samples > 50:
+            stops.append(samples)
+            send(alone / "run", "target", signal.SIGSTOP)
+            time.sleep(0.05)
+            send(alone / "run", "target", signal.SIGCONT)
+
+    slow = experiment(every(1, lambda: busy(0.002)), duration=0.5)
+    assert slow.run("emulation", out=alone / "run", progress=stop_now_and_then).verdict == "missed"
+    assert stops
+
+
+HOG = """
+import os, sys, time
+os.sched_setaffinity(0, {int(sys.argv[1])})
+os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))
+for _ in range(int(sys.argv[2])):
+    end = time.perf_counter() + 0.015
+    while time.perf_counter() < end:
+        pass
+    time.sleep(0.12)
+"""
+
+
+def test_whose_processor_is_taken_is_not_blamed(
+    experiment: Maker, during: Callable[..., Callable[[int, int], None]]
+) -> None:
+    """Something more urgent takes all processors for 15 ms, several times."""
+    if not hasattr(os, "sched_setscheduler"):
+        pytest.skip("no scheduling classes here")
+    probe = subprocess.run([sys.executable, "-c", HOG, "0", "0"], capture_output=True)
+    if probe.returncode:
+        pytest.skip("real-time priority is not permitted here")
+    hogs: list[subprocess.Popen[bytes]] = []
+
+    def start() -> None:
+        hogs.extend(subprocess.Popen([sys.executable, "-c", HOG, str(cpu), "6"]) for cpu in os.sched_getaffinity(0))
+
+    try:
+        result = experiment().run("emulation", progress=during(start, 100))
+    finally:
+        for hog in hogs:
+            hog.wait(30)
+    assert result.verdict == "void"

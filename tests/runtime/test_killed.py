@@ -1,0 +1,341 @@
+"""Processes killed in the middle of a run: every sample so far is kept, and the machine comes to rest."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from misbehaviour import every, process, send
+
+import rds
+from rds.bus.drivers import find_machine
+from rds.bus.frames import CALL, Kind, Status, answer_identifier, decode_answer
+from rds.results import Result
+from rds.runtime.ring import Ring
+
+pytestmark = pytest.mark.realtime
+
+Maker = Callable[..., rds.Experiment]
+During = Callable[..., Callable[[int, int], None]]
+
+FILE = """
+axis = "X"
+mode = "{mode}"
+duration = {duration}
+
+[reference]
+kind = "sinusoid"
+amplitude = 2.0
+frequency = 1.0
+
+[controller]
+name = "p"
+
+[bus]
+channel = "{channel}"
+"""
+
+
+@contextmanager
+def served(channel: str) -> Iterator[subprocess.Popen[str]]:
+    """A machine of our own on the built-in bus."""
+    command = [sys.executable, "-m", "rds.bus.server", "mini-cnc", "--channel", channel]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        assert server.stdout is not None
+        assert server.stdout.readline().startswith("ready")
+        yield server
+    finally:
+        server.terminate()
+        server.communicate(timeout=10)
+
+
+def statuses(channel: str) -> set[Status]:
+    """What the modules of the channel say of themselves."""
+    import can
+
+    nodes = [answer_identifier(axis.node) for axis in rds.load_machine("mini-cnc").axes.values()]
+    found = {}
+    with can.Bus(interface="rds", channel=channel) as bus:
+        bus.send(can.Message(arbitration_id=CALL, is_extended_id=False, data=b""))
+        deadline = time.monotonic() + 2.0
+        while len(found) < len(nodes) and time.monotonic() < deadline:
+            message = bus.recv(0.1)
+            if message is not None and message.arbitration_id in nodes:
+                answer = decode_answer(message.arbitration_id, message.data)
+                if answer.kind == Kind.REPORT:
+                    found[message.arbitration_id] = answer.status
+    assert len(found) == len(nodes)
+    return set(found.values())
+
+
+def started(folder: Path, mode: str, duration: float, channel: str, **options: Any) -> subprocess.Popen[str]:
+    """`rds run` of an experiment in a process of its own, when its record has begun to grow."""
+    experiment = folder / "experiment.toml"
+    experiment.write_text(FILE.format(mode=mode, duration=duration, channel=channel))
+    command = [sys.executable, "-m", "rds.cli", "run", str(experiment), "--out", str(folder / "run"), "--json"]
+    host = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    wait_until(lambda: (folder / "run" / "record.rds").is_file() or host.poll() is not None)
+    assert host.poll() is None, host.communicate()
+    return host
+
+
+def wait_until(condition: Callable[[], Any], timeout: float = 30.0) -> None:
+    deadline = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.02)
+
+
+def check_readable(folder: Path, ending: str, at_least: int = 100) -> Result:
+    result = rds.open_result(folder)
+    assert result.meta["ending"] == ending
+    assert len(result) >= at_least
+    samples = np.rint(result["time"] / 0.001)
+    assert (np.diff(samples) >= 1).all()
+    assert np.isfinite(result["X_measured"]).all()
+    return result
+
+
+def test_a_killed_target(experiment: Maker, during: During, alone: Path) -> None:
+    kill = during(lambda: send(alone / "run", "target"), 300)
+    with served("own") as _:
+        own = experiment(bus={"channel": "own"}, duration=5.0)
+        result = own.run("implementation", out=alone / "run", progress=kill)
+        assert result.meta["ending"] == "killed"
+        assert "signal 9" in result.meta["ending_reason"]
+        wait_until(lambda: statuses("own") == {Status.WATCHDOG})
+    assert 300 <= len(result) < 4500
+    saved = check_readable(alone / "run", "killed", 300)
+    assert (saved["X_measured"] == result["X_measured"]).all()
+    for name in ("result.parquet", "result.csv", "result.mat", "result.json"):
+        (alone / "run" / name).unlink()
+    raw = check_readable(alone / "run", "killed", 300)
+    assert (raw["X_measured"] == result["X_measured"]).all()
+
+
+def test_every_sample_before_the_kill_is_on_the_disk(experiment: Maker, during: During, alone: Path) -> None:
+    """Not only those of the recorder's last look: the ring outlives the target."""
+    heads = []
+
+    def kill() -> None:
+        send(alone / "run", "target", signal.SIGSTOP)
+        ring = next(path for path in mapped(process(alone / "run", "target")))
+        opened = Ring.open(ring)
+        heads.append(opened.head)
+        opened.close()
+        send(alone / "run", "target")
+
+    result = experiment(duration=5.0).run("emulation", out=alone / "run", progress=during(kill))
+    assert len(result) == heads[0]
+
+
+def mapped(number: int) -> list[str]:
+    maps = Path(f"/proc/{number}/maps")
+    if not maps.is_file():
+        pytest.skip("no /proc here")
+    return [line.split()[-1] for line in maps.read_text().splitlines() if line.endswith(".ring")]
+
+
+def test_a_killed_host_leaves_the_run_going_to_its_end(alone: Path) -> None:
+    host = started(alone, "implementation", 3.0, "own")
+    host.kill()
+    host.communicate()
+    wait_until(lambda: (alone / "run" / "ending.json").is_file())
+    result = check_readable(alone / "run", "done")
+    assert len(result) >= 2000  # the rest were discarded, on a busy computer
+    assert result["time"][-1] > 2.5
+    wait_until(lambda: not find_machine(rds.load_machine("mini-cnc"), channel="own"), 20.0)  # nobody needs it now
+    assert sorted(path.name for path in (alone / "run").iterdir()) == ["ending.json", "record.rds"]
+
+
+def test_a_killed_recorder(experiment: Maker, during: During, alone: Path) -> None:
+    numbers = []
+
+    def kill() -> None:
+        numbers.append(process(alone / "run", "target"))
+        send(alone / "run", "recorder")
+
+    result = experiment(duration=5.0).run("emulation", out=alone / "run", progress=during(kill))
+    assert result.meta["ending"] == "killed"
+    assert "recorder" in result.meta["ending_reason"]
+    check_readable(alone / "run", "killed", 200)
+    command = Path(f"/proc/{numbers[0]}/cmdline")
+    assert not command.is_file() or not command.read_bytes()  # gone, or waiting for an init that doesn't look
+    assert not {"plan.pickle", "target.json", "processes.json"} & {path.name for path in (alone / "run").iterdir()}
+
+
+def test_a_machine_that_is_lost_in_the_middle(alone: Path) -> None:
+    with served("own") as server:
+        host = started(alone, "implementation", 20.0, "own")
+        server.kill()
+        said, errors = host.communicate(timeout=30)
+    assert host.returncode == 1
+    assert json.loads(said)["ending"] == "machine lost"
+    assert "no answer from X (node 2)" in errors
+    check_readable(alone / "run", "machine lost", 10)
+
+
+def test_a_machine_that_is_not_there(alone: Path) -> None:
+    """On a bus that is not the built-in one, nothing is started in its place."""
+    bus = 'interface = "virtual"\n'
+    (alone / "e.toml").write_text(FILE.format(mode="implementation", duration=1.0, channel="empty") + bus)
+    command = [sys.executable, "-m", "rds.cli", "run", "e.toml", "--out", "run", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "no answer from X (node 2) on bus virtual:empty" in done.stderr
+    assert "rds machine serve mini-cnc" in done.stderr
+    assert not (alone / "run").exists()
+
+
+def test_an_interrupted_run_stops_safely_and_is_saved(alone: Path) -> None:
+    with served("own"):
+        host = started(alone, "implementation", 20.0, "own", start_new_session=True)
+        os.killpg(host.pid, signal.SIGINT)
+        said, errors = host.communicate(timeout=30)
+        assert host.returncode == 1, errors
+        wait_until(lambda: statuses("own") == {Status.WATCHDOG})  # after a last command of zero volts
+    outcome = json.loads(said)
+    assert outcome["ending"] == "stopped"
+    assert "the run ended early (stopped)" in errors
+    assert (alone / "run" / "result.parquet").is_file()
+    check_readable(alone / "run", "stopped", 1)
+
+
+def test_a_polite_kill_of_the_target_stops_safely(experiment: Maker, during: During, alone: Path) -> None:
+    stop = during(lambda: send(alone / "run", "target", signal.SIGTERM))
+    result = experiment(duration=10.0).run("implementation", out=alone / "run", progress=stop)
+    assert result.meta["ending"] == "stopped"
+
+
+# --- a student's code that ends a run -----------------------------------------------------------------------------
+
+
+def at_once(t: float, what: Callable[[], Any]) -> Callable[..., Any]:
+    """A controller whose answer at time `t` is what `what()` returns, if it returns."""
+
+    def control(now: float, r: Any, y: float, state: Any, params: Any) -> tuple[Any, Any]:
+        return (what() if now >= t - 1e-9 else 0.5), state
+
+    return control
+
+
+def fails() -> float:
+    return 1 / 0
+
+
+FAULTS = {
+    "nan": (lambda: float("nan"), r"returned the voltage nan at t = 1\.000 s \(axis X\); it must return"),
+    "raises": (fails, r"ZeroDivisionError: division by zero.*\(at t = 1\.000 s\)"),
+    "text": (lambda: "5 V", r"returned the voltage '5 V' at t = 1\.000 s"),
+    "sys.exit": (lambda: sys.exit(3), r"SystemExit: 3.*\(at t = 1\.000 s\)"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_in_a_simulation(experiment: Maker, alone: Path, fault: str) -> None:
+    what, said = FAULTS[fault]
+    with pytest.raises(rds.ContractError, match=said):
+        experiment(at_once(1.0, what)).run(out=alone / "run")
+    assert not (alone / "run").exists()
+
+
+@pytest.mark.parametrize(("fault", "mode"), [*((name, "implementation") for name in FAULTS), ("nan", "emulation")])
+def test_a_fault_in_real_time(experiment: Maker, alone: Path, fault: str, mode: str) -> None:
+    what, said = FAULTS[fault]
+    with pytest.raises(rds.ContractError, match=said.replace(r"1\.000", r"0\.2\d\d")):
+        experiment(at_once(0.2, what)).run(mode, out=alone / "run")
+    result = check_readable(alone / "run", "fault", 100)
+    assert result["time"][-1] < 0.3
+    kept = sorted(path.name for path in (alone / "run").iterdir() if path.suffix != ".log")
+    assert kept == ["ending.json", "record.rds"]
+
+
+def test_a_controller_that_hangs_is_killed(experiment: Maker, alone: Path) -> None:
+    def hang() -> None:
+        while True:
+            pass
+
+    started = time.monotonic()
+    with pytest.raises(rds.ContractError, match=r"did not return for 5 s at t = 0\.500 s; look for a loop without"):
+        experiment(at_once(0.5, hang)).run("implementation", out=alone / "run")
+    assert 5.0 < time.monotonic() - started < 20.0
+    assert len(check_readable(alone / "run", "fault", 400)) <= 500
+
+
+def test_a_controller_that_ends_the_process(experiment: Maker, alone: Path) -> None:
+    result = experiment(at_once(0.5, lambda: os._exit(7))).run("implementation", out=alone / "run")
+    assert result.meta["ending"] == "killed"
+    assert "ended with code 7 by itself" in result.meta["ending_reason"]
+    assert len(result) <= 500
+
+
+def test_what_a_controller_prints_is_kept_apart(
+    experiment: Maker, alone: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    experiment(every(100, lambda: print("hello")), duration=0.5).run("emulation", out=alone / "run")
+    assert capfd.readouterr().out == ""
+    assert (alone / "run" / "target.log").read_text().count("hello") == 5
+
+
+def test_too_many_late_samples_in_a_row_end_the_run(experiment: Maker) -> None:
+    def slow() -> None:
+        time.sleep(0.002)
+
+    result = experiment(every(1, slow), timing={"stop_after": 20, "late": "process"}).run("emulation")
+    assert (result.meta["ending"], result.verdict) == ("overloaded", "missed")
+    assert 20 <= len(result) <= 40
+
+
+# --- folders ------------------------------------------------------------------------------------------------------
+
+
+def test_a_new_run_replaces_an_earlier_one_in_its_folder(experiment: Maker, during: During, alone: Path) -> None:
+    """Its record from its first sample on: a kill must not leave the old result under the new run's name."""
+    first = experiment(duration=0.3).run("emulation", out=alone / "run")
+    assert len(first) == 300
+    second = experiment(duration=0.2).run("emulation", out=alone / "run")
+    assert len(second) == len(rds.open_result(alone / "run")) == 200
+    seen = []
+
+    def look() -> None:
+        seen.append(rds.open_result(alone / "run"))
+
+    experiment(duration=2.0).run("implementation", out=alone / "run", progress=during(look, 600))
+    assert seen[0].meta["ending"] == "killed"  # nothing better is known of it so far
+    assert seen[0].mode == "implementation"
+
+
+def test_a_run_that_never_began_leaves_the_earlier_one(experiment: Maker, alone: Path) -> None:
+    first = experiment(duration=0.2).run("emulation", out=alone / "run")
+    with served("own"):
+        from rds.bus.command import Command
+
+        with Command("own"), pytest.raises(rds.MachineError, match="another run commands the machine"):
+            experiment(duration=0.2, bus={"channel": "own"}).run("emulation", out=alone / "run")
+    assert (rds.open_result(alone / "run")["time"] == first["time"]).all()
+    assert not {"unstarted.json", "plan.pickle"} & {path.name for path in (alone / "run").iterdir()}
+
+
+def test_two_runs_do_not_share_a_folder(experiment: Maker, during: During, alone: Path) -> None:
+    refused = []
+
+    def again() -> None:
+        with suppress(rds.InputError):
+            experiment(duration=0.2).run("emulation", out=alone / "run")
+            return
+        refused.append(True)
+
+    result = experiment(duration=1.0).run("emulation", out=alone / "run", progress=during(again))
+    assert refused
+    assert len(result) == 1000

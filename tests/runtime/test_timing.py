@@ -1,0 +1,253 @@
+"""Verdicts from times alone: whose fault a late sample is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis.strategies import booleans, dictionaries, floats, integers
+
+from rds.core.types import Verdict
+from rds.runtime.timing import Timing, judge, late_samples, longest_run, own_wait, replay, summary
+
+MS = 1_000_000
+N = 1000
+
+
+def ran(
+    compute: Any = 0.05,
+    waits: dict[int, float] | None = None,
+    io: Any = 0.1,
+    inside: dict[int, float] | None = None,
+    taken: dict[int, float] | None = None,
+    samples: int = N,
+    discard: bool = False,
+) -> tuple[Timing, dict[str, int]]:
+    """What a loop of 1 ms records of a system that wakes it late (`waits`) or stalls it while it computes (`inside`).
+
+    Times in ms; `taken` is what the scheduler takes while it computes, and says so.
+    """
+    waits, inside, taken = waits or {}, inside or {}, taken or {}
+    compute, io = (np.broadcast_to(np.asarray(values, dtype=float), samples) for values in (compute, io))
+    rows, free, k = [], 0.0, 0
+    while k < samples:
+        start = max(free, float(k)) + waits.get(k, 0.0)
+        if discard and start - k >= 1.0:
+            k = int(start)
+            if k >= samples:
+                break
+        busy = float(compute[k]) + inside.get(k, 0.0) + taken.get(k, 0.0)
+        rows.append((k, start - k, float(io[k]), busy, 0.01, taken.get(k, 0.0)))
+        free = start + float(io[k]) + busy + 0.01
+        k += 1
+    table = np.array(rows).T
+    return Timing(table[0].astype(int), *(table[1:] * MS)), {"discarded": samples - len(rows)}
+
+
+def verdict(*arguments: Any, **options: Any) -> Verdict:
+    judging = {key: options.pop(key) for key in ("limit", "stalls", "threads", "again") if key in options}
+    timing, counts = ran(*arguments, **options)
+    return judge(timing, MS, **counts, **judging).verdict
+
+
+def some(times: int, ms: float, of: int = N) -> np.ndarray:
+    """Compute of `of` samples, `times` of which, evenly spread, take `ms`."""
+    compute = np.full(of, 0.05)
+    compute[5 :: of // times][:times] = ms
+    return compute
+
+
+SLOW = np.full(N, 2.0)
+
+
+@pytest.mark.parametrize("discard", [False, True])
+class TestWhoseFault:
+    def test_in_time(self, discard: bool) -> None:
+        assert verdict(discard=discard) == Verdict.MET
+        assert verdict(compute=0.85, discard=discard) == Verdict.MET
+
+    def test_a_slow_controller_missed(self, discard: bool) -> None:
+        assert verdict(compute=SLOW, discard=discard) == Verdict.MISSED
+        assert verdict(compute=1.05, discard=discard) == Verdict.MISSED
+
+    def test_a_controller_that_is_slow_now_and_then_missed(self, discard: bool) -> None:
+        assert verdict(compute=some(20, 1.5), discard=discard) == Verdict.MISSED
+
+    def test_a_stalled_machine_is_void(self, discard: bool) -> None:
+        stalls = {100: 50.0, 300: 50.0, 700: 50.0}
+        assert verdict(waits=stalls, discard=discard) == Verdict.VOID
+
+    def test_the_backlog_of_one_stall_is_not_blamed(self, discard: bool) -> None:
+        assert verdict(compute=0.8, waits={100: 200.0}, discard=discard) == Verdict.VOID
+
+    def test_a_slow_controller_on_a_stalled_machine_missed(self, discard: bool) -> None:
+        stalls = dict.fromkeys(range(0, N, 100), 20.0)
+        assert verdict(compute=SLOW, waits=stalls, discard=discard) == Verdict.MISSED
+        assert verdict(compute=some(100, 1.5), waits=stalls, discard=discard) == Verdict.MISSED
+
+    def test_what_the_scheduler_took_is_void(self, discard: bool) -> None:
+        taken = dict.fromkeys(range(0, N, 50), 5.0)
+        assert verdict(taken=taken, discard=discard) == Verdict.VOID
+
+    def test_stalls_inside_the_code_of_a_stalling_machine_are_void(self, discard: bool) -> None:
+        """Where waiting stalls as well, stalls while computing need no other cause."""
+        waits = dict.fromkeys(range(10, N, 100), 5.0)
+        inside = dict.fromkeys(range(60, N, 250), 5.0)
+        assert verdict(waits=waits, inside=inside, discard=discard) == Verdict.VOID
+
+    def test_doubtful_overruns_are_timed_again(self, discard: bool) -> None:
+        """Alone they can't be told apart; called again, the student's code takes as long and the system's doesn't."""
+        waits = dict.fromkeys(range(10, N, 100), 5.0)
+        for compute, expected in ((some(5, 4.0), Verdict.MISSED), (0.05, Verdict.VOID)):
+            inside = {} if expected is Verdict.MISSED else dict.fromkeys(range(60, N, 250), 4.0)
+            timing, counts = ran(compute, waits, inside=inside, discard=discard)
+            repeated = np.broadcast_to(np.asarray(compute, dtype=float), N)[timing.sample] * MS
+            assert judge(timing, MS, **counts, again=lambda own=repeated: own).verdict == expected
+
+    def test_a_single_overrun_is_timed_again(self, discard: bool) -> None:
+        timing, counts = ran(inside={500: 3.0}, discard=discard)
+        quick = np.full(len(timing.sample), 0.05 * MS)
+        assert judge(timing, MS, **counts, again=lambda: quick).verdict == Verdict.VOID
+        assert judge(timing, MS, **counts, again=lambda: timing.compute).verdict == Verdict.MISSED
+        assert judge(timing, MS, **counts, again=lambda: None).verdict == Verdict.MISSED
+        assert judge(timing, MS, **counts, stalls=1).verdict == Verdict.VOID
+
+    def test_a_slow_bus_missed_and_is_named(self, discard: bool) -> None:
+        timing, counts = ran(io=1.5, discard=discard)
+        judgement = judge(timing, MS, **counts)
+        assert judgement.verdict == Verdict.MISSED
+        assert "the bus's I/O took 1.500 ms at the median" in judgement.reason
+
+    def test_an_exchange_that_waits_now_and_then_is_void(self, discard: bool) -> None:
+        io = np.full(N, 0.1)
+        io[50::100] = 2.5
+        assert verdict(io=io, discard=discard) == Verdict.VOID
+
+
+def test_without_doubt_nothing_is_called_again() -> None:
+    def never() -> None:
+        raise AssertionError
+
+    for arguments in ({}, {"compute": SLOW}, {"waits": {100: 50.0}}, {"io": 2.0}):
+        timing, counts = ran(**arguments)
+        judge(timing, MS, **counts, again=never)
+
+
+def test_a_stall_seen_by_the_rehearsal_counts() -> None:
+    assert verdict(compute=some(5, 2.0), stalls=5) == Verdict.VOID
+    assert verdict(compute=some(50, 2.0), stalls=5) == Verdict.MISSED
+
+
+def test_threads_that_the_code_left_running_are_its_own() -> None:
+    waits = dict.fromkeys(range(10, N, 100), 5.0)
+    timing, counts = ran(waits=waits)
+    judgement = judge(timing, MS, **counts, threads=2)
+    assert judgement.verdict == Verdict.MISSED
+    assert "left 2 threads running" in judgement.reason
+    assert judge(timing, MS, **counts, threads=2, stalls=3).verdict == Verdict.VOID
+    assert verdict(threads=2) == Verdict.MET
+
+
+def test_the_limit_allows_so_many() -> None:
+    compute = some(20, 1.5)
+    assert verdict(compute=compute, limit=20) == Verdict.MET
+    assert verdict(compute=compute, limit=19) == Verdict.MISSED
+    assert verdict(waits={100: 1.5}, limit=5) == Verdict.MET
+    assert verdict(compute=some(4, 1.5), waits={150: 60.0}, limit=5) == Verdict.VOID
+
+
+def test_discarded_periods_are_not_met() -> None:
+    """The sample after them is in time again, so nothing else shows them; at the end, not even a sample."""
+    timing, counts = ran(waits={500: 50.0}, discard=True)
+    assert not late_samples(timing, MS).any()
+    assert judge(timing, MS, **counts).verdict == Verdict.VOID
+    assert own_wait(timing, MS).max() == pytest.approx(50.0 * MS)
+    timing, counts = ran(waits={990: 50.0}, discard=True)
+    assert counts["discarded"] == 10
+    assert judge(timing, MS, **counts).verdict == Verdict.VOID
+
+
+def test_the_first_sample_is_exempt_but_not_what_it_delays() -> None:
+    first = np.full(N, 0.05)
+    first[0] = 1.2
+    assert verdict(compute=first) == Verdict.MET
+    first[0] = 50.0
+    assert verdict(compute=first) == Verdict.MISSED
+
+
+def test_reasons_say_what_and_how_much() -> None:
+    timing, counts = ran(compute=SLOW)
+    reason = judge(timing, MS, **counts).reason
+    assert "999 of 1000 samples were late, and 999 would have been on a system without delays" in reason
+    assert "control() and the model took 2.010 ms at the 99th percentile" in reason
+    timing, counts = ran(waits={500: 50.0})
+    judgement = judge(timing, MS, **counts)
+    assert "woke the loop up to 50.00 ms late" in judgement.reason
+    assert "repeat it on a quieter machine" in judgement.reason
+    assert judgement.to_json()["verdict"] == "void"
+    timing, counts = ran(waits={500: 1.0})
+    assert "within the limit of 9" in judge(timing, MS, limit=9).reason
+    assert "all 1000 samples" in judge(ran()[0], MS).reason
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    waits=dictionaries(integers(0, 299), floats(0.0, 80.0), max_size=20),
+    taken=dictionaries(integers(0, 299), floats(0.0, 20.0), max_size=20),
+    stalled_io=dictionaries(integers(0, 299), floats(0.0, 20.0), max_size=20),
+    compute=floats(0.0, 0.85),
+    discard=booleans(),
+)
+def test_nobody_is_blamed_whose_own_times_fit(
+    waits: dict[int, float], taken: dict[int, float], stalled_io: dict[int, float], compute: float, discard: bool
+) -> None:
+    io = np.full(300, 0.1)
+    for k, ms in stalled_io.items():
+        io[k] += ms
+    assert verdict(compute, waits, io, taken=taken, samples=300, discard=discard) != Verdict.MISSED
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    waits=dictionaries(integers(0, 299), floats(0.0, 80.0), max_size=20),
+    taken=dictionaries(integers(0, 299), floats(0.0, 20.0), max_size=20),
+    compute=floats(1.05, 20.0),
+    discard=booleans(),
+)
+def test_who_never_fits_is_blamed_on_any_machine(
+    waits: dict[int, float], taken: dict[int, float], compute: float, discard: bool
+) -> None:
+    if discard:
+        waits = {k: min(ms, 5.0) for k, ms in waits.items()}  # else hardly a sample may be left
+    assert verdict(compute, waits, taken=taken, samples=300, discard=discard) == Verdict.MISSED
+
+
+@given(waits=dictionaries(integers(1, 99), floats(0.0, 20.0), max_size=20), discard=booleans())
+def test_waits_are_found_where_they_were(waits: dict[int, float], discard: bool) -> None:
+    timing, _ = ran(waits=waits, samples=100, discard=discard)
+    found = own_wait(timing, MS)
+    if not discard:
+        assert found == pytest.approx([waits.get(k, 0.0) * MS for k in range(100)], abs=1.0)
+    assert (found >= 0).all()
+
+
+def test_the_replay_by_hand() -> None:
+    work = np.array([0.5, 2.5, 0.5, 0.5, 0.5, 0.5]) * MS
+    assert replay(work, np.arange(6), MS).tolist() == [False, True, True, True, False, False]
+    assert replay(work, np.array([0, 1, 4, 5, 6, 7]), MS).tolist() == [False, True, False, False, False, False]
+
+
+def test_the_summary_counts_and_sorts() -> None:
+    timing, _ = ran(compute=some(10, 3.0))
+    report = summary(timing, MS)
+    assert report["samples"] == N
+    assert report["compute"]["p50"] == pytest.approx(50.0)
+    assert report["compute"]["max"] == pytest.approx(3000.0)
+    assert sum(report["compute"]["histogram"]) == N
+    assert len(report["compute"]["histogram"]) == len(report["histogram_edges_us"])
+    assert report["late"] == int(late_samples(timing, MS).sum())
+    assert report["longest_late_run"] == 3
+    assert longest_run(np.array([], dtype=bool)) == 0
+    assert longest_run(np.array([True, True, False, True])) == 2
