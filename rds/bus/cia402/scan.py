@@ -1,0 +1,82 @@
+"""Which CANopen devices are on a bus, and what they say of themselves."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import can
+import canopen
+from canopen.sdo import SdoAbortedError, SdoCommunicationError
+
+from rds.bus.cia402.codes import State, state_of
+from rds.bus.cia402.configure import library
+from rds.bus.link import BUILTIN, bus_name, open_bus
+from rds.core.errors import MachineError
+
+_WAIT = 0.3  # s for the devices to answer
+_DRIVE = 402
+
+
+@dataclass(frozen=True)
+class Found:
+    """A CANopen device; what it doesn't say is None."""
+
+    node: int
+    profile: int | None  # low half of the device type 0x1000: 402 for a drive
+    name: str | None  # 0x1008
+    vendor: int | None  # 0x1018:01
+    product: int | None  # 0x1018:02
+    revision: int | None  # 0x1018:03
+    state: State | None  # of a drive
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether it is a CiA 402 drive."""
+        return self.profile == _DRIVE
+
+
+def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = _WAIT, **options: Any) -> list[Found]:
+    """The devices that answer an SDO request within `timeout` s, by node-ID; nothing is changed on them.
+
+    `options` go to the python-can interface. Raises MachineError if the bus can't be opened or fails.
+    """
+    bus = open_bus(interface, channel, [0x580, 0x700], 0x780, **options)
+    try:
+        with library(bus) as network:
+            network.scanner.search()
+            time.sleep(timeout)
+            return [_ask(network, node) for node in sorted(network.scanner.nodes)]
+    except (can.CanError, OSError) as error:
+        raise MachineError(f"bus {bus_name(interface, channel)} failed: {error}") from error
+    finally:
+        bus.shutdown()
+
+
+def _ask(network: canopen.Network, number: int) -> Found:
+    node = network.add_node(number, canopen.ObjectDictionary())
+    node.sdo.RESPONSE_TIMEOUT = 0.2
+    kind, status, name = _number(node, 0x1000), _number(node, 0x6041), _read(node, 0x1008)
+    profile = None if kind is None else kind & 0xFFFF
+    return Found(
+        node=number,
+        profile=profile,
+        name=None if name is None else name.rstrip(b"\0").decode("ascii", "replace"),
+        vendor=_number(node, 0x1018, 1),
+        product=_number(node, 0x1018, 2),
+        revision=_number(node, 0x1018, 3),
+        state=state_of(status) if status is not None and profile == _DRIVE else None,
+    )
+
+
+def _read(node: canopen.RemoteNode, index: int, subindex: int = 0) -> bytes | None:
+    try:
+        return bytes(node.sdo.upload(index, subindex))
+    except (SdoAbortedError, SdoCommunicationError):
+        return None
+
+
+def _number(node: canopen.RemoteNode, index: int, subindex: int = 0) -> int | None:
+    data = _read(node, index, subindex)
+    return None if data is None else int.from_bytes(data, "little")
