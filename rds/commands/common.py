@@ -1,0 +1,79 @@
+"""What all commands share: refusals with exit codes, the one JSON object, progress.
+
+Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained on stderr.
+"""
+
+from __future__ import annotations
+
+import json as json_text
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from typing import Annotated, Any
+
+import typer
+
+Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Errors that a user can act on go to stderr as a sentence, with exit code 2."""
+    from rds.core.errors import RdsError
+
+    try:
+        yield
+    except RdsError as error:
+        typer.echo(f"rds: {error}", err=True)
+        raise typer.Exit(2) from error
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        remedy = "check that the folder can be written and that the disk has room"
+        typer.echo(f"rds: {place}{error.strerror or error}; {remedy}", err=True)
+        raise typer.Exit(2) from error
+
+
+@contextmanager
+def stdout_kept(json: bool) -> Iterator[None]:
+    """With `json`, whatever a student's code prints goes to stderr: stdout is for the one JSON object."""
+    if not json:
+        yield
+        return
+    sys.stdout.flush()
+    try:
+        saved = os.dup(1)
+        os.dup2(2, 1)  # what is not printed through Python as well
+    except OSError:
+        saved = -1
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        if saved >= 0:
+            os.dup2(saved, 1)
+            os.close(saved)
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
+    """Makes a progress function for a named stage: a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda name: lambda done, of: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+
+        def bar(name: str) -> Callable[[int, int], None]:
+            task = bars.add_task(name, total=None)
+            return lambda done, of: bars.update(task, completed=done, total=of)
+
+        yield bar
+
+
+def print_json(value: Any) -> None:
+    """One JSON object on stdout."""
+    typer.echo(json_text.dumps(value, allow_nan=False))
