@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -73,9 +73,9 @@ class Experiment:
         if isinstance(axis, str) and not overrides:
             table["axis"] = axis
         else:
-            table["axes"] = [axis] if isinstance(axis, str) else list(axis)
+            table["axes"] = [axis] if isinstance(axis, str) else list(axis) if isinstance(axis, Iterable) else axis
             if overrides:
-                table["axis"] = {name: dict(own) for name, own in overrides.items()}
+                table["axis"] = dict(overrides)
         self._words = Words(table)
         self._folder = Path.cwd()
         self.plan()

@@ -114,7 +114,12 @@ def _axes(words: Words, machine: Machine) -> list[tuple[Axis, Words]]:
 
 def _own_words(words: Words, overrides: Words | None, name: str) -> Words:
     own = overrides.inner(name) if overrides else None
-    return own.over(words, AXIS_WORDS) if own else words
+    if own is None:
+        return words
+    own = own.over(words, AXIS_WORDS)
+    for key in AXIS_WORDS:
+        _ = key in own
+    return own
 
 
 def _drive(words: Words, mode: Mode) -> str:

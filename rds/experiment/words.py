@@ -171,7 +171,7 @@ def _line_of(text: str, table: str, key: str | None) -> int | None:
             current = ".".join(part.strip().strip("\"'") for part in header[1].split("."))
             if current == table:
                 header_line = number
-            if key is not None and current == (f"{table}.{key}" if table else key):
+            if key is not None and f"{current}.".startswith(f"{table}.{key}." if table else f"{key}."):
                 return number
         elif key is not None and current == table and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]", line):
             return number

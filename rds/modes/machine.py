@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -56,17 +57,19 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
 
 def _serve(machine: str, channel: str) -> subprocess.Popen[bytes]:
     """Start the machine's modules in a process of their own, and wait until they are on the bus."""
-    server = subprocess.Popen(
-        [sys.executable, "-m", "rds.bus.server", machine, "--channel", channel, "--exit-with-stdin"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    assert server.stdout is not None
-    line = server.stdout.readline()
-    if not line.startswith(b"ready"):
-        server.kill()
-        server.wait()
-        raise MachineError(f"the machine behind the built-in bus did not start: {line.decode(errors='replace')!r}")
+    with tempfile.TemporaryFile() as said:
+        server = subprocess.Popen(
+            [sys.executable, "-P", "-m", "rds.bus.server", machine, "--channel", channel, "--exit-with-stdin"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            start_new_session=True,
+        )
+        assert server.stdout is not None
+        if not server.stdout.readline().startswith(b"ready"):
+            server.kill()
+            server.communicate()
+            said.seek(0)
+            last = said.read().decode(errors="replace").strip().splitlines()[-1:]
+            raise MachineError(f"the machine on the built-in bus did not start: {''.join(last) or 'it said nothing'}")
     return server
