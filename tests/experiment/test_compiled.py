@@ -1,0 +1,108 @@
+"""Compiled simulations: the same numbers as in Python, or Python with a note."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis.strategies import booleans, floats, sampled_from
+
+import rds
+
+numba = pytest.importorskip("numba")
+
+CONTROLLERS: list[dict[str, Any]] = [
+    {"name": "p"},
+    {"name": "pid"},
+    {"name": "modified-pid"},
+    {"name": "tracking", "gains": [1600.0, -36.6]},
+]
+REFERENCES = [rds.sinusoid(5.0, 2.0), rds.square(3.0, 4.0), rds.triangle(2.0, 1.0, phase=90.0)]
+
+
+def assert_same(settings: dict[str, Any]) -> None:
+    compiled = rds.Experiment(**settings, compiled=True).run()
+    python = rds.Experiment(**settings).run()
+    assert list(compiled.columns) == list(python.columns)
+    assert compiled.units == python.units
+    assert compiled.meta["notes"] == []
+    different = [name for name in python.columns if (compiled[name] != python[name]).any()]
+    assert not different
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS, ids=lambda controller: controller["name"])
+@pytest.mark.parametrize("interface", [True, False])
+def test_the_same_to_the_bit(controller: dict[str, Any], interface: bool) -> None:
+    assert_same(
+        {
+            "axis": ("X", "Y", "Z"),
+            "duration": 0.5,
+            "controller": controller,
+            "reference": REFERENCES[0],
+            "overrides": {"Y": {"reference": REFERENCES[1]}, "Z": {"reference": REFERENCES[2]}},
+            "interface": {"saturation": interface, "quantization": interface},
+        }
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    controller=sampled_from(CONTROLLERS),
+    reference=sampled_from(REFERENCES),
+    saturation=booleans(),
+    quantization=booleans(),
+    friction=floats(0.0, 5.0),
+    T=sampled_from([0.0005, 0.001, 0.002]),
+)
+def test_the_same_whatever_is_set(
+    controller: dict[str, Any], reference: Any, saturation: bool, quantization: bool, friction: float, T: float
+) -> None:
+    assert_same(
+        {
+            "duration": 0.2,
+            "sample_period": T,
+            "controller": controller,
+            "reference": reference,
+            "model": {"name": "linear-axis", "friction_plus": friction, "friction_minus": -friction / 2},
+            "interface": {"saturation": saturation, "quantization": quantization},
+        }
+    )
+
+
+@pytest.mark.parametrize("signal", [rds.square(12.0, 5.0), rds.sinusoid(0.4, 3.0)])
+def test_a_voltage_signal_as_well(signal: Any) -> None:
+    assert_same({"duration": 0.5, "signal": signal})
+
+
+def test_it_falls_back_with_a_note(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def control(t: float, r: Any, y: float, state: Any, params: Any) -> Any:
+        return 10.0 * (r.position - y), state
+
+    def advance(x: Any, u: Any, T: float, params: Any) -> Any:
+        return x[0] + u[0] * T, 0.0
+
+    good = {"duration": 0.1, "reference": REFERENCES[0], "controller": "p"}
+    for change, said in (
+        ({"controller": control}, "only the library's controllers can be compiled"),
+        ({"model": advance}, "only the library's linear-axis model can be compiled"),
+        ({"axis": "spindle"}, "only the library's linear-axis model can be compiled"),
+    ):
+        own: dict[str, Any] = good | change
+        result = rds.Experiment(**own, compiled=True).run()
+        (note,) = result.meta["notes"]
+        assert note.startswith("not compiled: axis ") and said in note
+        python = rds.Experiment(**own).run()
+        assert all((result[name] == python[name]).all() for name in python.columns)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    (note,) = rds.Experiment(**good, compiled=True).run().meta["notes"]
+    assert note == "not compiled: numba is not installed (pip install 'rds[fast]')"
+
+
+@pytest.mark.realtime
+def test_real_time_is_not_compiled_and_says_so(alone: Path) -> None:
+    own = rds.Experiment(duration=0.2, reference=REFERENCES[0], controller="p", compiled=True)
+    (note,) = own.run("emulation").meta["notes"]
+    assert note == "not compiled: emulation runs in real time; only simulations can be compiled"

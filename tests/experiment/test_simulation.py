@@ -1,0 +1,144 @@
+"""Simulations end to end: what a student hands in and gets back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+
+import rds
+
+GOOD: dict[str, Any] = {"duration": 0.5, "reference": rds.sinusoid(2.0, 2.0), "controller": "p"}
+
+
+def law(t: float, r: Any, y: float, state: Any, params: Any) -> Any:
+    return 20.0 * (r.position - y), state
+
+
+def test_columns_in_order_with_units_and_what_is_known() -> None:
+    result = rds.Experiment(**GOOD, title="First").run()
+    assert list(result.columns) == [
+        *("time", "X_reference", "X_reference_velocity", "X_reference_acceleration"),
+        *("X_measured", "X_command", "X_voltage"),
+    ]
+    assert [result.units[name] for name in result.columns] == ["s", "mm", "mm/s", "mm/s²", "mm", "V", "V"]
+    assert (result["time"] == np.arange(500) * 0.001).all()
+    assert result.meta["versions"]["numpy"] == np.__version__
+    assert result.meta["model"]["X"]["params"]["tau"] == pytest.approx(9.943e-3)
+    assert result.meta["period"] == {"X": 0.5}
+    assert result.verdict is None
+    assert "timing" not in result.meta
+
+
+def test_the_controller_in_every_way_gives_the_same(alone: Path) -> None:
+    (alone / "my.py").write_text(
+        "params = {'gain': 20.0}\n"
+        "def control(t, r, y, state, params):\n    return params['gain'] * (r.position - y), state\n"
+    )
+    ways: list[Any] = [
+        law,
+        {"control": law},
+        rds.Controller(law),
+        "my.py",
+        {"file": "my.py"},
+        {"file": str(alone / "my.py"), "params": {"gain": 20}},
+        control.ss([], [], [], [[20.0]], dt=True),
+        {"name": "p", "Pgain": 20.0},
+    ]
+    results = [rds.Experiment(**(GOOD | {"controller": way})).run() for way in ways]
+    for result in results[:-1]:
+        assert np.abs(result["X_measured"] - results[0]["X_measured"]).max() < 1e-9
+    assert results[3].meta["controller"]["X"]["name"] == "my.py"
+    assert len(results[3].meta["controller"]["X"]["sha256"]) == 64
+    assert results[0].meta["controller"]["X"]["source"].startswith("def law")
+
+
+def test_runs_do_not_share_their_state() -> None:
+    start = [0]
+
+    def counts(t: float, r: Any, y: float, state: list[int], params: dict[str, Any]) -> Any:
+        return float(state[0] % 3), [state[0] + 1]
+
+    experiment = rds.Experiment(**(GOOD | {"controller": rds.Controller(counts, start)}))
+    first, second = experiment.run(), experiment.run()
+    assert (first["X_command"] == second["X_command"]).all()
+    assert start == [0]
+
+
+def test_a_spindle_follows_its_speed() -> None:
+    reference = {"kind": "constant", "value": 3000.0}
+    speed = rds.Experiment(axis="spindle", duration=2.0, reference=reference, controller="pid").run()
+    assert speed.units["spindle_measured"] == "rev/min"
+    assert speed["spindle_measured"][-1] == pytest.approx(3000.0, abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [
+        ("derivatives", r"the model's position became (nan|inf).*must stay finite"),
+        ("advance", r"test_simulation.py, line \d+, in advance: ZeroDivisionError: division by zero: `return 1 / 0`"),
+        ("size", r"returned .*it must return dx/dt, 2 numbers"),
+    ],
+)
+@pytest.mark.parametrize("quantization", [True, False])
+def test_faults_of_a_model_are_not_the_controller_s(what: str, said: str, quantization: bool) -> None:
+    def derivatives(t: float, x: Any, u: Any, params: Any) -> Any:
+        return [x[1] * 1e200, 1e200 * (1.0 + abs(x[1]))]
+
+    def advance(x: Any, u: Any, T: float, params: Any) -> Any:
+        return 1 / 0
+
+    def size(t: float, x: Any, u: Any, params: Any) -> Any:
+        return [1.0, 2.0] if not x.any() and t == 0 else [1.0, 2.0, 3.0]
+
+    models = {"derivatives": derivatives, "advance": advance, "size": {"derivatives": size}}
+    own = rds.Experiment(**GOOD, model=models[what], interface={"quantization": quantization})
+    with np.errstate(all="ignore"), pytest.raises(rds.ContractError, match=said) as refusal:
+        own.run()
+    assert "(at t = 0.00" in str(refusal.value)
+
+
+def test_the_student_s_file_and_line_are_named(alone: Path) -> None:
+    (alone / "helper.py").write_text("def divide(a, b):\n    return a / b\n")
+    (alone / "my.py").write_text(
+        "from helper import divide\n\ndef control(t, r, y, state, params):\n    return divide(1.0, 0.1 - t), state\n"
+    )
+    own = rds.Experiment(**(GOOD | {"controller": "my.py"}))
+    with pytest.raises(rds.ContractError, match=r"helper.py, line 2, in divide: ZeroDivision.*\(at t = 0.100 s\)"):
+        own.run()
+    (alone / "my.py").write_text("def control(t, r, y, state, params):\n    return None\n")
+    with pytest.raises(rds.ContractError, match=r"my.py: control\(\) returned None at t = 0.000 s \(axis X\)"):
+        rds.Experiment(**(GOOD | {"controller": "my.py"})).run()
+
+
+def test_progress_is_told_and_ctrl_c_is_the_user_s() -> None:
+    told: list[tuple[int, int]] = []
+    rds.Experiment(**(GOOD | {"duration": 12.0})).run(progress=lambda done, of: told.append((done, of)))
+    assert told == [(5000, 12000), (10000, 12000), (12000, 12000)]
+
+    def interrupted(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        rds.Experiment(**(GOOD | {"controller": rds.Controller(interrupted)})).run()
+
+
+def test_results_are_saved_only_where_asked(alone: Path) -> None:
+    rds.Experiment(**GOOD).run()
+    assert list(alone.iterdir()) == []
+    result = rds.Experiment(**GOOD).run(out=alone / "a" / "b")
+    assert (rds.open_result(alone / "a" / "b")["X_measured"] == result["X_measured"]).all()
+    (alone / "file").write_text("")
+    with pytest.raises(rds.InputError, match="file"):
+        rds.Experiment(**GOOD).run(out=alone / "file")
+    assert (alone / "file").read_text() == ""
+
+
+def test_every_public_name_is_there() -> None:
+    assert all(getattr(rds, name) is not None for name in rds.__all__)
+    assert set(rds.__all__) <= set(dir(rds))
+    with pytest.raises(AttributeError, match="has no attribute 'Experment'"):
+        rds.Experment  # noqa: B018
