@@ -1,0 +1,57 @@
+"""The cyclic side of oacs modules: `rds.core.contracts.Drivers`.
+
+Modules answer the cyclic frames of every machine, so the drivers are those of every machine; only the start knows
+more: it refuses a bus on which two modules share a number, and modules whose emergency stop is latched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import can
+
+from rds.bus.drivers import AxisDrivers
+from rds.bus.link import BUILTIN, open_bus
+from rds.bus.oacs.host import refuse_clashes, survey
+from rds.bus.server import default_channel
+from rds.core.errors import MachineError
+from rds.machines.machine import Machine
+
+
+class OacsDrivers(AxisDrivers):
+    """As AxisDrivers, for the modules of the oacs dialect. A `bus` that is handed in must not filter frames."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        axes: Sequence[str] | None = None,
+        *,
+        bus: can.BusABC | None = None,
+        interface: str = BUILTIN,
+        channel: str | None = None,
+        **options: Any,
+    ):
+        super().__init__(machine, axes, bus=bus, interface=interface, channel=channel, **options)
+        self._shared = bus
+        self._numbers = {machine.axis(name).node: name for name in (axes if axes is not None else machine.axes)}
+        self._where = (interface, default_channel(machine, interface, channel))
+
+    def start(self) -> None:
+        """Look who is there, then as AxisDrivers.start.
+
+        Raises MachineError for numbers used twice, an emergency stop that is latched, and modules that don't answer.
+        """
+        bus = self._shared if self._shared is not None else open_bus(*self._where)
+        try:
+            found = survey(bus)
+        finally:
+            if self._shared is None:
+                bus.shutdown()
+        refuse_clashes(found)
+        latched = [self._numbers[info.id] for info in found if info.id in self._numbers and info.state == "emergency"]
+        if latched:
+            raise MachineError(
+                f"the emergency stop of {', '.join(latched)} is latched; release the button, then reset it"
+            )
+        super().start()

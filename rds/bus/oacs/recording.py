@@ -1,0 +1,105 @@
+"""Recorded motions and readings of a module, as results. Time is k period, by the count that each message carries."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rds.bus.oacs.talk import Heard
+from rds.bus.oacs.transfer import ModuleDescription
+from rds.bus.oacs.words import Says
+from rds.core.errors import MachineError
+from rds.results import Result
+
+
+class _Unwrapper:
+    """Sample numbers from a count that starts again at `turn`."""
+
+    def __init__(self, turn: int, first: int | None = None):
+        self._turn = turn
+        self._first = first  # None: the first one heard
+        self._last = 0
+
+    def number(self, count: int) -> int:
+        if self._first is None:
+            self._first = count
+        step = (count - self._first - self._last) % self._turn
+        self._last += step
+        return self._last
+
+
+class PositionRecorder:
+    """The positions of one motion."""
+
+    def __init__(self, description: ModuleDescription, period: float):
+        self._d = description
+        self._period = period
+        self._numbers = _Unwrapper(256, 0)  # a motion's positions count from 0
+        self.samples: dict[int, int] = {}  # number: counts
+
+    def take(self, heard: Heard) -> None:
+        """A message of the module."""
+        fields = heard.message.fields
+        if heard.message.kind == "Reply" and fields["Code"] == Says.POSITION:
+            self.samples[self._numbers.number(fields["Sequence"])] = fields["Position"]
+
+    def result(self, by: float, machine: str, notes: list[str]) -> Result:
+        """The response to a step of the set point by `by` (unit). MachineError if there are too few samples."""
+        if len(self.samples) < 2:
+            raise MachineError(f"{machine} sent {len(self.samples)} positions; a response needs two at least")
+        name, unit = self._d.axis, self._d.unit
+        numbers = np.array(sorted(self.samples))
+        measured = np.array([self.samples[k] for k in numbers.tolist()]) * self._d.resolution
+        columns = {
+            "time": numbers * self._period,
+            f"{name}_reference": np.full(len(numbers), measured[0] + by),
+            f"{name}_measured": measured,
+        }
+        units = {f"{name}_reference": unit, f"{name}_measured": unit}
+        meta = _meta(name, machine, self._period, numbers, "step response of a module")
+        return Result(columns, units, meta | {"notes": [*meta["notes"], *notes]})
+
+
+class ReadingsRecorder:
+    """Acceleration and current."""
+
+    def __init__(self, description: ModuleDescription, period: float):
+        self._d = description
+        self._period = period
+        self._numbers = _Unwrapper(1 << 16)
+        self._rows: dict[int, dict[str, float]] = {}
+
+    @property
+    def span(self) -> float:
+        """Time recorded so far, s."""
+        return (max(self._rows, default=0) - min(self._rows, default=0)) * self._period
+
+    def take(self, heard: Heard) -> None:
+        """A message of the module."""
+        kind, fields = heard.message.kind, heard.message.fields
+        if kind == "Acceleration":
+            row = self._rows.setdefault(self._numbers.number(fields["AccelerationCount"]), {})
+            row |= {f"acceleration_{axis}": fields[f"Acceleration{axis.upper()}"] for axis in "xyz"}
+        elif kind == "Current":
+            row = self._rows.setdefault(self._numbers.number(fields["CurrentCount"]), {})
+            row["current"] = fields["Current"]
+
+    def result(self, machine: str) -> Result:
+        """The readings. MachineError if there are too few."""
+        names = sorted({name for row in self._rows.values() for name in row})
+        whole = {k: row for k, row in sorted(self._rows.items()) if len(row) == len(names)}
+        if len(whole) < 2:
+            raise MachineError(f"{machine} sent {len(whole)} readings; a record needs two at least")
+        numbers = np.array(list(whole))
+        letter = self._d.axis
+        columns = {f"{letter}_{name}": np.array([row[name] for row in whole.values()]) for name in names}
+        units = {column: "A" if column.endswith("current") else "g" for column in columns}
+        meta = _meta(letter, machine, self._period, numbers, "readings of a module")
+        return Result({"time": numbers * self._period} | columns, units, meta)
+
+
+def _meta(axis: str, machine: str, period: float, numbers: np.ndarray, mode: str) -> dict[str, Any]:
+    lost = int(numbers[-1] - numbers[0]) + 1 - len(numbers)
+    notes = [f"{lost} of the module's messages were lost; their samples are missing"] if lost else []
+    return {"axes": [axis], "sample_period": period, "mode": mode, "machine": machine, "notes": notes}

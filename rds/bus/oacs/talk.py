@@ -1,0 +1,68 @@
+"""Sending and hearing messages on a python-can bus, with the bus's errors in the words of the machine's user."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import can
+
+from rds.bus.oacs import messages
+from rds.bus.oacs.messages import Decoded, Frame
+from rds.core.errors import MachineError
+
+
+class Heard(NamedTuple):
+    """A message, its time stamp (s, the bus's clock) and when it was in hand (s, time.monotonic)."""
+
+    message: Decoded
+    stamp: float
+    at: float
+
+
+def send(bus: can.BusABC, frame: Frame) -> None:
+    """Put a frame on the bus. MachineError if the bus does not take it."""
+    identifier, data, extended = frame
+    try:
+        bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=extended), timeout=0.5)
+    except (can.CanError, OSError) as error:
+        raise broken(bus, error) from error
+
+
+def hear(bus: can.BusABC, until: float) -> Heard | None:
+    """The next message of a module; None if there is none until `until` (time.monotonic). MachineError: bus failed.
+
+    Frames of others, and frames that make no sense, are passed over: on a bus everybody may speak.
+    """
+    while True:
+        left = until - time.monotonic()
+        try:
+            frame = bus.recv(max(left, 0.0))
+        except (can.CanError, OSError) as error:
+            raise broken(bus, error) from error
+        if frame is None:
+            if left <= 0.0:
+                return None
+            continue
+        if frame.is_error_frame or frame.is_remote_frame:
+            continue
+        if messages.kind_of(frame.arbitration_id, frame.is_extended_id) is None:
+            continue
+        try:
+            message = messages.decode(frame.arbitration_id, frame.data, frame.is_extended_id)
+        except MachineError:
+            continue
+        return Heard(message, frame.timestamp, time.monotonic())
+
+
+def hear_all(bus: can.BusABC, seconds: float) -> Iterator[Heard]:
+    """Every message of the next `seconds`."""
+    until = time.monotonic() + seconds
+    while (heard := hear(bus, until)) is not None:
+        yield heard
+
+
+def broken(bus: can.BusABC, error: Exception) -> MachineError:
+    """The error that the bus has failed."""
+    return MachineError(f"bus {bus.channel_info} failed: {error}; check the cable and the interface, open it again")
