@@ -1,0 +1,249 @@
+"""The command line as a script sees it: exit codes, one JSON object, sentences on stderr."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import rds
+from rds.cli import app, progress_bars
+
+SIMULATION = """
+axis = "X"
+mode = "simulation"
+duration = 2.0
+[reference]
+kind = "sinusoid"
+amplitude = 2.0
+frequency = 1.0
+[controller]
+file = "law.py"
+"""
+LAW = "def control(t, r, y, state, params):\n    return 20.0 * (r.position - y), state\n"
+PRINTS = """
+import os
+print("loading")
+def control(t, r, y, state, params):
+    print("calling", t)
+    if t == 0:
+        os.system("echo from a shell")
+        os.write(1, b"straight to the descriptor")
+    return 20.0 * (r.position - y), state
+"""
+SLOW = "import time\ndef control(t, r, y, state, params):\n    time.sleep(0.002)\n    return 0.5, state\n"
+
+METRICS = {"mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error"}
+
+
+@pytest.fixture
+def folder(alone: Path) -> Path:
+    (alone / "e.toml").write_text(SIMULATION)
+    (alone / "law.py").write_text(LAW)
+    return alone
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """`rds` with these arguments, in pipes."""
+    return subprocess.run([sys.executable, "-m", "rds.cli", *arguments], capture_output=True, text=True, timeout=120)
+
+
+def call(*arguments: str) -> Any:
+    """The same in this process."""
+    return CliRunner().invoke(app, list(arguments))
+
+
+def only_json(stdout: str) -> dict[str, Any]:
+    """The one JSON object that is all of stdout; NaN is no JSON."""
+    value = json.loads(stdout, parse_constant=lambda word: pytest.fail(f"{word} in JSON"))
+    assert isinstance(value, dict)
+    assert stdout.count("\n") == 1
+    return value
+
+
+def test_a_simulation(folder: Path) -> None:
+    done = command("run", "e.toml", "--out", "out", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    said = only_json(done.stdout)
+    assert (said["mode"], said["verdict"], said["timing"], said["ending"]) == ("simulation", None, None, "done")
+    assert set(said["axes"]["X"]) >= METRICS
+    result = rds.open_result(folder / "out")
+    assert said["axes"]["X"]["rms_error"] == result.metrics["X"]["rms_error"]
+    assert set(said["files"]) == {"csv", "json", "mat", "parquet", "plot_X", "report"}
+    assert all((folder / path).stat().st_size for path in said["files"].values())
+    assert sorted(path.name for path in (folder / "out").iterdir()) == sorted(
+        Path(path).name for path in said["files"].values()
+    )
+
+
+def test_in_words(folder: Path) -> None:
+    done = command("run", "e.toml", "--out", "out")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Tracking error, simulation" in done.stdout
+    assert "report: out/report.html" in done.stdout
+    assert "\x1b" not in done.stdout
+
+
+@pytest.mark.realtime
+def test_real_time(folder: Path) -> None:
+    done = command("run", "e.toml", "--mode", "implementation", "--out", "out", "--json")
+    said = only_json(done.stdout)
+    assert said["verdict"] in ("met", "missed", "void")
+    assert done.returncode == (1 if said["verdict"] == "missed" else 0)
+    assert said["verdict"] == "met" or f"timing {said['verdict']}" in done.stderr
+    assert said["axes"]["X"]["fit_percent"] > 50
+    for stage in ("lateness", "io", "compute", "model"):
+        assert set(said["timing"][stage]) == {"p50", "p99", "p999", "max"}
+    assert said["timing"]["samples"] <= 2000
+    assert said["environment"]["sentence"]
+
+
+@pytest.mark.realtime
+def test_a_missed_verdict_is_exit_code_1(folder: Path) -> None:
+    (folder / "law.py").write_text(SLOW)
+    done = command("run", "e.toml", "-m", "emulation", "-o", "out", "--json")
+    said = only_json(done.stdout)
+    assert (done.returncode, said["verdict"]) == (1, "missed")
+    assert "rds: timing missed: " in done.stderr
+    assert "control() and the model took 2." in done.stderr
+    (folder / "law.py").write_text(LAW)  # the record says what ran, not what is there now
+    assert "time.sleep" in rds.open_result(folder / "out").meta["controller"]["X"]["source"]
+
+
+@pytest.mark.parametrize("mode", ["simulation", pytest.param("emulation", marks=pytest.mark.realtime)])
+def test_stdout_is_the_json_s_whatever_the_student_prints(folder: Path, mode: str) -> None:
+    (folder / "law.py").write_text(PRINTS)
+    (folder / "e.toml").write_text(SIMULATION.replace("2.0", "0.2", 1))
+    done = command("run", "e.toml", "--mode", mode, "--out", "out", "--json")
+    assert only_json(done.stdout)["mode"] == mode
+    assert "loading" in done.stderr
+    if mode == "simulation":
+        assert all(word in done.stderr for word in ("calling 0.1", "from a shell", "straight to the descriptor"))
+    assert only_json(command("check", "law.py", "--json").stdout)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run", "gone.toml"], "gone.toml: cannot be read: No such file"),
+        (["run", "e.toml", "--mode", "fly"], "unknown mode 'fly'; known modes: simulation"),
+        (["run", "e.toml", "--mode", "system-test"], "give [signal]"),
+        (["run", "law.py"], "law.py: is not valid TOML"),
+        (["run", "e.toml", "--out", "law.py"], "law.py"),
+        (["run", "e.toml", "-m", "emulation", "--out", "law.py"], "law.py: this folder cannot be made"),
+        (["check", "gone.py"], "gone.py: there is no such file"),
+        (["check", "e.toml"], "e.toml"),
+        (["check", "law.py", "--sample-period", "0"], "must be more than 0"),
+        (["compare", "gone", "law.py"], "gone"),
+        (["machine", "serve", "gone"], "there is no machine 'gone'; known machines: mini-cnc"),
+        (["machine", "serve", "mini-cnc", "--interface", "gone"], "gone"),
+    ],
+)
+@pytest.mark.parametrize("json", [True, False])
+def test_bad_input_is_exit_code_2_and_a_sentence(folder: Path, arguments: list[str], said: str, json: bool) -> None:
+    if json and arguments[0] == "machine":
+        pytest.skip("it has no --json")
+    before = sorted(folder.rglob("*"))
+    done = call(*arguments, *(["--json"] if json else []))
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr.startswith("rds: ")
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_bad_usage_is_exit_code_2(folder: Path) -> None:
+    for arguments in (["run"], ["fly"], ["run", "e.toml", "--jsn"], ["machine"], []):
+        done = command(*arguments)
+        assert done.returncode == 2, arguments
+        assert "Traceback" not in done.stderr
+
+
+def test_a_fault_of_the_student_s_code_is_exit_code_2(folder: Path) -> None:
+    (folder / "law.py").write_text(LAW.replace("20.0", "1 / (0.5 - t)"))
+    done = command("run", "e.toml", "--out", "out", "--json")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "law.py, line 2, in control: ZeroDivisionError" in done.stderr
+    assert "(at t = 0.500 s)" in done.stderr
+    assert not (folder / "out").exists()
+
+
+def test_check(folder: Path) -> None:
+    good = command("check", "law.py", "--json")
+    assert good.returncode == 0
+    assert only_json(good.stdout)
+    assert "controller" in command("check", "law.py").stdout
+    (folder / "bad.py").write_text("def control(t, r, y, state, params):\n    return float('nan'), state\n")
+    bad = command("check", "bad.py", "--json")
+    assert bad.returncode == 1
+    assert "finite" in json.dumps(only_json(bad.stdout))
+    assert "finite" in command("check", "bad.py").stdout
+
+
+def test_compare(folder: Path) -> None:
+    call("run", "e.toml", "--out", "a")
+    (folder / "law.py").write_text(LAW.replace("20.0", "30.0"))
+    call("run", "e.toml", "--out", "b")
+    same, different = command("compare", "a", "a", "--json"), command("compare", "a", "b/result.csv", "--json")
+    assert same.returncode == different.returncode == 0
+    assert only_json(same.stdout) != only_json(different.stdout)
+    assert "X" in command("compare", "a", "b").stdout
+
+
+def test_machine_list(folder: Path) -> None:
+    said = only_json(command("machine", "list", "--json").stdout)
+    assert said["mini-cnc"]["axes"] == ["X", "Y", "Z", "spindle"]
+    assert "-75 to 75 mm" in command("machine", "list").stdout
+
+
+@pytest.mark.realtime
+def test_a_served_machine_ends_by_ctrl_c(folder: Path) -> None:
+    import signal
+
+    served = subprocess.Popen(
+        [sys.executable, "-m", "rds.cli", "machine", "serve", "mini-cnc"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert served.stderr is not None
+    try:
+        assert "Ctrl-C ends" in served.stderr.readline()
+        done = command("run", "e.toml", "-m", "implementation", "-o", "out", "--json")
+        assert only_json(done.stdout)["mode"] == "implementation"
+        served.send_signal(signal.SIGINT)
+        _, errors = served.communicate(timeout=10)
+    finally:
+        served.kill()
+    assert "Traceback" not in errors
+    assert served.returncode in (0, 130)
+
+
+def test_help_is_quick() -> None:
+    """Nothing heavy is imported for it: seconds would be, on any machine."""
+    started = time.perf_counter()
+    done = command("--help")
+    assert done.returncode == 0
+    assert all(word in done.stdout for word in ("demo", "run", "check", "machine", "compare"))
+    assert time.perf_counter() - started < 3.0
+
+
+def test_progress_is_for_terminals(folder: Path) -> None:
+    with progress_bars() as bar:
+        bar("run")(1, 2)
+    main, pipe = os.openpty()
+    arguments = [sys.executable, "-m", "rds.cli", "run", "e.toml", "--out", "out", "--json"]
+    on_terminal = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=pipe, text=True, timeout=60)
+    os.close(pipe)
+    shown = os.read(main, 65536).decode(errors="replace")
+    os.close(main)
+    assert "simulation" in shown or "run" in shown
+    only_json(on_terminal.stdout)
+    assert command("run", "e.toml", "--out", "out", "--json").stderr == ""
