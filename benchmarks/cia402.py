@@ -127,9 +127,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for axes, period in cases:
         for name, loop in (("ours", ours), ("canopen", library)):
             channel = f"bench-{uuid4().hex[:8]}"
+            where = ["--interface", options.interface, "--channel", channel, "--axes", ",".join(axes)]
             server = subprocess.Popen(
-                [sys.executable, "-m", "rds.bus.cia402.server", MACHINE, "--interface", options.interface]
-                + ["--channel", channel, "--axes", ",".join(axes), "--exit-with-stdin"],
+                [sys.executable, "-m", "rds.bus.cia402.server", MACHINE, *where, "--exit-with-stdin"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

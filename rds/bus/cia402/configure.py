@@ -91,6 +91,7 @@ def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
     time.sleep(_SECOND_ANSWER)
     for drive in drives:
         network.unsubscribe(0x580 + drive.node, note)
+    network.check()  # if the bus has failed, nobody could answer
     missing = [drive.name for drive in drives if not answers[drive.node]]
     if missing:
         raise MachineError(f"no drive answers for {', '.join(missing)}; check power, cable, bit rate and node-ID")

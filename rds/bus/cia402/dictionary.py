@@ -25,7 +25,8 @@ def axis_eds(node: int) -> canopen.ObjectDictionary:
 
 @cache
 def _axis_variables(node: int) -> dict[Key, ODVariable]:
-    return {(variable.index, variable.subindex): variable for variable in _variables(axis_eds(node))}
+    # below 0x1000 are data types, the dummies for mappings among them, but no objects
+    return {(v.index, v.subindex): v for v in _variables(axis_eds(node)) if v.index >= 0x1000}
 
 
 def _variables(objects: canopen.ObjectDictionary) -> list[ODVariable]:

@@ -1,0 +1,290 @@
+"""The host's side against served drives on python-can's virtual bus: contract, modes, errors, endings."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import pi, sin
+from typing import Any
+
+import can
+import pytest
+
+from rds.bus.cia402.codes import Nmt, State
+from rds.bus.cia402.follow import follow
+from rds.bus.cia402.host import Cia402Drivers
+from rds.bus.cia402.node import DriveNode
+from rds.bus.cia402.scan import scan
+from rds.core.errors import InputError, MachineError
+from rds.machines import Machine
+
+from .conftest import wait_for
+
+T = 0.02  # s: no test here is about speed, and a busy computer shall not decide it
+Served = Callable[..., tuple[str, list[DriveNode]]]
+
+
+@contextmanager
+def drivers(machine: Machine, channel: str, axes: list[str], **options: Any) -> Iterator[Cia402Drivers]:
+    table = {"heartbeat": 0.5} | options.pop("cia402", {})
+    host = Cia402Drivers(machine, axes, interface="virtual", channel=channel, sample_period=T, cia402=table, **options)
+    try:
+        yield host
+    finally:
+        host.close()
+
+
+def cycle(host: Cia402Drivers, *targets: float) -> tuple[list[float], tuple[float, ...]]:
+    due = time.monotonic() + T
+    positions = host.exchange()
+    acting = tuple(host.write(targets))
+    time.sleep(max(0.0, due - time.monotonic()))
+    return positions, acting
+
+
+def powered(host: Cia402Drivers, *targets: float) -> None:
+    for _ in range(50):
+        cycle(host, *targets)
+        if all(drive.enabled for drive in host.drives):
+            return
+    raise AssertionError("no power")
+
+
+def no_voltage(nodes: list[DriveNode]) -> bool:
+    return all(node.drive.servo.axis.voltage == 0.0 and node.drive.servo.torque is None for node in nodes)
+
+
+def test_voltages_move_the_axes_and_positions_come_back(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X", "Y")
+    with drivers(machine, channel, ["X", "Y"]) as host:
+        host.start()
+        assert [node.drive.state for node in nodes] == [State.SWITCHED_ON] * 2
+        assert host.exchange() == [0.0, 0.0]
+        powered(host, 0.0, 0.0)
+        for _ in range(10):
+            positions, acting = cycle(host, 4.0, -4.0)
+        assert acting == (4.0, -4.0)
+        assert positions[0] > 0.2 and positions[1] < -0.2
+    wait_for(lambda: [node.drive.nmt for node in nodes] == [Nmt.PRE_OPERATIONAL] * 2)
+    assert [node.drive.state for node in nodes] == [State.SWITCH_ON_DISABLED] * 2 and no_voltage(nodes)
+
+
+def test_what_acts_is_zero_until_there_is_power(machine: Machine, served: Served) -> None:
+    channel, _ = served("X")
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        acting = [cycle(host, 5.0)[1][0] for _ in range(10)]
+        assert acting[0] == 0.0 and acting[-1] == 5.0
+
+
+def test_there_is_no_power_before_the_first_command_or_in_a_dry_run(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        for _ in range(5):
+            host.exchange()
+        time.sleep(0.3)  # far more than any time-out: nobody minds
+        host.exchange()
+        assert nodes[0].drive.state is State.SWITCHED_ON
+    with drivers(machine, channel, ["X"], dry_run=True) as host:
+        host.start()
+        for _ in range(5):
+            assert cycle(host, 5.0) == ([0.0], (0.0,))
+        assert nodes[0].drive.state is State.SWITCHED_ON
+
+
+def test_csp_leads_along_positions_and_csv_along_velocities(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    wide = {"axis": {"X": {"write": [[0x6065, 0, 20000]]}}}
+    with drivers(machine, channel, ["X"], cia402={"mode": "csp"} | wide) as host:
+        host.start()
+        started = time.monotonic()
+        rows = [[sin(2 * pi * 0.5 * k * T)] for k in range(75)]
+        done = follow(host, rows, lambda k: time.sleep(max(0.0, started + k * T - time.monotonic())))
+        last = [measured[0] for _, measured in done]
+        assert max(last) == pytest.approx(1.0, abs=0.1) and min(last) == pytest.approx(-1.0, abs=0.2)
+    wait_for(lambda: nodes[0].drive.state is State.SWITCH_ON_DISABLED)
+    with drivers(machine, channel, ["X"], cia402={"mode": "csv"}) as host:
+        host.start()
+        powered(host, 0.0)
+        begun = time.monotonic()
+        positions = [cycle(host, 5.0)[0][0] for _ in range(40)]
+        assert positions[-1] == pytest.approx(5.0 * (time.monotonic() - begun), rel=0.25)
+
+
+def test_homing_at_the_start_makes_positions_the_drives_own(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    nodes[0].drive.servo.axis.position = nodes[0].drive.servo.axis._carriage = 0.4
+    table = {"positions": "drive", "axis": {"X": {"homing": 33, "write": [[0x607C, 0, -5000]]}}}
+    with drivers(machine, channel, ["X"], cia402=table) as host:
+        host.start()
+        assert host.exchange()[0] == pytest.approx(5.0, abs=0.05)
+        assert nodes[0].drive.servo.homed
+
+
+def test_a_spindle_reads_its_speed(machine: Machine, served: Served) -> None:
+    channel, _ = served("spindle")
+    with drivers(machine, channel, ["spindle"]) as host:
+        host.start()
+        powered(host, 0.0)
+        for _ in range(40):
+            positions, _ = cycle(host, 2.0)
+        assert positions[0] == pytest.approx(1900, rel=0.05)
+
+
+def test_directions_and_counts_are_the_tables(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    table = {"axis": {"X": {"direction": -1, "counts": 500.0}}}
+    with drivers(machine, channel, ["X"], cia402=table) as host:
+        host.start()
+        powered(host, 0.0)
+        for _ in range(10):
+            positions, _ = cycle(host, 4.0)
+        assert nodes[0].drive.servo.position < -100 and positions[0] > 0.2
+
+
+def test_a_fault_is_told_with_node_state_and_code_and_stops_all(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X", "Y")
+    with drivers(machine, channel, ["X", "Y"]) as host:
+        host.start()
+        powered(host, 2.0, 2.0)
+        nodes[1].fault(0x2310)
+        with pytest.raises(MachineError) as told:
+            for _ in range(10):
+                cycle(host, 2.0, 2.0)
+        for part in ("Y (node 3)", "FAULT", "statusword 0x", "0x2310 continuous over-current"):
+            assert part in str(told.value)
+        wait_for(lambda: no_voltage(nodes))
+    with drivers(machine, channel, ["X", "Y"]) as host:
+        host.start()  # resets the fault
+        powered(host, 0.0, 0.0)
+
+
+def test_a_drive_that_restarts_is_told(machine: Machine, served: Served, bus: Callable[..., can.BusABC]) -> None:
+    channel, _ = served("X")
+    other = bus(channel)
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        powered(host, 0.0)
+        other.send(can.Message(arbitration_id=0, data=b"\x81\x02", is_extended_id=False))
+        with pytest.raises(MachineError, match=r"X \(node 2\) has restarted"):
+            for _ in range(20):
+                cycle(host, 0.0)
+
+
+def test_a_drive_that_dies_is_told(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        powered(host, 0.0)
+        nodes[0].close()
+        nodes[0]._retry_at = float("inf")
+        with pytest.raises(MachineError, match=r"no answer from X \(node 2\)"):
+            for _ in range(30):
+                cycle(host, 0.0)
+
+
+def test_a_missing_heartbeat_is_told(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    with drivers(machine, channel, ["X"], cia402={"heartbeat": 0.05}) as host:
+        host.start()
+        powered(host, 0.0)
+        for _ in range(10):
+            cycle(host, 0.0)
+        nodes[0].drive.objects.writers[0x1017, 0](0)
+        with pytest.raises(MachineError, match=r"no heartbeat from X \(node 2\)"):
+            for _ in range(40):
+                cycle(host, 0.0)
+        wait_for(lambda: no_voltage(nodes))
+
+
+def test_a_host_that_falls_silent_loses_the_power(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        powered(host, 3.0)
+        cycle(host, 3.0)
+        wait_for(lambda: nodes[0].drive.state is State.FAULT and no_voltage(nodes))
+        with pytest.raises(MachineError, match="0x8700 sync controller"):
+            cycle(host, 3.0)
+
+
+def test_stop_takes_the_power_and_a_command_brings_it_back(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        powered(host, 3.0)
+        host.stop()
+        wait_for(lambda: nodes[0].drive.state is State.SWITCH_ON_DISABLED and no_voltage(nodes))
+        for _ in range(5):
+            host.exchange()
+            time.sleep(T)
+        assert nodes[0].drive.state is State.SWITCH_ON_DISABLED
+        powered(host, 0.0)
+
+
+def test_a_broken_bus_is_told_and_stop_bears_it(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        powered(host, 3.0)
+        host._bus.shutdown()
+        with pytest.raises(MachineError, match="bus virtual"):
+            cycle(host, 3.0)
+        host.stop()
+        wait_for(lambda: no_voltage(nodes))
+
+
+def test_no_drive_a_wrong_one_and_two_of_a_kind(
+    machine: Machine, served: Served, bus: Callable[..., can.BusABC]
+) -> None:
+    channel, _ = served("X")
+    with drivers(machine, channel, ["X", "Z"]) as host, pytest.raises(MachineError, match=r"Z \(node 4\)"):
+        host.start()
+    table = {"axis": {"Z": {"node": 2}}}
+    with drivers(machine, channel, ["Z"], cia402=table) as host:
+        host.start()
+    twin, other = served("X"), bus(channel)
+    assert twin[0] != channel
+    notifier = can.Notifier(other, [lambda message: _answer_too(other, message)], 0.02)
+    try:
+        with drivers(machine, channel, ["X"]) as host, pytest.raises(MachineError, match="2 devices answer as node 2"):
+            host.start()
+    finally:
+        notifier.stop()
+
+
+def _answer_too(bus: can.BusABC, message: can.Message) -> None:
+    if message.arbitration_id == 0x602:
+        data = b"\x43\x00\x10\x00\x92\x01\x02\x00"
+        bus.send(can.Message(arbitration_id=0x582, data=data, is_extended_id=False))
+
+
+def test_what_is_wrong_with_a_command_is_told(machine: Machine, served: Served) -> None:
+    channel, _ = served("X")
+    with drivers(machine, channel, ["X"]) as host:
+        host.start()
+        with pytest.raises(InputError, match="2 values for 1 drives"):
+            host.write([1.0, 2.0])
+        for bad in (10.5, float("nan"), float("inf")):
+            with pytest.raises(InputError, match=r"from -10 to 10 V"):
+                host.write([bad])
+
+
+def test_a_refused_object_names_itself(machine: Machine, served: Served) -> None:
+    channel, _ = served("X")
+    table = {"axis": {"X": {"write": [[0x605A, 0, 99]]}}}
+    with drivers(machine, channel, ["X"], cia402=table) as host, pytest.raises(MachineError) as told:
+        host.start()
+    assert "0x605A:00 = 99" in str(told.value) and "too high" in str(told.value)
+
+
+def test_scan(served: Served) -> None:
+    channel, _ = served("X", "Y")
+    found = scan("virtual", channel)
+    assert [(device.node, device.is_drive, device.name) for device in found] == [
+        (2, True, "RDS simulated axis"),
+        (3, True, "RDS simulated axis"),
+    ]
+    assert found[0].state is State.SWITCH_ON_DISABLED and found[0].product == 0x402

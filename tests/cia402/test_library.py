@@ -1,0 +1,94 @@
+"""The drive under canopen's own drive profile, `BaseNode402`, which knows nothing of ours."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+
+import canopen
+import pytest
+from canopen.profiles.p402 import BaseNode402
+
+from rds.bus.cia402.node import DriveNode
+
+from .conftest import wait_for
+
+EDS = str(files("rds.bus.cia402").joinpath("axis.eds"))
+
+
+@pytest.fixture
+def drive(served: Callable[..., tuple[str, list[DriveNode]]]) -> Iterator[tuple[BaseNode402, DriveNode]]:
+    channel, nodes = served("X")
+    network = canopen.Network()
+    network.NOTIFIER_CYCLE = 0.02
+    network.connect(interface="virtual", channel=channel)
+    try:
+        node = BaseNode402(2, EDS)
+        network.add_node(node)
+        node.nmt.state = "PRE-OPERATIONAL"
+        node.setup_402_state_machine()
+        node.nmt.state = "OPERATIONAL"
+        yield node, nodes[0]
+    finally:
+        network.sync.stop()
+        network.disconnect()
+
+
+def test_to_operation_enabled_and_back(drive: tuple[BaseNode402, DriveNode]) -> None:
+    node, ours = drive
+    node.op_mode = "PROFILED VELOCITY"
+    for state in ("READY TO SWITCH ON", "OPERATION ENABLED", "SWITCHED ON", "SWITCH ON DISABLED", "OPERATION ENABLED"):
+        node.state = state
+        assert node.state == state == ours.drive.state
+
+
+def test_a_profile_move_and_homing(drive: tuple[BaseNode402, DriveNode]) -> None:
+    node, _ = drive
+    node.op_mode = "PROFILED POSITION"
+    node.state = "OPERATION ENABLED"
+    node.sdo[0x607A].raw = 1500
+    node.controlword = 0x1F
+    wait_for(lambda: abs(node.sdo[0x6064].raw - 1500) <= 10)
+    node.sdo[0x6098].raw = 37
+    assert node.homing(timeout=5)
+    assert node.is_homed() and abs(node.sdo[0x6064].raw) <= 10
+
+
+def test_a_fault_and_its_reset(drive: tuple[BaseNode402, DriveNode]) -> None:
+    node, ours = drive
+    node.op_mode = "PROFILED VELOCITY"
+    node.state = "OPERATION ENABLED"
+    ours.fault(0x4310)
+    wait_for(lambda: node.state == "FAULT" and node.emcy.active)
+    assert node.emcy.active[0].code == 0x4310
+    node.reset_from_fault()
+    assert node.state == "OPERATION ENABLED" and not node.emcy.active
+
+
+def test_cyclic_position_with_the_librarys_sync(drive: tuple[BaseNode402, DriveNode]) -> None:
+    node, ours = drive
+    node.nmt.state = "PRE-OPERATIONAL"
+    node.sdo[0x60C2][1].raw = 50  # ms: the library's threads are what they are
+    node.sdo[0x6065].raw = 20000
+    node.rpdo[3].trans_type, node.rpdo[3].enabled = 1, True
+    node.rpdo[3].save()
+    node.rpdo[1].enabled = False
+    node.rpdo[1].save()
+    node.tpdo[3].enabled = True
+    node.tpdo[3].save()
+    node.nmt.state = "OPERATIONAL"
+    node.sdo[0x6060].raw = 8
+    target = node.rpdo[3]
+    for word in (0x06, 0x07, 0x0F):
+        target[0x6040].raw = word
+        target.transmit()
+        node.network.sync.transmit()
+        time.sleep(0.02)
+    for k in range(40):
+        target[0x607A].raw = 20 * k
+        target.transmit()
+        node.network.sync.transmit()
+        time.sleep(0.02)
+    assert ours.drive.state == "OPERATION ENABLED"
+    assert node.tpdo[3][0x6064].raw == pytest.approx(750, abs=150)

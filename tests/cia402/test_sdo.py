@@ -1,0 +1,114 @@
+"""The drive's SDO server: transfers, aborts by their codes, and no frame that it can't bear."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rds.machines import load_machine
+
+from .conftest import Abort, Rig
+
+
+@pytest.mark.parametrize(
+    "index, subindex, value, size, code",
+    [
+        (0x1018, 1, 1, 4, 0x06010002),  # read only
+        (0x1234, 0, 1, 4, 0x06020000),  # no object
+        (0x1018, 9, 1, 4, 0x06090011),  # no sub-index
+        (0x6040, 0, 1, 4, 0x06070012),  # too long
+        (0x607A, 0, 1, 2, 0x06070013),  # too short
+        (0x605A, 0, 7, 2, 0x06090031),  # above its limit
+        (0x6083, 0, 0, 4, 0x06090032),  # below its limit
+        (0x6060, 0, 7, 1, 0x06090030),  # a mode that the drive doesn't have
+        (0x6098, 0, 5, 1, 0x06090030),  # a homing method that it doesn't have
+        (0x1003, 0, 3, 1, 0x06090030),  # only 0 clears the history
+        (0x1005, 0, 0x40000080, 4, 0x06090030),  # it does not produce SYNC
+        (0x1019, 0, 1, 1, 0x06090030),
+    ],
+)
+def test_what_cannot_be_written_is_refused_with_its_code(
+    rig: Rig, index: int, subindex: int, value: int, size: int, code: int
+) -> None:
+    with pytest.raises(Abort) as refused:
+        rig.write(index, value, size, subindex)
+    assert refused.value.code == code
+
+
+def test_a_name_comes_in_segments(rig: Rig) -> None:
+    answer = rig.sdo(struct.pack("<BHB4x", 0x40, 0x1008, 0))
+    (size,) = struct.unpack_from("<I", answer, 4)
+    text, toggle = b"", 0
+    while True:
+        answer = rig.sdo(bytes([0x60 | toggle]) + bytes(7))
+        text += answer[1 : 8 - (answer[0] >> 1 & 7)]
+        toggle ^= 0x10
+        if answer[0] & 1:
+            break
+    assert text == b"RDS simulated axis" and len(text) == size
+    with pytest.raises(Abort) as refused:
+        rig.sdo(bytes([0x60 | toggle]) + bytes(7))
+    assert refused.value.code == 0x05040001  # there is no transfer any more
+
+
+def test_a_segmented_download_of_what_is_read_only_is_refused_before_it_begins(rig: Rig) -> None:
+    with pytest.raises(Abort) as refused:
+        rig.sdo(struct.pack("<BHBI", 0x21, 0x1008, 0, 8))
+    assert refused.value.code == 0x06010002
+
+
+def test_a_value_may_come_in_a_segment(rig: Rig) -> None:
+    rig.sdo(struct.pack("<BHBI", 0x21, 0x6081, 0, 4))
+    rig.sdo(bytes([0x01 | 3 << 1]) + struct.pack("<I", 4321) + bytes(3))
+    assert rig.read(0x6081) == 4321
+
+
+def test_stopped_means_deaf(rig: Rig) -> None:
+    rig.nmt(2)
+    assert rig.send(0x600 + rig.node, struct.pack("<BHB4x", 0x40, 0x1000, 0)) == []
+    rig.nmt(128)
+    assert rig.read(0x1000) == 0x00020192
+
+
+def test_reset_brings_the_defaults_back(rig: Rig) -> None:
+    rig.write(0x6081, 1, 4)
+    rig.write(0x1017, 50, 2)
+    rig.nmt(130)  # communication only
+    assert rig.frames[-1][1:] == (0x700 + rig.node, b"\0")
+    assert (rig.read(0x6081), rig.read(0x1017)) == (1, 0)
+    rig.nmt(129)
+    assert rig.read(0x6081) == 5000
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.binary(min_size=0, max_size=8), max_size=20))
+def test_no_request_breaks_the_server(requests: list[bytes]) -> None:
+    rig = Rig(load_machine("mini-cnc"))
+    for request in requests:
+        for identifier, data in rig.send(0x600 + rig.node, request):
+            assert identifier < 0x800 and len(data) <= 8
+    assert rig.read(0x1018, 2) == 0x402
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0x000, 0x080, 0x202, 0x302, 0x602, 0x702, 0x77F, 0x7FF]),
+            st.binary(max_size=8),
+            st.floats(0, 0.05),
+        ),
+        max_size=30,
+    )
+)
+def test_no_frame_breaks_the_drive(frames: list[tuple[int, bytes, float]]) -> None:
+    rig = Rig(load_machine("mini-cnc"))
+    rig.nmt(1)
+    for identifier, data, pause in frames:
+        rig.t += pause
+        rig.send(identifier, data)
+    rig.send(0x000, b"\x81\x00")
+    assert rig.read(0x1018, 2) == 0x402

@@ -1,0 +1,59 @@
+"""The [bus.cia402] table: what it says, and what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rds.bus.cia402.codes import Mode
+from rds.bus.cia402.settings import read_settings
+from rds.core.errors import InputError
+from rds.machines import Machine
+
+
+def test_without_a_word_the_machines_own_numbers_hold(machine: Machine) -> None:
+    settings = read_settings({}, machine, ["X", "spindle"])
+    x, spindle = settings.drives
+    assert (x.node, x.counts, x.velocity_counts, x.rated_voltage, x.direction) == (2, 1000.0, 1000.0, 10.0, 1)
+    assert spindle.reads_velocity and spindle.velocity_counts == pytest.approx(4096 / 60)
+    assert settings.command.mode is Mode.CYCLIC_TORQUE and settings.host == 127
+
+
+def test_counts_from_encoder_gear_and_feed(machine: Machine) -> None:
+    table = {"axis": {"X": {"encoder": 8192, "gear": 2.5, "feed": 5.0}}}
+    assert read_settings(table, machine, ["X"]).drives[0].counts == pytest.approx(4096.0)
+
+
+def test_an_eds_is_found_beside_the_machine_file_or_here(machine: Machine, tmp_path: Path) -> None:
+    eds = tmp_path / "drive.eds"
+    eds.write_text("")
+    assert read_settings({"axis": {"X": {"eds": str(eds)}}}, machine, ["X"]).drives[0].eds == str(eds)
+
+
+@pytest.mark.parametrize(
+    "table, says",
+    [
+        ({"modus": "cst"}, "no option 'modus'"),
+        ({"mode": "torque"}, "'cst', 'csp', 'csv'"),
+        ({"positions": "zero"}, '"start" or "drive"'),
+        ({"host": 2}, "must all differ"),
+        ({"host": 200}, "from 1 to 127"),
+        ({"rpdo_transmission": 252}, "254 and 255"),
+        ({"heartbeat": 0}, "more than 0"),
+        ({"axis": {"Q": {}}}, "no axis 'Q'"),
+        ({"axis": {"X": {"knots": 1}}}, "no option 'knots'"),
+        ({"axis": {"X": {"node": 3}}}, "must all differ"),
+        ({"axis": {"X": {"counts": -5}}}, "more than 0"),
+        ({"axis": {"X": {"counts": 5, "gear": 2}}}, "either counts"),
+        ({"axis": {"X": {"direction": 0}}}, "1, -1"),
+        ({"axis": {"X": {"homing": 5}}}, "17"),
+        ({"axis": {"X": {"eds": "nowhere.eds"}}}, "no such file"),
+        ({"axis": {"X": {"write": [[0x6072, 0]]}}}, "[index, sub-index, value]"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_words(machine: Machine, table: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=r"\[bus\.cia402|mini-cnc") as refused:
+        read_settings(table, machine, ["X", "Y"])
+    assert says in str(refused.value)
