@@ -49,10 +49,11 @@ def test_a_profile_move_and_homing(drive: tuple[BaseNode402, DriveNode]) -> None
     node.state = "OPERATION ENABLED"
     node.sdo[0x607A].raw = 1500
     node.controlword = 0x1F
-    wait_for(lambda: abs(node.sdo[0x6064].raw - 1500) <= 10)
+    wait_for(lambda: node.sdo[0x6041].raw & 0x0400)  # target reached
+    assert node.sdo[0x6064].raw == pytest.approx(1500, abs=12)
     node.sdo[0x6098].raw = 37
     assert node.homing(timeout=5)
-    assert node.is_homed() and abs(node.sdo[0x6064].raw) <= 10
+    assert node.is_homed() and abs(node.sdo[0x6064].raw) <= 12
 
 
 def test_a_fault_and_its_reset(drive: tuple[BaseNode402, DriveNode]) -> None:

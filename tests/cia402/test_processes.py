@@ -7,6 +7,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import can
 import pytest
@@ -25,7 +26,8 @@ HOST = """
 import sys, time
 from rds.bus.cia402.host import Cia402Drivers
 from rds.machines import load_machine
-host = Cia402Drivers(load_machine("mini-cnc"), ["X"], channel="drives")
+patient = {"axis": {"X": {"write": [[0x2000, 1, 200], [0x2000, 2, 250]]}}}
+host = Cia402Drivers(load_machine("mini-cnc"), ["X"], channel="drives", cia402=patient)
 host.start()
 due = time.monotonic()
 for k in range(1_000_000):
@@ -45,6 +47,11 @@ def serve(program: Program, *axes: str) -> subprocess.Popen[str]:
     return server
 
 
+def patient(*axes: str) -> dict[str, Any]:
+    """Drives that bear what a busy computer does to the period: nothing here is about time."""
+    return {"axis": {axis: {"write": [[0x2000, 1, 200], [0x2000, 2, 250]]} for axis in axes}}
+
+
 def run(host: Cia402Drivers, seconds: float, voltage: float) -> list[float]:
     positions, due = [], time.monotonic()
     for _ in range(round(seconds * 1000)):
@@ -58,7 +65,7 @@ def run(host: Cia402Drivers, seconds: float, voltage: float) -> list[float]:
 @pytest.mark.parametrize("axes", [("X",), ("X", "Y", "Z")])
 def test_a_second_under_command(builtin: Path, program: Program, machine: Machine, axes: tuple[str, ...]) -> None:
     serve(program, *axes)
-    host = Cia402Drivers(machine, axes, channel="drives")
+    host = Cia402Drivers(machine, axes, channel="drives", cia402=patient(*axes))
     try:
         host.start()
         positions = run(host, 1.0, 4.0)
@@ -88,7 +95,7 @@ def test_a_killed_host_leaves_no_voltage(
 
 def test_killed_drives_are_told(builtin: Path, program: Program, machine: Machine) -> None:
     server = serve(program, "X")
-    host = Cia402Drivers(machine, ["X"], channel="drives")
+    host = Cia402Drivers(machine, ["X"], channel="drives", cia402=patient("X"))
     try:
         host.start()
         run(host, 0.1, 1.0)

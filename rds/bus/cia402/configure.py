@@ -110,29 +110,32 @@ def home(node: canopen.RemoteNode, drive: DriveSettings, timeout: float) -> None
     """Carry out the drive's homing method. Raises MachineError if it fails or takes longer than `timeout` s."""
     _download(node, 0x6098, 0, drive.homing or 0)
     _choose(node, drive, Mode.HOMING)
-    for word, state in (
-        (codes.SHUTDOWN, State.READY),
-        (codes.SWITCH_ON, State.SWITCHED_ON),
-        (codes.ENABLE_OPERATION, State.OPERATION_ENABLED),
-    ):
-        _download(node, 0x6040, 0, word)
-        _wait_for_state(node, drive, state)
-    _download(node, 0x6040, 0, codes.ENABLE_OPERATION | codes.BIT_4)
-    deadline = time.monotonic() + timeout
+    try:
+        for word, state in (
+            (codes.SHUTDOWN, State.READY),
+            (codes.SWITCH_ON, State.SWITCHED_ON),
+            (codes.ENABLE_OPERATION, State.OPERATION_ENABLED),
+        ):
+            _download(node, 0x6040, 0, word)
+            _wait_for_state(node, drive, state)
+        _download(node, 0x6040, 0, codes.ENABLE_OPERATION | codes.BIT_4)
+        _wait_for_home(node, drive, time.monotonic() + timeout)
+    finally:  # whatever happened, and be it an interrupt from the keyboard: no power
+        _download(node, 0x6040, 0, codes.DISABLE_VOLTAGE)
+    _wait_for_state(node, drive, State.SWITCH_ON_DISABLED)
+
+
+def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: float) -> None:
     attained = codes.TARGET_REACHED | codes.MODE_12
-    while True:
-        word = node.sdo.upload(0x6041, 0)
-        status = int.from_bytes(word, "little")
+    while (status := _status(node)) & attained != attained or status & codes.MODE_13:
         if status & codes.MODE_13 or state_of(status) is not State.OPERATION_ENABLED:
             raise MachineError(f"{drive.name}: homing by method {drive.homing} failed: {_describe(node, status)}")
-        if status & attained == attained:
-            break
         if time.monotonic() > deadline:
-            _download(node, 0x6040, 0, codes.DISABLE_VOLTAGE)
-            raise MachineError(f"{drive.name}: homing by method {drive.homing} took longer than {timeout:g} s")
+            raise MachineError(
+                f"{drive.name}: homing by method {drive.homing} did not end in time; give it a longer homing_timeout, "
+                f"or check its speeds 0x6099: {_describe(node, status)}"
+            )
         time.sleep(0.01)
-    _download(node, 0x6040, 0, codes.DISABLE_VOLTAGE)
-    _wait_for_state(node, drive, State.SWITCH_ON_DISABLED)
 
 
 # --- steps

@@ -18,6 +18,7 @@ from typing import Any
 import can
 
 from rds.bus.cia402 import codes
+from rds.bus.cia402.asking import ask, frame
 from rds.bus.cia402.codes import Nmt, NmtCommand, State, error_text, status_text
 from rds.bus.cia402.configure import library, prepare
 from rds.bus.cia402.remote import Remote
@@ -34,7 +35,6 @@ _HEARTBEATS = 3  # heartbeats that may be missing
 _SWITCHING = 1.0  # s for all drives to change their state
 _STANDSTILL = 20  # cycles in which no encoder moves until the axes count as standing
 _LONGEST_COAST = 3.0  # s until then
-_ASKING = 0.1  # s for a drive in fault to say its error code
 _MOST_WAITING = 64  # frames taken before a cycle, whatever babbles
 _TPDO, _EMERGENCY, _HEARTBEAT, _OTHER = range(4)
 
@@ -93,8 +93,8 @@ class Cia402Drivers:
         else:
             self._bus_name = bus.channel_info
         self._bus = bus
-        self._sync = _frame(0x080, b"")
-        self._beat = _frame(0x700 + self.settings.host, bytes([Nmt.OPERATIONAL]))
+        self._sync = frame(0x080, b"")
+        self._beat = frame(0x700 + self.settings.host, bytes([Nmt.OPERATIONAL]))
         self._next_beat = self._check_beats_at = inf
         # with SYNC, targets are sent as soon as they are known, and wait in the drives; else just before SYNC
         self._early = self.settings.transmission <= 240
@@ -357,35 +357,19 @@ class Cia402Drivers:
         while any(drive.state in moving for drive in self.drives) and time.monotonic() < deadline:
             self._paced_exchange()
         for drive in self.drives:
-            self._bus.send(_frame(0x600 + drive.node, b"\x23\x16\x10\x01\0\0\0\0"), 0.1)  # 0x1016:01 = 0
-            self._bus.send(_frame(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, drive.node])), 0.1)
+            self._bus.send(frame(0x600 + drive.node, b"\x23\x16\x10\x01\0\0\0\0"), 0.1)  # 0x1016:01 = 0
+            self._bus.send(frame(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, drive.node])), 0.1)
 
     # --- errors
 
     def _wrong(self, drive: Remote, what: str) -> MachineError:
         """Stop all drives, and say what is wrong with one: its state, statusword and error code."""
         self.stop()
-        code = drive.emergency or self._ask_error_code(drive)
+        code = ask(self._bus, drive)
         return MachineError(
             f"{drive.name} {what}: state {drive.state}, statusword {status_text(drive.status)}, "
             f"error code {error_text(code) if code is not None else 'unknown (no answer)'}"
         )
-
-    def _ask_error_code(self, drive: Remote) -> int | None:
-        """The drive's error code 0x603F, or None if it doesn't say."""
-        with contextlib.suppress(can.CanError, OSError):
-            self._bus.send(_frame(0x600 + drive.node, b"\x40\x3f\x60\x00\0\0\0\0"), 0.1)
-            deadline = time.monotonic() + _ASKING
-            while (left := deadline - time.monotonic()) > 0.0:
-                message = self._bus.recv(left)
-                if message is None:
-                    continue
-                data = bytes(message.data)
-                if message.arbitration_id == 0x080 + drive.node and data[:2] != b"\0\0":
-                    return int.from_bytes(data[:2], "little")
-                if message.arbitration_id == 0x580 + drive.node and data[1:4] == b"\x3f\x60\x00":
-                    return int.from_bytes(data[4:6], "little") if data[0] & 0xE0 == 0x40 else None
-        return None
 
     def _silent(self, drives: Sequence[Remote]) -> MachineError:
         names = ", ".join(drive.name for drive in drives)
@@ -397,7 +381,3 @@ class Cia402Drivers:
             yield
         except (can.CanError, OSError) as error:
             raise MachineError(f"bus {self._bus_name} failed: {error}") from error
-
-
-def _frame(identifier: int, data: bytes) -> can.Message:
-    return can.Message(arbitration_id=identifier, is_extended_id=False, data=data)
