@@ -156,6 +156,17 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
     try:
         control(0.0, Reference(0.0, 0.0, 0.0), 0.0, (), copy.deepcopy(params))
     except (IndexError, KeyError, TypeError, ValueError) as error:
+        if (
+            isinstance(error, KeyError)
+            and error.args
+            and isinstance(error.args[0], str)
+            and error.args[0] not in params
+        ):
+            raise ContractError(
+                f"control() looks for {error.args[0]!r}, which is not in params: {student_error(error, source)}; "
+                f"define it there, as in `params = {{{error.args[0]!r}: 1.0}}`",
+                source.path or source.name,
+            ) from error
         raise ContractError(
             f"control() fails with the empty state, and there is no initial_state: {student_error(error, source)}; "
             "define initial_state, as in `initial_state = [0.0]`",

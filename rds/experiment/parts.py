@@ -20,6 +20,9 @@ from rds.models.student import student_model
 from rds.signals import Signal, make_signal, signal_kinds, user
 
 
+_FUNCTIONS = ("control", "derivatives", "advance", "output")
+
+
 @dataclass(frozen=True)
 class Setting:
     """What parts are made for: the axis, its sample period in s, its converter's limit in V, the user's folder."""
@@ -113,20 +116,31 @@ def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, 
         return nameless, given
     if isinstance(given, str):
         given = {"file" if given.endswith(".py") else "name": given}
-    elif isinstance(given, dict) and any(callable(given.get(name)) for name in ("control", "derivatives", "advance")):
+    elif isinstance(given, dict) and any(callable(given.get(name)) for name in _FUNCTIONS):
         with _named(nameless):
-            return nameless, from_namespace(given)
+            return _functions(words, key, given), from_namespace(given)
     elif callable(given):
         with _named(nameless):
             return nameless, from_function(given)
     elif not isinstance(given, dict):
-        raise words.fault(key, f"must be a table, as in `[{key}]`")
+        raise words.fault(key, f"must be a name, the path of a .py file, a function, or a table, as in `[{key}]`")
     table = words.table_of(key, given)
     if "file" not in table:
         return table, None
     if "name" in table:
         raise InputError("name and file both say what to take; give one of them", table.place("name"))
     return table, load_student(setting.path(str(table.text("file"))))
+
+
+def _functions(words: Words, key: str, given: dict[str, Any]) -> Words:
+    """What a table of functions says besides. A notebook's `globals()` holds much else; a table by hand does not."""
+    if "__name__" in given:
+        return words.table_of(key, {})
+    table = words.table_of(key, given)
+    for name in ("control",) if key == "controller" else _FUNCTIONS[1:]:
+        table.any(name)
+    table.any("initial_state")
+    return table
 
 
 def _name_and_options(table: Words, kind: str, known: Sequence[str]) -> tuple[str, dict[str, Any]]:
