@@ -29,6 +29,7 @@ _SECOND_ANSWER = 0.03  # s more for one that has the same node-ID
 _CHANGE = 2.0  # s for a drive to change its state or mode
 _LOST_AFTER = 3  # heartbeats that may be missing
 _PROFILE = 402
+_DEVICE_TYPE = b"\x00\x10\x00"  # object 0x1000:00 in an SDO frame
 
 
 @contextmanager
@@ -79,12 +80,13 @@ def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
     answers: dict[int, list[bytes]] = {drive.node: [] for drive in drives}
 
     def note(identifier: int, data: bytearray, _: float) -> None:
-        answers[identifier - 0x580].append(bytes(data))
+        if bytes(data[1:4]) == _DEVICE_TYPE:  # and not a late answer to somebody before us
+            answers[identifier - 0x580].append(bytes(data))
 
     for drive in drives:
         network.subscribe(0x580 + drive.node, note)
     for drive in drives:
-        network.send_message(0x600 + drive.node, b"\x40\x00\x10\x00\x00\x00\x00\x00")  # upload 0x1000, device type
+        network.send_message(0x600 + drive.node, b"\x40" + _DEVICE_TYPE + bytes(4))
     deadline = time.monotonic() + _SEARCH
     while time.monotonic() < deadline and not all(answers.values()):
         time.sleep(0.002)
