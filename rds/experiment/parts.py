@@ -19,7 +19,6 @@ from rds.models import library_model, model_names
 from rds.models.student import student_model
 from rds.signals import Signal, make_signal, signal_kinds, user
 
-
 _FUNCTIONS = ("control", "derivatives", "advance", "output")
 
 
