@@ -21,7 +21,10 @@ from typing import Any
 import can
 
 from rds.bus import connect, wire
-from rds.bus.address import channels
+from rds.bus.address import Address, channels
+from rds.bus.board import Glance
+from rds.bus.bus_settings import read_settings
+from rds.bus.confinement import ErrorState
 
 LOG = logging.getLogger(__name__)
 
@@ -34,9 +37,18 @@ _HALF_SENT = 10.0  # s to finish a frame of which a part is on its way
 class BuiltinBus(can.BusABC):
     """One node of the built-in bus.
 
-    Parameters beside python-can's own: none yet; an unknown one is a ValueError. `channel` is a name of up to 32
-    letters, digits, '.', '_' and '-'. Time stamps are given by the hub: seconds since the epoch by a clock that
-    never steps, the same for all nodes. A bus must not be used in a forked child.
+    Parameters beside python-can's own; an unknown one is a ValueError:
+
+    `bitrate`, bit/s (10,000 to 1,000,000): the bus has bit timing, if this is the first node on it; any other node's
+    must be the same. Without it a node joins whatever is there; the first one makes the bus untimed.
+    `data_bitrate`, bit/s (up to 8,000,000): of CAN FD frames with bit-rate switch.
+    `name`: what the hub calls this node, for faults and `rds bus nodes`.
+    `error_frames`: receive what this node's controller reports, in SocketCAN's format (error_reports.py).
+    `restart_ms`: come back from bus off by itself, so much later.
+
+    `channel` is a name of up to 32 letters, digits, '.', '_' and '-'. Time stamps are given by the hub: seconds since
+    the epoch by a clock that never steps, the same for all nodes; with bit timing, of the end of the frame on the
+    wire. A bus must not be used in a forked child.
 
     Raises can.CanInitializationError if the channel can't be joined.
     """
@@ -48,11 +60,7 @@ class BuiltinBus(can.BusABC):
         receive_own_messages: bool = False,
         **options: Any,
     ):
-        if options:
-            raise ValueError(
-                f"the built-in bus has no option {', '.join(sorted(options))}; "
-                "it takes channel, can_filters and receive_own_messages (python-can's files and variables count too)"
-            )
+        settings = read_settings(options)
         can_filters = list(can_filters or ()) or None
         self._channel = str(channel)
         self.channel_info = f"built-in bus channel {self._channel!r}"
@@ -63,12 +71,15 @@ class BuiltinBus(can.BusABC):
         self._sending = threading.Lock()
         self._pid = os.getpid()
         try:
-            connection = connect.join(self._channel, receive_own_messages, _as_filters(can_filters))
+            connection = connect.join(self._channel, receive_own_messages, _as_filters(can_filters), settings)
+            self._glance = Glance(Address(self._channel).board_path, connection.node) if connection.bitrate else None
         except OSError as error:
             raise can.CanInitializationError(f"{self.channel_info}: {error}") from error
         self._sock = connection.sock
         self._node = connection.node
         self.hub_pid = connection.hub_pid
+        self.bitrate = connection.bitrate  # bit/s; 0: the bus has no bit timing
+        self.data_bitrate = connection.data_bitrate
         self._filters = can_filters
         self._periodic_tasks = []
         self._is_shutdown = False
@@ -92,8 +103,8 @@ class BuiltinBus(can.BusABC):
             return None, False
         if record[12] != wire.FRAME:
             raise self._lose(f"the hub let this node go: {wire.goodbye_reason(record)}")
-        # frames that were on their way when filters changed are sorted out by python-can
-        return self._message(record), self._filters is None
+        # frames that were on their way when filters changed are sorted out by python-can; error frames have no filter
+        return self._message(record), self._filters is None or bool(record[13] & wire.ERROR)
 
     def _next_record(self, timeout: float | None) -> bytes | None:
         """The next record, or None if there is none in time. OSError if the connection broke."""
@@ -150,6 +161,8 @@ class BuiltinBus(can.BusABC):
         record = _record(msg)
         if self._lost is not None:
             raise can.CanOperationError(self._lost)
+        if self._glance is not None:
+            self._check_state(msg)
         with self._sending:
             try:
                 sent = self._send_at_once(record)
@@ -160,10 +173,54 @@ class BuiltinBus(can.BusABC):
             except (BlockingIOError, TimeoutError):
                 raise can.CanTimeoutError(
                     f"{self.channel_info}: frame {msg.arbitration_id:#x} was not taken within {timeout} s: "
-                    "a node does not read its frames"
+                    f"{self._obstacle()}"
                 ) from None
             except OSError as error:
                 raise self._lose(self._look_for_reason() or self._describe(error)) from error
+
+    def _check_state(self, msg: can.Message) -> None:
+        assert self._glance is not None
+        if msg.is_error_frame:
+            raise ValueError("error frames can't be sent on a bus with bit timing; inject a fault (rds.bus.faults)")
+        if self._glance.state() == ErrorState.OFF:
+            raise can.CanOperationError(
+                f"{self.channel_info}: this node is bus off: too many of its frames met errors. "
+                "Call restart(), open the bus again, or open it with restart_ms"
+            )
+
+    def _obstacle(self) -> str:
+        """Why frames wait."""
+        if self._glance is None:
+            return "a node does not read its frames"
+        if self._glance.state() == ErrorState.PASSIVE:
+            return "the node is error passive: nobody acknowledges its frames, or all are disturbed"
+        return "the bus is busy with other frames, or a node does not read its frames"
+
+    @property
+    def state(self) -> can.BusState:
+        """ACTIVE, PASSIVE, or ERROR for bus off; always ACTIVE on a bus without bit timing."""
+        states = (can.BusState.ACTIVE, can.BusState.PASSIVE, can.BusState.ERROR)
+        return states[0 if self._glance is None else self._glance.state()]
+
+    @state.setter
+    def state(self, new_state: can.BusState) -> None:
+        raise NotImplementedError(
+            "a controller's error state follows from its counters; restart() leads out of bus off"
+        )
+
+    def restart(self) -> None:
+        """Ask the controller to come back from bus off: it does when it has seen 128 times 11 recessive bits.
+
+        Raises can.CanOperationError if it is not bus off, or the hub does not answer.
+        """
+        from rds.bus.faults import Faults
+        from rds.core.errors import MachineError
+
+        try:
+            with Faults(self._channel) as faults:
+                faults.restart(self._node)
+        except MachineError as error:
+            raise can.CanOperationError(f"{self.channel_info}: {error}") from error
 
     def _send_at_once(self, data: bytes) -> int:
         if not _AT_ONCE and not _wait(self._sock, True, 0.0):
@@ -242,6 +299,9 @@ class BuiltinBus(can.BusABC):
                         pass
                 self._sock.shutdown(socket.SHUT_RD)  # wakes a thread that waits in recv()
         self._sock.close()
+        if self._glance is not None:
+            self._glance.close()
+            self._glance = None
         for stand_in in self._stand_in or ():
             stand_in.close()
 
@@ -271,7 +331,8 @@ def _record(msg: can.Message) -> bytes:
         if msg.error_state_indicator:
             flags |= wire.ERROR_STATE
     try:
-        header = wire.HEADER.pack(0, msg.arbitration_id, wire.FRAME, flags, msg.dlc, length)
+        # the stamp tells the hub how late it is
+        header = wire.HEADER.pack(time.monotonic_ns(), msg.arbitration_id, wire.FRAME, flags, msg.dlc, length)
         if flags or length > 8 or msg.arbitration_id > 0x7FF or msg.dlc > 8:
             wire.check_frame(header[wire.KEY_AT])
     except (wire.WireError, struct.error) as error:

@@ -24,18 +24,28 @@ class Connection(NamedTuple):
     sock: socket.socket
     node: int
     hub_pid: int
+    bitrate: int = 0  # bit/s; 0: the bus has no bit timing
+    data_bitrate: int = 0
 
 
-def join(channel: str, receive_own: bool, filters: Sequence[wire.Filter], timeout: float = PATIENCE) -> Connection:
+def join(
+    channel: str,
+    receive_own: bool,
+    filters: Sequence[wire.Filter],
+    settings: wire.Settings,
+    timeout: float = PATIENCE,
+) -> Connection:
     """Become a node of `channel`; start its hub if there is none.
 
-    ValueError for a bad channel name, OSError (TimeoutError, PermissionError...) if there is no way in.
+    The first node's settings say whether the bus has bit timing. ValueError for a bad channel name, OSError
+    (TimeoutError, PermissionError, ConnectionRefusedError...) if there is no way in.
     """
     address = Address(channel)
     deadline = time.monotonic() + timeout
-    hello = wire.Hello(wire.JOIN, receive_own, len(filters), 0, b"")
+    hello = wire.Hello(wire.JOIN, receive_own, len(filters), 0, b"", True)
+    greeting = wire.encode_settings(settings) + wire.encode_filters(filters)
     while True:
-        connection = _attempt(address, hello, filters, deadline)
+        connection = _attempt(address, hello, greeting, deadline)
         if connection is not None:
             return connection
         lock = address.lock()
@@ -62,28 +72,52 @@ def retune(channel: str, node: int, filters: Sequence[wire.Filter], timeout: flo
     By a connection of its own, so that the answer doesn't queue behind frames. OSError if the hub doesn't do it.
     """
     hello = wire.Hello(wire.RETUNE, False, len(filters), node, b"")
-    connection = _attempt(Address(channel), hello, filters, time.monotonic() + timeout)
+    connection = _attempt(Address(channel), hello, wire.encode_filters(filters), time.monotonic() + timeout)
     if connection is None:
         raise ConnectionError(f"the hub of channel {channel!r} has ended")
     connection.sock.close()
 
 
-def _attempt(address: Address, hello: wire.Hello, filters: Sequence[wire.Filter], deadline: float) -> Connection | None:
+def visit(channel: str, timeout: float = PATIENCE) -> Connection | None:
+    """A connection for questions to the hub (see hub_desk.py), which is no node; None if the channel has no hub."""
+    hello = wire.Hello(wire.ASK, False, 0, 0, b"")
+    connection = _attempt(Address(channel), hello, b"", time.monotonic() + timeout)
+    if connection is not None:
+        connection.sock.settimeout(timeout)
+    return connection
+
+
+def ask(connection: Connection, question: str) -> str:
+    """The hub's answer to `question`. OSError if the hub does not answer, or has ended."""
+    connection.sock.sendall(wire.encode_text(question))
+    answer, more = b"", True
+    while more:
+        record = _receive(connection.sock)
+        if not record:
+            raise ConnectionError("the hub has ended")
+        try:
+            part, more = wire.decode_part(record)
+        except wire.WireError as error:
+            raise ConnectionRefusedError(str(error)) from error
+        answer += part
+    return answer.decode()
+
+
+def _attempt(address: Address, hello: wire.Hello, rest: bytes, deadline: float) -> Connection | None:
     """Connect and greet; None if there is no hub or it is just ending."""
     try:
         sock = address.connect(max(0.01, deadline - time.monotonic()))
     except (FileNotFoundError, ConnectionError):
         return None
     try:
-        greeting = wire.encode_hello(hello._replace(token=address.token)) + wire.encode_filters(filters)
-        sock.sendall(greeting)
+        sock.sendall(wire.encode_hello(hello._replace(token=address.token)) + rest)
         answer = _receive(sock)
         if not answer:
             sock.close()
             return None
-        node, hub_pid = wire.decode_welcome(answer)
+        welcome = wire.decode_welcome(answer)
         sock.settimeout(None)
-        return Connection(sock, node, hub_pid)
+        return Connection(sock, *welcome)
     except ConnectionError:
         sock.close()
         return None

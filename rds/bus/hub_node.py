@@ -19,6 +19,7 @@ class State(Enum):
 
     GREETING = auto()  # it has not said all about itself yet
     JOINED = auto()  # it is a node of the bus
+    ASKING = auto()  # it is no node, and asks and tells the hub things
     LEAVING = auto()  # it gets what is on its way and then the reason
     GONE = auto()
 
@@ -37,7 +38,10 @@ class Node:
         "moved_at",
         "number",
         "out",
+        "paused",
+        "question",
         "receive_own",
+        "settings",
         "sock",
         "state",
         "waiting",
@@ -49,6 +53,7 @@ class Node:
         self.state = State.GREETING
         self.number = 0
         self.hello: wire.Hello | None = None
+        self.settings: wire.Settings | None = None
         self.receive_own = False
         self.filters: list[wire.Filter] = []
         self.inbox = b""  # the beginning of a record whose end is not here yet
@@ -58,6 +63,8 @@ class Node:
         self.dirty = False  # `out` has grown in this round
         self.hung_up = False  # ended while nothing could be read from it
         self.at_end = False  # nothing more will come
+        self.paused = False  # its controller is full; what it sends waits in its socket
+        self.question = b""  # the beginning of one whose end is not here yet
 
     def receive(self) -> list[bytes]:
         """The whole records that have come; OSError if there are none or the connection broke."""
@@ -98,8 +105,12 @@ class Node:
                 raise wire.WireError("the token is wrong: not the user who started the hub")
             self.hello = hello
             self.receive_own = hello.receive_own
+        elif self.hello.settings and self.settings is None:
+            self.settings = wire.decode_settings(record)
         else:
             self.filters += wire.decode_filters(record)
+        if self.hello.settings and self.settings is None:
+            return False
         return len(self.filters) >= self.hello.filters
 
     def wants(self, identifier: int, extended: bool) -> bool:

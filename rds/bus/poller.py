@@ -11,18 +11,37 @@ _LONGEST_WAIT = 86400.0  # s
 
 
 class Poller(Protocol):
-    """The part of `select.epoll` that the hub uses."""
+    """What the hub and the machine's server use."""
 
     def register(self, fd: int, eventmask: int) -> None: ...
     def modify(self, fd: int, eventmask: int) -> None: ...
     def unregister(self, fd: int) -> None: ...
     def poll(self, timeout: float | None = None) -> list[tuple[int, int]]: ...
+    def sleep(self, timeout: float) -> None: ...
     def close(self) -> None: ...
 
 
 def make_poller() -> Poller:
     """The best that the system has."""
-    return select.epoll() if hasattr(select, "epoll") else SelectPoller()
+    return EpollPoller() if hasattr(select, "epoll") else SelectPoller()
+
+
+class EpollPoller:
+    """`select.epoll`, and a sleep that is exact to the µs."""
+
+    def __init__(self) -> None:
+        self._epoll = select.epoll()
+        self._itself = [self._epoll.fileno()]
+        self._exact = self._itself[0] < 1024  # select() knows no higher descriptors
+        self.register, self.modify = self._epoll.register, self._epoll.modify
+        self.unregister, self.poll, self.close = self._epoll.unregister, self._epoll.poll, self._epoll.close
+
+    def sleep(self, timeout: float) -> None:
+        """Wait up to `timeout` s, or until something is ready."""
+        if self._exact:
+            select.select(self._itself, [], [], timeout)
+        else:
+            self._epoll.poll(int(timeout * 1000.0) / 1000.0)
 
 
 class SelectPoller:
@@ -53,6 +72,10 @@ class SelectPoller:
         for fd in writable:
             ready[fd] = ready.get(fd, 0) | WRITE
         return list(ready.items())
+
+    def sleep(self, timeout: float) -> None:
+        """Wait up to `timeout` s, or until something is ready."""
+        self.poll(timeout)
 
     def close(self) -> None:
         """Forget everything."""

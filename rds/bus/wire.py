@@ -22,18 +22,21 @@ KEY_AT = slice(8, 16)
 STAMP = Struct("<q")
 
 # kinds of record
-FRAME, HELLO, FILTERS, WELCOME, GOODBYE = range(5)
+FRAME, HELLO, FILTERS, WELCOME, GOODBYE, SETTINGS, CONTROL = range(7)
 
 # flags of a frame
 EXTENDED, REMOTE, ERROR, FD, BITRATE_SWITCH, ERROR_STATE, OWN = (1 << bit for bit in range(7))
 
-JOIN, RETUNE = range(2)  # purposes of a hello: become a node, or change the filters of the node with this number
+# purposes of a hello: become a node; change the filters of the node with this number; ask and tell the hub things
+JOIN, RETUNE, ASK = range(3)
 
 _MAGIC = b"rds-can1"
-_HELLO = Struct("<8sBBHQ32s")
-_WELCOME = Struct("<QQ")
+_HELLO = Struct("<8sBBHQ32sB")
+_SETTINGS = Struct("<IIqB")
+_WELCOME = Struct("<QQII")
 _FILTER = Struct("<IIB")
 FILTERS_PER_RECORD = DATA // _FILTER.size
+NAME = DATA - _SETTINGS.size  # bytes
 _FD_LENGTHS = frozenset((*range(9), 12, 16, 20, 24, 32, 48, 64))
 
 
@@ -61,6 +64,26 @@ class Hello(NamedTuple):
     filters: int  # how many
     node: int  # whose filters to change (RETUNE)
     token: bytes  # 32 bytes, proof of being the same user where the transport gives none
+    settings: bool = False  # a record of settings follows, before the filters
+
+
+class Settings(NamedTuple):
+    """What a node may say of itself and of the bus that it expects."""
+
+    name: str = ""  # at most NAME bytes
+    bitrate: int = 0  # bit/s; 0: whatever there is
+    data_bitrate: int = 0
+    restart_ms: int = -1  # from bus off to the request for recovery; -1: never by itself
+    error_frames: bool = False  # whether it wants its controller's error frames
+
+
+class Welcome(NamedTuple):
+    """The hub's answer to a hello. Rates in bit/s; 0 on a bus without bit timing."""
+
+    node: int
+    hub_pid: int
+    bitrate: int = 0
+    data_bitrate: int = 0
 
 
 def record(kind: int, data: bytes = b"") -> bytes:
@@ -70,20 +93,54 @@ def record(kind: int, data: bytes = b"") -> bytes:
 
 def encode_hello(hello: Hello) -> bytes:
     """The record of `hello`."""
-    purpose, receive_own, filters, node, token = hello
-    return record(HELLO, _HELLO.pack(_MAGIC, purpose, receive_own, filters, node, token))
+    return record(HELLO, _HELLO.pack(_MAGIC, *hello))
 
 
 def decode_hello(data: bytes) -> Hello:
     """The hello in a whole record; WireError if it is none, or of another version."""
     if data[12] != HELLO:
         raise WireError(f"the first record is of kind {data[12]} instead of a hello")
-    magic, purpose, receive_own, filters, node, token = _HELLO.unpack_from(data, HEADER.size)
+    magic, purpose, receive_own, filters, node, token, settings = _HELLO.unpack_from(data, HEADER.size)
     if magic != _MAGIC:
         raise WireError("a hello of another program or version")
-    if purpose not in (JOIN, RETUNE):
+    if purpose not in (JOIN, RETUNE, ASK):
         raise WireError(f"the hello's purpose {purpose} is unknown")
-    return Hello(purpose, bool(receive_own), filters, node, token)
+    return Hello(purpose, bool(receive_own), filters, node, token, bool(settings))
+
+
+def encode_settings(settings: Settings) -> bytes:
+    """The record of `settings`."""
+    name, *numbers = settings
+    return record(SETTINGS, _SETTINGS.pack(*numbers) + name.encode())
+
+
+def decode_settings(data: bytes) -> Settings:
+    """The settings in a whole record; WireError if it holds none."""
+    if data[12] != SETTINGS or not _SETTINGS.size <= data[15] <= DATA:
+        raise WireError(f"a record of kind {data[12]} instead of settings")
+    bitrate, data_bitrate, restart_ms, error_frames = _SETTINGS.unpack_from(data, HEADER.size)
+    name = data[HEADER.size + _SETTINGS.size : HEADER.size + data[15]].decode(errors="replace")
+    return Settings(name, bitrate, data_bitrate, restart_ms, bool(error_frames))
+
+
+def encode_text(text: str) -> bytes:
+    """A question or an answer as records; each but the last has its flag set."""
+    body = text.encode()
+    parts = [body[i : i + DATA] for i in range(0, len(body), DATA)] or [b""]
+    last = len(parts) - 1
+    return b"".join(
+        HEADER.pack(0, 0, CONTROL, number < last, 0, len(part)) + part.ljust(DATA, b"\0")
+        for number, part in enumerate(parts)
+    )
+
+
+def decode_part(data: bytes) -> tuple[bytes, bool]:
+    """The part of a text in a record, and whether more follows; WireError carries the hub's reason if it refused."""
+    if data[12] == GOODBYE:
+        raise WireError(goodbye_reason(data))
+    if data[12] != CONTROL or data[15] > DATA:
+        raise WireError(f"a record of kind {data[12]} instead of a question")
+    return data[HEADER.size : HEADER.size + data[15]], bool(data[13])
 
 
 def encode_filters(filters: Sequence[Filter]) -> bytes:
@@ -102,19 +159,18 @@ def decode_filters(data: bytes) -> list[Filter]:
     return [Filter(wanted, mask, None if ext == 2 else bool(ext)) for wanted, mask, ext in _FILTER.iter_unpack(body)]
 
 
-def encode_welcome(node: int, pid: int) -> bytes:
-    """The hub's answer to a hello: the node's number and the hub's process id."""
-    return record(WELCOME, _WELCOME.pack(node, pid))
+def encode_welcome(welcome: Welcome) -> bytes:
+    """The record of `welcome`."""
+    return record(WELCOME, _WELCOME.pack(*welcome))
 
 
-def decode_welcome(data: bytes) -> tuple[int, int]:
-    """Node number and hub's process id; WireError carries the hub's reason if it refused."""
+def decode_welcome(data: bytes) -> Welcome:
+    """The welcome in a whole record; WireError carries the hub's reason if it refused."""
     if data[12] == GOODBYE:
         raise WireError(goodbye_reason(data))
     if data[12] != WELCOME:
         raise WireError(f"the hub answered with a record of kind {data[12]} instead of a welcome")
-    node, pid = _WELCOME.unpack_from(data, HEADER.size)
-    return node, pid
+    return Welcome._make(_WELCOME.unpack_from(data, HEADER.size))
 
 
 def encode_goodbye(reason: str) -> bytes:

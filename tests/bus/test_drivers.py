@@ -281,7 +281,7 @@ def test_the_server_says_what_is_wrong(program: Callable[..., Any]) -> None:
     for arguments, code, words in (
         (["nonsense"], 2, "no machine 'nonsense'"),
         (["mini-cnc", "--axes", "X,Q"], 2, "no axis 'Q'"),
-        (["mini-cnc", "--option", "bitrate=5"], 1, "no option bitrate"),
+        (["mini-cnc", "--option", "baud=5"], 1, "no option baud"),
         (["mini-cnc", "--interface", "nonsense"], 1, "can't be opened"),
     ):
         process = program("rds.bus.server", *arguments)

@@ -166,8 +166,8 @@ def test_hostile_channel_names_are_refused(open_bus: Callable[..., can.BusABC], 
 
 
 def test_unknown_options_are_refused(open_bus: Callable[..., can.BusABC]) -> None:
-    with pytest.raises(ValueError, match="no option bitrate"):
-        open_bus(bitrate=500_000)
+    with pytest.raises(ValueError, match="no option baud"):
+        open_bus(baud=500_000)
 
 
 def test_a_directory_that_others_can_enter_is_refused(

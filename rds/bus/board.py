@@ -1,0 +1,53 @@
+"""The board of a channel with bit timing: every node's error state in a file that all can see at no cost.
+
+So send() knows that its node is bus off without asking the hub. One byte for each seat; a node's seat is its number
+modulo `SEATS`. The hub writes, nodes read.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+from pathlib import Path
+
+SEATS = 1 << 16
+
+
+class Board:
+    """The hub's end: makes the file at `path`, and removes it."""
+
+    def __init__(self, path: Path):
+        self._path = path
+        path.unlink(missing_ok=True)  # who still looks at an old one keeps it
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        try:
+            os.truncate(descriptor, SEATS)
+            self._states = mmap.mmap(descriptor, SEATS)
+        finally:
+            os.close(descriptor)
+
+    def show(self, number: int, state: int) -> None:
+        """The state of the node with this number."""
+        self._states[number % SEATS] = state
+
+    def remove(self) -> None:
+        """Take it away."""
+        self._path.unlink(missing_ok=True)
+        self._states.close()
+
+
+class Glance:
+    """A node's end: its own state on the board at `path`. OSError if there is none."""
+
+    def __init__(self, path: Path, number: int):
+        with open(path, "rb") as file:
+            self._states = mmap.mmap(file.fileno(), SEATS, access=mmap.ACCESS_READ)
+        self._seat = number % SEATS
+
+    def state(self) -> int:
+        """The state now, as in confinement.ErrorState."""
+        return self._states[self._seat]
+
+    def close(self) -> None:
+        """Look no more; the last state stays readable by nobody."""
+        self._states.close()
