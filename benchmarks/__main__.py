@@ -59,10 +59,12 @@ def main() -> int:
     report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}
     for name in options.subjects or SUBJECTS:
         before = machine.wait_for_quiet(options.quiet_load, options.patience)
+        rivals = machine.rivals()
         figures = runs[name]()
-        report["subjects"][name] = {"load_before": before, "figures": [figure.to_json() for figure in figures]}
+        subject = {"load_before": before, "rivals_before": rivals, "figures": [figure.to_json() for figure in figures]}
+        report["subjects"][name] = subject
         if not options.json:
-            note = "" if before is None else f"load average before: {before:.2f}"
+            note = "" if before is None else f"before: load average {before:.2f}, {rivals} rival real-time processes"
             show_table(SUBJECTS[name], TITLES, [figure.cells() for figure in figures], note)
     if options.json:
         print(json.dumps(report, ensure_ascii=False))

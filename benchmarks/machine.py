@@ -34,7 +34,7 @@ def versions() -> dict[str, str]:
 def machine() -> dict[str, Any]:
     """Processor, kernel, scheduler's circumstances, memory."""
     return {"processor_model": _field("/proc/cpuinfo", "model name"), **surroundings()} | {
-        "memory_kB": _field("/proc/meminfo", "MemTotal"),
+        "memory": _field("/proc/meminfo", "MemTotal"),
         "clock_source": _text("/sys/devices/system/clocksource/clocksource0/current_clocksource"),
     }
 
@@ -42,6 +42,18 @@ def machine() -> dict[str, Any]:
 def load() -> float | None:
     """The load average of the last minute."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
+def rivals(priority: int = 80) -> int | None:
+    """How many other processes have a real-time priority of at least our loop's; None where that can't be seen."""
+    if not hasattr(os, "sched_getparam"):
+        return None
+    count = 0
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):  # it may have ended meanwhile
+            of_the_kernel = not (folder / "cmdline").read_bytes()
+            count += not of_the_kernel and os.sched_getparam(int(folder.name)).sched_priority >= priority
+    return count
 
 
 def wait_for_quiet(most: float, patience: float) -> float | None:
