@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import configparser
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.resources import files
 from math import pi, sin
+from pathlib import Path
 from typing import Any
 
 import can
@@ -22,6 +25,7 @@ from rds.machines import Machine
 from .conftest import wait_for
 
 T = 0.02  # s: no test here is about speed, and a busy computer shall not decide it
+PDOS = (0x1400, 0x1600, 0x1800, 0x1A00)
 Served = Callable[..., tuple[str, list[DriveNode]]]
 
 
@@ -142,6 +146,39 @@ def test_directions_and_counts_are_the_tables(machine: Machine, served: Served) 
         for _ in range(10):
             positions, _ = cycle(host, 4.0)
         assert nodes[0].drive.servo.position < -100 and positions[0] > 0.2
+
+
+def test_a_drive_needs_nothing_but_what_the_profile_makes_mandatory(
+    machine: Machine, served: Served, tmp_path: Path
+) -> None:
+    """The EDS of a bought drive: no objects of ours, none of the optional ones, one PDO each way."""
+    eds = configparser.RawConfigParser()
+    eds.optionxform = str  # type: ignore[assignment,method-assign]
+    eds.read_string(files("rds.bus.cia402").joinpath("axis.eds").read_text())
+    optional = ("2000", "2001", "1006", "1016", "1017", "1019", "1029", "60C2", "6502", "60E3")
+    for section in eds.sections():
+        if section.startswith(optional) or section[:4] in {f"{base + n:04X}" for base in PDOS for n in (1, 2, 3)}:
+            eds.remove_section(section)
+    with (tmp_path / "bought.eds").open("w") as file:
+        eds.write(file)
+    channel, nodes = served("X")
+    table = {"rpdo_transmission": 255, "axis": {"X": {"eds": str(tmp_path / "bought.eds")}}}
+    nodes[0].drive.objects.values[0x60C2, 1] = 20  # ms; such a drive has its own way to know
+    nodes[0].drive.operation.look_up()
+    with drivers(machine, channel, ["X"], cia402=table) as host:
+        host.start()
+        powered(host, 0.0)
+        for _ in range(10):
+            positions, _ = cycle(host, 4.0)
+        assert positions[0] > 0.2
+
+
+def test_a_file_that_is_no_eds_is_told(machine: Machine, served: Served, tmp_path: Path) -> None:
+    (tmp_path / "bad.eds").write_text("this is no EDS")
+    channel, _ = served("X")
+    table = {"axis": {"X": {"eds": str(tmp_path / "bad.eds")}}}
+    with drivers(machine, channel, ["X"], cia402=table) as host, pytest.raises(InputError, match=r"bad\.eds"):
+        host.start()
 
 
 def test_a_fault_is_told_with_node_state_and_code_and_stops_all(machine: Machine, served: Served) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,19 @@ def test_an_eds_is_found_beside_the_machine_file_or_here(machine: Machine, tmp_p
     eds = tmp_path / "drive.eds"
     eds.write_text("")
     assert read_settings({"axis": {"X": {"eds": str(eds)}}}, machine, ["X"]).drives[0].eds == str(eds)
+
+
+def test_the_documented_example_is_accepted(machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "cia402.md").read_text(encoding="utf-8")
+    table = tomllib.loads(text.split("```toml\n")[1].split("```")[0])["bus"]["cia402"]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "servo-drive.eds").write_text("")
+    settings = read_settings(table, machine, ["X", "Y"])
+    x, y = settings.drives
+    assert (x.node, x.counts, x.homing, len(x.write)) == (11, 2000.0, 17, 6)
+    assert (y.node, y.counts, y.direction) == (12, 2000.0, -1)
+    for key in {*table, *table["axis"]["X"], *table["axis"]["Y"]} - {"axis"}:
+        assert f"`{key}`" in text, f"{key} is not explained"
 
 
 @pytest.mark.parametrize(
