@@ -49,7 +49,8 @@ class OacsDrivers(AxisDrivers):
             if self._shared is None:
                 bus.shutdown()
         refuse_clashes(found)
-        latched = [self._numbers[info.id] for info in found if info.id in self._numbers and info.state == "emergency"]
+        emergency = {info.id for info in found if info.state == "emergency"}
+        latched = [name for number, name in self._numbers.items() if number in emergency]
         if latched:
             raise MachineError(
                 f"the emergency stop of {', '.join(latched)} is latched; release the button, then reset it"

@@ -50,8 +50,14 @@ def scan(bus: can.BusABC, wait: float = WAIT) -> list[ModuleInfo]:
 
 
 def survey(bus: can.BusABC, wait: float = WAIT) -> list[ModuleInfo]:
-    """What `scan` finds, with every module of a clash."""
+    """What `scan` finds, with every module of a clash.
+
+    Where there is one, the thesis's calls are not sent: two modules of one number could answer them at the same bit
+    with different bytes, which neither the bus nor anybody on it can part. The identity call is safe.
+    """
     identities = identify(bus, wait)
+    if clashes(identities):
+        return identities
     kinds = _replies(bus, Code.CALL_ONE, wait)
     types = _replies(bus, Code.CALL_TWO, wait)
     found = []

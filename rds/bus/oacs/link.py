@@ -33,7 +33,6 @@ class Conversation:
         self.bus = bus
         self.number = check_node(number)
         self.name = f"module {name} (number {number})" if name else f"module {number}"
-        self.status: dict[str, Any] | None = None  # of its last status message
         self.listen: Callable[[talk.Heard], None] = lambda heard: None  # everything that the module says
 
     def send(self, **fields: Any) -> None:
@@ -48,8 +47,6 @@ class Conversation:
             heard = talk.hear(self.bus, min(until, alive))
             if heard is not None and self._is_mine(heard.message):
                 self.listen(heard)
-                if heard.message.kind == "Status":
-                    self.status = heard.message.fields
                 if wanted(heard.message):
                     return heard
             now = time.monotonic()
@@ -94,9 +91,8 @@ class Conversation:
 
     def drain(self) -> None:
         """Take what was said before, so that an old word does not count as the answer to a new command."""
-        while (heard := talk.hear(self.bus, 0.0)) is not None:
-            if self._is_mine(heard.message) and heard.message.kind == "Status":
-                self.status = heard.message.fields
+        while talk.hear(self.bus, 0.0) is not None:
+            pass
 
     def _is_mine(self, message: Decoded) -> bool:
         if message.kind == "Reply":

@@ -184,7 +184,6 @@ class OacsModule:
                 Version=words.VERSION,
                 Mode=self.mode,
             )
-            self._said = ()  # whoever asks who we are also learns how we are
         self.send(reply, at + self.data.response_call)
 
     def _latch(self, at: float) -> None:
@@ -279,6 +278,8 @@ class OacsModule:
             "Parameter", self.node, Parameter=parameter, Selection=tuning.controller, ParameterValue=value
         )
         self.send(frame, at + self.data.response_call)
+        if parameter == Parameter.SELECT:
+            self._said = ()  # whoever asks for the controller also learns how the module is
 
     @property
     def mode(self) -> Mode:

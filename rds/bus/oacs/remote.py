@@ -57,9 +57,11 @@ class Module:
         self.number = number
 
     @property
-    def status(self) -> dict[str, Any] | None:
-        """The fields of its last status message that this object heard."""
-        return self._link.status
+    def status(self) -> dict[str, Any]:
+        """The fields of its status message, asked now: limit switches, emergency stop, counts missing..."""
+        self._link.drain()
+        self._link.send(Code=Code.READ_PARAMETER, ReadIndex=Parameter.SELECT)
+        return self._link.wait_for(lambda m: m.kind == "Status", "to say its status").message.fields
 
     # --- what it is
 

@@ -29,6 +29,7 @@ ADVICE = {  # what raising a gain does: rise time, overshoot, settling time, ste
 }
 _SETTLED = 0.05  # the end's slope against the steepest one
 _OVERSHOOT = 0.05  # of the step
+_QUANTA = 10  # smallest steps of the record that a slope is taken over
 
 
 class Gains(NamedTuple):
@@ -69,8 +70,9 @@ def reaction_curve(time: ArrayLike, output: ArrayLike, step: float | None = None
     """Delay, time constant and gain of a recorded response to a step at time 0.
 
     `time` in s, `output` in any unit, of one length; `step` is the change of the input (default: the output's own
-    change, gain 1). The slope is taken over a thirtieth of the record, so that an encoder's steps do not count as
-    slope. Raises InputError for a response that the method is not for: one that oscillates, or does not settle.
+    change, gain 1). The slope is taken over as many samples as it takes to rise by ten of the record's smallest steps,
+    so that an encoder's counts do not make it. Raises InputError for a response that the method is not for: one that
+    oscillates, or does not settle.
     """
     t, y = np.asarray(time, dtype=float), np.asarray(output, dtype=float)
     if t.shape != y.shape or t.ndim != 1 or len(t) < 10 or not (np.isfinite(t).all() and np.isfinite(y).all()):
@@ -86,7 +88,7 @@ def reaction_curve(time: ArrayLike, output: ArrayLike, step: float | None = None
             f"the response overshoots by {100 * max(rise.max() - 1.0, -rise.min()):.0f} %; table 11 is for S-shaped "
             "ones without overshoot: lower the gains, or tune by trial and error"
         )
-    half = max(1, len(t) // 60)
+    half = _half_window(rise)
     slope = (rise[2 * half :] - rise[: -2 * half]) / (t[2 * half :] - t[: -2 * half])
     steepest = int(slope.argmax())
     middle, m = steepest + half, float(slope[steepest])
@@ -97,6 +99,16 @@ def reaction_curve(time: ArrayLike, output: ArrayLike, step: float | None = None
         )
     delay = float(t[middle] - rise[middle] / m)
     return ReactionCurve(delay, 1.0 / m, 1.0 if step is None else abs(float(change) / step))
+
+
+def _half_window(rise: np.ndarray) -> int:
+    """Half the number of samples over which a slope is taken: from one sample to a tenth of the record."""
+    steps = np.abs(np.diff(rise))
+    enough = min(_QUANTA * float(steps[steps > 0].min()), 0.25)
+    half = 1
+    while half < len(rise) // 20 and (rise[2 * half :] - rise[: -2 * half]).max() < enough:
+        half += 1
+    return half
 
 
 def gains_from_step(result: Result, axis: str, controller: str = "PID") -> Gains:

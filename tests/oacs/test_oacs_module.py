@@ -1,0 +1,400 @@
+"""A module in bus time: replies, motions, limit switches, emergency stop, watchdogs, tuning, hostile frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oacs_bench import Bench
+
+from rds.bus import frames
+from rds.bus.oacs import messages, words
+from rds.bus.oacs.words import Acknowledges, Code, Mode, Move, Parameter, Result, Select
+
+Benches = Callable[..., Bench]
+
+
+@pytest.mark.parametrize(
+    "name, call, download", [("drill", 5.2, 5.3), ("X", 1.1, 1.4), ("A", 6.7, 6.9), ("Z", 1.5, 2.2)]
+)
+def test_response_times_of_table_20(bench: Benches, name: str, call: float, download: float) -> None:
+    rig = bench(name)
+    for code in (1, 2, 9):
+        asked = rig.now
+        rig.say("GeneralCall", Code=code)
+        rig.run(0.02)
+        replied = [at for at, message in rig.heard if message.kind in ("Reply", "Identity")][-1]
+        assert replied - asked == pytest.approx(call * 1e-3, abs=1e-5)
+    asked = rig.now
+    rig.say("Command", Code=Code.DATA_CALL)
+    rig.run(0.02)
+    first = next(at for at, message in rig.heard if message.kind == "Download")
+    assert first - asked == pytest.approx(download * 1e-3, abs=1e-5)
+
+
+def test_replies_to_the_general_calls(bench: Benches) -> None:
+    rig = bench("drill")
+    for code in (1, 2, 9):
+        rig.say("GeneralCall", Code=code)
+        rig.run(0.02)
+    kind, kind_of = rig.said("Reply")
+    assert messages.text(kind.fields, "KindText", 5) == "SpinM" and kind.fields["BoardID"] == 5
+    assert messages.text(kind_of.fields, "TypeText", 6) == "DrillT"
+    assert rig.said("Identity")[0].fields["Serial"] == 77
+
+
+@pytest.mark.parametrize(
+    "name, direction, distance, counts, seconds",
+    [
+        ("X", 1, 80.0, 13533, 36.92),  # tables O32, O33 and O35: averages
+        ("X", 0, 80.0, 13537, 30.09),
+        ("Z", 1, 50.0, 8438, 27.11),
+        ("Z", 0, 50.0, 8456, 22.07),
+    ],
+)
+def test_moves_as_the_thesis_measured_them(
+    bench: Benches, name: str, direction: int, distance: float, counts: int, seconds: float
+) -> None:
+    rig = bench(name)
+    asked = rig.now
+    rig.move(Move.START, Direction=direction, Argument=round(distance * 1000))
+    assert rig.until_done() == Result.CARRIED_OUT
+    assert abs(rig.module.plant.counts) == pytest.approx(counts, abs=60)
+    assert rig.now - asked == pytest.approx(seconds, rel=0.05)
+    assert abs(rig.module.plant.true_position) == pytest.approx(distance, abs=1.0), "table 14: worst accuracy"
+
+
+@pytest.mark.parametrize("direction", [1, 0])
+def test_the_a_axis_loses_counts_and_goes_too_far(bench: Benches, direction: int) -> None:
+    """Section 9.5: 63 of 67 counts per degree, so it turns too far (22 degrees in 360) and cannot know it."""
+    rig = bench("A")
+    rig.move(Move.START, Direction=direction, Argument=170_000)
+    assert rig.until_done() == Result.CARRIED_OUT
+    turned = abs(rig.module.plant.true_position)
+    assert abs(rig.module.plant.counts) / turned == pytest.approx(63.0, abs=1.3)
+    assert turned - 170.0 == pytest.approx(22.0 * 170 / 360, abs=4.0)
+    assert rig.said("Status")[-1].fields["CountsMissing"] > 400, "the module's index pulses show it"
+
+
+def test_with_half_the_encoder_the_a_axis_is_right(bench: Benches) -> None:
+    rig = bench("A", counts_per_unit=33.5, counts_per_turn=512)
+    rig.module.plant.counter.set(0)
+    rig.move(Move.START, Direction=1, Argument=170_000)
+    assert rig.until_done() == Result.CARRIED_OUT
+    assert rig.module.plant.true_position == pytest.approx(170.0, abs=1.5)
+    assert rig.module.plant.counter.missing <= 2
+
+
+def test_the_thesis_way_of_writing_a_distance(bench: Benches) -> None:
+    rig = bench("X")
+    rig.frame(0x004, bytes([3, 1, 3, 1, 0, 0, 0, 0]))  # 31XY0000: start, 3 mm, clockwise
+    assert rig.until_done() == Result.CARRIED_OUT
+    assert rig.module.plant.true_position == pytest.approx(3.0, abs=0.3)
+
+
+def test_a_motion_is_accepted_then_carried_out_with_positions_between(bench: Benches) -> None:
+    rig = bench("X")
+    rig.say("Command", Code=Code.READINGS, Quantities=1, ReadingsPeriod=10)
+    rig.move(Move.TO_POINT, Argument=2000)
+    rig.until_done()
+    rig.run(0.1)
+    assert rig.results() == [Result.CARRIED_OUT, Result.ACCEPTED, Result.CARRIED_OUT]
+    positions = [(at, m.fields) for at, m in rig.heard if m.fields.get("Code") == words.Says.POSITION]
+    assert [fields["Sequence"] for _, fields in positions] == [k % 256 for k in range(len(positions))]
+    steps = [b - a for (a, _), (b, _) in pairwise(positions)]
+    assert steps == pytest.approx([0.01] * len(steps), abs=1e-6)
+    assert positions[0][1]["Position"] == 0 and positions[-1][1]["Position"] == rig.module.plant.counts
+
+
+def test_positions_do_not_depend_on_how_late_the_process_is(bench: Benches) -> None:
+    def positions(late: float) -> list[int]:
+        rig = bench("X")
+        rig.say("Command", Code=Code.READINGS, Quantities=1, ReadingsPeriod=10)
+        rig.move(Move.START, Direction=1, Argument=2000)
+        while rig.now < 103.0:
+            rig.module.mover.heard = rig.now
+            rig.now += late
+            rig._note(rig.module.expire(rig.now))
+        return [m.fields["Position"] for m in rig.said("Reply") if m.fields["Code"] == words.Says.POSITION]
+
+    assert positions(0.003) == positions(0.07)[: len(positions(0.003))] != []
+
+
+def test_stop_and_switch_direction(bench: Benches) -> None:
+    rig = bench("X")
+    rig.move(Move.SWITCH_DIRECTION)
+    rig.move(Move.START, Direction=1, Argument=20_000)
+    rig.run(3.0)
+    there = rig.module.plant.true_position
+    rig.move(Move.SWITCH_DIRECTION)
+    rig.run(3.0)
+    assert rig.module.plant.true_position < there - 3.0
+    rig.move(Move.STOP)
+    rig.run(1.0)
+    nothing, accepted, switched, stopped, ended = rig.results()
+    assert (nothing, accepted, switched) == (Result.NOTHING_MOVES, Result.ACCEPTED, Result.CARRIED_OUT)
+    assert (stopped, ended) == (Result.CARRIED_OUT, Result.STOPPED_BY_COMMAND)
+    assert rig.module.plant.voltage == 0.0 and rig.module.plant.velocity == 0.0
+
+
+@pytest.mark.parametrize(
+    "fields, result",
+    [
+        ({"Move": Move.TO_POINT, "Argument": 151_000}, Result.OUTSIDE_TRAVEL),
+        ({"Move": Move.START, "Argument": 151_000}, Result.OUTSIDE_TRAVEL),
+        ({"Move": Move.START}, Result.BAD_VALUE),
+        ({"Move": Move.START, "Argument": -5}, Result.BAD_VALUE),
+        ({"Move": Move.JOG, "Argument": 0}, Result.BAD_VALUE),
+        ({"Move": Move.JOG, "Argument": 61_000}, Result.BAD_VALUE),
+    ],
+)
+def test_commands_outside_the_limits_are_refused(bench: Benches, fields: dict[str, int], result: Result) -> None:
+    rig = bench("X")
+    rig.say("Command", Code=Code.MOVE, **fields)
+    rig.run(0.1)
+    assert rig.results() == [result]
+    assert rig.module.plant.voltage == 0.0 and rig.module.mover.motion is None
+
+
+def test_one_motion_at_a_time(bench: Benches) -> None:
+    rig = bench("X")
+    rig.move(Move.START, Argument=5000)
+    rig.move(Move.START, Argument=5000)
+    rig.run(0.1)
+    assert rig.results() == [Result.ACCEPTED, Result.BUSY]
+
+
+@pytest.mark.parametrize("direction, start", [(1, 149.0), (0, -149.0)])
+def test_a_limit_switch_stops_the_axis_within_its_time(bench: Benches, direction: int, start: float) -> None:
+    rig = bench("X", start=start)
+    rig.move(Move.JOG, Direction=direction, Argument=10_000)
+    assert rig.until_done() == Result.STOPPED_BY_LIMIT
+    beyond = abs(rig.module.plant.true_position) - 152.0
+    # 100 ms of debouncing at 2.7 mm/s at most, and the way to a stand
+    assert 0.1 < beyond < 2.7 * 0.101 + 0.25
+    side = "HighLimitOpen" if direction else "LowLimitOpen"
+    assert rig.said("Status")[-1].fields[side] == 1
+    rig.move(Move.JOG, Direction=direction, Argument=1000)
+    rig.run(0.1)
+    assert rig.results()[-1] == Result.AT_LIMIT, "not further"
+    rig.move(Move.JOG, Direction=1 - direction, Argument=2000)
+    assert rig.until_done() == Result.CARRIED_OUT, "but back"
+    assert rig.said("Status")[-1].fields[side] == 0
+
+
+def test_a_broken_wire_stops_whichever_way_it_moves(bench: Benches) -> None:
+    rig = bench("X")
+    rig.move(Move.START, Direction=1, Argument=20_000)
+    rig.run(1.0)
+    broke = rig.now
+    rig.module.set_wire(-1, False, rig.now)
+    rig.run(0.0995)
+    assert rig.module.plant.voltage != 0.0, "a glitch would be over by now"
+    rig.run(0.002)
+    assert rig.module.plant.voltage == 0.0 and rig.now - broke < 0.102
+    assert rig.until_done() == Result.STOPPED_BY_LIMIT
+
+
+def test_a_glitch_stops_nothing(bench: Benches) -> None:
+    rig = bench("X")
+    rig.move(Move.START, Direction=1, Argument=5000)
+    rig.run(1.0)
+    rig.module.set_wire(1, False, rig.now)
+    rig.run(0.09)
+    rig.module.set_wire(1, None, rig.now)
+    assert rig.until_done() == Result.CARRIED_OUT
+
+
+def test_homing_finds_the_zero(bench: Benches) -> None:
+    rig = bench("X", start=-145.0)
+    rig.module.plant.counter.set(999_999)  # the count is anything after a failure
+    rig.move(Move.HOME)
+    assert rig.until_done() == Result.CARRIED_OUT
+    plant = rig.module.plant
+    assert plant.counts / 169.0 == pytest.approx(plant.true_position, abs=0.02)
+    assert rig.said("Status")[-1].fields["Homed"] == 1 and not plant.switches[0].open
+
+
+def test_homing_from_on_the_switch(bench: Benches) -> None:
+    rig = bench("X", start=-152.5)
+    rig.run(0.3)
+    rig.module.plant.look(rig.now)
+    rig.run(0.3)
+    assert rig.module.plant.switches[0].open
+    rig.move(Move.HOME)
+    assert rig.until_done() == Result.CARRIED_OUT
+    assert rig.module.plant.counts / 169.0 == pytest.approx(rig.module.plant.true_position, abs=0.02)
+
+
+def test_homing_without_switches_sets_the_zero_here(bench: Benches) -> None:
+    rig = bench("A", start=30.0)
+    rig.move(Move.HOME)
+    rig.run(0.1)
+    assert rig.results() == [Result.CARRIED_OUT, Result.ACCEPTED] or rig.results()[-1] == Result.CARRIED_OUT
+    assert rig.module.plant.counts == 0 and rig.module.mover.homed
+
+
+def test_emergency_stop_latches_zero_volts(bench: Benches) -> None:
+    rig = bench("X")
+    rig.move(Move.START, Direction=1, Argument=20_000)
+    rig.run(2.0)
+    rig.say("GeneralCall", Code=Code.EMERGENCY)
+    assert rig.module.plant.voltage == 0.0
+    rig.run(1.0)
+    assert Result.STOPPED_BY_EMERGENCY in rig.results() and rig.module.mode == Mode.EMERGENCY
+    rig.move(Move.START, Direction=1, Argument=1000)
+    rig.run(0.1)
+    assert rig.results()[-1] == Result.EMERGENCY_LATCHED
+    rig.frame(frames.COMMAND, frames.encode_voltages([8.0]))
+    rig.run(0.005)
+    assert rig.module.plant.voltage == 0.0, "nor do cyclic commands move it"
+    rig.run(0.1)
+    rig.say("Command", Code=Code.EMERGENCY)
+    rig.move(Move.START, Direction=1, Argument=1000)
+    assert rig.until_done() == Result.CARRIED_OUT
+
+
+def test_the_emergency_input_stops_all_and_holds(bench: Benches) -> None:
+    rig = bench("drill")
+    rig.move(Move.START, Direction=1, Argument=500_000)
+    rig.run(1.0)
+    assert rig.module.plant.velocity > 400
+    rig.module.set_emergency_input(True, rig.now)
+    rig.run(0.01)
+    assert rig.said("GeneralCall")[0].fields["Code"] == Code.EMERGENCY, "the others hear it"
+    assert rig.module.plant.voltage == 0.0
+    rig.say("Command", Code=Code.EMERGENCY)
+    rig.run(0.1)
+    assert rig.results()[-1] == Result.EMERGENCY_LATCHED, "not while the button is pressed"
+    rig.module.set_emergency_input(False, rig.now)
+    assert rig.module.plant.emergency, "releasing the button starts nothing"
+    rig.say("Command", Code=Code.EMERGENCY)
+    rig.run(0.1)
+    assert rig.results()[-1] == Result.CARRIED_OUT and not rig.module.plant.emergency
+
+
+@pytest.mark.parametrize("name, argument", [("X", 50_000), ("drill", 500_000)])
+def test_a_host_that_falls_silent_leaves_nothing_moving(bench: Benches, name: str, argument: int) -> None:
+    rig = bench(name)
+    rig.move(Move.START, Direction=1, Argument=argument)
+    rig.run(1.9, alive=False)
+    assert rig.module.plant.voltage != 0.0
+    rig.run(0.2, alive=False)
+    assert rig.module.plant.voltage == 0.0
+    rig.run(2.0, alive=False)
+    assert rig.results()[-1] == Result.HOST_SILENT
+
+
+def test_the_cyclic_watchdog_cuts_after_ten_periods(bench: Benches) -> None:
+    rig = bench("X")
+    rig.frame(frames.COMMAND, frames.encode_voltages([8.0]))
+    rig.run(0.009)
+    assert rig.module.plant.voltage == pytest.approx(8.0, abs=1e-3)
+    rig.run(0.002)
+    assert rig.module.plant.voltage == 0.0
+    assert rig.said("Status")[-1].fields["WatchdogCut"] == 1
+
+
+def test_cyclic_commands_take_over_and_keep_the_axis(bench: Benches) -> None:
+    rig = bench("X")
+    rig.move(Move.START, Direction=1, Argument=50_000)
+    rig.run(1.0)
+    answers = rig.module.receive(frames.COMMAND, frames.encode_voltages([0.0]), rig.now)
+    assert frames.decode_answer(answers[0].identifier, answers[0].data).counts == rig.module.plant.counts
+    rig.move(Move.START, Direction=1, Argument=50_000)
+    rig.run(0.05)
+    assert rig.results()[-2:] == [Result.HOST_COMMANDS, Result.HOST_COMMANDS]
+
+
+def test_cyclic_commands_stop_at_the_limit_and_say_so(bench: Benches) -> None:
+    rig = bench("X", start=151.5)
+    status = 0
+    for k in range(3000):
+        rig.now = 100.0 + k * 1e-3
+        for frame in rig.module.receive(frames.COMMAND, frames.encode_voltages([9.0]), rig.now):
+            if frame.identifier == 0x24:
+                status = frames.decode_answer(0x24, frame.data).status
+    assert rig.module.plant.voltage == 0.0 and rig.module.plant.true_position < 152.7
+    assert status & frames.Status.FAULT
+    rig.module.receive(frames.COMMAND, frames.encode_voltages([-9.0]), rig.now)
+    rig.module.advance(rig.now + 0.001)
+    assert rig.module.plant.voltage < 0.0, "back is free"
+
+
+def test_tuning_takes_effect_as_a_whole(bench: Benches) -> None:
+    rig = bench("X")
+    rig.say("Command", Code=Code.SET_PARAMETER, Parameter=Parameter.KP, ParameterValue=3.0)
+    rig.say("Command", Code=Code.SET_PARAMETER, Parameter=Parameter.SAMPLE_TIME, ParameterValue=0.02)
+    assert rig.module.mover.tuning.Kp == 1.5
+    rig.say("Command", Code=Code.SET_PARAMETER, Parameter=Parameter.SELECT, Selection=Select.PI)
+    assert (rig.module.mover.tuning.Kp, rig.module.mover.tuning.controller) == (3.0, Select.PI)
+    rig.say("Command", Code=Code.SET_PARAMETER, Parameter=Parameter.KI, ParameterValue=-1.0)
+    rig.say("Command", Code=Code.READ_PARAMETER, ReadIndex=Parameter.KP)
+    rig.run(0.05)
+    assert rig.results() == [Result.CARRIED_OUT] * 3 + [Result.BAD_VALUE]
+    assert rig.said("Parameter")[0].fields["ParameterValue"] == 3.0
+
+
+def test_an_axis_that_does_not_move_is_given_up(bench: Benches) -> None:
+    rig = bench("X")
+    for parameter, value in ((Parameter.KP, 0.01), (Parameter.KI, 0.0), (Parameter.KICK, 0.0)):
+        rig.say("Command", Code=Code.SET_PARAMETER, Parameter=parameter, ParameterValue=value)
+    rig.say("Command", Code=Code.SET_PARAMETER, Parameter=Parameter.SELECT, Selection=Select.PI)
+    rig.move(Move.START, Argument=2000)
+    assert rig.until_done() == Result.STALLED
+
+
+def test_a_tool_turns_and_turns_round(bench: Benches) -> None:
+    rig = bench("drill")
+    rig.move(Move.START, Direction=1, Argument=400_000)
+    rig.run(1.5)
+    assert rig.module.plant.counts == pytest.approx(400, abs=20)
+    rig.move(Move.SWITCH_DIRECTION)
+    rig.run(1.5)
+    assert rig.module.plant.counts == pytest.approx(-400, abs=20)
+    rig.move(Move.TO_POINT, Argument=5)
+    rig.move(Move.HOME)
+    rig.run(0.1)
+    assert rig.results()[-2:] == [Result.NOT_FOR_THIS_MODULE] * 2
+
+
+def test_acceleration_and_current(bench: Benches) -> None:
+    rig = bench("drill")
+    rig.say("Command", Code=Code.READINGS, Quantities=6, ReadingsPeriod=20)
+    rig.run(0.2)
+    rest = rig.said("Acceleration")[-1].fields
+    assert rest["AccelerationX"] == pytest.approx(-1.05, abs=0.01)
+    rig.move(Move.START, Direction=1, Argument=580_000)
+    rig.run(2.0)
+    currents = [m.fields["Current"] for m in rig.said("Current")]
+    assert max(currents) == pytest.approx(1.48, abs=0.1) and currents[-1] == pytest.approx(1.4, abs=0.1)
+    swing = [m.fields["AccelerationX"] for m in rig.said("Acceleration")[-50:]]
+    assert max(swing) - min(swing) > 0.2
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0x001, 0x004, 0x114, 0x010, 0x011, 0x012, 0x013]) | st.integers(0, 0x7FF),
+            st.binary(max_size=8),
+            st.floats(0, 0.05),
+        ),
+        max_size=40,
+    )
+)
+def test_hostile_frames_break_nothing(frames_: list[tuple[int, bytes, float]]) -> None:
+    rig = Bench("X")
+    for identifier, data, pause in frames_:
+        rig.frame(identifier, data)
+        rig.run(pause, alive=False)
+    rig.run(0.3, alive=False)
+    rig.say("GeneralCall", Code=Code.EMERGENCY)
+    rig.run(0.05)
+    assert rig.module.plant.voltage == 0.0
+    kinds: list[Any] = [m.fields for m in rig.said("Reply") if m.fields.get("Acknowledges") == Acknowledges.EMERGENCY]
+    assert kinds
