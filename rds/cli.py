@@ -5,15 +5,13 @@ Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained
 
 from __future__ import annotations
 
-import json as json_text
-import os
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from rds.commands import modules, reports
+from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -24,8 +22,11 @@ app = typer.Typer(
 )
 machine_app = typer.Typer(no_args_is_help=True, help="Machines: list them, or serve one on a CAN bus.")
 app.add_typer(machine_app, name="machine")
+app.add_typer(modules.module_app, name="module")
+app.command()(modules.scan)
+app.command()(modules.estop)
+app.command()(reports.report)
 
-Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]
 
 
@@ -129,12 +130,13 @@ def machine_list(json: Json = False) -> None:
 @machine_app.command("serve")
 def machine_serve(
     name: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
-    interface: Annotated[str, typer.Option(help="python-can interface.")] = "rds",
+    interface: Interface = "rds",
     channel: Annotated[str | None, typer.Option(help="Channel of the bus; by default the machine's name.")] = None,
+    dialect: Annotated[str, typer.Option(help="What the modules speak: rds, oacs or cia402.")] = "rds",
 ) -> None:
     """Run the machine's axis modules as CAN nodes, until Ctrl-C."""
     with refusals():
-        from rds.bus.server import serve
+        from rds.bus.serving import serve_machine
         from rds.machines import load_machine
 
         machine = load_machine(name)
@@ -145,69 +147,7 @@ def machine_serve(
                 f"{machine.name}: {', '.join(machine.axes)} on {interface} channel {place}; Ctrl-C ends", err=True
             )
 
-        serve(machine, interface, place, ready=ready)
-
-
-@contextmanager
-def refusals() -> Iterator[None]:
-    """Errors that a user can act on go to stderr as a sentence, with exit code 2."""
-    from rds.core.errors import RdsError
-
-    try:
-        yield
-    except RdsError as error:
-        typer.echo(f"rds: {error}", err=True)
-        raise typer.Exit(2) from error
-    except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        remedy = "check that the folder can be written and that the disk has room"
-        typer.echo(f"rds: {place}{error.strerror or error}; {remedy}", err=True)
-        raise typer.Exit(2) from error
-
-
-@contextmanager
-def stdout_kept(json: bool) -> Iterator[None]:
-    """With `json`, whatever a student's code prints goes to stderr: stdout is for the one JSON object."""
-    if not json:
-        yield
-        return
-    sys.stdout.flush()
-    try:
-        saved = os.dup(1)
-        os.dup2(2, 1)  # what is not printed through Python as well
-    except OSError:
-        saved = -1
-    try:
-        with redirect_stdout(sys.stderr):
-            yield
-    finally:
-        if saved >= 0:
-            os.dup2(saved, 1)
-            os.close(saved)
-
-
-@contextmanager
-def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
-    """Makes a progress function for a named stage: a bar on a terminal, nothing in a pipe."""
-    if not sys.stderr.isatty():
-        yield lambda name: lambda done, of: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-
-        def bar(name: str) -> Callable[[int, int], None]:
-            task = bars.add_task(name, total=None)
-            return lambda done, of: bars.update(task, completed=done, total=of)
-
-        yield bar
-
-
-def print_json(value: Any) -> None:
-    """One JSON object on stdout."""
-    typer.echo(json_text.dumps(value, allow_nan=False))
+        serve_machine(machine, dialect, interface, place, ready)
 
 
 def explain(result: Any) -> None:

@@ -15,6 +15,8 @@ from typing import Annotated, Any
 import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
+Interface = Annotated[str, typer.Option(help="python-can interface.")]
+Channel = Annotated[str | None, typer.Option(help="Channel of the bus; on the built-in one by default mini-cnc.")]
 
 
 @contextmanager

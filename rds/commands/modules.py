@@ -1,0 +1,280 @@
+"""Commands for the modules on a bus: who is there, one module's motions and tuning, emergency stop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rds.commands.common import Channel, Interface, Json, print_json, refusals
+
+module_app = typer.Typer(
+    no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
+)
+
+
+@contextmanager
+def bus_of(interface: str, channel: str | None) -> Iterator[Any]:
+    """An open bus, closed at the end. The built-in bus's channel is by default the mini CNC's."""
+    from rds.bus.link import open_bus
+
+    bus = open_bus(interface, channel_of(interface, channel))
+    try:
+        yield bus
+    finally:
+        bus.shutdown()
+
+
+def channel_of(interface: str, channel: str | None) -> str | None:
+    """The channel that was asked for, else the mini CNC's on the built-in bus."""
+    return channel if channel is not None or interface != "rds" else "mini-cnc"
+
+
+def scan(interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+    """List the modules on a bus: number, type, dialect, version, state."""
+    with refusals():
+        distributed = _oacs(interface, channel)
+        known = {row["id"] for row in distributed}  # these take cyclic commands as well
+        cyclic = [row for row in _cyclic(interface, channel) if row["id"] not in known]
+        rows = [*cyclic, *distributed, *_drives(interface, channel)]
+    if json:
+        print_json({"channel": channel_of(interface, channel), "interface": interface, "modules": rows})
+        return
+    if not rows:
+        typer.echo(f"no module answers on {interface} channel {channel_of(interface, channel)}; is a machine served?")
+        return
+    from rds.console import show_table
+
+    columns = ["id", "type", "dialect", "version", "state"]
+    show_table("Modules", columns, [["–" if row[c] is None else str(row[c]) for c in columns] for row in rows])
+
+
+def _oacs(interface: str, channel: str | None) -> list[dict[str, Any]]:
+    from rds.bus.oacs.host import scan as scan_oacs
+
+    with bus_of(interface, channel) as bus:
+        return [info.as_dict() for info in scan_oacs(bus)]
+
+
+def _cyclic(interface: str, channel: str | None) -> list[dict[str, Any]]:
+    """Modules that answer the cyclic call and speak no other dialect: those of `rds machine serve`."""
+    import time
+
+    import can
+
+    from rds.bus import frames
+
+    with bus_of(interface, channel) as bus:
+        bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), 0.5)
+        answers = {frames.answer_identifier(node): node for node in frames.NODES}
+        found: dict[int, dict[str, Any]] = {}
+        deadline = time.monotonic() + 0.2
+        while (left := deadline - time.monotonic()) > 0:
+            message = bus.recv(left)
+            if message is None or message.is_extended_id or message.arbitration_id not in answers:
+                continue
+            answer = frames.decode_answer(message.arbitration_id, message.data)
+            node = answers[message.arbitration_id]
+            state = (frames.Status(answer.status).name or "none").lower().replace("|", ", ").replace("none", "idle")
+            found[node] = {"id": node, "type": "axis", "dialect": "rds", "version": 1, "state": state}
+        return [found[node] for node in sorted(found)]
+
+
+def _drives(interface: str, channel: str | None) -> list[dict[str, Any]]:
+    from rds.bus.cia402.scan import scan as scan_drives
+
+    return [
+        {
+            "id": device.node,
+            "type": device.name or ("drive" if device.is_drive else "device"),
+            "dialect": "cia402" if device.is_drive else "canopen",
+            "version": device.revision,
+            "state": device.state.name.lower().replace("_", " ") if device.state is not None else None,
+        }
+        for device in scan_drives(interface, channel_of(interface, channel))
+    ]
+
+
+def estop(interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+    """Emergency stop of every module on a bus: zero volts, whatever dialect it speaks."""
+    with refusals(), bus_of(interface, channel) as bus:
+        from rds.bus.estop import stop_everything
+
+        stopped = stop_everything(bus)
+    if json:
+        print_json({"stopped": stopped})
+    else:
+        typer.echo(f"emergency stop sent; acknowledged by {', '.join(map(str, stopped)) or 'no module'}")
+
+
+@module_app.callback()
+def module(
+    context: typer.Context,
+    number: Annotated[int, typer.Argument(metavar="ID", help="The module's number, as `rds scan` lists it.")],
+) -> None:
+    """One distributed module (oacs dialect): information, tuning, motions, recorded steps."""
+    context.obj = number
+
+
+@contextmanager
+def _module(context: typer.Context, interface: str, channel: str | None) -> Iterator[Any]:
+    from rds.bus.oacs.remote import Module
+
+    with refusals(), bus_of(interface, channel) as bus:
+        yield Module(bus, context.obj)
+
+
+@module_app.command()
+def info(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+    """Download what the module says of itself, and its tuning."""
+    with _module(context, interface, channel) as module:
+        found = module.info().as_dict()
+    if json:
+        print_json(found)
+        return
+    for name, value in found.items():
+        typer.echo(f"{name}: {value}")
+
+
+@module_app.command()
+def tune(
+    context: typer.Context,
+    controller: Annotated[str | None, typer.Option(help="PI or PID.")] = None,
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A tuning parameter.")] = None,
+    from_step: Annotated[
+        Path | None, typer.Option(help="Gains by Ziegler and Nichols from a recorded step (rds module ID step).")
+    ] = None,
+    interface: Interface = "rds",
+    channel: Channel = None,
+    json: Json = False,
+) -> None:
+    """Select PI or PID and set gains and limits; without options, show what is in force."""
+    with _module(context, interface, channel) as module:
+        parameters = dict(_pair(text) for text in set_ or ())
+        if from_step is not None:
+            parameters = _gains(from_step, controller or "PID") | parameters
+        changes = bool(parameters) or controller is not None
+        tuning = module.tune(controller, **parameters) if changes else module.tuning()
+    from dataclasses import asdict
+
+    values = asdict(tuning) | {"controller": tuning.controller.name}
+    if json:
+        print_json(values)
+        return
+    for name, value in values.items():
+        typer.echo(f"{name} = {value}")
+
+
+def _gains(path: Path, controller: str) -> dict[str, float]:
+    from rds.bus.oacs.tuning import gains_from_step
+    from rds.results import open_result
+
+    result = open_result(path)
+    return gains_from_step(result, result.axes[0], controller)._asdict()
+
+
+def _pair(text: str) -> tuple[str, float]:
+    from rds.core.errors import InputError
+
+    name, equals, value = text.partition("=")
+    try:
+        if equals and name:
+            return name, float(value)
+    except ValueError:
+        pass
+    raise InputError(f"--set {text!r} must be NAME=VALUE with a number, as in --set Kp=2.5")
+
+
+@module_app.command()
+def move(
+    context: typer.Context,
+    by: Annotated[float | None, typer.Option(help="Distance, mm or degrees, positive clockwise.")] = None,
+    to: Annotated[float | None, typer.Option(help="Point, mm or degrees.")] = None,
+    interface: Interface = "rds",
+    channel: Channel = None,
+    json: Json = False,
+) -> None:
+    """Move by a distance or to a point, and say where it stands then."""
+    _moved(context, interface, channel, json, lambda module: module.move(by=by, to=to))
+
+
+@module_app.command()
+def jog(
+    context: typer.Context,
+    direction: Annotated[int, typer.Argument(help="1 clockwise, -1 counter-clockwise.")],
+    seconds: Annotated[float, typer.Option(help="How long, s.")] = 0.5,
+    duty: Annotated[float, typer.Option(help="Share of the supply voltage, up to 1.")] = 1.0,
+    interface: Interface = "rds",
+    channel: Channel = None,
+    json: Json = False,
+) -> None:
+    """Run for a time; it also ends if this command is killed."""
+    _moved(context, interface, channel, json, lambda module: module.jog(direction, seconds, duty))
+
+
+@module_app.command()
+def home(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+    """Find the zero."""
+    _moved(context, interface, channel, json, lambda module: module.home())
+
+
+def _moved(context: typer.Context, interface: str, channel: str | None, json: bool, act: Any) -> None:
+    with _module(context, interface, channel) as module:
+        try:
+            position, unit = act(module), module.description.unit
+        except KeyboardInterrupt:
+            module.stop()
+            raise
+    if json:
+        print_json({"position": position, "unit": unit})
+    else:
+        typer.echo(f"stands at {position:g} {unit}")
+
+
+@module_app.command()
+def stop(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+    """Zero volts now."""
+    with _module(context, interface, channel) as module:
+        module.stop()
+    if json:
+        print_json({"stopped": context.obj})
+    else:
+        typer.echo("stopped")
+
+
+@module_app.command()
+def reset(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+    """Release the latch of the emergency stop."""
+    with _module(context, interface, channel) as module:
+        module.reset_emergency()
+    if json:
+        print_json({"reset": context.obj})
+    else:
+        typer.echo("emergency stop reset")
+
+
+@module_app.command()
+def step(
+    context: typer.Context,
+    by: Annotated[float, typer.Option(help="Step of the set point, mm or degrees.")] = 5.0,
+    period: Annotated[float, typer.Option(help="Time between two samples, s; a multiple of 0.01.")] = 0.01,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the record and its plot.")] = Path("step"),
+    interface: Interface = "rds",
+    channel: Channel = None,
+    json: Json = False,
+) -> None:
+    """Step the set point, record the response and plot it."""
+    with _module(context, interface, channel) as module:
+        from rds.results.files import save_all
+
+        result = module.step(by, period)
+        files = {kind: str(path) for kind, path in save_all(result, out).items()}
+        files["plot"] = str(out / "step.png")
+        result.plot().savefig(files["plot"])
+    if json:
+        print_json({"samples": len(result), "notes": result.meta.get("notes", []), "files": files})
+    else:
+        typer.echo(f"{len(result)} samples in {out}")
