@@ -75,6 +75,7 @@ class OacsModule:
         self._grid = start  # a line of the grid of slots: when the last general call came
         self._said: tuple[object, ...] = ()
         self._statuses = 0
+        self._steady: tuple[object, ...] = ()  # what is looked at in each cycle, to see whether there is more to do
         self._said = self._state()
 
     @property
@@ -200,12 +201,18 @@ class OacsModule:
         if identifier in (frames.COMMAND, frames.DRY_COMMAND) and self.mover.motion is not None:
             self.advance(at)
             self.mover.give_way()
-        return [*self._answers(self.cyclic.receive(identifier, data, at)), *self.expire(at)]
+        answers = self._answers(self.cyclic.receive(identifier, data, at))
+        # a thousand times a second, in which nothing else happens as a rule: then the answer is all
+        state = (self.cyclic.status, self.plant.emergency, self.plant.changes)
+        if state == self._steady and not self._queue and self.readings.next is None and not self.mover.finished:
+            return answers
+        self._steady = state
+        return [*answers, *self.expire(at)]
 
     def _answers(self, answers: list[bytes]) -> list[Frame]:
         """The cyclic answers, with what this dialect knows of the module's state in their status."""
         bits = EMERGENCY_BIT | frames.Status.FAULT if self.plant.emergency else 0
-        if any(switch.open for switch in self.plant.switches):
+        if self.plant.opened:
             bits |= LIMIT_BIT | frames.Status.FAULT
         identifier = self.cyclic.identifier
         if bits:

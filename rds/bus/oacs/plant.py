@@ -30,6 +30,8 @@ class Plant(MachineAxis):
         self.tool = data.kind == Kind.TOOL
         self.emergency = False
         self.trips = 0  # how often a limit switch has opened
+        self.changes = 0  # how often one has opened or closed
+        self.opened = False  # whether one is open
         self.watch: Callable[[float], None] = lambda now: None
         self.awake = False  # whether `watch` wants every step
         self._moving = False
@@ -82,7 +84,9 @@ class Plant(MachineAxis):
 
     def allowed(self, voltage: float) -> float:
         """`voltage`, or 0 V where it must not be applied."""
-        if self.emergency or any(switch.open and voltage * switch.side > 0 for switch in self.switches):
+        if self.emergency or (
+            self.opened and any(switch.open and voltage * switch.side > 0 for switch in self.switches)
+        ):
             return 0.0
         return voltage
 
@@ -126,6 +130,10 @@ class Plant(MachineAxis):
     def _look(self, at: float) -> None:
         position = self.data.start + self._carriage
         for switch in self.switches:
-            if switch.look(position, at, self.counter.recorded) and switch.open:
+            if not switch.look(position, at, self.counter.recorded):
+                continue
+            self.changes += 1
+            self.opened = any(each.open for each in self.switches)
+            if switch.open:
                 self.trips += 1
                 self.cut(at)  # a switch that opens stops the axis, whichever way it moves

@@ -15,6 +15,7 @@ import queue
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -24,10 +25,10 @@ import can
 from rds.bus.link import BUILTIN, bus_name, open_bus
 from rds.bus.oacs import messages
 from rds.bus.oacs.bench import handle
-from rds.bus.oacs.module import OacsModule
+from rds.bus.oacs.module import HEARTBEAT, OacsModule
 from rds.bus.oacs.module_data import read_modules
 from rds.bus.oacs.node import OacsNode
-from rds.bus.poller import READ, make_poller
+from rds.bus.poller import READ, SelectPoller
 from rds.bus.server import PRIORITY, default_channel
 from rds.core.errors import InputError, RdsError
 from rds.machines import Machine, load_machine
@@ -97,26 +98,32 @@ def _be_on_time(stop: threading.Event) -> None:
 
 
 def _serve(nodes: Sequence[OacsNode], stop: threading.Event, lines: queue.SimpleQueue[str]) -> None:
-    """One loop, one wait for all buses."""
-    poller, watched = make_poller(), dict[int, OacsNode]()
+    """One loop, one wait for all buses. While frames come, they come first: the rest is looked after in between."""
+    poller, watched = SelectPoller(), dict[int, OacsNode]()  # exact to the µs, as response times are; epoll to the ms
+    sleep, look_at = 0.0, 0.0
     try:
         while not stop.is_set():
+            ready = poller.poll(sleep)
+            for descriptor, _ in ready:
+                watched[descriptor].step()
+            now = time.monotonic()
+            if ready and now < look_at:
+                sleep = 0.0
+                continue
+            look_at = now + HEARTBEAT
+            for node in nodes:
+                if node.bus is None or node.patience() == 0.0 or _descriptor(node.bus) < 0:
+                    node.step()
+            _do_lines(nodes, lines)
             if {_descriptor(node.bus) for node in nodes} - {-1} != set(watched):
                 poller.close()
-                poller = make_poller()
+                poller = SelectPoller()
                 watched = {d: node for node in nodes if (d := _descriptor(node.bus)) >= 0}
                 for descriptor in watched:
                     poller.register(descriptor, READ)
             longest = _LONGEST_SLEEP if len(watched) == len(nodes) else _NO_DESCRIPTOR_SLEEP
-            sleep = min((p for node in nodes if (p := node.patience()) is not None), default=longest)
-            ready = {descriptor for descriptor, _ in poller.poll(min(sleep, longest))}
-            for descriptor, node in watched.items():
-                if descriptor in ready or node.patience() == 0.0:
-                    node.step()
-            for node in nodes:
-                if node not in watched.values():
-                    node.step()
-            _do_lines(nodes, lines)
+            patience = min((p for node in nodes if (p := node.patience()) is not None), default=longest)
+            sleep = min(patience, longest)
     finally:
         poller.close()
 
