@@ -1,0 +1,126 @@
+"""Lines of text logs on their way to python-can's readers, watched: a damaged line is named, never skipped in silence.
+
+python-can's readers pass over what they don't know, and take half of a byte for a whole one. So each line is looked at
+before it is handed out, and once more if no frame came of it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import TextIO
+
+from rds.core.errors import InputError
+
+_CANDUMP = re.compile(
+    r"\(\d+\.\d+\)\s+\S+\s+([0-9A-F]{3}|[0-9A-F]{8})#"
+    r"(R\d*|#[0-9A-F]([0-9A-F]{2}){0,64}|([0-9A-F]{2}){0,8})(\s+[RT])?",
+    re.IGNORECASE,
+)
+# time, channel, identifier and, if it was not cut off there, the direction: an event has a word for an identifier
+_ASC_FRAME = re.compile(r"\d+\.\d+\s+(CANFD\s+)?\d+(\s+(Rx|Tx))?(\s+[0-9A-F]+x?(\s.*)?)?", re.IGNORECASE)
+_ASC_TIME_ONLY = re.compile(r"\d+(\.\d*)?")
+_TRC_FRAME = {"DT", "FD", "FB", "FE", "BI", "RR", "RX", "TX"}
+_CSV_HEADING = "timestamp,arbitration_id,extended,remote,error,dlc,data"
+
+
+class Lines:
+    """The lines of a text log; what python-can's readers need of a file. `frames` is for whoever gets the frames.
+
+    `number` is that of the last line, from 1. Raises InputError, with the file and the line, at a damaged one.
+    """
+
+    def __init__(self, file: TextIO, path: str, suffix: str):
+        self._file = file
+        self._path = path
+        self._check, self._is_frame = _RULES[suffix]
+        self._line = ""
+        self.number = 0
+        self.frames = 0  # that came of the last line
+        self.skipped = 0  # lines of other things than frames, comments and headings
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        self._look_back()
+        while True:
+            self._line = next(self._file)
+            self.number += 1
+            self.frames = 0
+            if self._line.strip():
+                break
+        problem = self._check(self._line.strip(), self.number)
+        if problem:
+            raise self.fault(problem)
+        return self._line
+
+    def _look_back(self) -> None:
+        if self.number and not self.frames:
+            line = self._line.strip()
+            is_frame = self._is_frame(line)
+            if is_frame:
+                raise self.fault(f"it is cut off or damaged: {_short(line)}")
+            self.skipped += is_frame is False
+            self.frames = 1  # it is looked at once
+
+    def fault(self, problem: str) -> InputError:
+        """The error to raise for the last line."""
+        return InputError(f"{problem}; correct the line, or take it out", f"{self._path}:{self.number}")
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def _check_candump(line: str, number: int) -> str | None:
+    if _CANDUMP.fullmatch(line):
+        return None
+    return f"{_short(line)} is no line of `candump -L`, as in '(1700000000.000000) can0 123#11223344'"
+
+
+def _check_csv(line: str, number: int) -> str | None:
+    if number == 1 and line != _CSV_HEADING:
+        return f"the first line must be {_CSV_HEADING!r}, not {_short(line)}"
+    return None
+
+
+def _anything(line: str, number: int) -> str | None:
+    return None
+
+
+# Whether a line of which no frame came should have been one: False counts as skipped, None is a comment or the like.
+
+
+def _asc_frame(line: str) -> bool | None:
+    if _ASC_FRAME.fullmatch(line) or _ASC_TIME_ONLY.fullmatch(line):
+        return True
+    return False if re.match(r"\d+\.\d+\s", line) and "Start of measurement" not in line else None
+
+
+def _trc_frame(line: str) -> bool | None:
+    if line.startswith(";"):
+        return None
+    words = line.upper().split()
+    return len(words) < 4 or not _TRC_FRAME.isdisjoint(words)
+
+
+def _always(line: str) -> bool | None:
+    return True
+
+
+def _csv_frame(line: str) -> bool | None:
+    return None if line == _CSV_HEADING else True
+
+
+_RULES: dict[str, tuple[Callable[[str, int], str | None], Callable[[str], bool | None]]] = {
+    ".log": (_check_candump, _always),
+    ".csv": (_check_csv, _csv_frame),
+    ".asc": (_anything, _asc_frame),
+    ".trc": (_anything, _trc_frame),
+}
+TEXT = frozenset(_RULES)
+
+
+def _short(line: str) -> str:
+    return repr(line if len(line) <= 60 else line[:57] + "...")

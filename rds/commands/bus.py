@@ -1,0 +1,284 @@
+"""`rds bus monitor | record | replay | serve-socketcand`: what goes over a bus, seen, kept and offered to others."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rds.commands.common import Json, print_json, refusals, stdout_kept
+
+app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
+
+Interface = Annotated[str, typer.Option(help="python-can interface.")]
+Channel = Annotated[str, typer.Option(help="Channel of the bus.")]
+Seconds = Annotated[float | None, typer.Option(help="End after so many seconds instead of at Ctrl-C.", min=0.0)]
+Bitrate = Annotated[int, typer.Option(help="Bit rate of the bus, bit/s.", min=1)]
+Identifiers = Annotated[
+    list[str] | None,
+    typer.Option("--id", help="Only this identifier or range, as in 0x020-0x07F; may be given more than once."),
+]
+WithCommands = Annotated[
+    bool, typer.Option("--with-commands", help="Let frames through that can move a machine on this bus.")
+]
+BUILTIN, DEMO = "rds", "mini-cnc"
+
+
+@app.command()
+def monitor(
+    interface: Interface = BUILTIN,
+    channel: Channel = DEMO,
+    seconds: Seconds = None,
+    bitrate: Bitrate = 1_000_000,
+    data_bitrate: Annotated[int | None, typer.Option(help="Of the fast part of CAN FD frames, bit/s.", min=1)] = None,
+    dbc: Annotated[list[Path] | None, typer.Option(help="DBC file to decode frames by; may be given again.")] = None,
+    json: Json = False,
+) -> None:
+    """Show identifiers, rates, periods, decoded signals, load and errors.
+
+    Live on a terminal; in a pipe, and with --json, once at the end.
+    """
+    with refusals(), stdout_kept(json):
+        from rds.bus.decode import decoder
+        from rds.bus.monitor import monitor as watch
+        from rds.bus.monitor import to_json
+        from rds.bus.statistics import Statistics
+
+        statistics = Statistics(bitrate, data_bitrate)
+        decode = decoder(dbc or ())
+        with _quiet_log(live := _is_live(json)), _live(decode, live) as refresh, _until_ctrl_c() as stop:
+            view = watch(
+                _opener(interface, channel),
+                statistics,
+                name=_name(interface, channel),
+                seconds=seconds,
+                stop=stop,
+                refresh=refresh,
+            )
+    if json:
+        print_json(to_json(view, decode))
+    else:
+        from rds.bus.monitor_view import picture
+        from rds.console import console
+
+        console().print(picture(view, decode))
+    raise typer.Exit(0 if view.healthy else 1)
+
+
+@app.command()
+def record(
+    file: Annotated[
+        Path, typer.Argument(help="The log: .asc .blf .log (candump) .trc .csv .db .mf4, or text with .gz.")
+    ],
+    interface: Interface = BUILTIN,
+    channel: Channel = DEMO,
+    seconds: Seconds = None,
+    count: Annotated[int | None, typer.Option(help="End after so many frames.", min=1)] = None,
+    identifiers: Identifiers = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    json: Json = False,
+) -> None:
+    """Record what goes over a bus, until Ctrl-C. Exit code 1 if the log is not complete; stderr says why."""
+    with refusals(), stdout_kept(json):
+        from rds.bus.record import record as record_bus
+        from rds.bus.selection import Selection
+
+        selection = Selection(identifiers or ())
+        with _quiet_log(False), _until_ctrl_c() as stop, _counter("frames recorded") as show:
+            result = record_bus(
+                file,
+                _opener(interface, channel),
+                name=_name(interface, channel),
+                seconds=seconds,
+                count=count,
+                selection=selection,
+                force=force,
+                stop=stop,
+                progress=lambda recording: show(recording.frames),
+                ready=lambda: _say(f"recording {_name(interface, channel)} to {file}; Ctrl-C ends"),
+            )
+    if json:
+        print_json({**vars(result), "complete": result.complete})
+    else:
+        typer.echo(f"{result.frames} frames in {result.seconds:.1f} s: {result.path}")
+    for kind, number in result.unkept.items():
+        _say(f"{number} {kind} are not in the log: {file.suffix} can't hold them; record to .blf or .asc")
+    if result.lost:
+        _say(f"{result.lost} frames are not in the log: the disk, or this computer, was too slow")
+    raise typer.Exit(0 if result.complete else 1)
+
+
+@app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(help="A log of any of python-can's formats.")],
+    interface: Interface = BUILTIN,
+    channel: Channel = DEMO,
+    speed: Annotated[
+        float, typer.Option(help="2: twice as fast as recorded; inf: as fast as the bus takes them.")
+    ] = 1.0,
+    begin: Annotated[float, typer.Option("--from", help="Begin so many seconds after the log's first frame.")] = 0.0,
+    end: Annotated[float | None, typer.Option("--to", help="End so many seconds after the log's first frame.")] = None,
+    identifiers: Identifiers = None,
+    loop: Annotated[int, typer.Option(help="Play it so many times.")] = 1,
+    with_commands: WithCommands = False,
+    json: Json = False,
+) -> None:
+    """Send the frames of a log onto a bus, at the times at which they were recorded."""
+    with refusals(), stdout_kept(json):
+        from rds.bus.logs import LogFile
+        from rds.bus.replay import replay as replay_log
+        from rds.bus.selection import Selection
+
+        log = LogFile(file)
+        selection = Selection(identifiers or ())
+        with (
+            _command_of(interface, channel, with_commands),
+            _opener(interface, channel)() as bus,
+            _quiet_log(False),
+            _until_ctrl_c() as stop,
+            _counter("frames sent") as show,
+        ):
+            result = replay_log(
+                log,
+                bus,
+                speed=speed,
+                begin=begin,
+                end=end,
+                selection=selection,
+                loops=loop,
+                with_commands=with_commands,
+                stop=stop,
+                progress=lambda so_far: show(so_far.sent),
+            )
+    if json:
+        print_json({**vars(result), "path": str(file), "skipped_lines": log.skipped})
+    else:
+        typer.echo(f"{result.sent} frames in {result.seconds:.1f} s, at most {result.latest * 1e3:.1f} ms late")
+    for reason, number in result.skipped.items():
+        _say(f"{number} frames were left out: {reason}")
+    if log.skipped:
+        _say(f"{log.skipped} lines of the log describe no frame and were passed over")
+    raise typer.Exit(0)
+
+
+@app.command("serve-socketcand")
+def serve_socketcand(
+    interface: Interface = BUILTIN,
+    channel: Channel = DEMO,
+    host: Annotated[str, typer.Option(help="Loopback address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="TCP port; 0 takes a free one.")] = 29536,
+    with_commands: WithCommands = False,
+) -> None:
+    """Offer a bus to other programs of this computer by socketcand's protocol, until Ctrl-C."""
+    with refusals():
+        from rds.bus.socketcand import Server
+
+        with (
+            _quiet_log(False),
+            _until_ctrl_c() as stop,
+            _command_of(interface, channel, with_commands),
+            Server(_opener(interface, channel), channel, host=host, port=port, with_commands=with_commands) as server,
+        ):
+            _say(f"{_name(interface, channel)} on {server.address[0]} port {server.address[1]}; Ctrl-C ends")
+            while server.alive() and not stop.wait(0.2):
+                pass
+            alive = server.alive()
+    raise typer.Exit(0 if alive else 1)
+
+
+def _opener(interface: str, channel: str) -> Any:
+    from rds.bus.link import open_bus
+
+    return partial(open_bus, interface, channel)
+
+
+def _name(interface: str, channel: str) -> str:
+    from rds.bus.link import bus_name
+
+    return bus_name(interface, channel)
+
+
+def _command_of(interface: str, channel: str, wanted: bool) -> Any:
+    """Holds the command of a channel of the built-in bus, so that no run commands the machine at the same time."""
+    if not wanted or interface != BUILTIN:
+        return nullcontext()
+    from rds.bus.command import Command
+
+    return Command(channel)
+
+
+@contextmanager
+def _until_ctrl_c() -> Iterator[threading.Event]:
+    """An event that Ctrl-C and a polite kill set."""
+    stop = threading.Event()
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _quiet_log(silent: bool) -> Iterator[None]:
+    """The package's warnings as sentences on stderr; none while a live view has the screen, which shows them itself."""
+    import logging
+
+    logger = logging.getLogger("rds")
+    handler: logging.Handler = logging.NullHandler() if silent else logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("rds: %(message)s"))
+    logger.addHandler(handler)
+    propagate, logger.propagate = logger.propagate, False
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = propagate
+
+
+def _is_live(json: bool) -> bool:
+    return not json and sys.stdout.isatty()
+
+
+@contextmanager
+def _live(decode: Any, live: bool) -> Iterator[Any]:
+    """What shows a monitor's views: a table that is redrawn, or nothing."""
+    if not live:
+        yield None
+        return
+    from rich.live import Live
+
+    from rds.bus.monitor_view import picture
+    from rds.console import console
+
+    screen = console()
+    with Live(console=screen, auto_refresh=False, transient=True) as display:
+        yield lambda view: display.update(picture(view, decode, screen.height), refresh=True)
+
+
+@contextmanager
+def _counter(what: str) -> Iterator[Any]:
+    """What shows a growing number: a line on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda number: None
+        return
+    from rich.console import Console
+    from rich.status import Status
+
+    with Status(f"0 {what}", console=Console(stderr=True)) as status:
+        yield lambda number: status.update(f"{number} {what}")
+
+
+def _say(sentence: str) -> None:
+    typer.echo(f"rds: {sentence}", err=True)
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,278 @@
+"""Logs: what is written comes back, what a format can't hold is counted, and every damage is named."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import can
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bus_tools.made_frames import START, frame, kept, of_every_kind
+from rds.bus.logs import LogFile, LogWriter
+from rds.core.errors import InputError
+
+WITHOUT_FD = ("trc", "csv", "db", "trc.gz", "csv.gz")
+FORMATS = ("asc", "blf", "log", *WITHOUT_FD, "asc.gz", "log.gz")
+RELATIVE = ("asc", "asc.gz")  # times begin at 0
+
+
+def write(path: Path, messages: list[can.Message]) -> LogWriter:
+    writer = LogWriter(path)
+    for message in messages:
+        writer.write(message)
+    writer.close()
+    return writer
+
+
+def can_hold(ending: str, message: can.Message) -> bool:
+    if ending.startswith("trc"):
+        return not (message.is_fd or message.is_remote_frame or message.is_error_frame)
+    return not (ending in WITHOUT_FD and message.is_fd)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_what_is_written_comes_back(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{ending}"
+    messages = of_every_kind()
+    writer = write(path, of_every_kind())
+    expected = [message for message in messages if can_hold(ending, message)]
+    found = list(LogFile(path))
+    assert [kept(message) for message in found] == [kept(message) for message in expected]
+    origin = START if ending in RELATIVE else 0.0
+    for a, b in zip(found, expected, strict=True):
+        assert a.timestamp == pytest.approx(b.timestamp - origin, abs=1.01e-6)
+    assert sum(writer.unkept.values()) == len(messages) - len(expected)
+    assert writer.frames == len(expected)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_log_that_was_never_closed_is_read_to_the_last_flush(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{ending}"
+    program = (
+        "import os, sys; from pathlib import Path; sys.path.insert(0, sys.argv[2])\n"
+        "from bus_tools.made_frames import frame; from rds.bus.logs import LogWriter\n"
+        "log = LogWriter(Path(sys.argv[1]))\n"
+        "for k in range(100):\n"
+        "    log.write(frame(0x100, bytes([k]), k / 1000))\n"
+        "    if k % 40 == 39: log.flush()\n"
+        "os._exit(9)"
+    )
+    here = str(Path(__file__).resolve().parents[1])
+    assert subprocess.run([sys.executable, "-c", program, str(path), here], check=False).returncode == 9
+    if ending.endswith(".gz"):
+        text = subprocess.run(["zcat", str(path)], capture_output=True, check=False).stdout
+        path = tmp_path / f"unpacked.{ending.removesuffix('.gz')}"
+        path.write_bytes(text)
+    assert [message.data[0] for message in LogFile(path)] == list(range(80))
+
+
+def test_flushing_often_changes_nothing(tmp_path: Path) -> None:
+    messages = of_every_kind()
+    for origin in (0.0, -START + 5.0):  # since the epoch, and since a device was switched on
+        path = tmp_path / f"log{origin:.0f}.blf"
+        log = LogWriter(path)
+        for message in of_every_kind():
+            message.timestamp += origin
+            log.write(message)
+            log.flush()
+        log.close()
+        found = list(LogFile(path))
+        assert [kept(message) for message in found] == [kept(message) for message in messages]
+        distances = [message.timestamp - found[0].timestamp for message in found]
+        assert distances == pytest.approx([message.timestamp - START for message in messages], abs=1.01e-6)
+
+
+def test_a_clock_that_was_set_back_stands_still(tmp_path: Path) -> None:
+    write(tmp_path / "a.asc", [frame(1, at=1.0), frame(2, at=0.5), frame(3, at=2.0)])
+    assert [message.timestamp for message in LogFile(tmp_path / "a.asc")] == [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_an_existing_file_is_overwritten_only_when_told_so(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"log.{ending}"
+    write(path, [frame(1), frame(2)])
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="--force"):
+        LogWriter(path)
+    assert path.read_bytes() == before
+    log = LogWriter(path, force=True)
+    log.write(frame(3))
+    log.close()
+    assert [message.arbitration_id for message in LogFile(path)] == [3]
+
+
+@pytest.mark.parametrize("name", ["a.txt", "a", "a.blf.gz", "a.gz", "a.db.gz"])
+def test_an_unknown_format_is_refused(name: str, tmp_path: Path) -> None:
+    for attempt in (LogWriter, LogFile):
+        with pytest.raises(InputError, match=r"end the name in \.asc, \.blf"):
+            attempt(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_mf4_says_what_to_install_or_works(tmp_path: Path) -> None:
+    try:
+        import asammdf  # noqa: F401
+    except ImportError:
+        with pytest.raises(InputError, match="pip install asammdf"):
+            LogWriter(tmp_path / "a.mf4")
+        assert not list(tmp_path.iterdir())
+    else:
+        write(tmp_path / "a.mf4", of_every_kind())
+        expected = sorted(kept(message) for message in of_every_kind() if not message.is_error_frame)
+        assert (
+            sorted(kept(message) for message in LogFile(tmp_path / "a.mf4") if not message.is_error_frame) == expected
+        )
+
+
+def test_there_is_no_such_log(tmp_path: Path) -> None:
+    for ending in FORMATS:
+        with pytest.raises(InputError, match="there is no such log"):
+            LogFile(tmp_path / f"none.{ending}")
+    assert not list(tmp_path.iterdir()), "SQLite makes what it doesn't find"
+
+
+ASC_HEAD = "date Thu Jan 1 00:00:00.000 2026\nbase hex  timestamps absolute\ninternal events logged\n"
+TRC_HEAD = ";$FILEVERSION=2.1\n;$STARTTIME=46000.5\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n"
+CSV_HEAD = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
+
+
+@pytest.mark.parametrize(
+    "name, text, line",
+    [
+        ("a.log", "(1.5) can0 123#11\n(2.5) can0 123#1\n", 2),
+        ("a.log", "(1.5) can0 123#11\n(2.5) can0 12", 2),
+        ("a.log", "(1.5) can0 123#112233445566778899\n", 1),
+        ("a.log", "(1.5) can0 FFF#11\n", 1),
+        ("a.log", "  can0  123   [2]  11 22\n", 1),
+        ("a.log", "(1.5) can0 12345678#1G\n", 1),
+        ("a.log", "\x89PNG\x00\xff", 1),
+        ("a.csv", CSV_HEAD + "1.5,0x123,0,0,0,1,EQ==\n1.6,0x123,0,0,0\n", 3),
+        ("a.csv", CSV_HEAD + "1.5,0x123,0,0,0,5,EQ==\n", 2),
+        ("a.csv", CSV_HEAD + "nan,0x123,0,0,0,1,EQ==\n", 2),
+        ("a.csv", "1.5,0x123,0,0,0,1,EQ==\n", 1),
+        ("a.asc", ASC_HEAD + "0.5 1  123  Rx   d 1 11\n0.6 1  123  Rx   d 2 11\n", 5),
+        ("a.asc", ASC_HEAD + "0.5 1  123  Rx   d\n", 4),
+        ("a.asc", ASC_HEAD + "0.5 1  123  R", 4),
+        ("a.asc", ASC_HEAD + "0.5 1  123", 4),
+        ("a.asc", ASC_HEAD + "0.5 1", 4),
+        ("a.asc", ASC_HEAD + "0.", 4),
+        ("a.asc", ASC_HEAD + "0.5 1  XYZ  Rx   d 1 11\n", 4),
+        ("a.trc", TRC_HEAD + "1 0.0 DT 1 0123 Rx - 2 11 22\n2 1.0 DT 1 0123 Rx - 2 11\n", 5),
+        ("a.trc", TRC_HEAD + "1 0.0 DT 1 0123 Rx - 2 11 2", 4),
+        ("a.trc", TRC_HEAD + "1 0.0 DT 1 0123 R", 4),
+        ("a.trc", TRC_HEAD + "1 0.0\n", 4),
+    ],
+)
+def test_a_damaged_line_is_named(name: str, text: str, line: int, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(InputError) as caught:
+        list(LogFile(path))
+    assert str(caught.value).startswith(f"{path}:{line}: ")
+    with gzip.open(f"{path}.gz", "wt", encoding="latin-1") as file:
+        file.write(text)
+    with pytest.raises(InputError) as caught:
+        list(LogFile(Path(f"{path}.gz")))
+    assert str(caught.value).startswith(f"{path}.gz:{line}: ")
+
+
+def test_events_and_comments_are_no_damage(tmp_path: Path) -> None:
+    path = tmp_path / "a.asc"
+    path.write_text(
+        ASC_HEAD + "// comment\n0.0 Start of measurement\n0.1 1  Statistic: D 1 R 0 XD 0 XR 0 E 0 O 0 B 0.1%\n"
+        "0.2 CAN 1 Status:chip status error active\n0.3 1 123 Rx d 1 11\n\nEnd TriggerBlock\n"
+    )
+    log = LogFile(path)
+    assert len(list(log)) == 1
+    assert log.skipped == 2
+
+
+def test_a_cut_or_damaged_blf_is_refused_with_its_offset(tmp_path: Path) -> None:
+    path = tmp_path / "a.blf"
+    write(path, [frame(k % 2048, os.urandom(8), k / 1000) for k in range(8000)])
+    whole = path.read_bytes()
+    assert len(list(LogFile(path))) == 8000
+    for cut in (len(whole) - 100, len(whole) // 2, 150, 20, 3, 0):
+        path.write_bytes(whole[:cut])
+        with pytest.raises(InputError, match=r"byte \d+"):
+            list(LogFile(path))
+    middle = len(whole) // 2
+    path.write_bytes(whole[:middle] + bytes([whole[middle] ^ 0xFF]) + whole[middle + 1 :])
+    with pytest.raises(InputError, match=r"byte \d+: the container is damaged"):
+        list(LogFile(path))
+
+
+def test_a_cut_gzip_file_is_refused_behind_its_last_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.log.gz"
+    write(path, [frame(1, os.urandom(8), k / 1000) for k in range(5000)])
+    path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.raises(InputError, match=r"a\.log\.gz:\d\d\d+: "):
+        list(LogFile(path))
+    path.write_bytes(b"no gzip")
+    with pytest.raises(InputError, match=r"can't be read"):
+        list(LogFile(path))
+
+
+def test_what_is_no_database_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.db"
+    path.write_bytes(b"x" * 4096)
+    with pytest.raises(InputError, match="not a database"):
+        list(LogFile(path))
+    path.unlink()
+    sqlite3.connect(path).close()
+    path.touch()
+    with pytest.raises(InputError, match="no such table"):
+        list(LogFile(path))
+
+
+@given(data=st.binary(max_size=400), ending=st.sampled_from(FORMATS))
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_rubbish_is_refused_or_read_but_never_anything_else(data: bytes, ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rubbish.{ending}"
+    path.write_bytes(data)
+    try:
+        list(LogFile(path))
+    except InputError as error:
+        assert error.where is not None and error.where.startswith(str(path))
+
+
+@given(cut=st.integers(0, 10_000), ending=st.sampled_from([*FORMATS[:6]]), flip=st.integers(0, 255))
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_log_with_one_wrong_byte_is_refused_or_read(cut: int, ending: str, flip: int, tmp_path: Path) -> None:
+    path = tmp_path / f"wrong.{ending}"
+    path.unlink(missing_ok=True)
+    write(path, of_every_kind())
+    whole = bytearray(path.read_bytes())
+    whole[cut % len(whole)] ^= flip
+    path.write_bytes(whole)
+    try:
+        list(LogFile(path))
+    except InputError as error:
+        assert error.where is not None and error.where.startswith(str(path))
+
+
+def test_a_full_disk_is_said(tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full on this system")
+    path = tmp_path / "a.log"
+    path.symlink_to("/dev/full")
+    log = LogWriter(path, force=True)
+    log.write(frame(1))
+    with pytest.raises(OSError, match="No space left"):
+        log.flush()
+
+
+@pytest.mark.parametrize("ending", ["asc", "blf", "log", "trc", "csv", "db"])
+def test_python_can_converts_what_was_written_here(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a.{ending}"
+    write(path, [frame(0x21, bytes([k]), k / 1000) for k in range(50)])
+    command = [sys.executable, "-m", "can.logconvert", str(path), str(tmp_path / "b.csv")]
+    subprocess.run(command, check=True, capture_output=True)
+    assert [message.data[0] for message in LogFile(tmp_path / "b.csv")] == list(range(50))

@@ -1,0 +1,307 @@
+"""Recording from and replaying onto the built-in bus."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+from bus.conftest import wait_for
+
+from bus_tools.made_frames import frame, kept, of_every_kind
+from rds.bus.link import open_bus as open_any
+from rds.bus.logs import LogFile
+from rds.bus.record import record
+from rds.bus.replay import replay
+from rds.bus.selection import Selection
+from rds.core.errors import InputError, MachineError
+
+Opener = Callable[..., can.BusABC]
+TEST_BUS = partial(open_any, "rds", "test")
+
+
+def spaced(count: int, gap: float = 0.01) -> list[can.Message]:
+    return [frame(0x500 + 0x80 + k % 16, bytes([k]), k * gap) for k in range(count)]
+
+
+def drain(bus: can.BusABC, quiet: float = 0.2) -> list[can.Message]:
+    return list(iter(lambda: bus.recv(quiet), None))
+
+
+class Recorder:
+    """`record` in a thread."""
+
+    def __init__(self, path: Path, **options: Any):
+        self.stop, ready = threading.Event(), threading.Event()
+        self.result: Any = None
+        self.error: BaseException | None = None
+
+        def run() -> None:
+            try:
+                self.result = record(path, TEST_BUS, stop=self.stop, ready=ready.set, **options)
+            except BaseException as error:
+                self.error = error
+
+        self.thread = threading.Thread(target=run)
+        self.thread.start()
+        assert ready.wait(5.0)
+
+    def end(self) -> Any:
+        self.stop.set()
+        self.thread.join(10.0)
+        assert self.error is None
+        return self.result
+
+
+@pytest.fixture
+def pair(open_bus: Opener) -> Iterator[tuple[can.BusABC, can.BusABC]]:
+    yield open_bus(), open_bus()
+
+
+# --- recording
+
+
+@pytest.mark.parametrize("ending", ["asc", "blf", "log"])
+def test_everything_on_the_bus_is_in_the_file(ending: str, tmp_path: Path, open_bus: Opener) -> None:
+    recorder = Recorder(tmp_path / f"a.{ending}")
+    bus = open_bus()
+    sent = [message for message in of_every_kind() if not message.is_error_frame]
+    for message in sent:
+        bus.send(message)
+    time.sleep(0.1)
+    result = recorder.end()
+    assert [kept(message) for message in LogFile(tmp_path / f"a.{ending}")] == [kept(message) for message in sent]
+    assert result.complete and result.frames == len(sent)
+
+
+def test_a_burst_as_fast_as_the_bus_carries_it_is_kept(tmp_path: Path, open_bus: Opener) -> None:
+    recorder = Recorder(tmp_path / "a.log", count=20_000)
+    bus = open_bus()
+    for k in range(20_000):
+        bus.send(can.Message(arbitration_id=1, is_extended_id=False, data=k.to_bytes(4, "big")))
+    recorder.thread.join(30.0)
+    assert recorder.result.complete
+    numbers = [int.from_bytes(message.data, "big") for message in LogFile(tmp_path / "a.log")]
+    assert numbers == list(range(20_000))
+
+
+def test_only_what_was_selected_and_as_many_as_asked(tmp_path: Path, open_bus: Opener) -> None:
+    recorder = Recorder(tmp_path / "a.log", selection=Selection(["0x582-0x583"]), count=3)
+    bus = open_bus()
+    for message in spaced(64):
+        bus.send(message)
+    recorder.thread.join(10.0)
+    assert recorder.result.frames == 3
+    assert [message.arbitration_id for message in LogFile(tmp_path / "a.log")] == [0x582, 0x583, 0x582]
+
+
+def test_what_a_format_cannot_hold_is_counted(tmp_path: Path, open_bus: Opener) -> None:
+    recorder = Recorder(tmp_path / "a.trc")
+    bus = open_bus()
+    for message in of_every_kind():
+        if not message.is_error_frame:
+            bus.send(message)
+    time.sleep(0.1)
+    result = recorder.end()
+    assert result.unkept == {"remote frames": 3, "CAN FD frames": 4}
+    assert not result.complete and result.frames == 7
+
+
+def test_a_killed_hub_is_in_the_result_and_recording_goes_on(
+    tmp_path: Path, hub: Callable[..., Any], open_bus: Opener
+) -> None:
+    process = hub("test")
+    recorder = Recorder(tmp_path / "a.log")
+    first = open_bus()
+    first.send(frame(1))
+    time.sleep(0.1)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    bus = open_bus()
+
+    def second_arrives() -> bool:
+        bus.send(frame(2))
+        return b" 002#" in (tmp_path / "a.log").read_bytes()
+
+    wait_for(second_arrives, 10.0)
+    result = recorder.end()
+    assert len(result.faults) == 1 and "ended without a word" in result.faults[0]
+    assert not result.complete
+    assert {message.arbitration_id for message in LogFile(tmp_path / "a.log")} == {1, 2}
+
+
+def test_no_bus_no_file(tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match="can't be opened"):
+        record(tmp_path / "a.log", partial(open_any, "socketcan", "no-such-bus-0"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_killed_recorder_leaves_what_it_took(tmp_path: Path, open_bus: Opener) -> None:
+    path = tmp_path / "a.blf"
+    command = [sys.executable, "-m", "rds.commands.bus", "record", str(path), "--channel", "test"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert "recording" in process.stderr.readline()
+    bus = open_bus()
+    for message in spaced(100):
+        bus.send(message)
+    time.sleep(1.2)
+    process.kill()
+    process.wait()
+    process.stderr.close()
+    assert len(list(LogFile(path))) == 100
+
+
+# --- replaying
+
+
+@pytest.mark.parametrize("speed", [1.0, 4.0])
+def test_frames_come_at_their_times(speed: float, pair: tuple[can.BusABC, can.BusABC]) -> None:
+    sender, witness = pair
+    log = spaced(30)
+    result = replay(log, sender, speed=speed)
+    found = drain(witness)
+    assert [kept(message) for message in found] == [kept(message) for message in log]
+    length = found[-1].timestamp - found[0].timestamp
+    assert length == pytest.approx(0.29 / speed, abs=0.05)
+    assert result.sent == 30 and result.loops == 1
+
+
+def test_lateness_does_not_add_up() -> None:
+    class Slow:
+        """A bus that takes 8 ms for each frame, of which there is one in 10 ms."""
+
+        def __init__(self) -> None:
+            self.times: list[float] = []
+
+        def send(self, message: can.Message, timeout: float) -> None:
+            self.times.append(time.monotonic())
+            time.sleep(0.008)
+
+    bus = Slow()
+    replay(spaced(50), bus)  # type: ignore[arg-type]
+    assert bus.times[-1] - bus.times[0] == pytest.approx(0.49, abs=0.03)
+
+
+def test_as_fast_as_possible(pair: tuple[can.BusABC, can.BusABC]) -> None:
+    sender, witness = pair
+    began = time.monotonic()
+    assert replay(spaced(200, gap=1.0), sender, speed=float("inf")).sent == 200
+    assert time.monotonic() - began < 2.0
+    assert len(drain(witness)) == 200
+
+
+def test_a_part_of_a_log_by_time_and_identifier(pair: tuple[can.BusABC, can.BusABC]) -> None:
+    sender, witness = pair
+    selection = Selection(["0x580-0x584", "0x586"])
+    result = replay(spaced(32), sender, begin=0.02, end=0.20, selection=selection, speed=10)
+    wanted = [k for k in range(2, 21) if k % 16 <= 4 or k % 16 == 6]
+    assert [message.data[0] for message in drain(witness)] == wanted
+    assert result.skipped == {"not selected": 32 - len(wanted)}
+
+
+def test_loops_follow_each_other_evenly(pair: tuple[can.BusABC, can.BusABC]) -> None:
+    sender, witness = pair
+    assert replay(spaced(5, gap=0.02), sender, loops=3).loops == 3
+    found = drain(witness)
+    assert [message.data[0] for message in found] == [0, 1, 2, 3, 4] * 3
+    gaps = [b.timestamp - a.timestamp for a, b in itertools.pairwise(found)]
+    assert gaps == pytest.approx([0.02] * 14, abs=0.015)
+
+
+def test_error_frames_are_left_out_and_counted(pair: tuple[can.BusABC, can.BusABC]) -> None:
+    sender, witness = pair
+    result = replay(of_every_kind(), sender, loops=2)
+    assert result.skipped == {"error frames": 1}
+    found = [message for message in drain(witness) if message.arbitration_id != 0x013]  # modules were called
+    assert result.sent == len(found) == 2 * (len(of_every_kind()) - 1)
+
+
+def test_a_replay_that_waits_can_be_stopped(open_bus: Opener) -> None:
+    stop = threading.Event()
+    threading.Timer(0.2, stop.set).start()
+    began = time.monotonic()
+    result = replay([frame(0x700), frame(0x701, at=100.0)], open_bus(), stop=stop)
+    assert result.stopped and result.sent == 1
+    assert time.monotonic() - began < 1.0
+
+
+@pytest.mark.parametrize(
+    "options, word",
+    [
+        ({"speed": 0.0}, "speed"),
+        ({"speed": float("nan")}, "speed"),
+        ({"loops": 0}, "loop"),
+        ({"begin": 5.0, "end": 1.0}, "from 5.0 s"),
+        ({"begin": -1.0}, "from"),
+        ({"begin": 50.0}, "no frame to send"),
+        ({"selection": Selection(["0x1"])}, "no frame to send"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(options: dict[str, Any], word: str, open_bus: Opener) -> None:
+    with pytest.raises(InputError, match=word):
+        replay(spaced(5), open_bus(), **options)
+
+
+def test_a_damaged_log_is_refused_before_anything_is_sent(tmp_path: Path, pair: tuple[can.BusABC, can.BusABC]) -> None:
+    path = tmp_path / "a.log"
+    path.write_text("(1.0) can0 700#11\n(1.1) can0 700#1\n")
+    with pytest.raises(InputError, match=r"a\.log:2"):
+        replay(LogFile(path), pair[0])
+    assert not drain(pair[1])
+
+
+@pytest.mark.parametrize("text", ["x", "0x", "0x20000000", "-1", "5-3", "1-", "0x10-"])
+def test_what_is_no_identifier_is_refused(text: str) -> None:
+    with pytest.raises(InputError):
+        Selection([text])
+
+
+def test_identifiers_of_eight_digits_are_extended() -> None:
+    assert frame(0x21) in Selection(["0x021"]) and frame(0x21, is_extended_id=True) not in Selection(["0x21"])
+    assert frame(0x21, is_extended_id=True) in Selection(["0x00000021"])
+    assert frame(0x12345, is_extended_id=True) in Selection(["0x10000-0x20000"])
+
+
+# --- a machine on the bus
+
+
+@pytest.fixture
+def machine(program: Callable[..., Any]) -> None:
+    """The demo machine on the test channel, in a process of its own."""
+    server = program("rds.bus.server", "mini-cnc", "--channel", "test")
+    assert server.stdout.readline().startswith("ready")
+
+
+@pytest.mark.parametrize("identifier", [0x010, 0x011, 0x012, 0x021, 0x004, 0x001, 0x000, 0x201, 0x601])
+def test_frames_that_act_on_a_live_machine_are_refused(identifier: int, machine: None, open_bus: Opener) -> None:
+    bus, witness = open_bus(), open_bus()
+    drain(witness)
+    log = [frame(0x700), frame(identifier, bytes(8), 0.01)]
+    with pytest.raises(InputError, match=r"module 2.*live on this bus.*--with-commands") as caught:
+        replay(log, bus)
+    assert f"{identifier:#05x}" in str(caught.value)
+    assert 0x700 not in {message.arbitration_id for message in drain(witness)}
+    assert replay(log, bus, selection=Selection(["0x700"])).sent == 1
+
+
+def test_with_commands_ends_at_zero_volts(machine: None, open_bus: Opener) -> None:
+    bus, witness = open_bus(), open_bus()
+    command = frame(0x010, b"\0\x40" + bytes(6))
+    assert replay([command], bus, with_commands=True).sent == 1
+    commands = [bytes(message.data) for message in drain(witness) if message.arbitration_id == 0x010]
+    assert commands == [bytes(command.data), bytes(8)]
+
+
+def test_without_a_machine_commands_are_frames_like_others(pair: tuple[can.BusABC, can.BusABC]) -> None:
+    assert replay([frame(0x010, bytes(8))], pair[0]).sent == 1
