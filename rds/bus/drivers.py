@@ -24,6 +24,7 @@ _STARTING = 1.0  # s for all modules to answer at the start
 _STANDSTILL = 20  # ticks in which no encoder moves until the axes count as standing
 _LONGEST_COAST = 3.0  # s until then
 _HALF_TURN = frames.COUNT_TURNS // 2
+HOST = "host"  # what the built-in bus calls this node
 
 
 @dataclass
@@ -91,7 +92,7 @@ class AxisDrivers:
         self._owns_bus = bus is None
         if bus is None:
             channel = default_channel(machine, interface, channel)
-            bus = open_bus(interface, channel, sorted(self._by_identifier), **options)
+            bus = open_bus(interface, channel, sorted(self._by_identifier), node=HOST, **options)
             self._bus_name = bus_name(interface, channel)
         else:
             self._bus_name = bus.channel_info
@@ -120,7 +121,12 @@ class AxisDrivers:
                 raise self._silent([module for module in self._modules if not module.seen])
             for module in self._modules:
                 module.missed = 0
-            self.exchange()
+            try:
+                self.exchange()
+            except MachineError as error:
+                if isinstance(error.__cause__, can.CanTimeoutError):  # with bit timing: nobody acknowledges the ticks
+                    raise self._silent([module for module in self._modules if not module.seen]) from error
+                raise
         self._wait_for_standstill()
         for module in self._modules:
             module.origin = 0 if module.axis.unit == "rev/min" else module.counts
@@ -149,6 +155,7 @@ class AxisDrivers:
         tick.data[:] = self._waiting
         self._sent_voltages = self._waiting_voltages
         try:
+            self._take_stragglers()
             self._bus.send(tick, self._timeout * LOST_AFTER)
             self._count_tick()
             self._collect(deadline)
@@ -162,6 +169,27 @@ class AxisDrivers:
         self.counters.ticks += 1
         for module in self._modules:
             module.expected = (module.expected + 1) % frames.COUNT_TURNS
+
+    def _take_stragglers(self) -> None:
+        """What has come before this tick is sent does not answer it.
+
+        So a module whose answers were late for a while is not taken for one that lost a tick, and its answers for
+        ever for those to the tick before.
+        """
+        receive, modules = self._bus.recv, self._by_identifier
+        while (message := receive(0.0)) is not None:
+            module = modules.get(message.arbitration_id)
+            if module is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+                self.counters.foreign += 1
+                continue
+            answer = frames.decode_answer(message.arbitration_id, message.data)
+            if answer.kind != Kind.ANSWER:
+                self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
+            elif module.seen:
+                self.counters.late += 1
+                module.owed = max(0, module.owed - 1)
+                if 0 < (answer.ticks - module.expected) % frames.COUNT_TURNS < _HALF_TURN:
+                    module.expected = answer.ticks
 
     def _collect(self, deadline: float) -> None:
         """Take answers until all are here or the deadline has passed."""
@@ -288,7 +316,7 @@ def find_machine(
     channel = default_channel(machine, interface, channel)
     names = {frames.answer_identifier(axis.node): axis.name for axis in machine.axes.values()}
     found: set[str] = set()
-    bus = open_bus(interface, channel, sorted(names), **options)
+    bus = open_bus(interface, channel, sorted(names), node="scan", **options)
     try:
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), timeout)
         deadline = time.monotonic() + timeout

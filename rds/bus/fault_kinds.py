@@ -72,7 +72,7 @@ class Fault:
         if kind is None:
             close = get_close_matches(str(self.kind), KINDS, n=1)
             hint = f"; did you mean {close[0]!r}?" if close else ""
-            raise InputError(f"no fault is of kind {self.kind!r}; kinds are {', '.join(KINDS)}{hint}")
+            raise InputError(f"kind = {self.kind!r} is no kind of fault; kinds are {', '.join(KINDS)}{hint}")
         said = {_word(name) for name, value in asdict(self).items() if value is not None} - {"kind", "at"}
         for word in sorted(said - set(kind.words)):
             raise InputError(f"{self.kind!r} has nothing to do with {word!r}; it takes {', '.join(kind.words)}")

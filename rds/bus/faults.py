@@ -49,6 +49,17 @@ class Faults:
         """Inject a schedule whose times count from now. With `own`, all of it ends when this line is closed."""
         self._ask("inject", faults=[fault.to_table() for fault in faults], own=own)
 
+    def check_names(self, faults: Iterable[Fault]) -> None:
+        """InputError if a fault names a node that is not on the bus now."""
+        known = [node["name"] for node in self.nodes()]
+        for fault in faults:
+            for name in (fault.node, fault.receiver):
+                if name is not None and name not in known:
+                    raise InputError(
+                        f"the fault {fault.kind!r} at {fault.at:g} s is for a node {name!r}, which is not on bus "
+                        f"rds:{self.channel}; there are {', '.join(known) or 'none'}"
+                    )
+
     def clear(self) -> None:
         """End all faults: plug in what is unplugged, and so on. Who is dead stays dead."""
         self._ask("clear")

@@ -18,12 +18,20 @@ def bus_name(interface: str, channel: str | None) -> str:
 
 
 def open_bus(
-    interface: str, channel: str | None, identifiers: Sequence[int] | None = None, mask: int = 0x7FF, **options: Any
+    interface: str,
+    channel: str | None,
+    identifiers: Sequence[int] | None = None,
+    mask: int = 0x7FF,
+    node: str | None = None,
+    **options: Any,
 ) -> can.BusABC:
     """An open bus that receives the standard frames whose identifier, masked, is one of `identifiers` (None: all).
 
-    `options` go to the interface as they are (bitrate, fd...). Raises MachineError if the bus can't be opened.
+    `node` is what the built-in bus calls this node; `options` go to the interface as they are (bitrate, fd...).
+    Raises MachineError if the bus can't be opened.
     """
+    if node is not None and interface == BUILTIN:
+        options.setdefault("name", node)
     filters = None
     if identifiers is not None:
         filters = [{"can_id": wanted, "can_mask": mask, "extended": False} for wanted in identifiers]

@@ -21,6 +21,9 @@ from typing import Any
 
 import can
 
+from rds.bus.fault_file import read_faults
+from rds.bus.fault_kinds import Fault
+from rds.bus.faults import Faults
 from rds.bus.link import BUILTIN, bus_name, open_bus
 from rds.bus.module import AxisModule
 from rds.bus.module_node import LISTEN_MASK, LISTENS_TO, ModuleNode
@@ -45,18 +48,23 @@ def serve(
     stop: threading.Event | None = None,
     orphaned: threading.Event | None = None,
     afterlife: float = AFTERLIFE,
+    faults: Sequence[Fault] = (),
     **options: Any,
 ) -> None:
     """Serve the modules of `machine` (or of its `axes`), each a node of its own, until `stop` is set.
 
-    `channel` defaults to the machine's name on the built-in bus; `options` go to the python-can interface. `ready` is
-    called when all nodes are on the bus. Once `orphaned` is set, the machine also ends when nobody has commanded it
-    for `afterlife` s. A bus that fails later is reported in the log and opened again; the axes go on meanwhile.
+    `channel` defaults to the machine's name on the built-in bus; `options` go to the python-can interface. `faults`
+    are injected there, their times counting from when all nodes are on the bus, until the end. `ready` is called
+    when all nodes are on the bus. Once `orphaned` is set, the machine also ends when nobody has commanded it for
+    `afterlife` s. A bus that fails later is reported in the log and opened again; the axes go on meanwhile.
     In a process's main thread it takes real-time priority where permitted, and ends on SIGTERM and SIGINT.
 
-    Raises MachineError if the bus can't be opened at the start, InputError for an unknown axis.
+    Raises MachineError if the bus can't be opened at the start, InputError for an unknown axis, and for faults on
+    another bus than the built-in one.
     """
     channel = default_channel(machine, interface, channel)
+    if faults and interface != BUILTIN:
+        raise InputError(f"faults can be injected on the built-in bus only, not on {bus_name(interface, channel)}")
     stop = stop or threading.Event()
     for name in axes or ():
         machine.axis(name)
@@ -65,8 +73,9 @@ def serve(
     try:
         for slot, axis in enumerate(machine.axes.values()):
             if axes is None or axis.name in axes:
-                nodes.append(ModuleNode(partial(AxisModule, axis, slot, machine.sample_period), opener))
-        with _as_process(stop):
+                module = partial(AxisModule, axis, slot, machine.sample_period)
+                nodes.append(ModuleNode(module, partial(opener, node=axis.name)))
+        with _as_process(stop), _injected(channel, faults):
             if ready is not None:
                 ready()
             keep_on = _until(stop, orphaned, afterlife, nodes)
@@ -82,6 +91,17 @@ def serve(
 def default_channel(machine: Machine, interface: str, channel: str | None) -> str | None:
     """The channel that was asked for, else the machine's name on the built-in bus, else the interface's own default."""
     return channel if channel is not None or interface != BUILTIN else machine.name
+
+
+@contextmanager
+def _injected(channel: str | None, faults: Sequence[Fault]) -> Iterator[None]:
+    """Inject the faults for as long as the context lasts."""
+    if not faults:
+        yield
+        return
+    with Faults(str(channel)) as line:
+        line.play(faults)
+        yield
 
 
 @contextmanager
@@ -187,6 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--interface", default=BUILTIN)
     parser.add_argument("--channel", default=None)
     parser.add_argument("--axes", default=None, help="names, separated by commas (default: all)")
+    parser.add_argument("--faults", default=None, metavar="FILE", help="schedule of faults, TOML")
     parser.add_argument("--option", action="append", default=[], metavar="KEY=VALUE", help="of the interface")
     parser.add_argument(
         "--exit-with-stdin",
@@ -211,6 +232,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ready,
             orphaned=orphaned,
             afterlife=options.afterlife,
+            faults=read_faults(options.faults) if options.faults else (),
             **bus_options,
         )
     except RdsError as error:

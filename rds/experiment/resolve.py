@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from rds.bus.bus_settings import BITRATES, DATA_BITRATES
+from rds.bus.fault_file import read_faults
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
 from rds.experiment.parts import Setting, make_controller, make_drive, make_model
@@ -44,7 +46,7 @@ def resolve(words: Words, folder: Path, mode_name: str | None = None) -> tuple[P
     for axis, own in _axes(words, machine):
         made, periods[axis.name] = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
         axes.append(made)
-    bus = _bus(words)
+    bus = _bus(words, folder)
     words.done()
     _check_coupling(axes, words)
     plan = Plan(
@@ -193,8 +195,11 @@ def _interface(words: Words, mode: Mode) -> tuple[bool, bool]:
     return flags
 
 
-def _bus(words: Words) -> dict[str, Any]:
-    """The keyword arguments of can.Bus; python-can itself knows which options an interface has."""
+def _bus(words: Words, folder: Path) -> dict[str, Any]:
+    """The keyword arguments of can.Bus; python-can itself knows which options an interface has.
+
+    On the built-in bus also "faults", the schedule that is injected during the run.
+    """
     table = words.inner("bus")
     if table is None:
         return {}
@@ -203,8 +208,16 @@ def _bus(words: Words) -> dict[str, Any]:
     if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
         raise table.fault("channel", "must be the name or the number of a channel")
     if interface == BUILTIN:
+        table.whole("bitrate", None, "bit/s", *BITRATES)
+        table.whole("data_bitrate", None, "bit/s, of CAN FD", *DATA_BITRATES)
+        if "data_bitrate" in table and "bitrate" not in table:
+            raise table.fault("data_bitrate", "needs a bitrate beside it: only a bus with bit timing has a data rate")
+        table.whole("restart_ms", None, "ms until the host comes back from bus off", 0, 3_600_000)
+        file = table.text("faults")
         table.done()
-        return dict(table.table)
+        return dict(table.table) | ({} if file is None else {"faults": read_faults(folder / file)})
+    if "faults" in table:
+        raise table.fault("faults", "can be injected on the built-in bus only; remove it, or the interface")
     from can.interfaces import VALID_INTERFACES
 
     table.choice("interface", "", sorted(VALID_INTERFACES))

@@ -6,14 +6,16 @@ import secrets
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 from rds.core.errors import MachineError
 from rds.runtime.plan import Plan
 
 BUILTIN = "rds"
+TIMING = ("bitrate", "data_bitrate")  # options that all nodes of a bus share
 
 
 @contextmanager
@@ -40,7 +42,7 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
         return
     if given is None:
         channel = f"{plan.machine.name[:20]}-{secrets.token_hex(4)}"
-    server = _serve(plan.machine.path, channel)
+    server = _serve(plan.machine.path, channel, {key: bus[key] for key in TIMING if key in bus})
     try:
         yield replace(plan, bus=bus | {"channel": channel})
     finally:
@@ -55,11 +57,25 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
             pipe.close()
 
 
-def _serve(machine: str, channel: str) -> subprocess.Popen[bytes]:
-    """Start the machine's modules in a process of their own, and wait until they are on the bus."""
+def _serve(machine: str, channel: str, timing: Mapping[str, Any]) -> subprocess.Popen[bytes]:
+    """Start the machine's modules in a process of their own, and wait until they are on the bus.
+
+    They are the first there, so it is their options that say whether the bus has bit timing.
+    """
+    options = [word for key, value in timing.items() for word in ("--option", f"{key}={value}")]
     with tempfile.TemporaryFile() as said:
         server = subprocess.Popen(
-            [sys.executable, "-P", "-m", "rds.bus.server", machine, "--channel", channel, "--exit-with-stdin"],
+            [
+                sys.executable,
+                "-P",
+                "-m",
+                "rds.bus.server",
+                machine,
+                "--channel",
+                channel,
+                "--exit-with-stdin",
+                *options,
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=said,

@@ -39,26 +39,31 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     """Take every sample of the plan; returns how it ended, why, and the environment."""
     from rds.bus.command import Command
     from rds.bus.drivers import AxisDrivers
+    from rds.bus.run_watch import RunWatch
 
     mode = load_mode(plan.mode)
     environment = surroundings() | prepare(plan.priority, plan.cpu)
     clock = RealTimeClock(round(plan.T * 1e9), plan.late)
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()
-    drivers = loop = None
+    drivers = loop = watch = None
+    bus = dict(plan.bus)
+    faults = bus.pop("faults", ())
     threads = threading.active_count()
     stack = ExitStack()
     try:
-        if plan.bus["interface"] == "rds":
-            stack.enter_context(Command(plan.bus["channel"]))
-        drivers = AxisDrivers(
-            plan.machine, plan.names, sample_period=plan.T, dry_run=mode.drivers == "dry run", **plan.bus
-        )
+        if bus["interface"] == "rds":
+            stack.enter_context(Command(bus["channel"]))
+        drivers = AxisDrivers(plan.machine, plan.names, sample_period=plan.T, dry_run=mode.drivers == "dry run", **bus)
         drivers.start()
+        if bus["interface"] == "rds":
+            watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
         loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
-        threads = threading.active_count()
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
+        if watch is not None:
+            watch.start()
+        threads = threading.active_count()
         ring.beat(READY)
         with quiet_memory():
             clock.start()
@@ -73,6 +78,8 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
         environment["threads"] = threading.active_count() - threads  # that the student's code left running
         if drivers is not None:
             report["drivers"] = asdict(drivers.counters)
+            if watch is not None:
+                report["bus"] = watch.summary()
             drivers.close()
         stack.close()
         clock.close()
