@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands import modules, reports
+from rds.commands import analyse, bus, modules, reports
 from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
 
 app = typer.Typer(
@@ -23,6 +23,8 @@ app = typer.Typer(
 machine_app = typer.Typer(no_args_is_help=True, help="Machines: list them, or serve one on a CAN bus.")
 app.add_typer(machine_app, name="machine")
 app.add_typer(modules.module_app, name="module")
+app.add_typer(bus.app, name="bus")
+bus.app.command()(analyse.analyse)
 app.command()(modules.scan)
 app.command()(modules.estop)
 app.command()(reports.report)

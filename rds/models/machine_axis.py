@@ -130,7 +130,7 @@ class MachineAxis:
             return
         p = self.parameters
         pull = p.K * self._voltage
-        steps = ceil(time / SUBSTEP - 1e-9) if p.stribeck else 1
+        steps = max(ceil(time / SUBSTEP - 1e-9), 1) if p.stribeck else 1
         step = time / steps
         for _ in range(steps):
             if self.velocity == 0.0 and self._sticks(pull):
