@@ -140,7 +140,7 @@ def _place(trace: Path, file: Path) -> str:
     try:
         text = trace.read_text(errors="replace")
         source = file.resolve().read_text(errors="replace").splitlines()
-    except OSError:
+    except (OSError, RuntimeError):  # RuntimeError: how Path.resolve tells of a loop of links before Python 3.13
         return ""
     for name, number, function in re.findall(r'File "(.+)", line (\d+) in (\S+)', text):
         if Path(name) == file.resolve() and 0 < int(number) <= len(source):

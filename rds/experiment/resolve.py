@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -237,6 +238,9 @@ def _timing(words: Words, mode: Mode) -> dict[str, Any]:
         "cpu": table.whole("cpu", None, "processor to run on", 0, 4095),
     }
     table.done()
+    usable = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+    if usable and settings["cpu"] is not None and settings["cpu"] not in usable:
+        raise table.fault("cpu", f"is not a processor that this program may use; it may use {usable}")
     return settings
 
 

@@ -184,6 +184,13 @@ def test_a_missing_file_raises(tmp_path):
         check_file(tmp_path / "none.py")
 
 
+def test_a_link_that_leads_to_itself_raises(tmp_path):
+    loop = tmp_path / "loop.py"
+    loop.symlink_to(loop)
+    with pytest.raises(InputError, match=r"loop\.py"):
+        check_file(loop)
+
+
 def test_a_wrong_signature_is_a_fault(write):
     (report,) = check_file(write("def control(t, r, y, state):\n    return 0.0, state\n")).reports
     assert [fault.clause for fault in report.faults] == [clauses.ARGUMENTS]
