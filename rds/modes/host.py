@@ -12,7 +12,7 @@ import sys
 import tempfile
 import time
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,8 @@ from rds.modes import load_mode
 from rds.modes.blame import fault
 from rds.modes.machine import machine_behind
 from rds.runtime.plan import Plan, dump
-from rds.runtime.record import ENDING, UNSTARTED, check_free, read_ending, read_raw, write_whole
-from rds.runtime.recorder import HANG_AFTER, PLAN, PROCESSES, READY, Recorder, finish
+from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
+from rds.runtime.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
 from rds.runtime.ring import Ring
 from rds.runtime.stopwatch import TIMING_COLUMNS
 
@@ -84,55 +84,83 @@ def _here(plan: Plan, progress: Progress | None) -> Rows:
 
 def _in_target(plan: Plan, directory: Path, progress: Progress | None) -> Rows:
     """A real-time run, in a target process that a recorder starts."""
-    mode = load_mode(plan.mode)
-    columns, units = plan.columns(mode.followed)
+    columns, units = plan.columns(load_mode(plan.mode).followed)
     columns[1:1] = TIMING_COLUMNS
     units |= dict.fromkeys(TIMING_COLUMNS, "ns")
-    is_new = _make_folder(directory)
-    write_whole(directory / PLAN, dump(plan))
+    data = _dumped(plan)
+    with _folder(directory) as lock:
+        write_whole(directory / PLAN, data)
+        has_rows = _recorded(plan, directory, columns, units, lock, progress)
+        report = read_ending(directory, ENDING if has_rows else UNSTARTED)
+        ending, reason = Ending(report["ending"]), report.get("reason", "")
+        if has_rows:
+            return Rows(columns, units, read_raw(directory)[1], ending, reason, report)
+        (directory / UNSTARTED).unlink()
+        return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
+
+
+def _recorded(
+    plan: Plan, directory: Path, columns: list[str], units: dict[str, str], lock: int, progress: Progress | None
+) -> bool:
+    """Let a recorder start the target, and wait for the end of the run; whether there is a sample."""
     about: dict[str, Any] = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
     about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8), "ready": READY}
     capacity = min(plan.samples, max(_RING_BYTES // (8 * len(columns)), 1000))
     ring = Ring.create(_ring_path(about["run"]), columns, capacity, **about)
-    recorder = subprocess.Popen(
-        [sys.executable, "-P", "-m", "rds.runtime.recorder", str(directory), str(ring.path), "rds.modes.target"],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
     try:
-        _follow(recorder, ring, plan, progress)
+        recorder = subprocess.Popen(
+            [sys.executable, "-P", "-m", "rds.runtime.recorder", str(directory), str(ring.path), "rds.modes.target"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            pass_fds=(lock,) if os.name == "posix" else (),
+        )
+        try:
+            _follow(recorder, ring, plan, progress)
+        finally:
+            if recorder.poll() is None:
+                ring.ask_to_stop()
+                recorder.wait()
+            if recorder.returncode != 0:
+                _take_over(directory, ring, plan.T)
+        return bool(ring.head)
     finally:
-        if recorder.poll() is None:
-            ring.ask_to_stop()
-            recorder.wait()
-        if recorder.returncode != 0:
-            _take_over(directory, ring, plan.T)
-        has_rows = bool(ring.head)
         ring.close()
         with contextlib.suppress(OSError):
             ring.path.unlink()
-    report = read_ending(directory, ENDING if has_rows else UNSTARTED)
-    ending, reason = Ending(report["ending"]), report.get("reason", "")
-    if not has_rows:
-        (directory / UNSTARTED).unlink()
-        if is_new:
-            with contextlib.suppress(OSError):
-                directory.rmdir()
-        return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
-    return Rows(columns, units, read_raw(directory)[1], ending, reason, report)
 
 
-def _make_folder(directory: Path) -> bool:
-    """Make the folder of a run if it isn't there; whether it was made. InputError if it can't be."""
+def _dumped(plan: Plan) -> bytes:
+    """The plan as bytes; ContractError if the student's code holds what cannot be sent to another process."""
+    try:
+        return dump(plan)
+    except Exception as error:  # pickle raises whatever comes to hand
+        raise ContractError(
+            f"the controller or the model cannot be handed to the target process: {error}; keep open files, locks, "
+            f"threads and devices out of params, initial_state and the variables that its functions use"
+        ) from error
+
+
+@contextlib.contextmanager
+def _folder(directory: Path) -> Iterator[int]:
+    """The folder of a run, claimed for it (see `runtime.record.claim`), and taken away if nothing came into it."""
     try:
         is_new = not directory.is_dir()
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"this folder cannot be made: {error.strerror}; name another one", str(directory)) from error
-    check_free(directory)
-    return is_new
+    lock = claim(directory)
+    try:
+        yield lock
+    finally:
+        for name in (PLAN, PROCESSES):
+            with contextlib.suppress(OSError):
+                (directory / name).unlink()
+        os.close(lock)
+        if is_new:
+            with contextlib.suppress(OSError):
+                directory.rmdir()
 
 
 def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress: Progress | None) -> None:

@@ -5,7 +5,7 @@
     rows, little-endian float64, appended as they come
 
 What is known only at the end stands beside it in `ending.json`. A record that was cut short anywhere is read
-up to its last whole row. While it grows, its writer holds a lock on it.
+up to its last whole row. `processes.json` is there, and locked, for as long as somebody records.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from rds.core.types import Ending
 
 NAME = "record.rds"
 ENDING = "ending.json"
+PROCESSES = "processes.json"  # while a run goes on: the numbers of its processes
 UNSTARTED = "unstarted.json"  # the ending of a run that took no sample, on its way to the host
 _FIRST_LINE = b"RDS record 1\n"
 
@@ -30,7 +31,7 @@ class RecordFile:
     """Appends rows to the record of one run; takes up where an earlier writer of the same run left off.
 
     `about` describes the run; `about["run"]` tells it from others, whose record and results in the same directory
-    are removed. Raises InputError where another run is being recorded there.
+    are removed.
     """
 
     def __init__(self, directory: str | Path, about: dict[str, Any]):
@@ -41,7 +42,6 @@ class RecordFile:
             clear(directory)
             write_whole(self.path, header)
         self._file = open(self.path, "r+b")  # noqa: SIM115  (open for the life of the object)
-        _lock(self._file.fileno())
         self.rows = (self.path.stat().st_size - len(header)) // self._row
         self._file.truncate(len(header) + self.rows * self._row)
         self._file.seek(0, os.SEEK_END)
@@ -64,17 +64,25 @@ class RecordFile:
         self._file.close()
 
 
-def check_free(directory: str | Path) -> None:
-    """InputError if a run is being recorded in `directory`."""
-    path = Path(directory) / NAME
-    with contextlib.suppress(FileNotFoundError), open(path, "r+b") as file:
-        if not _lock(file.fileno()):
+def claim(directory: str | Path) -> int:
+    """The right to record in `directory`: an open file, whose lock ends with the last process that has it open.
+
+    InputError if another run is being recorded there.
+    """
+    path = Path(directory) / PROCESSES
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        if not _lock(descriptor):
+            os.close(descriptor)
             raise InputError("another run is being recorded there; wait for it or choose another folder", str(path))
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), path.stat()):
+                return descriptor
+        os.close(descriptor)  # the run before has just taken this file away
 
 
 def clear(directory: str | Path) -> None:
     """Remove what an earlier run left in `directory`: its record, its ending and its results."""
-    check_free(directory)
     directory = Path(directory)
     for name in (NAME, ENDING, *(entry.name for entry in directory.glob("result.*"))):
         with contextlib.suppress(FileNotFoundError):

@@ -18,14 +18,14 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.types import Ending
-from rds.runtime.record import ENDING, UNSTARTED, RecordFile, write_ending
+from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending
 from rds.runtime.ring import Ring
 
 DRAIN_EVERY = 0.05  # s
 HANG_AFTER = 5.0  # s without a new sample, or 20 periods if that is longer
 READY_WITHIN = 60.0  # s from the start of the target to its first sample
 READY = 2  # heartbeats of the target when its loop begins
-PLAN, REPORT, PROCESSES, LOG = "plan.pickle", "target.json", "processes.json", "target.log"
+PLAN, REPORT, LOG = "plan.pickle", "target.json", "target.log"
 
 
 class Recorder:

@@ -305,7 +305,7 @@ def test_the_same_in_python() -> None:
         ({"model": 3}, "model = 3 must be a name"),
         ({"timing": {"phase": "free"}}, "timing.phase = 'free' is unknown; known: keep, ignore"),
         ({"timing": 3}, "timing = 3 must be a table"),
-        ({"bus": {"bitrate": 500}}, "unknown key 'bitrate' in .bus."),
+        ({"bus": {"baud": 500}}, "unknown key 'baud' in .bus."),
         ({"interface": {"saturation": 0}}, "must be true or false"),
         ({"overrides": {"Y": {}}}, r"\[axis.Y\] is for an axis that does not run"),
         ({"signal": rds.square(1.0, 1.0)}, "give either"),

@@ -7,9 +7,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -179,7 +180,7 @@ def test_a_machine_that_is_lost_in_the_middle(alone: Path) -> None:
     with served("own") as server:
         host = started(alone, "implementation", 20.0, "own")
         server.kill()
-        said, errors = host.communicate(timeout=30)
+        said, errors = host.communicate(timeout=120)
     assert host.returncode == 1
     assert json.loads(said)["ending"] == "machine lost"
     assert "no answer from X (node 2)" in errors
@@ -202,7 +203,7 @@ def test_an_interrupted_run_stops_safely_and_is_saved(alone: Path) -> None:
     with served("own"):
         host = started(alone, "implementation", 20.0, "own", start_new_session=True)
         os.killpg(host.pid, signal.SIGINT)
-        said, errors = host.communicate(timeout=30)
+        said, errors = host.communicate(timeout=120)
         assert host.returncode == 1, errors
         wait_until(lambda: statuses("own") == {Status.WATCHDOG})  # after a last command of zero volts
     outcome = json.loads(said)
@@ -328,14 +329,26 @@ def test_a_run_that_never_began_leaves_the_earlier_one(experiment: Maker, alone:
 
 
 def test_two_runs_do_not_share_a_folder(experiment: Maker, during: During, alone: Path) -> None:
-    refused = []
+    said = []
 
     def again() -> None:
-        with suppress(rds.InputError):
+        with pytest.raises(rds.InputError, match="another run is being recorded there") as refusal:
             experiment(duration=0.2).run("emulation", out=alone / "run")
-            return
-        refused.append(True)
+        said.append(str(refusal.value))
 
-    result = experiment(duration=1.0).run("emulation", out=alone / "run", progress=during(again))
-    assert refused
-    assert len(result) == 1000
+    result = experiment(duration=0.5).run("emulation", out=alone / "run", progress=during(again, 0))
+    assert said
+    assert result.meta["ending"] == "done"
+
+
+def test_what_cannot_be_sent_to_the_target_is_refused(experiment: Maker, alone: Path) -> None:
+    lock = threading.Lock()
+
+    def control(t: float, r: Any, y: float, state: Any, params: Any) -> Any:
+        with lock:
+            return 0.0, state
+
+    experiment(control, duration=0.1).run()
+    with pytest.raises(rds.ContractError, match=r"cannot pickle '_thread.lock' object; keep open files, locks"):
+        experiment(control).run("emulation", out=alone / "run")
+    assert not (alone / "run").exists()
