@@ -110,11 +110,10 @@ def test_stop_cuts_the_voltage_at_once(served: dict[str, Any]) -> None:
     drive(drivers, 10, [5.0], 0.01)
     drivers.stop()
     time.sleep(0.08)  # 8 time constants, less than the watchdog's 10 periods
-    here = drivers.exchange()
-    time.sleep(0.02)
-    assert drivers.exchange() == here
     assert drivers.counters.watchdogs == 0
+    positions = [drivers.exchange() for _ in range(20)]
     drivers.close()
+    assert positions[-1] == positions[-5], "it stands, though answers may have come late to the first of these"
 
 
 def test_silence_trips_the_watchdog_and_the_next_command_clears_it(served: dict[str, Any]) -> None:
