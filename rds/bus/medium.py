@@ -148,6 +148,8 @@ class UntimedMedium(Medium[Node]):
 
     def offer(self, node: Node, frame: bytes, now: int) -> None:
         """Takes the frame at once, unless a fault has something against it."""
+        if self._agenda:
+            self._happen(now)
         if self._ill or self.frame_faults:
             self._offer_with_faults(node, frame, now)
         else:

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 from rds.bus import wire
 from rds.bus.analysis import responses
 from rds.bus.bits import frame_time
-from rds.bus.medium import Delivery
 from rds.bus.messages import Message, in_order
 from rds.bus.messages import priority as message_priority
 from rds.bus.schedule import schedule
-from rds.bus.station import Station, flags_of, priority, record_bits
+from rds.bus.station import flags_of, priority, record_bits
 from rds.bus.timed_medium import TimedMedium
 
-MBIT = 1_000_000
+from .wires import MBIT, bus, drain, identifier_of, record
 
 
 class Offer(NamedTuple):
@@ -29,25 +28,6 @@ class Offer(NamedTuple):
     record: bytes
 
 
-def record(identifier: int, data: bytes = b"", flags: int = 0, dlc: int | None = None) -> bytes:
-    header = wire.HEADER.pack(0, identifier, wire.FRAME, flags, len(data) if dlc is None else dlc, len(data))
-    return header + data.ljust(wire.DATA, b"\0")
-
-
-def bus(*names: str, bitrate: int = MBIT, data_bitrate: int | None = None) -> TimedMedium[str]:
-    medium: TimedMedium[str] = TimedMedium(bitrate, data_bitrate)
-    for number, name in enumerate(names or ("A", "B", "C")):
-        medium.join(name, Station(number, name), 0)
-    return medium
-
-
-def drain(medium: TimedMedium[str], now: int) -> list[Delivery[str]]:
-    taken = []
-    while (delivery := medium.take(now)) is not None:
-        taken.append(delivery)
-    return taken
-
-
 def carry(medium: TimedMedium[str], offers: list[Offer], until: int = 10**10) -> list[tuple[int, int]]:
     """(instant, identifier) of every frame."""
     seen = []
@@ -55,7 +35,7 @@ def carry(medium: TimedMedium[str], offers: list[Offer], until: int = 10**10) ->
         medium.offer(node, frame, at)
         seen += drain(medium, at - 1)
     seen += drain(medium, until)
-    return [(delivery.at, wire.HEADER.unpack_from(delivery.frame)[1]) for delivery in seen]
+    return [(delivery.at, identifier_of(delivery)) for delivery in seen]
 
 
 def test_a_frame_arrives_at_the_end_of_its_end_of_frame() -> None:
@@ -200,7 +180,12 @@ message_sets = st.lists(
 def table(raw: list[tuple[int, bool, int, int, int]]) -> list[Message]:
     return in_order(
         Message(
-            f"m{identifier:x}", identifier << 18 if extended else identifier, extended, size, period * 1e-6, jitter * 1e-6
+            f"m{identifier:x}",
+            identifier << 18 if extended else identifier,
+            extended,
+            size,
+            period * 1e-6,
+            jitter * 1e-6,
         )
         for identifier, extended, size, period, jitter in raw
     )
