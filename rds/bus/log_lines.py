@@ -21,6 +21,7 @@ _CANDUMP = re.compile(
 _ASC_FRAME = re.compile(r"\d+\.\d+\s+(CANFD\s+)?\d+(\s+(Rx|Tx))?(\s+[0-9A-F]+x?(\s.*)?)?", re.IGNORECASE)
 _ASC_TIME_ONLY = re.compile(r"\d+(\.\d*)?")
 _TRC_FRAME = {"DT", "FD", "FB", "FE", "BI", "RR", "RX", "TX"}
+_TRC_OTHER = {"ST", "EC", "ER", "EV"}  # status, error counters, error frames, events: python-can reads none of them
 _CSV_HEADING = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 
 
@@ -102,6 +103,8 @@ def _trc_frame(line: str) -> bool | None:
     if line.startswith(";"):
         return None
     words = line.upper().split()
+    if not _TRC_OTHER.isdisjoint(words[1:4]):
+        return False
     return len(words) < 4 or not _TRC_FRAME.isdisjoint(words)
 
 

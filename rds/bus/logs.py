@@ -140,17 +140,21 @@ class LogFile:
 
 
 def _problem(message: can.Message) -> str | None:
-    """Why there is no such frame, or None. Mends the length of an FD frame, for which some readers give the DLC."""
+    """Why there is no such frame, or None. Mends what python-can's readers make of some files first."""
     size = len(message.data)
+    if message.is_fd and message.is_remote_frame:
+        message.is_fd = False  # CAN FD has none: it is a classic frame on a bus that carries both
     if message.is_fd and dlc2len(message.dlc) == size:
-        message.dlc = size
+        message.dlc = size  # was the code of the length
+    elif not message.is_fd and message.dlc > 8:
+        message.dlc = 8  # codes 9 to 15 mean 8 too, and were taken for those of CAN FD
     if not math.isfinite(message.timestamp):
         return f"its time {message.timestamp} is no number of seconds"
     if message.is_error_frame:
         return None
     if not 0 <= message.arbitration_id <= (0x1FFFFFFF if message.is_extended_id else 0x7FF):
         return f"identifier {message.arbitration_id:#x} is too large for {29 if message.is_extended_id else 11} bits"
-    if not message.is_remote_frame and size != (message.dlc if message.is_fd else min(message.dlc, 8)):
+    if not message.is_remote_frame and size != message.dlc:
         return f"the frame has {size} bytes of data, and its length says {message.dlc}"
     return None
 

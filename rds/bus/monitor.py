@@ -105,11 +105,20 @@ def to_json(view: View, decode: Decoder) -> dict[str, Any]:
         "rate_hz": _number(snapshot.rate),
         "load_percent": _number(snapshot.load),
         "error_frames": snapshot.errors,
+        "last_error": describe_error(snapshot),
         "impossible_frames": snapshot.impossible,
         "lost": view.lost,
         "faults": view.faults,
         "identifiers": [_row(row, decode) for row in snapshot.rows],
     }
+
+
+def describe_error(snapshot: Snapshot) -> str | None:
+    """The last error frame in words, as SocketCAN and the built-in bus code them; None if there was none."""
+    from rds.bus.error_reports import describe
+
+    message = snapshot.last_error
+    return None if message is None else describe(message.arbitration_id, message.data)
 
 
 def _row(row: Row, decode: Decoder) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rds.bus.decode import Decoder
-from rds.bus.monitor import View
+from rds.bus.monitor import View, describe_error
 from rds.bus.statistics import Row
 
 _FAULTS = 3  # of the last are shown
@@ -19,7 +19,7 @@ _FAULTS = 3  # of the last are shown
 def picture(view: View, decode: Decoder, height: int | None = None) -> Group:
     """The whole view; of a table that is higher than `height` lines, the first ones and how many are left out."""
     rows = view.snapshot.rows
-    room = len(rows) if height is None else max(1, height - 9 - min(len(view.faults), _FAULTS))
+    room = len(rows) if height is None else max(1, height - 10 - min(len(view.faults), _FAULTS))
     table = Table()
     for heading in ("identifier", "frames", "Hz", "period ms", "± ms", "load %", "data", "decoded"):
         left = heading in ("identifier", "data", "decoded")
@@ -29,6 +29,9 @@ def picture(view: View, decode: Decoder, height: int | None = None) -> Group:
     parts: list[RenderableType] = [Text(_headline(view), style="bold" if view.healthy else "bold red"), table]
     if len(rows) > room:
         parts.append(Text(f"and {len(rows) - room} more identifiers; a higher terminal shows them", style="dim"))
+    error = describe_error(view.snapshot)
+    if error is not None:
+        parts.append(Text(f"last error frame: {error}", style="red"))
     parts += [Text(fault, style="red") for fault in view.faults[-_FAULTS:]]
     return Group(*parts)
 

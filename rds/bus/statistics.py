@@ -54,6 +54,7 @@ class Snapshot:
     impossible: int  # frames that CAN doesn't have, of unknown length on the wire
     rate: float  # frames/s
     load: float  # % of the bit rate, exact frame lengths with interframe space
+    last_error: can.Message | None = None  # error frame
 
 
 class Statistics:
@@ -73,6 +74,7 @@ class Statistics:
         self.bitrate, self.data_bitrate = bitrate, data_bitrate
         self._rows: dict[Key, _Counts] = {}
         self._errors = self._impossible = 0
+        self._last_error: can.Message | None = None
         self._busy = 0  # ns
         self._first: float | None = None
         self._last = 0.0  # s, stamps
@@ -85,6 +87,7 @@ class Statistics:
         self._last = max(self._last, stamp)
         if message.is_error_frame:
             self._errors += 1
+            self._last_error = message
             self._busy += SHORTEST_ERROR * 1_000_000_000 // self.bitrate
             return
         key = Key(message.is_extended_id, message.arbitration_id, message.is_remote_frame)
@@ -128,6 +131,7 @@ class Statistics:
             impossible=self._impossible,
             rate=_per(frames, seconds),
             load=100.0 * _per(self._busy * _NS, seconds),
+            last_error=self._last_error,
         )
 
 
@@ -183,12 +187,10 @@ def since(now: Snapshot, before: Snapshot) -> Snapshot:
         busy = row.load * now.seconds - (old.load * before.seconds if old else 0.0)
         return replace(row, rate=_per(count, seconds), load=max(0.0, _per(busy, seconds)))
 
-    return Snapshot(
+    return replace(
+        now,
         rows=tuple(recent(row) for row in now.rows),
-        seconds=now.seconds,
-        frames=now.frames,
-        errors=now.errors,
-        impossible=now.impossible,
+        seconds=seconds,
         rate=_per(now.frames - before.frames, seconds),
         load=max(0.0, _per(now.load * now.seconds - before.load * before.seconds, seconds)),
     )

@@ -13,14 +13,12 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands.common import Json, print_json, refusals, stdout_kept
+from rds.commands.common import Channel, Interface, Json, print_json, refusals, stdout_kept
 
 app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
 
-Interface = Annotated[str, typer.Option(help="python-can interface.")]
-Channel = Annotated[str, typer.Option(help="Channel of the bus.")]
 Seconds = Annotated[float | None, typer.Option(help="End after so many seconds instead of at Ctrl-C.", min=0.0)]
-Bitrate = Annotated[int, typer.Option(help="Bit rate of the bus, bit/s.", min=1)]
+Bitrate = Annotated[int | None, typer.Option(help="Bit rate, bit/s, for interfaces that have to be told.", min=1)]
 Identifiers = Annotated[
     list[str] | None,
     typer.Option("--id", help="Only this identifier or range, as in 0x020-0x07F; may be given more than once."),
@@ -34,9 +32,11 @@ BUILTIN, DEMO = "rds", "mini-cnc"
 @app.command()
 def monitor(
     interface: Interface = BUILTIN,
-    channel: Channel = DEMO,
+    channel: Channel = None,
     seconds: Seconds = None,
-    bitrate: Bitrate = 1_000_000,
+    bitrate: Annotated[
+        int | None, typer.Option(help="Bit rate, bit/s, that the load is of; by default the bus's, or 1000000.", min=1)
+    ] = None,
     data_bitrate: Annotated[int | None, typer.Option(help="Of the fast part of CAN FD frames, bit/s.", min=1)] = None,
     dbc: Annotated[list[Path] | None, typer.Option(help="DBC file to decode frames by; may be given again.")] = None,
     json: Json = False,
@@ -49,13 +49,16 @@ def monitor(
         from rds.bus.decode import decoder
         from rds.bus.monitor import monitor as watch
         from rds.bus.monitor import to_json
-        from rds.bus.statistics import Statistics
+        from rds.bus.statistics import BITRATE, Statistics
 
-        statistics = Statistics(bitrate, data_bitrate)
+        channel = _channel(interface, channel)
+        given = None if interface == BUILTIN else bitrate
+        opener = _opener(interface, channel, given, "monitor", errors=True)
+        statistics = Statistics(bitrate or (interface == BUILTIN and _timing(opener)) or BITRATE, data_bitrate)
         decode = decoder(dbc or ())
         with _quiet_log(live := _is_live(json)), _live(decode, live) as refresh, _until_ctrl_c() as stop:
             view = watch(
-                _opener(interface, channel),
+                opener,
                 statistics,
                 name=_name(interface, channel),
                 seconds=seconds,
@@ -78,7 +81,8 @@ def record(
         Path, typer.Argument(help="The log: .asc .blf .log (candump) .trc .csv .db .mf4, or text with .gz.")
     ],
     interface: Interface = BUILTIN,
-    channel: Channel = DEMO,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
     seconds: Seconds = None,
     count: Annotated[int | None, typer.Option(help="End after so many frames.", min=1)] = None,
     identifiers: Identifiers = None,
@@ -90,11 +94,12 @@ def record(
         from rds.bus.record import record as record_bus
         from rds.bus.selection import Selection
 
+        channel = _channel(interface, channel)
         selection = Selection(identifiers or ())
         with _quiet_log(False), _until_ctrl_c() as stop, _counter("frames recorded") as show:
             result = record_bus(
                 file,
-                _opener(interface, channel),
+                _opener(interface, channel, bitrate, "recorder", errors=True),
                 name=_name(interface, channel),
                 seconds=seconds,
                 count=count,
@@ -119,7 +124,8 @@ def record(
 def replay(
     file: Annotated[Path, typer.Argument(help="A log of any of python-can's formats.")],
     interface: Interface = BUILTIN,
-    channel: Channel = DEMO,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
     speed: Annotated[
         float, typer.Option(help="2: twice as fast as recorded; inf: as fast as the bus takes them.")
     ] = 1.0,
@@ -136,11 +142,12 @@ def replay(
         from rds.bus.replay import replay as replay_log
         from rds.bus.selection import Selection
 
+        channel = _channel(interface, channel)
         log = LogFile(file)
         selection = Selection(identifiers or ())
         with (
             _command_of(interface, channel, with_commands),
-            _opener(interface, channel)() as bus,
+            _opener(interface, channel, bitrate, "replay")() as bus,
             _quiet_log(False),
             _until_ctrl_c() as stop,
             _counter("frames sent") as show,
@@ -171,7 +178,8 @@ def replay(
 @app.command("serve-socketcand")
 def serve_socketcand(
     interface: Interface = BUILTIN,
-    channel: Channel = DEMO,
+    channel: Channel = None,
+    bitrate: Bitrate = None,
     host: Annotated[str, typer.Option(help="Loopback address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="TCP port; 0 takes a free one.")] = 29536,
     with_commands: WithCommands = False,
@@ -180,11 +188,14 @@ def serve_socketcand(
     with refusals():
         from rds.bus.socketcand import Server
 
+        channel = _channel(interface, channel)
+        opener = _opener(interface, channel, bitrate, "socketcand", errors=True)
+        name = channel or interface  # what clients open
         with (
             _quiet_log(False),
             _until_ctrl_c() as stop,
             _command_of(interface, channel, with_commands),
-            Server(_opener(interface, channel), channel, host=host, port=port, with_commands=with_commands) as server,
+            Server(opener, name, host=host, port=port, with_commands=with_commands) as server,
         ):
             _say(f"{_name(interface, channel)} on {server.address[0]} port {server.address[1]}; Ctrl-C ends")
             while server.alive() and not stop.wait(0.2):
@@ -193,25 +204,39 @@ def serve_socketcand(
     raise typer.Exit(0 if alive else 1)
 
 
-def _opener(interface: str, channel: str) -> Any:
+def _channel(interface: str, channel: str | None) -> str | None:
+    return channel or (DEMO if interface == BUILTIN else None)
+
+
+def _opener(interface: str, channel: str | None, bitrate: int | None, node: str, errors: bool = False) -> Any:
+    """Opens the bus; on the built-in one as `node`, and with `errors` hearing of its controller's errors."""
     from rds.bus.link import open_bus
 
-    return partial(open_bus, interface, channel)
+    options: dict[str, Any] = {} if bitrate is None else {"bitrate": bitrate}
+    if interface == BUILTIN and errors:
+        options["error_frames"] = True
+    return partial(open_bus, interface, channel, node=node, **options)
 
 
-def _name(interface: str, channel: str) -> str:
+def _timing(opener: Any) -> int:
+    """The bit rate of a channel of the built-in bus, bit/s; 0 if it has no bit timing."""
+    with opener() as bus:
+        return bus.bitrate
+
+
+def _name(interface: str, channel: str | None) -> str:
     from rds.bus.link import bus_name
 
     return bus_name(interface, channel)
 
 
-def _command_of(interface: str, channel: str, wanted: bool) -> Any:
+def _command_of(interface: str, channel: str | None, wanted: bool) -> Any:
     """Holds the command of a channel of the built-in bus, so that no run commands the machine at the same time."""
     if not wanted or interface != BUILTIN:
         return nullcontext()
     from rds.bus.command import Command
 
-    return Command(channel)
+    return Command(str(channel))
 
 
 @contextmanager
