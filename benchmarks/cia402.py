@@ -8,7 +8,7 @@ otherwise `bus` (the hub, or the drives' process). The library's way: RPDOs by `
 
 Columns: wire time at most at 1 Mbit/s, cycle (median, 99th percentile, longest), lateness (99th percentile).
 
-`python -m benchmarks.cia402 [--seconds 20] [--interface rds]`.
+`python -m benchmarks.cia402 [--seconds 20] [--bitrate 1000000]`; without a bit rate, the bus is untimed.
 """
 
 from __future__ import annotations
@@ -69,10 +69,10 @@ def keep(period: float, seconds: float, cycle: Cycle) -> tuple[list[int], list[i
     return times, late, missed
 
 
-def ours(interface: str, channel: str, axes: Sequence[str], period: float, seconds: float) -> tuple:
+def ours(channel: str, axes: Sequence[str], period: float, seconds: float) -> tuple:
     """Cia402Drivers in mode cst at zero volts."""
     machine = load_machine(MACHINE)
-    drivers = Cia402Drivers(machine, axes, interface=interface, channel=channel, sample_period=period)
+    drivers = Cia402Drivers(machine, axes, channel=channel, sample_period=period)
     zero = [0.0] * len(axes)
     try:
         drivers.start()
@@ -89,11 +89,11 @@ def ours(interface: str, channel: str, axes: Sequence[str], period: float, secon
         drivers.close()
 
 
-def library(interface: str, channel: str, axes: Sequence[str], period: float, seconds: float) -> tuple:
+def library(channel: str, axes: Sequence[str], period: float, seconds: float) -> tuple:
     """The same cycle through canopen, with its receiving thread."""
     machine = load_machine(MACHINE)
     settings = read_settings({"rpdo_transmission": 1}, machine, axes)
-    network = canopen.Network(can.Bus(interface=interface, channel=channel, ignore_config=True))
+    network = canopen.Network(can.Bus(interface="rds", channel=channel, ignore_config=True))
     network.connect()
     try:
         prepare(network, settings, period)
@@ -123,18 +123,21 @@ def library(interface: str, channel: str, axes: Sequence[str], period: float, se
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--interface", default="rds")
+    parser.add_argument("--bitrate", type=int, default=None, help="bit/s of the built-in bus (default: untimed)")
     options = parser.parse_args(arguments)
     console = Console()
     priority = raise_priority(80)
     cases = [(["X"], 0.001), (["X", "Y", "Z"], 0.002)]
-    table = Table(title=f"CiA 402 cycles in µs on {options.interface}, {options.seconds:g} s each, {priority}")
+    rate = f"{options.bitrate} bit/s" if options.bitrate else "untimed"
+    table = Table(title=f"CiA 402 cycles in µs, built-in bus ({rate}), {options.seconds:g} s each, {priority}")
     for column in ("drives", "ms", "loop", "wire", "median", "p99", "max", "late", "missed, why"):
         table.add_column(column, justify="left" if column in ("loop", "missed, why") else "right")
     for axes, period in cases:
         for name, loop in (("ours", ours), ("canopen", library)):
             channel = f"bench-{uuid4().hex[:8]}"
-            where = ["--interface", options.interface, "--channel", channel, "--axes", ",".join(axes)]
+            where = ["--channel", channel, "--axes", ",".join(axes)]
+            if options.bitrate:
+                where += ["--option", f"bitrate={options.bitrate}"]
             server = subprocess.Popen(
                 [sys.executable, "-m", "rds.bus.cia402.server", MACHINE, *where, "--exit-with-stdin"],
                 stdin=subprocess.PIPE,
@@ -145,7 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 assert server.stdout is not None and server.stdout.readline().startswith(b"ready")
                 gc.collect()
                 gc.freeze()
-                times, late, missed = loop(options.interface, channel, axes, period, options.seconds)
+                times, late, missed = loop(channel, axes, period, options.seconds)
             finally:
                 server.terminate()
                 server.wait()

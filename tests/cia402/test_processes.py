@@ -93,6 +93,17 @@ def test_a_killed_host_leaves_no_voltage(
         assert sdo(client, 0x6064) == first
 
 
+def test_nobody_on_a_bus_with_bit_timing(builtin: Path, machine: Machine) -> None:
+    """No acknowledgement, so a frame waits for ever there: neither host nor scan may."""
+    assert scan("rds", "drives", bitrate=1_000_000) == []
+    host = Cia402Drivers(machine, ["X"], channel="drives", bitrate=1_000_000)
+    try:
+        with pytest.raises(MachineError, match=r"no drive answers for X \(node 2\)"):
+            host.start()
+    finally:
+        host.close()
+
+
 def test_killed_drives_are_told(builtin: Path, program: Program, machine: Machine) -> None:
     server = serve(program, "X")
     host = Cia402Drivers(machine, ["X"], channel="drives", cia402=patient("X"))

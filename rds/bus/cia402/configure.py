@@ -6,6 +6,7 @@ drive's EDS has it, and a refusal of an optional object is reported in the log a
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -23,6 +24,7 @@ from rds.core.errors import InputError, MachineError
 
 LOG = logging.getLogger(__name__)
 
+_SEND = 0.5  # s for a frame to be taken
 _LOOK = 0.02  # s between two looks at whether the library's receiving thread shall end
 _SEARCH = 0.5  # s for a drive to answer
 _SECOND_ANSWER = 0.03  # s more for one that has the same node-ID
@@ -32,10 +34,22 @@ _PROFILE = 402
 _DEVICE_TYPE = b"\x00\x10\x00"  # object 0x1000:00 in an SDO frame
 
 
+class _Network(canopen.Network):
+    """The library on a bus where a frame that nobody takes is an error after a while, not a wait for ever."""
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        assert self.bus is not None
+        with self.send_lock:
+            self.bus.send(
+                can.Message(arbitration_id=can_id, is_extended_id=False, data=data, is_remote_frame=remote), _SEND
+            )
+        self.check()
+
+
 @contextmanager
 def library(bus: can.BusABC) -> Iterator[canopen.Network]:
     """The library on an open bus, with its receiving thread, until the block ends."""
-    network = canopen.Network(bus)
+    network = _Network(bus)
     network.notifier = can.Notifier(bus, network.listeners, _LOOK)
     try:
         yield network
@@ -85,8 +99,9 @@ def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
 
     for drive in drives:
         network.subscribe(0x580 + drive.node, note)
-    for drive in drives:
-        network.send_message(0x600 + drive.node, b"\x40" + _DEVICE_TYPE + bytes(4))
+    with contextlib.suppress(can.CanTimeoutError):  # with bit timing, nobody acknowledges where nobody is
+        for drive in drives:
+            network.send_message(0x600 + drive.node, b"\x40" + _DEVICE_TYPE + bytes(4))
     deadline = time.monotonic() + _SEARCH
     while time.monotonic() < deadline and not all(answers.values()):
         time.sleep(0.002)

@@ -30,6 +30,7 @@ from rds.machines.machine import Machine
 
 LOG = logging.getLogger(__name__)
 
+HOST = "host"  # what the built-in bus calls this node
 LOST_AFTER = 10  # periods in a row without an answer
 _HEARTBEATS = 3  # heartbeats that may be missing
 _SWITCHING = 1.0  # s for all drives to change their state
@@ -88,7 +89,7 @@ class Cia402Drivers:
         self._owns_bus = bus is None
         if bus is None:
             channel = default_channel(machine, interface, channel)
-            bus = open_bus(interface, channel, sorted(self._table), **options)
+            bus = open_bus(interface, channel, sorted(self._table), node=HOST, **options)
             self._bus_name = bus_name(interface, channel)
         else:
             self._bus_name = bus.channel_info

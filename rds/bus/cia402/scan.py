@@ -42,12 +42,14 @@ def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = 
 
     `options` go to the python-can interface. Raises MachineError if the bus can't be opened or fails.
     """
-    bus = open_bus(interface, channel, [0x580, 0x700], 0x780, **options)
+    bus = open_bus(interface, channel, [0x580, 0x700], 0x780, node="scan", **options)
     try:
         with library(bus) as network:
             network.scanner.search()
             time.sleep(timeout)
             return [_ask(network, node) for node in sorted(network.scanner.nodes)]
+    except can.CanTimeoutError:  # with bit timing, nobody acknowledges where nobody is
+        return []
     except (can.CanError, OSError) as error:
         raise MachineError(f"bus {bus_name(interface, channel)} failed: {error}") from error
     finally:

@@ -28,6 +28,7 @@ from rds.bus.poller import READ, make_poller
 from rds.bus.server import AFTERLIFE, PRIORITY, default_channel
 from rds.core.errors import InputError, RdsError
 from rds.machines import Machine, load_machine
+from rds.machines.machine import Axis
 from rds.runtime.scheduling import lock_memory, raise_priority
 
 LOG = logging.getLogger(__name__)
@@ -52,18 +53,20 @@ def serve(
     A drive's node-ID is its axis's node, its full voltage the converter's range. `channel` defaults to the machine's
     name on the built-in bus; `options` go to the python-can interface. `ready` is called when all have booted. The
     drives are appended to `nodes`, for whoever wants to look at them or to inject faults. Once `orphaned` is set, the
-    drives also end when no SYNC has come for `afterlife` s. A bus that fails later is opened again.
+    drives also end when no SYNC has come for `afterlife` s. A bus that fails later is opened again. In a process's main
+    thread it takes real-time priority where permitted, and ends on SIGTERM and SIGINT.
 
     Raises MachineError if the bus can't be opened at the start, InputError for an unknown axis.
     """
     channel = default_channel(machine, interface, channel)
     stop = stop or threading.Event()
     used = [machine.axis(name) for name in (machine.axes if axes is None else axes)]
-    opener = partial(open_bus, interface, channel, **options)
     nodes = [] if nodes is None else nodes
     try:
         for axis in used:
-            nodes.append(DriveNode(lambda start, axis=axis: Drive(axis, start, machine.converter.range), opener))  # type: ignore[misc]
+            make = partial(_make_drive, axis, machine.converter.range)
+            nodes.append(DriveNode(make, partial(open_bus, interface, channel, node=axis.name, **options)))
+        _be_on_time(stop)
         if ready is not None:
             ready()
         keep_on = _until(stop, orphaned, afterlife, nodes)
@@ -74,6 +77,22 @@ def serve(
     finally:
         for node in nodes:
             node.close()
+
+
+def _make_drive(axis: Axis, volts: float, start: float) -> Drive:
+    return Drive(axis, start, volts)
+
+
+def _be_on_time(stop: threading.Event) -> None:
+    """Where the whole process is the machine's: priority, and an end when told."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    LOG.info("%s; memory locked: %s", raise_priority(PRIORITY), lock_memory())
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    logging.getLogger("canopen").setLevel(logging.WARNING)  # it reports every SDO transfer
+    gc.collect()
+    gc.freeze()
 
 
 def _until(
@@ -168,21 +187,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--afterlife", type=float, default=AFTERLIFE, metavar="SECONDS")
     options = parser.parse_args(arguments)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
-    logging.getLogger("canopen").setLevel(logging.WARNING)  # it reports every SDO transfer
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
     orphaned = _watch_stdin() if options.exit_with_stdin else None
     axes = options.axes.split(",") if options.axes else None
     try:
         machine = load_machine(options.machine)
         bus_options = dict(_pair(text) for text in options.option)
         bus = bus_name(options.interface, default_channel(machine, options.interface, options.channel))
-        LOG.info("%s; memory locked: %s", raise_priority(PRIORITY), lock_memory())
 
         def ready() -> None:
-            gc.collect()
-            gc.freeze()
             sys.stdout.write(f"ready {machine.name} on {bus}: {', '.join(axes or machine.axes)}\n")
             sys.stdout.flush()
 
@@ -192,7 +204,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.channel,
             axes,
             ready,
-            stop,
             orphaned=orphaned,
             afterlife=options.afterlife,
             **bus_options,
