@@ -128,7 +128,11 @@ def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, 
         return table, None
     if "name" in table:
         raise InputError("name and file both say what to take; give one of them", table.place("name"))
-    return table, load_student(setting.path(str(table.text("file"))))
+    path = setting.path(str(table.text("file")))
+    if not path.is_file():
+        kind = f"{path} is a folder" if path.is_dir() else f"there is no such file as {path}"
+        raise table.fault("file", f"will not do: {kind}; a name counts from the experiment's folder")
+    return table, load_student(path)
 
 
 def _functions(words: Words, key: str, given: dict[str, Any]) -> Words:

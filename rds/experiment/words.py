@@ -91,7 +91,9 @@ class Words:
         """A number in `unit` from `low` to `high`; without a default it must be there."""
         value = self.any(key, default)
         if value is None:
-            raise InputError(f"{key} is missing; give it in {unit}, as in `{key} = 1.0`", self.place())
+            slip = get_close_matches(key, [name for name in self.table if name not in self._asked], n=1)
+            hint = f"; is '{slip[0]}' meant to be it?" if slip else ""
+            raise InputError(f"{key} is missing; give it in {unit}, as in `{key} = 1.0`{hint}", self.place())
         if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
             raise self.fault(key, f"must be a number in {unit}, without quotes")
         if not low <= value <= high:

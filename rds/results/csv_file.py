@@ -140,5 +140,8 @@ def _layout(path: Path) -> tuple[list[str], str, str, bool]:
         raise InputError("it is not a table: its first line must head the columns, as in 'time [s],X_measured [mm]'")
     delimiter = max(",;\t", key=head.count)
     decimal = "," if delimiter != "," and b"," in second else "."
-    names = [name.strip() for name in next(csv.reader([head], delimiter=delimiter))]
+    try:
+        names = [name.strip() for name in next(csv.reader([head], delimiter=delimiter))]
+    except csv.Error as error:
+        raise InputError(f"it is not a table: its first line cannot be read ({error})") from error
     return names, delimiter, decimal, not second.strip()
