@@ -214,13 +214,13 @@ class BuiltinBus(can.BusABC):
         Raises can.CanOperationError if it is not bus off, or the hub does not answer.
         """
         from rds.bus.faults import Faults
-        from rds.core.errors import MachineError
+        from rds.core.errors import RdsError
 
         try:
             with Faults(self._channel) as faults:
                 faults.restart(self._node)
-        except MachineError as error:
-            raise can.CanOperationError(f"{self.channel_info}: {error}") from error
+        except RdsError as error:
+            raise can.CanOperationError(str(error)) from error
 
     def _send_at_once(self, data: bytes) -> int:
         if not _AT_ONCE and not _wait(self._sock, True, 0.0):

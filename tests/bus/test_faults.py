@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -85,9 +86,8 @@ def test_what_cannot_be_is_refused_with_the_reason(words: dict[str, Any], reason
 
 def test_a_schedule_is_read_in_the_order_of_its_times(tmp_path: Path) -> None:
     file = tmp_path / "faults.toml"
-    file.write_text(
-        '[[fault]]\nat = 2.0\nnode = "Y"\nkind = "unplug"\nfor = 1.0\n\n[[fault]]\nat = 0.5\nkind = "corrupt"\ncount = 3\n'
-    )
+    late = '[[fault]]\nat = 2.0\nnode = "Y"\nkind = "unplug"\nfor = 1.0\n'
+    file.write_text(late + '[[fault]]\nat = 0.5\nkind = "corrupt"\ncount = 3\n')
     assert read_faults(file) == (Fault("corrupt", at=0.5, count=3), Fault("unplug", "Y", 2.0, 1.0))
 
 
@@ -284,7 +284,7 @@ def test_a_babbling_node_takes_the_whole_bus() -> None:
     each = frame_time(0, bytes(8), bitrate=MBIT, interframe=True)
     assert [identifier for identifier, _ in seen] == [0] * (len(seen) - 1) + [5]
     assert len(seen) - 1 == -(-10_000_000 // each)
-    assert all(after[1] - before[1] == each for before, after in zip(seen[:-2], seen[1:-1], strict=True))
+    assert all(after - before == each for (_, before), (_, after) in pairwise(seen[:-1]))
 
 
 def test_a_babbling_node_leaves_what_is_above_it() -> None:
