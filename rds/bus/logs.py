@@ -79,8 +79,8 @@ class LogFile:
     where the log is damaged.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: str | Path):
+        self.path = path = Path(path)
         self._ending, self._packed = ending(path)
         self.skipped = 0
         if not path.is_file():
@@ -169,11 +169,11 @@ class LogWriter:
     where the disk says no (whenever it says so).
     """
 
-    def __init__(self, path: Path, force: bool = False):
+    def __init__(self, path: str | Path, force: bool = False):
         from rds.bus import log_writers
 
+        self.path = path = Path(path)
         self._ending, packed = ending(path)
-        self.path = path
         self.frames = 0
         self.unkept: Counter[str] = Counter()
         self._last = 0.0
