@@ -9,7 +9,7 @@ import json as json_text
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, nullcontext, redirect_stdout
 from typing import Annotated, Any
 
 import typer
@@ -38,10 +38,21 @@ def refusals() -> Iterator[None]:
 
 @contextmanager
 def stdout_kept(json: bool) -> Iterator[None]:
-    """With `json`, whatever a student's code prints goes to stderr: stdout is for the one JSON object."""
-    if not json:
-        yield
-        return
+    """With `json`, whatever a student's code prints goes to stderr: stdout is for the one JSON object.
+
+    A copy of the process that the student's code made by os.fork() ends here: it has nothing to say.
+    """
+    process = os.getpid()
+    try:
+        with _stdout_to_stderr() if json else nullcontext():
+            yield
+    finally:
+        if os.getpid() != process:
+            os._exit(0)
+
+
+@contextmanager
+def _stdout_to_stderr() -> Iterator[None]:
     sys.stdout.flush()
     try:
         saved = os.dup(1)

@@ -56,3 +56,16 @@ def set_timer_slack(nanoseconds: int = 1) -> bool:
         return ctypes.CDLL(None, use_errno=True).prctl(set_slack, ctypes.c_ulong(nanoseconds), 0, 0, 0) == 0
     except (ImportError, OSError, AttributeError):
         return False
+
+
+def end_with_parent() -> bool:
+    """Let the kernel kill this process when the one that started it dies; true if that was arranged."""
+    if not sys.platform.startswith("linux"):
+        return False
+    set_death_signal, kill = 1, 9  # PR_SET_PDEATHSIG, <sys/prctl.h>; SIGKILL
+    try:
+        import ctypes
+
+        return ctypes.CDLL(None, use_errno=True).prctl(set_death_signal, ctypes.c_ulong(kill), 0, 0, 0) == 0
+    except (ImportError, OSError, AttributeError):
+        return False
