@@ -37,7 +37,7 @@ ALLOWED: dict[str, set[str]] = {
 ONLY = {
     ("bus", "models"): {"rds.models.machine_axis"},  # the machine's own axis, behind the bus
     ("bus", "runtime"): {"rds.runtime.scheduling"},  # hub and machine are on time as well
-    ("experiment", "bus"): {"rds.bus.bus_settings", "rds.bus.fault_file"},  # what a [bus] table may say
+    ("experiment", "bus"): {"rds.bus.bus_settings", "rds.bus.dialects", "rds.bus.fault_file"},  # what a [bus] table may say
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     ("reports", "bus"): {"rds.bus.frames"},  # which frames are commands and answers
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record

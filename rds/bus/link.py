@@ -7,7 +7,7 @@ from typing import Any
 
 import can
 
-from rds.core.errors import MachineError
+from rds.core.errors import InputError, MachineError
 
 BUILTIN = "rds"  # the built-in bus's name among python-can's interfaces
 
@@ -48,3 +48,11 @@ def open_bus(
         raise MachineError(
             f"bus {bus_name(interface, channel)} can't be opened: {error}; check the [bus] table"
         ) from error
+
+
+def pair(text: str) -> tuple[str, Any]:
+    """KEY=VALUE; a value that looks like a number or true/false becomes one, as in python-can's own files."""
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise InputError(f"option {text!r} must be KEY=VALUE", "--option")
+    return key, can.util.cast_from_string(value)

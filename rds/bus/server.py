@@ -24,7 +24,7 @@ import can
 from rds.bus.fault_file import read_faults
 from rds.bus.fault_kinds import Fault
 from rds.bus.faults import Faults
-from rds.bus.link import BUILTIN, bus_name, open_bus
+from rds.bus.link import BUILTIN, bus_name, open_bus, pair
 from rds.bus.module import AxisModule
 from rds.bus.module_node import LISTEN_MASK, LISTENS_TO, ModuleNode
 from rds.bus.poller import READ, make_poller
@@ -221,7 +221,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     axes = options.axes.split(",") if options.axes else None
     try:
         machine = load_machine(options.machine)
-        bus_options = dict(_pair(text) for text in options.option)
+        bus_options = dict(pair(text) for text in options.option)
         bus = bus_name(options.interface, default_channel(machine, options.interface, options.channel))
         ready = partial(_say, f"ready {machine.name} on {bus}: {', '.join(axes or machine.axes)}\n")
         serve(
@@ -257,14 +257,6 @@ def _watch_stdin() -> threading.Event:
 
     threading.Thread(target=read_to_end, name="starter", daemon=True).start()
     return ended
-
-
-def _pair(text: str) -> tuple[str, Any]:
-    """KEY=VALUE; a value that looks like a number or true/false becomes one, as in python-can's own files."""
-    key, equals, value = text.partition("=")
-    if not equals or not key:
-        raise InputError(f"option {text!r} must be KEY=VALUE", "--option")
-    return key, can.util.cast_from_string(value)
 
 
 if __name__ == "__main__":

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rds.core.errors import InputError
+from rds.bus.dialects import check_dialect
 from rds.machines import Machine
-
-DIALECTS = ("rds", "oacs", "cia402")
 
 
 def serve_machine(
     machine: Machine, dialect: str, interface: str, channel: str, ready: Callable[[], Any], **options: Any
 ) -> None:
     """Serve `machine` until the process is told to end. InputError for an unknown dialect; else as each server says."""
+    check_dialect(dialect)
     if dialect == "rds":
         from rds.bus.server import serve
 
@@ -23,9 +22,7 @@ def serve_machine(
         from rds.bus.oacs.server import serve_oacs
 
         serve_oacs(machine, interface, channel, ready=ready, **options)
-    elif dialect == "cia402":
+    else:
         from rds.bus.cia402.server import serve as serve_drives
 
         serve_drives(machine, interface, channel, ready=ready, **options)
-    else:
-        raise InputError(f"unknown dialect {dialect!r}; known dialects: {', '.join(DIALECTS)}")

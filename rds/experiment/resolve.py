@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.bus.bus_settings import BITRATES, DATA_BITRATES
+from rds.bus.dialects import DEFAULT, dialect_names
 from rds.bus.fault_file import read_faults
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
@@ -208,6 +209,9 @@ def _bus(words: Words, folder: Path) -> dict[str, Any]:
     channel = table.any("channel")
     if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
         raise table.fault("channel", "must be the name or the number of a channel")
+    table.choice("dialect", DEFAULT, dialect_names())
+    if "cia402" in table and table.any("dialect") != "cia402":
+        raise table.fault("cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it')
     if interface == BUILTIN:
         table.whole("bitrate", None, "bit/s", *BITRATES)
         table.whole("data_bitrate", None, "bit/s, of CAN FD", *DATA_BITRATES)

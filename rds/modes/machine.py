@@ -32,17 +32,21 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
         return
     from rds.bus.address import channels
     from rds.bus.command import commanded
-    from rds.bus.drivers import find_machine
+    from rds.bus.dialects import DEFAULT, is_served, server_module
 
-    given = bus.get("channel")
+    given, dialect = bus.get("channel"), bus.get("dialect", DEFAULT)
     channel = str(given or plan.machine.name)
-    is_served = channel in channels() and bool(find_machine(plan.machine, BUILTIN, channel))
-    if is_served and (given or not commanded(channel)):
+    if (
+        channel in channels()
+        and is_served(dialect, plan.machine, BUILTIN, channel)
+        and (given or not commanded(channel))
+    ):
         yield replace(plan, bus=bus | {"channel": channel})
         return
     if given is None:
         channel = f"{plan.machine.name[:20]}-{secrets.token_hex(4)}"
-    server = _serve(plan.machine.path, channel, {key: bus[key] for key in TIMING if key in bus})
+    timing = {key: bus[key] for key in TIMING if key in bus}
+    server = _serve(server_module(dialect), plan.machine.path, channel, timing)
     try:
         yield replace(plan, bus=bus | {"channel": channel})
     finally:
@@ -57,7 +61,7 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
             pipe.close()
 
 
-def _serve(machine: str, channel: str, timing: Mapping[str, Any]) -> subprocess.Popen[bytes]:
+def _serve(module: str, machine: str, channel: str, timing: Mapping[str, Any]) -> subprocess.Popen[bytes]:
     """Start the machine's modules in a process of their own, and wait until they are on the bus.
 
     They are the first there, so it is their options that say whether the bus has bit timing.
@@ -69,7 +73,7 @@ def _serve(machine: str, channel: str, timing: Mapping[str, Any]) -> subprocess.
                 sys.executable,
                 "-P",
                 "-m",
-                "rds.bus.server",
+                module,
                 machine,
                 "--channel",
                 channel,

@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     """Take every sample of the plan; returns how it ended, why, and the environment."""
     from rds.bus.command import Command
-    from rds.bus.drivers import AxisDrivers
+    from rds.bus.dialects import DEFAULT, open_drivers
     from rds.bus.run_watch import RunWatch
 
     mode = load_mode(plan.mode)
@@ -48,13 +48,13 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     stolen = stolen_ticks()
     drivers = loop = watch = None
     bus = dict(plan.bus)
-    faults = bus.pop("faults", ())
+    faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
     threads = threading.active_count()
     stack = ExitStack()
     try:
         if bus["interface"] == "rds":
             stack.enter_context(Command(bus["channel"]))
-        drivers = AxisDrivers(plan.machine, plan.names, sample_period=plan.T, dry_run=mode.drivers == "dry run", **bus)
+        drivers = open_drivers(dialect, plan.machine, plan.names, plan.T, mode.drivers == "dry run", bus)
         drivers.start()
         if bus["interface"] == "rds":
             watch = stack.enter_context(RunWatch(bus["channel"], faults))

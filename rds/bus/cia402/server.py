@@ -23,7 +23,7 @@ import can
 
 from rds.bus.cia402.drive import Drive
 from rds.bus.cia402.node import DriveNode
-from rds.bus.link import BUILTIN, bus_name, open_bus
+from rds.bus.link import BUILTIN, bus_name, open_bus, pair
 from rds.bus.poller import READ, make_poller
 from rds.bus.server import AFTERLIFE, PRIORITY, default_channel
 from rds.core.errors import InputError, RdsError
@@ -191,7 +191,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     axes = options.axes.split(",") if options.axes else None
     try:
         machine = load_machine(options.machine)
-        bus_options = dict(_pair(text) for text in options.option)
+        bus_options = dict(pair(text) for text in options.option)
         bus = bus_name(options.interface, default_channel(machine, options.interface, options.channel))
 
         def ready() -> None:
@@ -225,14 +225,6 @@ def _watch_stdin() -> threading.Event:
 
     threading.Thread(target=read_to_end, name="starter", daemon=True).start()
     return ended
-
-
-def _pair(text: str) -> tuple[str, Any]:
-    """KEY=VALUE; a value that looks like a number or true/false becomes one, as in python-can's own files."""
-    key, equals, value = text.partition("=")
-    if not equals or not key:
-        raise InputError(f"option {text!r} must be KEY=VALUE", "--option")
-    return key, can.util.cast_from_string(value)
 
 
 if __name__ == "__main__":

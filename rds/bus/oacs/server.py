@@ -22,7 +22,7 @@ from typing import Any
 
 import can
 
-from rds.bus.link import BUILTIN, bus_name, open_bus
+from rds.bus.link import BUILTIN, bus_name, open_bus, pair
 from rds.bus.oacs import messages
 from rds.bus.oacs.bench import handle
 from rds.bus.oacs.module import HEARTBEAT, OacsModule
@@ -150,6 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--interface", default=BUILTIN)
     parser.add_argument("--channel", default=None)
     parser.add_argument("--modules", default=None, help="names, separated by commas (default: all)")
+    parser.add_argument("--option", action="append", default=[], metavar="KEY=VALUE", help="of the interface")
     parser.add_argument("--exit-with-stdin", action="store_true", help="end when stdin does")
     options = parser.parse_args(arguments)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
@@ -160,7 +161,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         machine = load_machine(options.machine)
         bus = bus_name(options.interface, default_channel(machine, options.interface, options.channel))
         ready = partial(_say, f"ready {machine.name} on {bus}: {', '.join(modules or machine.axes)}\n")
-        serve_oacs(machine, options.interface, options.channel, modules, ready, stop, lines)
+        bus_options = dict(pair(text) for text in options.option)
+        serve_oacs(machine, options.interface, options.channel, modules, ready, stop, lines, **bus_options)
     except RdsError as error:
         sys.stderr.write(f"{error}\n")
         return 2 if isinstance(error, InputError) else 1

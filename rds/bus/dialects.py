@@ -1,0 +1,54 @@
+"""What the modules on a bus speak: for each dialect its server, its drivers on the host, and how to see it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.machines.machine import Machine
+
+_DRIVERS = {
+    "rds": ("rds.bus.drivers", "AxisDrivers"),
+    "oacs": ("rds.bus.oacs.drivers", "OacsDrivers"),
+    "cia402": ("rds.bus.cia402.host", "Cia402Drivers"),
+}
+_SERVERS = {"rds": "rds.bus.server", "oacs": "rds.bus.oacs.server", "cia402": "rds.bus.cia402.server"}
+DEFAULT = "rds"
+
+
+def dialect_names() -> list[str]:
+    """The dialects there are; the first is the cyclic frames of `rds.bus.frames`."""
+    return list(_DRIVERS)
+
+
+def check_dialect(dialect: str) -> None:
+    """InputError listing the dialects there are, for another one."""
+    if dialect not in _DRIVERS:
+        raise InputError(f"unknown dialect {dialect!r}; known dialects: {', '.join(_DRIVERS)}")
+
+
+def server_module(dialect: str) -> str:
+    """The module that serves a machine in this dialect, for `python -m`."""
+    return _SERVERS[dialect]
+
+
+def open_drivers(
+    dialect: str, machine: Machine, axes: Sequence[str], sample_period: float, dry_run: bool, bus: dict[str, Any]
+) -> Any:
+    """The host's drivers (`rds.core.contracts.Drivers`) of a machine's axes; `bus` goes to them as it is."""
+    module, name = _DRIVERS[dialect]
+    drivers: Any = getattr(import_module(module), name)
+    return drivers(machine, axes, sample_period=sample_period, dry_run=dry_run, **bus)
+
+
+def is_served(dialect: str, machine: Machine, interface: str, channel: str) -> bool:
+    """Whether modules of this dialect answer on a channel; nothing else happens there."""
+    if dialect == "cia402":
+        from rds.bus.cia402.scan import scan
+
+        return any(device.is_drive for device in scan(interface, channel))
+    from rds.bus.drivers import find_machine
+
+    return bool(find_machine(machine, interface, channel))
