@@ -229,11 +229,11 @@ def test_error_frames_are_left_out_and_counted(pair: tuple[can.BusABC, can.BusAB
 
 def test_a_replay_that_waits_can_be_stopped(open_bus: Opener) -> None:
     stop = threading.Event()
-    threading.Timer(0.2, stop.set).start()
+    threading.Timer(1.0, stop.set).start()
     began = time.monotonic()
     result = replay([frame(0x700), frame(0x701, at=100.0)], open_bus(), stop=stop)
     assert result.stopped and result.sent == 1
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < 5.0
 
 
 @pytest.mark.parametrize(
