@@ -33,7 +33,7 @@ class Row:
 
     key: Key
     count: int
-    rate: float  # NaN for less than two frames
+    rate: float  # while it was sent: 1 by the mean period; NaN for less than two frames
     period: float  # mean; NaN for less than two frames
     jitter: float  # standard deviation of the period; NaN for less than three frames
     shortest: float  # period
