@@ -19,6 +19,7 @@ def read_settings(options: Mapping[str, Any]) -> wire.Settings:
     Raises ValueError for an unknown option or a value that can't be, with what can.
     """
     given = {key: value for key, value in options.items() if value is not None}
+    given.pop("single_handle", None)  # python-can's own tools give it to every interface; it says nothing here
     if unknown := sorted(set(given) - set(OPTIONS)):
         raise ValueError(
             f"the built-in bus has no option {', '.join(unknown)}; it takes channel, can_filters, "
