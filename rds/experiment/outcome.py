@@ -67,6 +67,7 @@ def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
         | {"discarded": judgement.discarded, "late_without_system": judgement.late_without_system},
         "environment": environment | {"sentence": sentence(environment)} if environment else {},
         "drivers": rows.report.get("drivers", {}),
+        "bus": rows.report.get("bus", {}),
     }
 
 

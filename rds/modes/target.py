@@ -78,9 +78,9 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
         environment["threads"] = threading.active_count() - threads  # that the student's code left running
         if drivers is not None:
             report["drivers"] = asdict(drivers.counters)
+            drivers.close()
             if watch is not None:
                 report["bus"] = watch.summary()
-            drivers.close()
         stack.close()
         clock.close()
     after = stolen_ticks()

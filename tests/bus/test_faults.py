@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -346,3 +347,21 @@ def test_a_node_that_leaves_takes_its_faults_along(medium: Medium[str]) -> None:
     hand.injector.withdraw(None, 3 * SECOND)
     medium.offer("A", record(1), 3 * SECOND)
     assert [delivery.sender for delivery in drain(medium, 4 * SECOND)] == ["A"]
+
+
+# --- the document
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "bus-timing.md"
+
+
+def test_the_document_names_every_kind_and_word(tmp_path: Path) -> None:
+    text = DOCUMENT.read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \|(.*)$", text, re.MULTILINE))
+    for name, kind in KINDS.items():
+        assert name in rows, f"{name} is not in {DOCUMENT.name}"
+        assert ("| no" in rows[name]) == kind.needs_bits
+        for word in kind.words:
+            assert f"`{word}`" in rows[name] or "the same" in rows[name], f"{name} takes {word}"
+    (schedule,) = re.findall(r"```toml file=faults.toml\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "faults.toml").write_text(schedule)
+    assert [fault.kind for fault in read_faults(tmp_path / "faults.toml")] == ["corrupt", "unplug", "lose"]
