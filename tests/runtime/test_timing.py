@@ -135,6 +135,14 @@ def test_without_doubt_nothing_is_called_again() -> None:
         judge(timing, MS, **counts, again=never)
 
 
+def test_code_that_starts_threads_is_not_called_again() -> None:
+    def never() -> None:
+        raise AssertionError
+
+    timing, counts = ran(inside={500: 3.0})
+    assert judge(timing, MS, **counts, threads=1, again=never).verdict == Verdict.MISSED
+
+
 def test_a_stall_seen_by_the_rehearsal_counts() -> None:
     assert verdict(compute=some(5, 2.0), stalls=5) == Verdict.VOID
     assert verdict(compute=some(50, 2.0), stalls=5) == Verdict.MISSED
