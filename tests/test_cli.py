@@ -112,7 +112,7 @@ def test_a_missed_verdict_is_exit_code_1(folder: Path) -> None:
     said = only_json(done.stdout)
     assert (done.returncode, said["verdict"]) == (1, "missed")
     assert "rds: timing missed: " in done.stderr
-    assert "control() and the model took 2." in done.stderr
+    assert "control() and the model took " in done.stderr
     (folder / "law.py").write_text(LAW)  # the record says what ran, not what is there now
     assert "time.sleep" in rds.open_result(folder / "out").meta["controller"]["X"]["source"]
 

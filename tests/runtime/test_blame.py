@@ -28,7 +28,7 @@ Maker = Callable[..., rds.Experiment]
 def test_two_milliseconds_of_one_are_missed(experiment: Maker, samples: int, mode: str, wait: Any) -> None:
     result = experiment(every(samples, lambda: wait(0.002)), duration=0.5).run(mode)
     assert result.verdict == "missed"
-    assert "control() and the model took 2." in result.meta["verdict_reason"]
+    assert "control() and the model took " in result.meta["verdict_reason"]
     assert result.meta["ending"] == "done"
     assert result.meta["timing"]["compute"]["max"] >= 2000.0
 
