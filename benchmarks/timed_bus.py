@@ -35,6 +35,7 @@ from rds.bus.drivers import AxisDrivers
 from rds.bus.faults import Faults
 from rds.console import show_table
 from rds.core.clock import LatePolicy, RealTimeClock
+from rds.core.errors import MachineError
 from rds.machines import load_machine
 from rds.runtime.scheduling import lock_memory, raise_priority
 
@@ -83,7 +84,8 @@ class Cycles:
     times: array[float] = field(default_factory=lambda: array("d"))
     wire: array[float] = field(default_factory=lambda: array("d"))
     missed: Counter[str] = field(default_factory=Counter)
-    skipped: int = 0  # periods that passed while the loop was late
+    skipped: int = 0  # periods that passed while the loop was late, or the machine was started again
+    lost: int = 0  # times that the machine had not answered for ten periods, and was started again
     hub: dict[str, Any] = field(default_factory=dict)
 
 
@@ -125,7 +127,13 @@ def _cycles(drivers: AxisDrivers, bus: NotingBus, line: Faults, count: int) -> C
         begin = time.monotonic_ns()
         late = clock.lateness(k, clock.now())
         bus.clear()
-        drivers.exchange()
+        try:
+            drivers.exchange()
+        except MachineError:  # ten periods in a row
+            found.lost += 1
+            drivers.start()
+            missing = drivers.counters.missing
+            continue
         end = time.monotonic_ns()
         push = 5.0 if k % 1000 < 500 else -5.0
         drivers.write([push, -push, push / 2, 3.0])
@@ -167,6 +175,7 @@ def run(seconds: float = 60.0) -> list[Figure]:
         Figure("missed cycles", f"of {round(seconds * 1e9 / PERIOD)}", (float(missed),)),
         *(Figure(f"missed by the {who}", "", (float(found.missed[who]),)) for who in ("bus", "host", "system")),
         Figure("periods skipped after a late cycle", "", (float(found.skipped),)),
+        Figure("machine lost and started again", "times", (float(found.lost),)),
         Figure("bus load", "%", (100 * found.hub["load"],)),
     ]
     for name, title in (("delivery_lateness", "hub: end of frame to hand-over"), ("pickup_lateness", "hub: pick-up")):

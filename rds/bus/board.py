@@ -6,6 +6,7 @@ modulo `SEATS`. The hub writes, nodes read.
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import os
 from pathlib import Path
@@ -18,9 +19,11 @@ class Board:
 
     def __init__(self, path: Path):
         self._path = path
-        path.unlink(missing_ok=True)  # who still looks at an old one keeps it
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        with contextlib.suppress(PermissionError):  # Windows keeps files that are open
+            path.unlink(missing_ok=True)  # who still looks at an old one keeps it
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
         try:
+            os.truncate(descriptor, 0)
             os.truncate(descriptor, SEATS)
             self._states = mmap.mmap(descriptor, SEATS)
         finally:
@@ -32,8 +35,9 @@ class Board:
 
     def remove(self) -> None:
         """Take it away."""
-        self._path.unlink(missing_ok=True)
         self._states.close()
+        with contextlib.suppress(PermissionError):
+            self._path.unlink(missing_ok=True)
 
 
 class Glance:

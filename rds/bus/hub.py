@@ -62,10 +62,11 @@ def _detach(address: Address) -> bool:
 
 def _serve(hub: Hub) -> None:
     # not imported above: nobody needs these before the hub listens
-    from rds.runtime.scheduling import lock_memory, raise_priority
+    from rds.runtime.scheduling import lock_memory, raise_priority, set_timer_slack
 
     signal.signal(signal.SIGTERM, _end)
     signal.signal(signal.SIGINT, _end)
+    set_timer_slack()
     log(f"hub {os.getpid()} listens; {raise_priority(PRIORITY)}; memory {'' if lock_memory() else 'not '}locked")
     gc.collect()
     gc.freeze()

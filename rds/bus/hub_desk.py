@@ -51,7 +51,7 @@ class Desk:
             return json.dumps(action(asked, asker, now))
         except (FaultRefused, InputError) as error:
             return json.dumps({"error": str(error)})
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             return json.dumps({"error": f"this makes no sense to the hub: {error}"})
 
     def take_part(self, asker: Node, part: bytes, more: bool) -> str | None:

@@ -179,7 +179,8 @@ class HubNodes:
     def _hang_up(self, node: Node) -> None:
         """A member ended while it has to wait: nothing can be read from it now, and nothing reaches it."""
         station = self._medium.stations.get(node)
-        if station is not None and not station.plugged:  # what it sent will never go
+        # what nobody can take will never go
+        if station is not None and (not station.on_bus or len(self._members) == 1):
             self._part(node)
             return
         self._poller.unregister(node.fd)

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.bus import wire
-from rds.bus.analysis import responses
+from rds.bus.analysis import Errors, responses
 from rds.bus.bits import frame_time
+from rds.bus.fault_kinds import Fault
 from rds.bus.messages import Message, in_order
 from rds.bus.messages import priority as message_priority
 from rds.bus.schedule import schedule
@@ -234,6 +235,31 @@ def test_as_the_exact_schedule_and_never_beyond_the_analysis(
         bound = bounds[slot.message].time
         if bound is not None:
             assert slot.end - due <= bound
+
+
+@settings(max_examples=40, deadline=None)
+@given(raw=message_sets, burst=st.integers(1, 8), seed=st.integers(0, 100), probability=st.floats(0.05, 1.0))
+def test_with_errors_never_beyond_the_analysis_with_so_many(
+    raw: list[tuple[int, bool, int, int, int]], burst: int, seed: int, probability: float
+) -> None:
+    messages = table(raw)
+    bounds = responses(messages, 500_000, errors=Errors(burst=burst))
+    medium = bus("listener", *(message.name for message in messages), bitrate=500_000)
+    medium.frame_faults.arm(Fault("corrupt", count=burst, probability=probability, seed=seed), 0)
+    due: dict[int, list[int]] = {message.identifier: [] for message in messages}
+    offers = []
+    for message in messages:
+        period = round(message.period * 1e9)
+        for k in range(20_000_000 // period):  # all released together at 0, the worst case
+            due[message.identifier].append(k * period)
+            flags = wire.EXTENDED if message.extended else 0
+            content = bytes([seed, k % 256] * 4)[: message.size]
+            offers.append(Offer(k * period, message.name, record(message.identifier, content, flags)))
+    worst = dict.fromkeys(due, 0)
+    for at, identifier in carry(medium, offers, 10**12):
+        worst[identifier] = max(worst[identifier], at + 6000 - due[identifier].pop(0))
+    for message, bound in zip(messages, bounds, strict=True):
+        assert bound.time is None or worst[message.identifier] <= bound.time
 
 
 @settings(max_examples=50, deadline=None)
