@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 import can
@@ -19,7 +20,8 @@ from rds.machines.machine import Axis, Machine
 
 LOG = logging.getLogger(__name__)
 
-LOST_AFTER = 10  # periods in a row without an answer; then the module has cut its voltage too
+SILENT_AFTER = 10  # periods in a row without an answer; then all axes get zero volts until it answers again
+LOST_AFTER = 0.1  # s without an answer, and SILENT_AFTER periods at least: the run ends. Computers stall for less
 _STARTING = 1.0  # s for all modules to answer at the start
 _STANDSTILL = 20  # ticks in which no encoder moves until the axes count as standing
 _LONGEST_COAST = 3.0  # s until then
@@ -36,6 +38,7 @@ class Counters:
     late: int = 0  # answers to an earlier tick
     lost_ticks: int = 0  # ticks that a module says it did not hear
     watchdogs: int = 0  # reports that a module's watchdog has cut the voltage
+    cut: int = 0  # periods of zero volts because a module was silent
     foreign: int = 0  # frames that no module of ours sent
 
 
@@ -89,6 +92,7 @@ class AxisDrivers:
         self._period = machine.sample_period if sample_period is None else sample_period
         self._setup = frames.encode_setup(self._period)
         self._timeout = self._period if timeout is None else timeout
+        self._lost_after = max(SILENT_AFTER, ceil(LOST_AFTER / self._period))
         self._owns_bus = bus is None
         if bus is None:
             channel = default_channel(machine, interface, channel)
@@ -147,8 +151,8 @@ class AxisDrivers:
     def exchange(self) -> list[float]:
         """Send the waiting voltages as the tick; return the measured positions at the tick, in axis units.
 
-        An answer that doesn't come in time repeats the last position and is counted. Raises MachineError when a module
-        has not answered for 10 periods in a row, or the bus fails.
+        An answer that doesn't come in time repeats the last position and is counted. While a module has not answered
+        for 10 periods in a row, all axes get zero volts. Raises MachineError when that lasts 0.1 s, or the bus fails.
         """
         deadline = time.monotonic() + self._timeout
         tick = self._tick
@@ -156,7 +160,7 @@ class AxisDrivers:
         self._sent_voltages = self._waiting_voltages
         try:
             self._take_stragglers()
-            self._bus.send(tick, self._timeout * LOST_AFTER)
+            self._bus.send(tick, self._timeout * SILENT_AFTER)
             self._count_tick()
             self._collect(deadline)
         except can.CanError as error:
@@ -250,7 +254,7 @@ class AxisDrivers:
                 module.owed += 1
                 module.missed += 1
             self.counters.missing += 1
-            if module.missed >= LOST_AFTER and module.seen:
+            if module.missed >= self._lost_after and module.seen:
                 lost.append(module)
         if lost:
             raise self._silent(lost)
@@ -262,6 +266,9 @@ class AxisDrivers:
         """
         if len(voltages) != len(self._slots):
             raise InputError(f"{len(voltages)} voltages for {len(self._slots)} axes")
+        if any(module.missed >= SILENT_AFTER for module in self._modules):
+            voltages = (0.0,) * len(self._slots)  # nobody moves by positions that are not known
+            self.counters.cut += 1
         command = [0.0] * frames.SLOTS
         for slot, voltage in zip(self._slots, voltages, strict=True):
             command[slot] = voltage

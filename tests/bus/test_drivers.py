@@ -121,6 +121,7 @@ def test_silence_trips_the_watchdog_and_the_next_command_clears_it(served: dict[
     drivers.start()
     drive(drivers, 5, [5.0], 0.01)
     time.sleep(0.25)
+    drivers.write([0.0])  # so that it goes on standing, however long the next tick takes
     here = drivers.exchange()
     assert drivers.counters.watchdogs == 1
     assert drivers.exchange()[0] == pytest.approx(here[0], abs=0.01), "it stood until this tick"
