@@ -43,7 +43,7 @@ def descriptions(draw: st.DrawFn) -> ModuleDescription:
         draw(positive),
         draw(positive),
         lowest,
-        highest if highest > lowest else lowest + 1024.0,
+        highest if highest > lowest else 2.0**14,  # beyond the others, and exact in 32 bits
         initial,
         draw(st.floats(0.015625, 1024.0, width=32)),
         draw(positive),
