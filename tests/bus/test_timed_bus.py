@@ -296,7 +296,7 @@ def experiment(period: float, duration: float, **bus: Any) -> rds.Experiment:
 
 
 def run(own: rds.Experiment, folder: Path, ending: str) -> Result:
-    """Run; again, twice at most, if it ends otherwise because the system stood still (it is void then)."""
+    """Run until it ends so; twice more at most, where the system stood still (the run is void then)."""
     result = own.run(out=folder / "out")
     for attempt in range(2):
         if result.meta["ending"] == ending or result.verdict != "void":
