@@ -139,6 +139,12 @@ def machine_serve(
     interface: Interface = "rds",
     channel: Annotated[str | None, typer.Option(help="Channel of the bus; by default the machine's name.")] = None,
     dialect: Annotated[str, typer.Option(help="What the modules speak: rds, oacs or cia402.")] = "rds",
+    bitrate: Annotated[
+        int | None, typer.Option(help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
+    ] = None,
+    faults: Annotated[
+        Path | None, typer.Option(help="TOML file of faults to inject (dialect rds, built-in bus).")
+    ] = None,
 ) -> None:
     """Run the machine's axis modules as CAN nodes, until Ctrl-C."""
     with refusals():
@@ -153,7 +159,17 @@ def machine_serve(
                 f"{machine.name}: {', '.join(machine.axes)} on {interface} channel {place}; Ctrl-C ends", err=True
             )
 
-        serve_machine(machine, dialect, interface, place, ready)
+        options: dict[str, Any] = {} if bitrate is None else {"bitrate": bitrate}
+        if faults is not None:
+            from rds.bus.fault_file import read_faults
+            from rds.core.errors import InputError
+
+            if dialect != "rds" or interface != "rds":
+                raise InputError(
+                    "faults can be injected by a machine of dialect rds on the built-in bus only", "--faults"
+                )
+            options["faults"] = read_faults(faults)
+        serve_machine(machine, dialect, interface, place, ready, **options)
 
 
 def explain(result: Any) -> None:
