@@ -79,7 +79,7 @@ def _cyclic(interface: str, channel: str | None) -> list[dict[str, Any]]:
             answer = frames.decode_answer(message.arbitration_id, message.data)
             node = answers[message.arbitration_id]
             state = (frames.Status(answer.status).name or "none").lower().replace("|", ", ").replace("none", "idle")
-            found[node] = {"id": node, "type": "axis", "dialect": "rds", "version": 1, "state": state}
+            found[node] = {"id": node, "type": "axis", "dialect": "rds", "version": None, "state": state}
         return [found[node] for node in sorted(found)]
 
 
