@@ -14,9 +14,7 @@ from typing import BinaryIO
 from rds.reports.content import Report, Table
 from rds.results import html
 from rds.results.atomic import write_files
-
-# the look of the run reports; one page for both, so that it is changed in one place
-from rds.results.report import _PAGE, _POLICY, _STYLE
+from rds.results.report import page
 
 
 def write(report: Report, folder: str | Path) -> list[Path]:
@@ -26,7 +24,7 @@ def write(report: Report, folder: str | Path) -> list[Path]:
     """
     folder = Path(folder)
     pictures = {name: draw().png() for name, draw in report.figures.items()}
-    contents = {folder / f"{report.kind}.html": page(report, pictures).encode("utf-8")}
+    contents = {folder / f"{report.kind}.html": to_html(report, pictures).encode("utf-8")}
     for name, table in _named(report).items():
         contents[folder / f"{name}.csv"] = _csv(table)
     for name, png in pictures.items():
@@ -35,7 +33,7 @@ def write(report: Report, folder: str | Path) -> list[Path]:
     return list(contents)
 
 
-def page(report: Report, pictures: dict[str, bytes]) -> str:
+def to_html(report: Report, pictures: dict[str, bytes]) -> str:
     """The report as one HTML page that fetches nothing; `pictures` are PNG files by name."""
     settings = {name: value for name, value in report.settings.items() if value is not None}
     findings = "".join(f"<li>{escape(finding)}</li>" for finding in report.findings)
@@ -50,7 +48,7 @@ def page(report: Report, pictures: dict[str, bytes]) -> str:
         *(f"<section><h2>{escape(name)}</h2>{_image(png, name)}</section>" for name, png in pictures.items()),
         f"<details><summary>Options</summary>{html.key_values(settings)}</details>" if settings else "",
     ]
-    return _PAGE.format(title=escape(report.title), policy=_POLICY, style=_STYLE, body="\n".join(filter(None, parts)))
+    return page(report.title, "\n".join(filter(None, parts)))
 
 
 def slug(text: str) -> str:

@@ -40,10 +40,10 @@ def write_report(
     or rows, no results, or a path that can't be written.
     """
     path = Path(path)
-    page = report(title, results, tables, notes, [_link(path, file) for file in files])
+    text = report(title, results, tables, notes, [_link(path, file) for file in files])
 
     def write(stream: BinaryIO) -> None:
-        stream.write(page.encode("utf-8"))
+        stream.write(text.encode("utf-8"))
 
     write_files({path: write})
     return path
@@ -69,7 +69,15 @@ def report(
         *(_run_section(result, label) for result, label in zip(results, labels, strict=True)),
         _files(files),
     ]
-    return _PAGE.format(title=escape(title), policy=_POLICY, style=_STYLE, body="\n".join(filter(None, parts)))
+    return page(title, "\n".join(filter(None, parts)))
+
+
+def page(title: str, body: str) -> str:
+    """A whole HTML page that fetches nothing, in the look of all reports.
+
+    `title` is text and is escaped; `body` is HTML and stands as it is. For whoever makes a report of another kind.
+    """
+    return _PAGE.format(title=escape(title), policy=_POLICY, style=_STYLE, body=body)
 
 
 def _labels(results: Sequence[Result]) -> list[str]:

@@ -12,6 +12,7 @@ from made_results import make_result
 
 from rds.core.errors import InputError
 from rds.results import Result, write_report
+from rds.results.report import page
 
 HOSTILE = "<script>alert('x')</script>\"><img src=http://evil.example/x onerror=alert(1)>{title}"
 
@@ -111,3 +112,11 @@ def test_what_cannot_be_reported_is_refused_and_leaves_nothing(tmp_path: Path) -
     with pytest.raises(InputError, match="lacks 'columns'"):
         write_report(tmp_path / "r.html", "", [make_result(seconds=0.1)], [{"title": "t", "rows": []}])
     assert not list(tmp_path.iterdir())
+
+
+def test_a_page_of_any_kind_escapes_its_title_and_keeps_its_body() -> None:
+    text = page(HOSTILE, "<p>as it is</p>")
+    seen = Page(text)
+    assert not seen.open and "<p>as it is</p>" in text
+    assert "script" not in {tag for tag, _ in seen.tags} and HOSTILE in seen.text
+    assert "default-src 'none'" in text
