@@ -107,8 +107,9 @@ def test_columns() -> None:
 
 def test_machine_files() -> None:
     assert {field.name for field in fields(MachineParameters)} <= NAMED
-    from rds.machines import machine
+    from rds.machines import machine, module_table
 
+    assert set(module_table.KEYS) <= NAMED
     assert {"name", "title", "sample_period"} <= NAMED
     assert set(machine._TOP) == {"name", "title", "sample_period", "converter", "axis"}
     assert {f"axis.NAME.{key}" for key in machine._AXIS} | {"converter.range", "converter.bits"} <= NAMED

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.machines.module_table import module_table
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,8 @@ class Axis:
     """One axis of a machine.
 
     `model` names the library model that a student starts from, with its parameters; `machine` holds the
-    parameters of the simulated machine behind the bus, which the student does not see.
+    parameters of the simulated machine behind the bus, which the student does not see. `module` is what a distributed
+    module of this axis knows of itself (module_table.py).
     """
 
     name: str
@@ -34,6 +36,7 @@ class Axis:
     resolution: float  # unit per encoder count
     model: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, float] = field(default_factory=dict)
+    module: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ def load_machine(name: str) -> Machine:
 
 
 _TOP = {"name", "title", "sample_period", "converter", "axis"}
-_AXIS = {"node", "unit", "travel", "resolution", "model", "machine"}
+_AXIS = {"node", "unit", "travel", "resolution", "model", "machine", "module"}
 
 
 def _machine(data: dict[str, Any], path: str) -> Machine:
@@ -100,6 +103,7 @@ def _machine(data: dict[str, Any], path: str) -> Machine:
             resolution=resolution,
             model=dict(table.get("model", {})),
             machine=dict(table.get("machine", {})),
+            module=module_table(table.get("module", {}), f"{path}, [axis.{name}.module]"),
         )
     nodes = [axis.node for axis in axes.values()]
     if len(set(nodes)) != len(nodes):

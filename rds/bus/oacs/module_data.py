@@ -1,24 +1,25 @@
-"""What a distributed module knows of itself and what its board does: the table modules.toml, beside a machine's file.
+"""What a distributed module knows of itself and what its board does: `[axis.NAME.module]` of a machine's file.
 
-The machine's file (rds/machines) has an axis's number, travel, resolution and physics; this table adds what only the
-oacs dialect needs. An axis without a table here gets what its machine file says, and a quick board.
+The other tables of the file (rds/machines) have an axis's number, travel, resolution and physics; what this one does
+not say follows from them, with a quick board. So every machine can be served, if its nodes are from 2 to 15.
 """
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from importlib.resources import files
+from dataclasses import dataclass
 from typing import Any
 
-from rds.bus.oacs.transfer import UNITS, Matrix, ModuleDescription
+from rds.bus.module import machine_parameters
+from rds.bus.oacs.transfer import JOINTS, UNITS, Matrix, ModuleDescription, encode_description
 from rds.bus.oacs.words import Kind, check_node
 from rds.core.errors import InputError
 from rds.machines.machine import Axis, Machine
+from rds.models.machine_axis import MachineParameters
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 _KINDS = {"translational": Kind.TRANSLATIONAL, "rotary": Kind.ROTARY, "tool": Kind.TOOL}
+_MODELS = ("linear-axis", "spindle")  # whose parameters are those of a machine's axis
+_ROUNDING = 1e-4  # of a resolution that is written with few digits
 
 
 @dataclass(frozen=True)
@@ -86,44 +87,68 @@ class ModuleData:
         )
 
 
-_KNOWN = {f.name for f in fields(ModuleData)} - {"name", "node"}
-
-
 def read_modules(machine: Machine) -> dict[str, ModuleData]:
     """The data of each axis of `machine` by its name. InputError for a table that is wrong, or a number over 15."""
-    text = files("rds.bus.oacs").joinpath("modules.toml").read_text(encoding="utf-8")
-    tables = tomllib.loads(text) if machine.name == "mrmt-oacs" else {}
-    return {axis.name: module_data(axis, tables.get(axis.name, {})) for axis in machine.axes.values()}
+    return {axis.name: module_data(axis, machine.converter.range, machine.path) for axis in machine.axes.values()}
 
 
-def module_data(axis: Axis, table: Mapping[str, Any]) -> ModuleData:
-    """The data of one axis: its table, completed by what the machine's file says of it."""
-    where = f"oacs module {axis.name}"
-    values = dict(table)
-    for key in values:
-        if key not in _KNOWN:
-            raise InputError(f"unknown key {key!r}; known keys: {', '.join(sorted(_KNOWN))}", where)
+def module_data(axis: Axis, supply: float, path: str = "") -> ModuleData:
+    """The data of one axis: its `module` table, completed by what else is known of it.
+
+    `supply` is the motor's, V, where the table names none; `path` is the machine's file, for errors. Raises InputError
+    for a number that no module can have, and for data that a download can't carry.
+    """
+    where = f"{path}, [axis.{axis.name}.module]" if path else f"[axis.{axis.name}.module]"
+    values = dict(axis.module)
     kind = values.pop("kind", _kind_by_unit(axis.unit))
-    if kind not in _KINDS:
-        raise InputError(f"kind = {kind!r} must be one of {', '.join(_KINDS)}", where)
-    letter = values.pop("letter", axis.name[:1].upper() if kind != "tool" else "T")
+    letter = values.pop("letter", "T" if kind == "tool" else _first_letter(axis.name))
+    supply = values.setdefault("supply", supply)
+    clockwise, counterclockwise = _speeds(axis, supply, 1.0 if kind == "tool" else 60.0)
     defaults: dict[str, Any] = {
-        "lowest": axis.travel[0],
-        "highest": axis.travel[1],
         "counts_per_unit": 1.0 / axis.resolution,
         "kind_text": "SpinM" if kind == "tool" else "ServM",
         "type_text": {"translational": f"Linr{letter}a", "rotary": f"Rotr{letter}a", "tool": "ToolT"}[kind],
         "counts_per_turn": 0 if kind == "tool" else 1024,
+        "clockwise_speed": clockwise,
+        "counterclockwise_speed": counterclockwise,
         "switches": kind == "translational",
-        "joint": letter.lower() if kind != "tool" and letter.lower() in "xyzabc" else "",
+        "joint": letter.lower() if kind != "tool" and letter.lower() in JOINTS else "",
+        "initial": (inside := min(max(0.0, axis.travel[0]), axis.travel[1])),
+        "start": inside,
     }
     values = defaults | values
-    for key in ("accelerometer", "vibration"):
-        if key in values:
-            values[key] = tuple(values[key])
-    if "matrix" in values:
-        values["matrix"] = tuple(tuple(float(value) for value in row) for row in values["matrix"])
-    return ModuleData(axis.name, check_node(axis.node), _KINDS[kind], letter, **values)
+    if abs(values["counts_per_unit"] * axis.resolution - 1.0) > _ROUNDING:
+        raise InputError(
+            f"counts_per_unit = {values['counts_per_unit']:g} contradicts the axis's resolution of {axis.resolution:g}"
+            f" {axis.unit} per count, which makes {1.0 / axis.resolution:g}; leave it out, or mend one of them",
+            where,
+        )
+    if not (values["kind_text"].isascii() and values["kind_text"].isprintable() and 1 <= len(values["kind_text"]) <= 5):
+        raise InputError(f"kind_text = {values['kind_text']!r} must be 1 to 5 printable ASCII characters", where)
+    try:
+        data = ModuleData(axis.name, check_node(axis.node), _KINDS[kind], letter, *axis.travel, **values)
+        encode_description(data.describe(0))
+    except InputError as error:
+        raise InputError(error.args[0], where) from None
+    return data
+
+
+def _speeds(axis: Axis, supply: float, scale: float) -> tuple[float, float]:
+    """The speeds at the full supply, both ways, by K and friction of the axis's model, else of its machine table.
+
+    `scale` makes speeds per minute of those of the axis: 60, or 1 of a tool.
+    """
+    known = machine_parameters(axis)
+    if axis.model.get("name") in _MODELS:  # what is said of the axis, not what it turns out to be
+        table = {key: value for key, value in axis.model.items() if key != "name"}
+        known = MachineParameters.from_table(table, f"[axis.{axis.name}.model]")
+    full = known.K * supply
+    return max(0.0, full - known.friction_plus) * scale, max(0.0, full + known.friction_minus) * scale
+
+
+def _first_letter(name: str) -> str:
+    """Of an axis's name, in capitals; X where there is none that a message can carry."""
+    return next((letter.upper() for letter in name if letter.isascii() and letter.isalpha()), "X")
 
 
 def _kind_by_unit(unit: str) -> str:
