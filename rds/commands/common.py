@@ -16,7 +16,9 @@ import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
 Interface = Annotated[str, typer.Option(help="python-can interface.")]
-Channel = Annotated[str | None, typer.Option(help="Channel of the bus; on the built-in one by default mini-cnc.")]
+Channel = Annotated[
+    str | None, typer.Option("--channel", "-c", help="Channel of the bus; on the built-in one by default mini-cnc.")
+]
 
 
 @contextmanager

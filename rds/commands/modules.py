@@ -201,7 +201,7 @@ def move(
     _moved(context, interface, channel, json, lambda module: module.move(by=by, to=to))
 
 
-@module_app.command()
+@module_app.command(context_settings={"ignore_unknown_options": True})  # or -1 would be taken for an option
 def jog(
     context: typer.Context,
     direction: Annotated[int, typer.Argument(help="1 clockwise, -1 counter-clockwise.")],
@@ -211,7 +211,7 @@ def jog(
     channel: Channel = None,
     json: Json = False,
 ) -> None:
-    """Run for a time; it also ends if this command is killed."""
+    """Run for a time, a tool too; it also ends if this command is killed."""
     _moved(context, interface, channel, json, lambda module: module.jog(direction, seconds, duty))
 
 
@@ -224,14 +224,15 @@ def home(context: typer.Context, interface: Interface = "rds", channel: Channel 
 def _moved(context: typer.Context, interface: str, channel: str | None, json: bool, act: Any) -> None:
     with _module(context, interface, channel) as module:
         try:
-            position, unit = act(module), module.description.unit
+            reached, unit = act(module), module.description.unit
         except KeyboardInterrupt:
             module.stop()
             raise
+    turns = unit == "rev/min"
     if json:
-        print_json({"position": position, "unit": unit})
+        print_json({"speed" if turns else "position": reached, "unit": unit})
     else:
-        typer.echo(f"stands at {position:g} {unit}")
+        typer.echo(f"{'turned at' if turns else 'stands at'} {reached:g} {unit}")
 
 
 @module_app.command()

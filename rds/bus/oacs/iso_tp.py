@@ -120,4 +120,7 @@ def fetch(bus: can.BusABC, node: int, request: can.Message, timeout: float = 1.0
         if payload is not None:
             return payload
     why = receiver.problem or "nothing came"
-    raise MachineError(f"module {node}: the data download is not whole after {timeout:g} s ({why}); ask again")
+    raise MachineError(
+        f"the data download is not whole after {timeout:g} s ({why}); ask again (`rds scan` shows who is there, and in "
+        "which dialect)"
+    )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import can
@@ -11,7 +12,7 @@ import can
 from rds.bus.oacs import messages, talk
 from rds.bus.oacs.messages import Decoded
 from rds.bus.oacs.refusals import reason
-from rds.bus.oacs.words import Acknowledges, Code, Parameter, Result, Says, check_node
+from rds.bus.oacs.words import Acknowledges, Code, Move, Parameter, Result, Says, check_node
 from rds.core.errors import MachineError
 
 PATIENCE = 0.5  # s for a module to say a word
@@ -41,6 +42,16 @@ class Conversation:
 
     def wait_for(self, wanted: Callable[[Decoded], bool], what: str, seconds: float = PATIENCE) -> talk.Heard:
         """The module's next message that is `wanted`. MachineError naming module and `what` after `seconds`."""
+        heard = self._hear(wanted, seconds)
+        if heard is None:
+            raise MachineError(
+                f"{self.name} was told {what} and did not answer within {seconds:g} s; check its power and cable "
+                "(a scan of the bus shows who is there)"
+            )
+        return heard
+
+    def _hear(self, wanted: Callable[[Decoded], bool], seconds: float) -> talk.Heard | None:
+        """The same, None if it does not come in time. Meanwhile the module hears that the host lives."""
         until = time.monotonic() + seconds
         alive = time.monotonic() + _KEEP_ALIVE
         while True:
@@ -51,10 +62,7 @@ class Conversation:
                     return heard
             now = time.monotonic()
             if now >= until:
-                raise MachineError(
-                    f"{self.name} was told {what} and did not answer within {seconds:g} s; check its power and cable "
-                    "(a scan of the bus shows who is there)"
-                )
+                return None
             if now >= alive:
                 alive = now + _KEEP_ALIVE
                 self.send(Code=Code.READ_PARAMETER, ReadIndex=Parameter.SELECT)
@@ -79,15 +87,29 @@ class Conversation:
         Whatever ends the wait otherwise (an error, Ctrl-C), the module is told to stop.
         """
         asked = time.monotonic()
-        try:
+        with self._stopping():
             heard = self.wait_for(acknowledgement(answers, last=True), what, seconds)
-        except BaseException:
-            self.send(Code=Code.MOVE, Move=0)
-            raise
         result, counts = Result(heard.message.fields["Result"]), heard.message.fields["AcknowledgePosition"]
         if result not in also:
             raise MachineError(f"{self.name} was told {what} and did not finish: {reason(result)}")
         return Done(result, counts, heard.at - asked)
+
+    def hold(self, what: str, answers: Acknowledges, seconds: float) -> None:
+        """Let an accepted command that has no end of its own go on for `seconds`. MachineError if it ends before."""
+        with self._stopping():
+            heard = self._hear(acknowledgement(answers, last=True), seconds)
+        if heard is not None:
+            ended = Result(heard.message.fields["Result"])
+            raise MachineError(f"{self.name} was told {what} and did not go on: {reason(ended)}")
+
+    @contextmanager
+    def _stopping(self) -> Iterator[None]:
+        """Tell the module to stop if the block fails or is interrupted."""
+        try:
+            yield
+        except BaseException:
+            self.send(Code=Code.MOVE, Move=Move.STOP)
+            raise
 
     def drain(self) -> None:
         """Take what was said before, so that an old word does not count as the answer to a new command."""

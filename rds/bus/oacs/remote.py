@@ -135,8 +135,9 @@ class Module:
         """Move by a distance or to a point (mm, degrees), wait until it stands, and return where.
 
         `by` is positive clockwise. Raises InputError unless exactly one is given, MachineError if the module refuses,
-        fails, or takes more than `timeout` s (default: by its speed); it is stopped then.
+        fails, or takes more than `timeout` s (default: by its speed); it is stopped then. A tool has jog() and start().
         """
+        self._check_axis("move to a point or by a distance")
         what, answers = self._start(by, to)
         done = self._link.finish(what, answers, self._patience(by, to) if timeout is None else timeout)
         return done.counts * self.description.resolution
@@ -164,12 +165,15 @@ class Module:
 
     def jog(self, direction: int, seconds: float, duty: float = 1.0) -> float:
         """Run clockwise (+1) or counter-clockwise (-1) for `seconds` with a share `duty` of the supply; return where
-        it stands then. The time is part of the command: it also ends if the host does."""
+        it stands then. The time is part of the command: it also ends if the host does. A tool turns with that share of
+        its highest speed, and its speed at the end is returned; it stops by itself 2 s after the host's last word."""
         if direction not in (1, -1) or not 0 < duty <= 1 or not 0 < seconds <= 60:
             raise InputError(
                 f"jog(direction={direction!r}, seconds={seconds!r}, duty={duty!r}): direction must be 1 or -1, seconds "
                 "more than 0 and at most 60, duty more than 0 and at most 1"
             )
+        if self.description.kind == Kind.TOOL:
+            return self._turn(direction, seconds, duty)
         what = f"to jog for {seconds:g} s"
         fields = {"Code": Code.MOVE, "Move": Move.JOG, "Direction": int(direction > 0)}
         value, time = max(1, round(duty * 255)), max(1, round(seconds * 1000))
@@ -195,6 +199,7 @@ class Module:
         Columns `time`, `NAME_reference`, `NAME_measured` with NAME the axis's letter; result.plot() draws it. The
         step is at time 0. Lost frames leave gaps in time, and a note; so does an axis that stops short of the point.
         """
+        self._check_axis("step its position")
         d = self.description
         self._subscribe(Quantity.POSITION, period)
         recorder = PositionRecorder(d, period)
@@ -222,6 +227,19 @@ class Module:
         return recorder.result(f"module {self.number}")
 
     # --- parts
+
+    def _check_axis(self, what: str) -> None:
+        if self.description.kind == Kind.TOOL:
+            raise InputError(
+                f"{self._link.name} is a tool and can't {what}; it can jog, and start(by=...) turns it until stop()"
+            )
+
+    def _turn(self, direction: int, seconds: float, duty: float) -> float:
+        """A tool: turn for a time, stop; return the speed that it had, rev/min."""
+        highest = self.description.highest if direction > 0 else -self.description.lowest
+        what, answers = self._start(direction * duty * highest, None)
+        self._link.hold(what, answers, seconds)
+        return self.stop().counts * self.description.resolution
 
     def _start(self, by: float | None, to: float | None) -> tuple[str, Acknowledges]:
         d = self.description

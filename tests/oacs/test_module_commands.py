@@ -1,0 +1,91 @@
+"""`rds scan`, `rds module`, `rds estop` as a user types them, against real processes of modules."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from rds.cli import app
+
+pytestmark = pytest.mark.realtime
+Serve = Callable[..., subprocess.Popen[str]]
+Rds = Callable[..., Any]
+
+
+@pytest.fixture
+def rds(channel: str) -> Rds:
+    """Runs `rds ARGUMENTS --channel ...`, and returns the result."""
+    return lambda *arguments: CliRunner().invoke(app, [*map(str, arguments), "--channel", channel])
+
+
+@pytest.fixture
+def said(rds: Rds) -> Rds:
+    """The same with --json; returns what it says."""
+
+    def run(*arguments: object) -> Any:
+        result = rds(*arguments, "--json")
+        assert result.exit_code == 0, result.output
+        return json.loads(result.stdout)
+
+    return run
+
+
+def refused(result: Any) -> str:
+    """Why; all refusals have exit code 2 and say nothing on stdout."""
+    assert result.exit_code == 2 and result.stdout == ""
+    return str(result.stderr)
+
+
+def test_an_axis_from_scan_to_emergency_stop(serve: Serve, rds: Rds, said: Rds, tmp_path: Path) -> None:
+    serve("X,Z")
+    rows = said("scan")["modules"]
+    assert [(row["id"], row["type"], row["dialect"], row["version"], row["state"]) for row in rows] == [
+        (2, "LinrZa", "oacs", 1, "idle"),
+        (4, "LinrXa", "oacs", 1, "idle"),
+    ]
+    info = said("module", 4, "info")
+    assert (info["axis"], info["counts_per_unit"], info["unit"]) == ("X", 169.0, "mm")
+    tuned = said("module", 4, "tune", "--controller", "pi", "--set", "Kp=2", "--set", "kick=0", "--set", "Ki=0",
+                 "--set", "sample_time=0.02", "--set", "tolerance=45")  # fmt: skip
+    assert (tuned["controller"], tuned["Kp"], tuned["kick"]) == ("PI", 2.0, 0.0)
+    assert said("module", 4, "tune") == tuned
+    stepped = said("module", 4, "step", "--by", 2, "--out", tmp_path / "step")
+    assert stepped["samples"] > 50 and Path(stepped["files"]["plot"]).stat().st_size > 5000
+    gains = said("module", 4, "tune", "--from-step", stepped["files"]["csv"], "--controller", "PID")
+    assert gains["controller"] == "PID" and gains["Kp"] != 2.0 and gains["Kd"] > 0.0
+    said("module", 4, "tune", "--set", "Kp=2", "--set", "Ki=0", "--set", "Kd=0", "--set", "kick=0")
+    there = said("module", 4, "jog", "1", "--seconds", 0.3)
+    assert there["unit"] == "mm" and there["position"] > 2.0
+    assert "stands at" in rds("module", 4, "move", "--to", 2).stdout
+    assert said("module", 4, "stop") == {"stopped": 4}
+    assert said("estop") == {"stopped": [2, 4]}
+    assert "emergency stop is latched" in refused(rds("module", 4, "move", "--by", 1))
+    assert said("module", 4, "reset") == {"reset": 4}
+    assert [row["state"] for row in said("scan")["modules"]] == ["emergency", "idle"]
+
+
+def test_a_tool_jogs_and_has_no_position(serve: Serve, rds: Rds, said: Rds) -> None:
+    serve("drill")
+    turned = said("module", 5, "jog", "-1", "--seconds", 1.2, "--duty", 0.5)
+    assert turned["unit"] == "rev/min" and -300 < turned["speed"] < -200
+    assert said("scan")["modules"][0]["state"] in ("settling", "idle")
+    for words in (("move", "--by", 100), ("step",)):
+        assert "module 5 is a tool and can't" in refused(rds("module", 5, *words))
+
+
+def test_refusals_say_what_and_why(serve: Serve, rds: Rds) -> None:
+    serve("X")
+    absent = refused(rds("module", 7, "info"))
+    assert absent.startswith("rds: module 7: the data download is not whole") and "rds scan" in absent
+    assert "number 99 must be from 2 to 15" in refused(rds("module", 99, "info"))
+    assert "outside its travel" in refused(rds("module", 4, "move", "--by", 400))
+    assert "give one of by" in refused(rds("module", 4, "move"))
+    assert "no tuning parameter 'Kq'" in refused(rds("module", 4, "tune", "--set", "Kq=1"))
+    assert "--duti" in refused(rds("module", 4, "jog", "1", "--duti", "0.5"))
+    assert "must be NAME=VALUE" in refused(rds("module", 4, "tune", "--set", "Kp"))
