@@ -40,7 +40,7 @@ ONLY = {
     # what a [bus] table may say
     ("experiment", "bus"): {"rds.bus.bus_settings", "rds.bus.dialects", "rds.bus.fault_file"},
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
-    ("reports", "bus"): {"rds.bus.frames"},  # which frames are commands and answers
+    ("reports", "bus"): {"rds.bus.frames", "rds.bus.logs"},  # which frames are commands and answers; their logs
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record
 }
 LAZY = [("results", "runtime"), ("modes", "bus")]  # inside functions only

@@ -31,7 +31,11 @@ def report(
             name, equals, value = text.partition("=")
             if not name or not equals:
                 raise InputError(f"--set {text!r} must be NAME=VALUE; `rds report {kind} --options` lists the names")
+            if name in given:
+                raise InputError(f"--set {name} is given twice; give it once")
             given[name] = value
+        if options and (data or given or out):
+            raise InputError("--options only lists the options; leave the data, --set and --out away")
         if options:
             tables, findings, files, found = [option_table(kind)], [], [], option_table(kind).to_json()
         else:

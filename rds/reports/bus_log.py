@@ -22,7 +22,8 @@ def read_frames(path: Path) -> list[Frame]:
     """The data frames of a log, in its order, without error and remote frames.
 
     A CSV file is either python-can's or has the columns time (in s, ms or us), id and data, both in hexadecimal; an id
-    of eight digits is an extended one. Raises InputError for a file that is none of this or holds no data frame.
+    of eight digits is an extended one. Raises InputError for a file that is none of this, is damaged or holds no data
+    frame.
     """
     if not path.is_file():
         raise InputError("there is no such file; check the name of the log", str(path))
@@ -44,20 +45,11 @@ def _is_python_can_csv(path: Path) -> bool:
 
 
 def _log(path: Path) -> Iterator[Frame]:
-    import can
+    from rds.bus.logs import LogFile  # names every damage, where python-can's readers pass over some
 
-    try:
-        with can.LogReader(path) as reader:
-            for message in reader:
-                if not (message.is_error_frame or message.is_remote_frame):
-                    yield Frame(message.timestamp, message.arbitration_id, message.is_extended_id, bytes(message.data))
-    # each of python-can's readers fails in its own way on what is not of its format
-    except Exception as error:
-        raise InputError(
-            f"it cannot be read as a log of this ending ({type(error).__name__}: {error}); "
-            "give an ASC, BLF, candump (.log), TRC or CSV file",
-            str(path),
-        ) from error
+    for message in LogFile(path):
+        if not (message.is_error_frame or message.is_remote_frame):
+            yield Frame(message.timestamp, message.arbitration_id, message.is_extended_id, bytes(message.data))
 
 
 def _table(path: Path) -> Iterator[Frame]:

@@ -18,6 +18,7 @@ from rds.core.errors import InputError
 from rds.results.units import split_heading
 
 ENDINGS = ("counts", "adc", "mm", "deg", "min", "ms", "us", "mA", "A", "mV", "V", "g", "s")
+BEYOND_MEASURE = 1e15  # no reading or option has a larger magnitude; their squares and sums stay finite
 ORDINALS = ("reading", "iteration", "move", "index", "n", "count")  # columns that only number the rows
 
 
@@ -55,6 +56,8 @@ class Column:
             ) from None
         if not isfinite(number):
             raise self.fault(line, f"{cell!r} is not a finite number; leave the reading out")
+        if abs(number) > BEYOND_MEASURE:
+            raise self.fault(line, f"{cell!r} is beyond what is measured ({BEYOND_MEASURE:g}); leave the reading out")
         return number
 
     def fault(self, line: int, message: str) -> InputError:

@@ -92,7 +92,10 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
                 findings.append(f"{path.name}: not ready again at its end, after changes of {modules}.")
         else:
             for column in columns_in(path, columns, tuple(_SECONDS), "times taken", "familiar_3_modules_s"):
+                below = next(((line, cell) for line, cell in column.cells.items() if cell.startswith("-")), None)
                 values = [_SECONDS[column.unit] * value for value in column.numbers(blanks=True)]
+                if below is not None:
+                    raise column.fault(below[0], f"{below[1]!r} is negative; give the time taken")
                 times.setdefault(column.name, []).extend(values)
     findings += [_finding(name, values) for name, values in times.items()]
     return Report(

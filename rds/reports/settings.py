@@ -9,6 +9,7 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.options import Option, check_known
+from rds.reports.reading import BEYOND_MEASURE
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class Setting:
     whole: bool = False  # a whole number
     at_least: float = -inf
     more_than: float = -inf
+    at_most: float = BEYOND_MEASURE
 
     def read(self, value: Any, name: str, owner: str) -> float | int | str:
         """The value as what the option holds; InputError if it is no such thing."""
@@ -29,6 +31,10 @@ class Setting:
             return str(value)
         meaning = f"{self.meaning}, in {self.unit}" if self.unit else self.meaning
         number = Option(meaning, at_least=self.at_least, more_than=self.more_than).check(_number(value), name, owner)
+        if number > self.at_most:
+            raise InputError(f"{owner}: {name} = {value!r} must be at most {self.at_most:g} ({meaning})")
+        if 0 < abs(number) < 1 / BEYOND_MEASURE:
+            raise InputError(f"{owner}: {name} = {value!r} is too close to zero; check its unit ({meaning})")
         if not self.whole:
             return number
         if not number.is_integer():

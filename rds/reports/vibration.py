@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rds.results.figure import Picture
 
 SETTINGS = {
-    "bits": Setting("bits of the converter", "bit", 10, whole=True, at_least=1),
+    "bits": Setting("bits of the converter", "bit", 10, whole=True, at_least=1, at_most=32),
     "reference": Setting("reference voltage of the converter: what a full reading stands for", "V", 3.3, more_than=0),
     "supply": Setting("supply voltage of the sensor; it gives half of it at 0 g", "V", 3.3, more_than=0),
     "sensitivity": Setting("sensitivity of the sensor", "mV/g", 330.0, more_than=0),

@@ -8,9 +8,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from thesis_data import COUNTS_X, CURRENT_X, DRILLING, MOVE_TIMES, RECONFIGURATION, VIBRATION, save
+from typer.testing import CliRunner
 
+from rds.cli import app
 from rds.core.errors import InputError
 from rds.reports import KINDS, Report, make_report, option_table, options_of, write
 
@@ -177,7 +180,9 @@ def test_a_missing_or_binary_file(kind: str, tmp_path: Path) -> None:
 def test_a_log_that_is_none(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"bad.{ending}"
     path.write_text("this is not a log\nat all\n")
-    with pytest.raises(InputError, match=r"bad\.\w+: it (cannot be read as a log|has no data frames)"):
+    with pytest.raises(
+        InputError, match=r"bad\.\w+:.*(this is no BLF file|is no line of|can't be read as|has no data frames)"
+    ):
         make_report("response", [path])
 
 
@@ -192,3 +197,72 @@ def test_spreadsheets_of_other_countries(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_text("\ufeffreading;cw_A\n1;4,39\n2;2,89\n\n3;2,13\n", encoding="utf-8")
     assert make_report("current", [path]).tables[0].column("starting peak [A]") == [4.39]
+
+
+@pytest.mark.parametrize("ending", ["asc", "log", "trc"])
+def test_a_damaged_line_of_a_log_is_named_and_never_passed_over(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"run.{ending}"
+    with can.Logger(path) as log:
+        for k in range(50):
+            log(can.Message(timestamp=1e9 + 4e-3 * k, arbitration_id=0x001, data=[1], is_extended_id=False))
+            log(can.Message(timestamp=1e9 + 4e-3 * k + 2e-3, arbitration_id=0, data=[1, 2], is_extended_id=False))
+    whole = path.read_text()
+    assert make_report("response", [path]).tables[0].rows
+    lines = whole.splitlines(keepends=True)
+    lines[-20] = lines[-20][: len(lines[-20]) // 2] + "\n"
+    path.write_text("".join(lines))
+    with pytest.raises(InputError) as refused:
+        make_report("response", [path])
+    assert f"run.{ending}:{len(lines) - 19}" in str(refused.value)
+
+
+def test_a_blf_log_that_was_cut_off_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.blf"
+    with can.Logger(path) as log:
+        for k in range(2000):
+            log(can.Message(timestamp=1e9 + 1e-3 * k, arbitration_id=k % 2, data=[1, k % 256], is_extended_id=False))
+    path.write_bytes(path.read_bytes()[:-700])
+    with pytest.raises(InputError, match="cut off"):
+        make_report("response", [path])
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "word"),
+    [
+        ("vibration", {"bits": "4000"}, "bits"),
+        ("vibration", {"sensitivity": "1e-320"}, "sensitivity"),
+        ("current", {"period": "1e308"}, "period"),
+        ("accuracy", {"distance": "1e-300", "counts_per_unit": "1e-300"}, "distance"),
+    ],
+)
+def test_options_beyond_measure_are_refused(kind: str, options: dict[str, str], word: str, tmp_path: Path) -> None:
+    table, usual = DATA[kind]
+    with pytest.raises(InputError, match=f"{word} = '{options[word]}'"):
+        make_report(kind, [save(tmp_path / "data.csv", table)], usual | options)
+
+
+def test_readings_beyond_measure_are_refused_with_their_line(tmp_path: Path) -> None:
+    path = tmp_path / "current.csv"
+    path.write_text("cw_A\n1.5\n1e308\n")
+    with pytest.raises(InputError, match=r"current.csv, line 3, column 'cw_A': '1e308' is beyond"):
+        make_report("current", [path])
+
+
+def test_a_reconfiguration_takes_no_negative_time(tmp_path: Path) -> None:
+    path = tmp_path / "change.csv"
+    path.write_text("swap_s\n5\n-5\n")
+    with pytest.raises(InputError, match=r"line 3, column 'swap_s': '-5' is negative"):
+        make_report("reconfiguration", [path])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--options", "--out", "x"], "--options only lists"),
+        (["--options", "data.csv"], "--options only lists"),
+        (["data.csv", "--set", "period=1", "--set", "period=2"], "period is given twice"),
+    ],
+)
+def test_no_word_of_the_command_is_ignored(words: list[str], said: str) -> None:
+    ran = CliRunner().invoke(app, ["report", "current", *words])
+    assert ran.exit_code == 2 and said in ran.stderr

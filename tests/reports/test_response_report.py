@@ -111,7 +111,7 @@ def test_the_cyclic_exchange_of_this_projects_modules(tmp_path: Path) -> None:
 
 
 def test_moves_from_a_bus_log(tmp_path: Path) -> None:
-    lines = ["(0.0) can0 002#0301500100000000", "(36.9) can0 000#04020058", "(40) can0 002#0301500000000000"]
+    lines = ["(0.0) can0 002#0301500100000000", "(36.9) can0 000#04020058", "(40.0) can0 002#0301500000000000"]
     path = tmp_path / "moves.log"
     path.write_text("\n".join([*lines, "(70.1) can0 000#04020058"]) + "\n")
     report = make_report("moves", [path], {"distances": "2=80 mm"})
