@@ -140,7 +140,7 @@ def machine_serve(
     channel: Annotated[str | None, typer.Option(help="Channel of the bus; by default the machine's name.")] = None,
     dialect: Annotated[str, typer.Option(help="What the modules speak: rds, oacs or cia402.")] = "rds",
     bitrate: Annotated[
-        int | None, typer.Option(help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
+        int | None, typer.Option(min=1, help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
     ] = None,
     faults: Annotated[
         Path | None, typer.Option(help="TOML file of faults to inject (dialect rds, built-in bus).")
@@ -152,7 +152,7 @@ def machine_serve(
         from rds.machines import load_machine
 
         machine = load_machine(name)
-        place = channel or machine.name
+        place = machine.name if channel is None else channel
 
         def ready() -> None:
             typer.echo(

@@ -41,6 +41,8 @@ KINDS = {
     "plug": Kind("an unplugged node is plugged in again", ("node",), ("node",)),
     "restart": Kind("a node that is bus off is asked to come back", ("node",), ("node",), True),
 }
+# whole numbers: least, most, how to write them
+_WHOLE = (("count", 1, 10**9, ","), ("identifier", 0, 0x1FFFFFFF, "#x"), ("bit", 1, 1000, ","))
 FRAME_KINDS = ("lose", "corrupt", "delay", "duplicate")
 
 
@@ -91,11 +93,13 @@ class Fault:
         for name, least in (("at", False), ("duration", True), ("by", True)):
             value = getattr(self, name)
             if value is not None and not (_is_number(value) and (value > 0 or not (least or value)) and value < 1e6):
-                raise InputError(f"{_word(name)} = {value!r} must be {'more than' if least else 'at least'} 0 s")
-        for name, low, high in (("count", 1, 10**9), ("identifier", 0, 0x1FFFFFFF), ("bit", 1, 1000)):
+                low = "more than" if least else "at least"
+                raise InputError(f"{_word(name)} = {value!r} must be {low} 0 s and less than 1,000,000 s")
+        for name, low, high, form in _WHOLE:
             value = getattr(self, name)
             if value is not None and not (_is_whole(value) and low <= value <= high):
-                raise InputError(f"{name} = {value!r} must be a whole number from {low} to {high:#x}")
+                shown = hex(value) if form == "#x" and _is_whole(value) else repr(value)
+                raise InputError(f"{name} = {shown} must be a whole number from {low} to {high:{form}}")
         if self.probability is not None:
             if not (_is_number(self.probability) and 0.0 < self.probability <= 1.0):
                 raise InputError(f"probability = {self.probability!r} must be more than 0 and at most 1")

@@ -44,6 +44,8 @@ class Desk:
     def answer(self, question: str, asker: Node, now: int) -> str:
         """The answer to one question."""
         try:
+            if len(question) > _LONGEST_QUESTION:
+                raise InputError("this is too much at once (more than 1 MiB); give the schedule in parts")
             asked = json.loads(question)
             action = self._actions.get(str(asked.get("do"))) if isinstance(asked, dict) else None
             if action is None:
@@ -56,8 +58,9 @@ class Desk:
 
     def take_part(self, asker: Node, part: bytes, more: bool) -> str | None:
         """Put a question together; None until it is whole."""
-        asker.question += part
-        if more and len(asker.question) < _LONGEST_QUESTION:
+        if len(asker.question) <= _LONGEST_QUESTION:  # the rest of one that is refused anyway is not kept
+            asker.question += part
+        if more:
             return None
         question, asker.question = asker.question, b""
         return question.decode(errors="replace")

@@ -205,7 +205,7 @@ def serve_socketcand(
 
 
 def _channel(interface: str, channel: str | None) -> str | None:
-    return channel or (DEMO if interface == BUILTIN else None)
+    return DEMO if channel is None and interface == BUILTIN else channel
 
 
 def _opener(interface: str, channel: str | None, bitrate: int | None, node: str, errors: bool = False) -> Any:

@@ -11,6 +11,8 @@ from rds.commands.common import Json, print_json, refusals
 
 Channel = Annotated[str, typer.Option("--channel", "-c", help="Channel of the built-in bus: a machine's name.")]
 
+AT = ("at", 0.0)  # when nothing else is said
+_OPTIONS = {"duration": "for", "identifier": "id"}  # as the command line calls them
 NODE_TITLES = ("node", "state", "TEC", "REC", "frames", "bits", "errors", "lost", "waiting", "")
 
 
@@ -48,14 +50,18 @@ def fault(
 
         if (kind is None) == (file is None):
             raise InputError("give a kind of fault or --file with a schedule, one of the two", "rds bus fault")
-        if kind == "clear":
-            faults: tuple[Fault, ...] = ()
-        elif file is not None:
+        words: dict[str, Any] = {"node": node, "at": at, "duration": duration, "count": count, "by": by}
+        words |= {"bit": bit, "receiver": receiver, "probability": probability, "seed": seed}
+        words |= {"identifier": _identifier(identifier)}
+        given = [_OPTIONS.get(name, name) for name, value in words.items() if value is not None and (name, value) != AT]
+        if given and (kind == "clear" or file is not None):
+            what = "clear ends all faults of all nodes" if kind == "clear" else "the schedule says what happens when"
+            raise InputError(f"{what}; leave {', '.join(given)} away", "rds bus fault")
+        faults: tuple[Fault, ...] = ()
+        if file is not None:
             faults = read_faults(file)
-        else:
-            words: dict[str, Any] = {"node": node, "at": at, "duration": duration, "count": count, "by": by}
-            words |= {"bit": bit, "receiver": receiver, "probability": probability, "seed": seed}
-            faults = (Fault(kind or "", identifier=_identifier(identifier), **words),)
+        elif kind != "clear":
+            faults = (Fault(kind or "", **words),)
         with Faults(channel) as line:
             if kind == "clear":
                 line.clear()
@@ -103,5 +109,5 @@ def _identifier(text: str | None) -> int | None:
 
 
 def _words(table: dict[str, Any]) -> str:
-    rest = ", ".join(f"{key} {value}" for key, value in table.items() if key != "kind" and (key, value) != ("at", 0.0))
+    rest = ", ".join(f"{key} {value}" for key, value in table.items() if key != "kind" and (key, value) != AT)
     return f"{table['kind']} ({rest})" if rest else str(table["kind"])

@@ -78,6 +78,12 @@ def heard(medium: Medium[str], now: int) -> list[tuple[int, str]]:
         ({"kind": "lose", "node": 3}, "name of a node"),
         ({"node": "X"}, "needs a kind"),
         ({"kind": "lose", "at": float("nan")}, "at = nan"),
+        ({"kind": "lose", "at": 1e300}, "less than 1,000,000 s"),
+        (
+            {"kind": "lose", "identifier": 1 << 29},
+            "identifier = 0x20000000 must be a whole number from 0 to 0x1fffffff",
+        ),
+        ({"kind": "lose", "count": 10**10}, "from 1 to 1,000,000,000"),
     ],
 )
 def test_what_cannot_be_is_refused_with_the_reason(words: dict[str, Any], reason: str) -> None:
