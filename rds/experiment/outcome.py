@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.types import Ending, Source
+from rds.experiment.bus_note import bus_note
 from rds.modes import load_mode
 from rds.modes.host import Rows, run_plan
 from rds.modes.second_look import own_times
@@ -34,6 +35,8 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     meta = _description(plan, rows) | known
     if mode.real_time:
         meta |= _judged(plan, rows, sample)
+        if note := bus_note(meta["drivers"], meta["bus"]):
+            meta["notes"].append(note)
     return Result(columns, units, meta)
 
 
@@ -58,6 +61,7 @@ def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
         discarded=passed - len(sample),
         stalls=environment.get("rehearsal", {}).get("stalls", 0),
         threads=environment.get("threads", 0),
+        missing=rows.report.get("drivers", {}).get("missing", 0),
         again=partial(own_times, plan, rows),
     )
     return {

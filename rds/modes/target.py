@@ -47,6 +47,7 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()
     drivers = loop = watch = None
+    counted: dict[str, int] = {}  # by the drivers before the first sample
     bus = dict(plan.bus)
     faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
     threads = threading.active_count()
@@ -61,6 +62,7 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
         ring.beat(1)
         loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
+        counted = asdict(drivers.counters)
         if watch is not None:
             watch.start()
         threads = threading.active_count()
@@ -77,7 +79,7 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
     finally:
         environment["threads"] = threading.active_count() - threads  # that the student's code left running
         if drivers is not None:
-            report["drivers"] = asdict(drivers.counters)
+            report["drivers"] = {name: n - counted.get(name, 0) for name, n in asdict(drivers.counters).items()}
             drivers.close()
             if watch is not None:
                 report["bus"] = watch.summary()

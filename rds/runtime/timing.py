@@ -91,13 +91,15 @@ def judge(
     discarded: int = 0,
     stalls: int = 0,
     threads: int = 0,
+    missing: int = 0,
     again: Callable[[], np.ndarray | None] | None = None,
 ) -> Judgement:
     """Met, missed or void (see the module's text).
 
     `limit` is how many late samples are allowed; `stalls` is how often the same clock, without the student's
     code, was late by more than a period in the rehearsal before the run; `threads` is how many threads the student's
-    code left running. `again()` makes the run's calls once more and gives each one's time in ns, or None if it can't.
+    code left running; `missing` is how many answers had not come over the bus at the end of their period. `again()`
+    makes the run's calls once more and gives each one's time in ns, or None if it can't.
     """
     count = int(late_samples(timing, period).sum())
     lost = f"{count} of {len(timing.sample)} samples were late"
@@ -126,11 +128,13 @@ def judge(
             f"processor from the loop; without the student's code the same clock was on time"
         )
         return Judgement(Verdict.MISSED, reason, count, alone, discarded)
+    owner = "the system's own" if not missing else "the system's or the bus's"
+    answers = f", {missing} answer{'s' if missing > 1 else ''} did not come within the period" if missing else ""
     reason = (
-        f"{lost}, but by the system's own doing: it woke the loop up to "
+        f"{lost}, but by {owner} doing: the system woke the loop up to "
         f"{float(own_wait(timing, period).max(initial=0.0)) / 1e6:.2f} ms late with a period of {period / 1e6:g} ms, "
         f"took {float(timing.taken.sum()) / 1e6:.2f} ms from the running code, "
-        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms; "
+        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{answers}; "
         "the run says nothing about the controller: repeat it on a quieter machine"
     )
     return Judgement(Verdict.VOID, reason, count, alone, discarded)

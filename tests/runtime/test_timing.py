@@ -194,7 +194,10 @@ def test_reasons_say_what_and_how_much() -> None:
     judgement = judge(timing, MS, **counts)
     assert "woke the loop up to 50.00 ms late" in judgement.reason
     assert "repeat it on a quieter machine" in judgement.reason
+    assert "by the system's own doing" in judgement.reason and "answer" not in judgement.reason
     assert judgement.to_json()["verdict"] == "void"
+    reason = judge(timing, MS, **counts, missing=20).reason
+    assert "by the system's or the bus's doing" in reason and "20 answers did not come within the period" in reason
     timing, counts = ran(waits={500: 1.0})
     assert "within the limit of 9" in judge(timing, MS, limit=9).reason
     assert "all 1000 samples" in judge(ran()[0], MS).reason
