@@ -17,9 +17,9 @@ down), so the bound never gets too short.
 A message that another one releases (`Message.after`) inherits that one's response as jitter: it is released at the
 earliest when the other's shortest frame can have arrived, at the latest after its worst response and its own delay.
 Its response counts from where the other's does, from the beginning of the cycle (holistic analysis: K. Tindell,
-J. Clark, Microprocessing and Microprogramming 40 (1994) 117-134). Where one message releases all the others and the
-whole cycle surely ends before the next begins, cycles can't meet, and the simple sum bounds it more closely; then the
-lesser of both holds.
+J. Clark, Microprocessing and Microprogramming 40 (1994) 117-134). Where one message releases others, one after another
+or all at once, and the whole cycle surely ends before the next begins, cycles can't meet, and the simple sum bounds it
+more closely; then the lesser of both holds.
 """
 
 from __future__ import annotations
@@ -212,33 +212,57 @@ def _single_cycle(
     errors: Errors | None,
     results: list[Response],
 ) -> list[Response]:
-    """Closer bounds where one message releases all others and all is over before it comes again.
+    """Closer bounds where one message releases a whole cycle of others, and all is over before it comes again.
 
-    If a cycle finds the bus free, then the first message starts at once, and each answer waits for at most one answer
-    of lower priority (which was ready before it) and each of higher priority once; the last one ends within the sum
-    of all. If that sum is less than the period, the next cycle finds the bus free as well.
+    If a cycle finds the bus free, the first message starts at once. From then until a message has been sent, its path
+    (those that released it, one after another, and itself) is either late by its own jitter, or waits while something
+    is sent: something of higher priority than who waits, each once; or one of lower priority, which began while who
+    waits was late. If that bounds all of a cycle by less than its period, the next one finds the bus free as well.
+    Messages beside the cycle are reckoned with as if they all came first: those of three periods, for some can be left
+    from the one before.
     """
-    roots = [number for number, at in enumerate(before) if at is None]
-    if len(roots) != 1 or len(messages) == 1 or any(at not in (None, roots[0]) for at in before):
+    paths = [_path(number, before) for number in range(len(messages))]
+    root = next((number for number in before if number is not None and before[number] is None), None)
+    if root is None:
         return results
-    root = roots[0]
+    cycle = [number for number, path in enumerate(paths) if path[0] == root]
     period = _ns(messages[root].period, down=True)
-    if any(message.period != messages[root].period for message in messages):
+    if any(messages[number].period != messages[root].period for number in cycle):
         return results
-    answers = [number for number in range(len(messages)) if number != root]
-    slowest = max(own[number] for number in answers)
-    wrong = errors.within(period) * (LONGEST_ERROR * tau + max(transmission)) if errors else 0
-    start = own[root] + transmission[root] + wrong
-    if start + slowest + sum(transmission[number] for number in answers) > period - tau:
+    beside = [number for number in range(len(messages)) if number not in cycle]
+    if any(before[number] is not None for number in beside):
+        return results
+    longest = LONGEST_ERROR * tau + max(transmission)
+    start = own[root] + transmission[root] + (errors.within(period) * longest if errors else 0)
+    for number in beside:
+        often = _ceil(3 * period + own[number], _ns(messages[number].period, down=True))
+        start += often * transmission[number]
+    bounds = {root: (start, 0)}
+    for number in cycle:
+        if number != root:
+            path = paths[number][1:]
+            first = {other for other in cycle if other != root and other <= max(path)}
+            blocking = [
+                max((transmission[other] for other in cycle if other > waiting and other not in first), default=0)
+                for waiting in path
+                if own[waiting]  # who is never late is in the arbitration behind the message that released it
+            ]
+            late = sum(own[waiting] for waiting in path)
+            bounds[number] = start + late + sum(blocking) + sum(transmission[other] for other in first), sum(blocking)
+    if max(time for time, _ in bounds.values()) > period - tau:
         return results
     closer = list(results)
-    for place, number in enumerate(answers):
-        # answers that all come at once are in one arbitration: nobody is ready before another
-        blocking = max((transmission[other] for other in answers[place + 1 :]), default=0) if slowest else 0
-        time = start + own[number] + blocking + sum(transmission[other] for other in answers[: place + 1])
+    for number, (time, blocking) in bounds.items():
         closer[number] = _lesser(results[number], time, blocking)
-    closer[root] = _lesser(results[root], start, 0)
     return closer
+
+
+def _path(number: int, before: Sequence[int | None]) -> list[int]:
+    """The messages that release each other until `number` is released: from the first one to `number` itself."""
+    path = [number]
+    while (at := before[path[0]]) is not None:
+        path.insert(0, at)
+    return path
 
 
 def _lesser(result: Response, time: int, blocking: int) -> Response:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf
 from typing import Any, NamedTuple
 
 from rds.bus.analysis import NS, Errors, Response, responses
 from rds.bus.bits import INTERFRAME
+from rds.bus.dialects import DEFAULT, check_dialect
 from rds.bus.messages import Message, in_order, messages_of
 from rds.bus.schedule import Slot, occupied, one_cycle
 from rds.core.errors import InputError
@@ -61,6 +62,7 @@ class Analysis:
     worst_load_percent: float
     cycle: tuple[Slot, ...]  # one release of each message at once, exact lengths; ns
     worst_cycle: float  # s until the last response at worst; inf if one is unbounded
+    assumed: str = ""  # what the worst cases rest on, in words
 
     @property
     def met(self) -> bool:
@@ -85,6 +87,7 @@ class Analysis:
             "cycle_us": self.cycle[-1].end / 1e3,
             "worst_cycle_us": _microseconds(self.worst_cycle),
             "met": self.met,
+            "assumed": self.assumed,
             "messages": [_plain(row) for row in self.rows],
         }
 
@@ -96,6 +99,7 @@ class Analysis:
             f"{self.title}: {rate}",
             f"bus load {self.load_percent:.1f} % with the table's data, {self.worst_load_percent:.1f} % at worst",
             f"one cycle of all messages {time_text(self.cycle[-1].end / NS)}, {time_text(self.worst_cycle)} at worst",
+            *([f"if {self.assumed}"] if self.assumed else []),
             "",
             *_table(self.rows),
         ]
@@ -108,18 +112,35 @@ def analyse(
     bitrate: int = 1_000_000,
     sample_period: float | None = None,
     *,
+    dialect: str = DEFAULT,
     response_time: float = 0.0,
     host_jitter: float = 0.0,
     errors: Errors | None = None,
+    cia402: Mapping[str, Any] | None = None,
 ) -> Analysis:
-    """The bus of a machine: its command and its modules' answers in each sample period.
+    """The bus of a machine: what host and modules say in each sample period, in their `dialect`.
 
     `bitrate` in bit/s; times in s: `sample_period` (default: the machine's), the modules' longest `response_time` from
     a command's arrival to their answer being ready, and how late the host's command can be. Without `errors` the bus
-    is taken to be free of them. Raises InputError for values that can't be.
+    is taken to be free of them. `cia402` is that dialect's `[bus.cia402]` table. Raises InputError for values that
+    can't be.
     """
-    table = messages_of(machine, sample_period, response_time, host_jitter)
-    return analyse_messages(table, bitrate, errors=errors, title=f"{machine.name}, {1 / table[0].period:g} Hz")
+    check_dialect(dialect)
+    period = machine.sample_period if sample_period is None else sample_period
+    if dialect == "cia402":
+        from rds.bus.cia402.messages import messages_of_drives
+        from rds.bus.cia402.settings import read_settings
+
+        table = messages_of_drives(read_settings(cia402 or {}, machine), period, response_time, host_jitter)
+    else:  # the distributed modules take the same cyclic frames
+        table = messages_of(machine, period, response_time, host_jitter)
+    assumed = [
+        f"modules answer {_within(response_time)}",
+        f"the host is {f'up to {time_text(host_jitter)} late' if host_jitter else 'on time'}",
+        _words(errors),
+    ]
+    title = f"{machine.name}, {1 / period:g} Hz" + ("" if dialect == DEFAULT else f", dialect {dialect}")
+    return analyse_messages(table, bitrate, errors=errors, title=title, assumed=", ".join(assumed))
 
 
 def analyse_messages(
@@ -128,8 +149,12 @@ def analyse_messages(
     data_bitrate: int | None = None,
     errors: Errors | None = None,
     title: str = "bus",
+    assumed: str = "",
 ) -> Analysis:
-    """The bus of a message table of one's own; `data_bitrate` (bit/s) for CAN FD frames with the bit-rate switch."""
+    """The bus of a message table of one's own; `data_bitrate` (bit/s) for CAN FD frames with the bit-rate switch.
+
+    `assumed` is said with the results: on what the times in the table rest.
+    """
     _check_rates(bitrate, data_bitrate)
     table = in_order(messages)
     found = responses(table, bitrate, data_bitrate, errors)
@@ -147,7 +172,20 @@ def analyse_messages(
         worst_load_percent=100 * worst / NS,
         cycle=tuple(one_cycle(table, bitrate, data_bitrate)),
         worst_cycle=max(row.response for row in rows),
+        assumed=assumed,
     )
+
+
+def _within(response_time: float) -> str:
+    return f"within {time_text(response_time)}" if response_time else "at once"
+
+
+def _words(errors: Errors | None) -> str:
+    """What is assumed of errors."""
+    if errors is None:
+        return "there are no errors"
+    more = "" if errors.interval == inf else f", and one more every {time_text(errors.interval)}"
+    return f"{errors.burst} error{'s come' if errors.burst > 1 else ' comes'} at once{more}"
 
 
 def _check_rates(bitrate: int, data_bitrate: int | None) -> None:

@@ -231,19 +231,19 @@ def test_a_cycle_that_does_not_fit_is_not_called_met() -> None:
 @given(st.data())
 @settings(max_examples=150, deadline=None)
 def test_no_cycle_exceeds_the_analysis(data: st.DataObject) -> None:
-    """Random tables with a message that releases others, others beside them, random frame lengths, jitters, delays."""
+    """Random tables: a message releases others, and these others; some beside them; random lengths, jitters, delays."""
     period = data.draw(st.sampled_from([1e-3, 1.3e-3, 2e-3]), "period")
     identifiers = iter(data.draw(st.lists(st.integers(0, 2047), min_size=8, max_size=8, unique=True), "identifiers"))
     jitter = st.sampled_from([0.0, 20e-6, 150e-6])
     root = Message("root", next(identifiers), False, data.draw(st.integers(0, 8)), period, data.draw(jitter))
     answers = [
         Message(f"answer {place}", next(identifiers), False, data.draw(st.integers(0, 8)), period, data.draw(jitter),
-                after="root")
+                after=data.draw(st.sampled_from(["root", *(f"answer {before}" for before in range(place))])))
         for place in range(data.draw(st.integers(1, 4)))
     ]  # fmt: skip
     others = [
         Message(f"other {place}", next(identifiers), False, data.draw(st.integers(0, 8)),
-                data.draw(st.sampled_from([1e-3, 2.5e-3, 3.5e-3])), data.draw(jitter))
+                data.draw(st.sampled_from([1e-3, 2.5e-3, 3.5e-3, 20e-3])), data.draw(jitter))
         for place in range(data.draw(st.integers(0, 2)))
     ]  # fmt: skip
     table = in_order([root, *answers, *others])
@@ -260,9 +260,8 @@ def test_no_cycle_exceeds_the_analysis(data: st.DataObject) -> None:
         return chance.choice([0, lates[number], chance.randint(0, lates[number])])
 
     def follow(slot: Slot) -> list[tuple[int, int]]:
-        if names[slot.message] != "root":
-            return []
-        return [(slot.end - 3000 + late(n), n) for n, entry in enumerate(table) if entry.after]
+        released = [n for n, entry in enumerate(table) if entry.after == names[slot.message]]
+        return [(slot.end - 3000 + late(n), n) for n in released]
 
     releases = [
         (offsets[number] + count * periods[number] + late(number), number)

@@ -65,6 +65,40 @@ def test_slow_modules_late_hosts_and_errors_are_added() -> None:
     assert wrong.row("answer X").response == pytest.approx((270 + 31 + 135) * 1e-6)
 
 
+@pytest.mark.parametrize("mode, target", [("cst", 4), ("csp", 6)])
+def test_drives_answer_sync_and_get_their_targets_in_one_cycle(mode: str, target: int) -> None:
+    """SYNC, the TPDOs of 6 bytes, then the RPDOs: each waits for what comes before it, and once for the heartbeats."""
+    machine = load_machine("mini-cnc")
+    analysis = analyse(machine, dialect="cia402", cia402={"mode": mode})
+    beats = 5 * (55 + 10)
+    start = 55 + beats
+    tpdo, rpdo = 55 + 60, 55 + 10 * target
+    expected = {"SYNC": start}
+    for place, name in enumerate(("X", "Y", "Z", "spindle"), 1):
+        expected |= {f"TPDO {name}": start + place * tpdo, f"RPDO {name}": start + 4 * tpdo + place * rpdo}
+    worst = max(expected.values())
+    assert worst > 1000 and not analysis.met  # with all heartbeats at once it does not fit into 1 ms
+    slower = analyse(machine, sample_period=2e-3, dialect="cia402", cia402={"mode": mode})
+    for name, bits in expected.items():
+        assert slower.row(name).response <= bits * 1e-6 * (1 + 1e-9)
+    assert slower.row("RPDO spindle").response == pytest.approx(worst * 1e-6)
+    assert slower.met and {row.identifier for row in analysis.rows} >= {0x080, 0x182, 0x202, 0x702, 0x77F}
+    cycle = sum(row.longest_bits for row in analysis.rows if "heartbeat" not in row.name)
+    assert analysis.worst_load_percent == pytest.approx(cycle / 10 + beats / 1000)
+
+
+def test_what_the_times_rest_on_is_said() -> None:
+    machine = load_machine("mini-cnc")
+    assert "if modules answer at once, the host is on time, there are no errors" in str(analyse(machine))
+    slow = analyse(machine, response_time=50e-6, host_jitter=20e-6, errors=Errors(2, 0.1))
+    said = (
+        "modules answer within 50 µs, the host is up to 20 µs late, 2 errors come at once, and one more every 100000 µs"
+    )
+    assert slow.assumed == slow.to_json()["assumed"] == said
+    with pytest.raises(InputError, match="unknown dialect 'canopen'"):
+        analyse(machine, dialect="canopen")
+
+
 def test_load_is_exact_for_the_data_given() -> None:
     data = b"\x55" * 8
     analysis = analyse_messages([Message("m", 0x555, False, 8, 1e-3, data=data)], 500_000)
