@@ -242,13 +242,13 @@ def _single_cycle(
         if number != root:
             path = paths[number][1:]
             first = {other for other in cycle if other != root and other <= max(path)}
-            blocking = [
+            blockers = [
                 max((transmission[other] for other in cycle if other > waiting and other not in first), default=0)
                 for waiting in path
                 if own[waiting]  # who is never late is in the arbitration behind the message that released it
             ]
             late = sum(own[waiting] for waiting in path)
-            bounds[number] = start + late + sum(blocking) + sum(transmission[other] for other in first), sum(blocking)
+            bounds[number] = start + late + sum(blockers) + sum(transmission[other] for other in first), sum(blockers)
     if max(time for time, _ in bounds.values()) > period - tau:
         return results
     closer = list(results)
