@@ -13,8 +13,7 @@ import can
 
 from rds.bus import frames
 from rds.bus.frames import Answer, Kind, Status
-from rds.bus.link import BUILTIN, bus_name, open_bus
-from rds.bus.server import default_channel
+from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Axis, Machine
 

@@ -8,6 +8,7 @@ from typing import Any
 import can
 
 from rds.core.errors import InputError, MachineError
+from rds.machines.machine import Machine
 
 BUILTIN = "rds"  # the built-in bus's name among python-can's interfaces
 
@@ -15,6 +16,11 @@ BUILTIN = "rds"  # the built-in bus's name among python-can's interfaces
 def bus_name(interface: str, channel: str | None) -> str:
     """How messages call a bus."""
     return f"{interface}:{channel}" if channel else interface
+
+
+def default_channel(machine: Machine, interface: str, channel: str | None) -> str | None:
+    """The channel that was asked for, else the machine's name on the built-in bus, else the interface's own default."""
+    return channel if channel is not None or interface != BUILTIN else machine.name
 
 
 def open_bus(

@@ -12,7 +12,10 @@ from rds.machines import Machine
 def serve_machine(
     machine: Machine, dialect: str, interface: str, channel: str, ready: Callable[[], Any], **options: Any
 ) -> None:
-    """Serve `machine` until the process is told to end. InputError for an unknown dialect; else as each server says."""
+    """Serve `machine` until the process is told to end; `options` as of `serve_loop.serve_nodes`.
+
+    InputError for an unknown dialect; else as each server says.
+    """
     check_dialect(dialect)
     if dialect == "rds":
         from rds.bus.server import serve

@@ -23,8 +23,7 @@ from rds.bus.cia402.codes import Nmt, NmtCommand, State, error_text, status_text
 from rds.bus.cia402.configure import library, prepare
 from rds.bus.cia402.remote import Remote
 from rds.bus.cia402.settings import Command, read_settings
-from rds.bus.link import BUILTIN, bus_name, open_bus
-from rds.bus.server import default_channel
+from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 

@@ -1,93 +1,57 @@
-"""A simulated drive on a bus: its connection, its notion of bus time, and what to do when the bus fails."""
+"""A simulated drive on a bus."""
 
 from __future__ import annotations
 
-import logging
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 
 import can
 
+from rds.bus.bus_node import BusNode, Outgoing
 from rds.bus.cia402.drive import NMT, Drive, Frame
-from rds.bus.module_node import RETRY, BusTime
-from rds.core.errors import MachineError
-
-LOG = logging.getLogger(__name__)
-
-_SEND_TIMEOUT = 0.1  # s
 
 
-class DriveNode:
-    """One drive with a bus of its own, which `open_bus(identifiers)` opens and opens again after a failure."""
+class DriveNode(BusNode):
+    """The drive that `make_drive` makes, given the bus time now, s."""
 
-    def __init__(self, make_drive: Callable[[float], Drive], open_bus: Callable[[Sequence[int]], can.BusABC]):
-        self._clock = BusTime()
-        self.drive = make_drive(self._clock.now())
-        self._open_bus = open_bus
+    def __init__(self, name: str, make_drive: Callable[[float], Drive], open_bus: Callable[[list[int]], can.BusABC]):
+        super().__init__(name, open_bus)
+        self.drive = make_drive(self.clock.now())
         self._filter = self.drive.listens_to
-        self.bus: can.BusABC | None = open_bus(sorted(self._filter))
-        self._retry_at = 0.0
         self._configuring = (NMT, 0x600 + self.drive.node)  # identifiers that may change what it listens to
-        self._send(self.drive.boot(self._clock.now()))
+        self.join()
+        self.send(_standard(self.drive.boot(self.clock.now())))
 
-    def patience(self) -> float | None:
-        """How long the node may sleep if no frame comes, s."""
-        if self.bus is None:
-            return max(0.0, self._retry_at - time.monotonic())
-        expires = self.drive.expires
-        return None if expires is None else max(0.0, expires - self._clock.now())
+    @property
+    def identifiers(self) -> list[int]:
+        """NMT, SYNC, its SDO and PDOs."""
+        return sorted(self._filter)
 
-    def step(self, timeout: float) -> bool:
-        """Take one frame, waiting for it at most `timeout` s, and look after the drive's time; false if none came.
+    @property
+    def expires(self) -> float | None:
+        """The drive's own."""
+        return self.drive.expires
 
-        A bus that fails is closed and reported; the axis goes on, and so do the drive's time-outs.
-        """
-        message = None
-        try:
-            if self.bus is not None:
-                message = self.bus.recv(timeout)
-            if message is not None and not message.is_error_frame and not message.is_extended_id:
-                at = self._clock.at(message.timestamp)
-                remote = message.is_remote_frame
-                frames = self.drive.receive(message.arbitration_id, message.data, at, remote)
-                if message.arbitration_id in self._configuring:
-                    self._keep_filter()
-                self._send(frames)
-            elif message is None:
-                expires = self.drive.expires
-                if expires is not None and expires <= (now := self._clock.now()):
-                    self._send(self.drive.expire(now))
-        except (can.CanError, OSError) as error:
-            LOG.error("drive %s lost its bus: %s; trying again every %g s", self.drive.name, error, RETRY)
-            self.close()
-            self._retry_at = time.monotonic() + RETRY
-        return message is not None
+    @property
+    def heard(self) -> float:
+        """SYNCs."""
+        return self.drive.syncs
+
+    def receive(self, message: can.Message, at: float) -> Iterable[Outgoing]:
+        """To the drive; extended frames mean nothing to it."""
+        if message.is_extended_id:
+            return ()
+        frames = self.drive.receive(message.arbitration_id, message.data, at, message.is_remote_frame)
+        if message.arbitration_id in self._configuring:
+            self._keep_filter()
+        return _standard(frames)
+
+    def expire(self, now: float) -> Iterable[Outgoing]:
+        """The drive's."""
+        return _standard(self.drive.expire(now))
 
     def fault(self, code: int) -> None:
         """Inject a fault by its error code, now."""
-        self._send(self.drive.fault(code, self._clock.now()))
-
-    def reopen(self) -> bool:
-        """Open the bus again if it failed and it is time to; true if it did."""
-        if self.bus is not None or time.monotonic() < self._retry_at:
-            return False
-        try:
-            self.bus = self._open_bus(sorted(self._filter))
-        except MachineError as error:
-            LOG.error("drive %s: %s", self.drive.name, error)
-            self._retry_at = time.monotonic() + RETRY
-            return False
-        LOG.warning("drive %s is back on its bus", self.drive.name)
-        return True
-
-    def close(self) -> None:
-        """Leave the bus."""
-        bus, self.bus = self.bus, None
-        if bus is not None:
-            try:
-                bus.shutdown()
-            except (can.CanError, OSError) as error:
-                LOG.warning("drive %s could not close its bus: %s", self.drive.name, error)
+        self.send(_standard(self.drive.fault(code, self.clock.now())))
 
     def _keep_filter(self) -> None:
         """The host may have given a PDO another identifier: listen to that from now on."""
@@ -98,8 +62,6 @@ class DriveNode:
                 [{"can_id": identifier, "can_mask": 0x7FF, "extended": False} for identifier in sorted(wanted)]
             )
 
-    def _send(self, frames: Sequence[Frame]) -> None:
-        if self.bus is None:
-            return
-        for identifier, data in frames:
-            self.bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data), _SEND_TIMEOUT)
+
+def _standard(frames: Iterable[Frame]) -> list[Outgoing]:
+    return [(identifier, data, False) for identifier, data in frames]

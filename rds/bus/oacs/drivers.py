@@ -12,9 +12,8 @@ from typing import Any
 import can
 
 from rds.bus.drivers import AxisDrivers
-from rds.bus.link import BUILTIN, open_bus
+from rds.bus.link import BUILTIN, default_channel, open_bus
 from rds.bus.oacs.host import refuse_clashes, survey
-from rds.bus.server import default_channel
 from rds.core.errors import MachineError
 from rds.machines.machine import Machine
 
