@@ -13,6 +13,7 @@ from rds.core.errors import MachineError
 
 NMT = 0x000  # CANopen: network management; command 2 stops all nodes, whose drives then disable their voltage
 _STOP_ALL_NODES = bytes((0x02, 0x00))
+_ANSWER_AGAIN = bytes((0x80, 0x00))  # PRE-OPERATIONAL: no process data, but who looks for them finds them
 _REPEATS = 3  # a frame may be lost
 
 
@@ -25,9 +26,10 @@ def stop_everything(bus: can.BusABC) -> list[int]:
     """
     zero = can.Message(arbitration_id=frames.COMMAND, is_extended_id=False, data=frames.encode_voltages(()))
     network = can.Message(arbitration_id=NMT, is_extended_id=False, data=_STOP_ALL_NODES)
+    again = can.Message(arbitration_id=NMT, is_extended_id=False, data=_ANSWER_AGAIN)
     failures = []
     for _ in range(_REPEATS):
-        for message in (zero, network):
+        for message in (zero, network, again):
             try:
                 bus.send(message, 0.2)
             except (can.CanError, OSError) as error:

@@ -18,7 +18,7 @@ import canopen
 from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
 from rds.bus.cia402 import codes
-from rds.bus.cia402.codes import Mode, State, error_text, state_of, status_text
+from rds.bus.cia402.codes import Mode, NmtCommand, State, error_text, state_of, status_text
 from rds.bus.cia402.settings import DriveSettings, Settings
 from rds.core.errors import InputError, MachineError
 
@@ -100,7 +100,8 @@ def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
     for drive in drives:
         network.subscribe(0x580 + drive.node, note)
     with contextlib.suppress(can.CanTimeoutError):  # with bit timing, nobody acknowledges where nobody is
-        for drive in drives:
+        for drive in drives:  # one that was stopped, as by an emergency stop, answers to nothing else
+            network.send_message(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, drive.node]))
             network.send_message(0x600 + drive.node, b"\x40" + _DEVICE_TYPE + bytes(4))
     deadline = time.monotonic() + _SEARCH
     while time.monotonic() < deadline and not all(answers.values()):
