@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands.common import Channel, Interface, Json, print_json, refusals
+from rds.commands.common import Channel, Interface, Json, print_json, progress_bars, refusals
 
 module_app = typer.Typer(
     no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
@@ -262,16 +262,21 @@ def step(
     context: typer.Context,
     by: Annotated[float, typer.Option(help="Step of the set point, mm or degrees.")] = 5.0,
     period: Annotated[float, typer.Option(help="Time between two samples, s; a multiple of 0.01.")] = 0.01,
+    settled: Annotated[
+        float,
+        typer.Option(help="End when it has stood still for so long, s; 0: when the module gives up (3 s) or is there."),
+    ] = 1.0,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the record and its plot.")] = Path("step"),
     interface: Interface = "rds",
     channel: Channel = None,
     json: Json = False,
 ) -> None:
     """Step the set point, record the response and plot it."""
-    with _module(context, interface, channel) as module:
+    with _module(context, interface, channel) as module, progress_bars() as bar:
+        result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
+        bar("save")
         from rds.results.files import save_all
 
-        result = module.step(by, period)
         files = {kind: str(path) for kind, path in save_all(result, out).items()}
         files["plot"] = str(out / "step.png")
         result.plot().savefig(files["plot"])
@@ -279,3 +284,5 @@ def step(
         print_json({"samples": len(result), "notes": result.meta.get("notes", []), "files": files})
     else:
         typer.echo(f"{len(result)} samples in {out}")
+        for note in result.meta.get("notes", []):
+            typer.echo(f"note: {note}")

@@ -29,23 +29,59 @@ class _Unwrapper:
         return self._last
 
 
-class PositionRecorder:
-    """The positions of one motion."""
+_SETTLED_COUNTS = 2  # by which a position that has settled may still change: an encoder between two counts
+_SETTLED_SHARE = 0.002  # or this share of the step, where that is more
 
-    def __init__(self, description: ModuleDescription, period: float):
+
+class PositionRecorder:
+    """The positions of one motion: a step of the set point by `by` (unit)."""
+
+    def __init__(self, description: ModuleDescription, period: float, by: float):
         self._d = description
         self._period = period
+        self._by = by
         self._numbers = _Unwrapper(256, 0)  # a motion's positions count from 0
         self.samples: dict[int, int] = {}  # number: counts
+        self._far = max(1, round(abs(by) * description.counts_per_unit))  # counts
+        self._band = max(_SETTLED_COUNTS, _SETTLED_SHARE * self._far)  # counts
+        self._first: int | None = None
+        self._level = 0  # counts: what the position has stayed near...
+        self._since = 0  # ...from this sample on
+        self._last = (0, 0)  # sample, counts
+        self._moved = False
+
+    @property
+    def first(self) -> int:
+        """Where the axis stood at the step, counts; 0 before the first position has come."""
+        return self._first or 0
+
+    @property
+    def way(self) -> tuple[int, int]:
+        """How far the axis is from where it began, and how far it has to go; counts."""
+        gone = 0 if self._first is None else abs(self._last[1] - self._first)
+        return min(gone, self._far), self._far
+
+    @property
+    def still(self) -> float:
+        """For how long the position has stayed within 2 counts or 0.2 % of the step, s; 0 until it has moved."""
+        return (self._last[0] - self._since) * self._period if self._moved else 0.0
 
     def take(self, heard: Heard) -> None:
         """A message of the module."""
         fields = heard.message.fields
         if heard.message.kind == "Reply" and fields["Code"] == Says.POSITION:
-            self.samples[self._numbers.number(fields["Sequence"])] = fields["Position"]
+            self._keep(self._numbers.number(fields["Sequence"]), fields["Position"])
 
-    def result(self, by: float, machine: str, notes: list[str]) -> Result:
-        """The response to a step of the set point by `by` (unit). MachineError if there are too few samples."""
+    def _keep(self, number: int, counts: int) -> None:
+        self.samples[number] = counts
+        self._last = number, counts
+        if self._first is None:
+            self._first = self._level = counts
+        if abs(counts - self._level) > self._band:
+            self._level, self._since, self._moved = counts, number, True
+
+    def result(self, machine: str, notes: list[str]) -> Result:
+        """The response. MachineError if there are too few samples."""
         if len(self.samples) < 2:
             raise MachineError(f"{machine} sent {len(self.samples)} positions; a response needs two at least")
         name, unit = self._d.axis, self._d.unit
@@ -53,7 +89,7 @@ class PositionRecorder:
         measured = np.array([self.samples[k] for k in numbers.tolist()]) * self._d.resolution
         columns = {
             "time": numbers * self._period,
-            f"{name}_reference": np.full(len(numbers), measured[0] + by),
+            f"{name}_reference": np.full(len(numbers), measured[0] + self._by),
             f"{name}_measured": measured,
         }
         units = {f"{name}_reference": unit, f"{name}_measured": unit}

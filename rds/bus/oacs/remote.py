@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import Any
 
 import can
@@ -13,6 +15,7 @@ from rds.bus.oacs.link import Conversation, Done
 from rds.bus.oacs.pid import FIELDS, Tuning
 from rds.bus.oacs.recording import PositionRecorder, ReadingsRecorder
 from rds.bus.oacs.refusals import reason
+from rds.bus.oacs.talk import Heard
 from rds.bus.oacs.transfer import ModuleDescription, decode_description
 from rds.bus.oacs.words import (
     THOUSAND,
@@ -28,6 +31,7 @@ from rds.bus.oacs.words import Result as Ended
 from rds.core.errors import InputError, MachineError
 from rds.results import Result
 
+SETTLED = 1.0  # s without a change worth the name until a recorded step counts as settled
 _SLACK = 10.0  # s that a motion may take beyond twice its way at the slowest speed
 
 
@@ -193,26 +197,55 @@ class Module:
 
     # --- recordings
 
-    def step(self, by: float, period: float = 0.01, timeout: float | None = None) -> Result:
+    def step(
+        self,
+        by: float,
+        period: float = 0.01,
+        timeout: float | None = None,
+        settled: float = SETTLED,
+        progress: Callable[[int, int], None] = lambda done, of: None,
+    ) -> Result:
         """Step the set point by a distance and record the response every `period` s until the axis stands.
 
         Columns `time`, `NAME_reference`, `NAME_measured` with NAME the axis's letter; result.plot() draws it. The
         step is at time 0. Lost frames leave gaps in time, and a note; so does an axis that stops short of the point.
+
+        The module ends the motion at the point, or after 3 s without a count. It is stopped before, which a note says,
+        when the axis has moved and then stayed within 2 counts (or 0.2 % of the step) for `settled` s; 0: never.
+        `progress` is called with the counts gone and to go.
         """
         self._check_axis("step its position")
+        if not (isfinite(settled) and settled >= 0.0):
+            raise InputError(f"settled = {settled!r} s must be at least 0 (0: wait for the module's own end)")
         d = self.description
         self._subscribe(Quantity.POSITION, period)
-        recorder = PositionRecorder(d, period)
-        self._link.listen = recorder.take
+        recorder = PositionRecorder(d, period, by)
+        ends = {Ended.CARRIED_OUT, Ended.STALLED}
+
+        def listen(heard: Heard) -> None:
+            recorder.take(heard)
+            progress(*recorder.way)
+            if settled and recorder.still >= settled and Ended.STOPPED_BY_COMMAND not in ends:
+                ends.add(Ended.STOPPED_BY_COMMAND)
+                self._link.send(Code=Code.MOVE, Move=Move.STOP)
+
+        self._link.listen = listen
         try:
             what, answers = self._start(by, None)
             patience = self._patience(by, None) if timeout is None else timeout
-            done = self._link.finish(what, answers, patience, also=(Ended.CARRIED_OUT, Ended.STALLED))
+            done = self._link.finish(what, answers, patience, also=ends)
         finally:
             self._link.listen = lambda heard: None
             self._subscribe(Quantity.POSITION, 0.1)
         notes = [f"the axis stopped short: {reason(done.result)}"] if done.result == Ended.STALLED else []
-        return recorder.result(by, f"module {self.number}", notes)
+        if done.result == Ended.STOPPED_BY_COMMAND:
+            short = by - (done.counts - recorder.first) * d.resolution
+            notes = [
+                f"stopped after it had stood still for {settled:g} s, {abs(short):.3g} {d.unit} "
+                f"{'short of' if short * by > 0 else 'beyond'} the point: higher gains bring it nearer, 0 as the time "
+                "for settling waits for the module's own end"
+            ]
+        return recorder.result(f"module {self.number}", notes)
 
     def record(self, seconds: float, period: float = 0.02) -> Result:
         """Record acceleration (g; a module with an accelerometer) and motor current (A) every `period` s."""
