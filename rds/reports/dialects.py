@@ -2,7 +2,8 @@
 
 `oacs`: tables 6 and 7 of the thesis on the open architecture control system. Its general call has the identifier 0x01
 in table 6 and in its code, 0x00 in table 5 and in its text; 0x01 is taken, for 0x00 is where the modules answer. Its
-data download, to one module, begins with 2 like the second general call (its CANbus class, appendix H).
+data download, to one module, begins with 2 like the second general call (its CANbus class, appendix H). Our modules
+answer it by ISO 15765-2, whose first frame counts here (docs/oacs.md).
 `rds`: command and answer of this project's cyclic exchange. `sdo`: service data of CANopen (CiA 301).
 """
 
@@ -13,15 +14,17 @@ from rds.reports.pairing import Pair, parse_pairs
 
 DIALECTS = {
     "oacs": (
-        "general call: 001#01 -> 000#01MM; type call: 001#02 -> 000#02MM; data download: M#02 -> 000#02MM; "
+        "general call: 001#01 -> 000#01MM; type call: 001#02 -> 000#02MM; data download: M#02 -> 000#02MM | 120+M#10; "
         "move start: M#0301 -> 000#04MM00; move stop: M#0300 -> 000#04MM03"
     ),
     "rds": "cycle: 010# -> 020+M#..........00; dry run: 011# -> 020+M#..........00; call: 013# -> 020+M#..........01",
     "sdo": "service data: 600+M# -> 580+M#",
 }
 
-# a start is acknowledged when the move has been carried out; the fourth byte is its direction (table 6)
-OACS_MOVES = "cw: M#0301..01 -> 000#04MM00; ccw: M#0301..00 -> 000#04MM00"
+# A start is acknowledged when the move has been carried out; the request's fourth byte is its direction (table 6). Our
+# modules say at once that they have accepted it (fifth byte 1), and at the end that it is carried out (0).
+_CARRIED_OUT = "000#04MM00..00 | 000#04MM00..$"
+OACS_MOVES = f"cw: M#0301..01 -> {_CARRIED_OUT}; ccw: M#0301..00 -> {_CARRIED_OUT}"
 
 
 def pairs_from(dialect: str, pairs: str | None) -> list[Pair]:

@@ -6,9 +6,11 @@ A pattern is an identifier, `#`, and how the data begin, in hexadecimal:
     000#04MM00      the second byte is the number of the module
     M#0301..01      the identifier is the number of the module; the third byte may be anything
     020+M#          the identifier is 0x020 + the number of the module (1 to 127), any data
+    000#04MM00..$   no more data after these four bytes
 
-An identifier of eight digits is an extended one. A pair is `name: request -> answer`; pairs are separated by `;`. A
-request without M is to all modules, and each module's first answer counts; a request with M is to that module alone.
+An identifier of eight digits is an extended one. A pair is `name: request -> answer`, and where there is more than one
+answer that will do, `name: request -> answer | answer`; pairs are separated by `;`. A request without M is to all
+modules, and each module's first answer counts; a request with M is to that module alone.
 """
 
 from __future__ import annotations
@@ -44,11 +46,14 @@ class Pattern:
     module_in_identifier: bool
     extended: bool
     data: tuple[int | str, ...]  # a byte, ".." for any, "MM" for the module's number
+    whole: bool = False  # whether no more data may follow
 
     def module(self, frame: Frame) -> int | None:
         """The module of a frame that fits (EVERY where the pattern has no M), or None for a frame that doesn't."""
         module = frame.identifier - self.base if self.module_in_identifier else EVERY
         if frame.extended != self.extended or len(frame.data) < len(self.data):
+            return None
+        if self.whole and len(frame.data) > len(self.data):
             return None
         if module not in MODULES if self.module_in_identifier else frame.identifier != self.base:
             return None
@@ -68,23 +73,30 @@ class Pattern:
 
 
 class Pair(NamedTuple):
-    """A request and the answer to it."""
+    """A request and the answers to it: whichever comes first."""
 
     name: str
     request: Pattern
-    answer: Pattern
+    answers: tuple[Pattern, ...]
+
+    def answered_by(self, frame: Frame) -> int | None:
+        """The module whose answer a frame is (EVERY where the pattern has no M); None if it is none."""
+        found = (answer.module(frame) for answer in self.answers)
+        return next((module for module in found if module is not None), None)
 
 
 def parse_pattern(text: str) -> Pattern:
     """A pattern from its text; InputError where it is none."""
     identifier, hash_sign, data = text.strip().partition("#")
+    whole, data = data.endswith("$"), data.removesuffix("$")
     parts, valid = _IDENTIFIER.fullmatch(identifier), _DATA.fullmatch(data)
     # "M" or "020+M" or "020": a sum needs both of its terms
     summed = parts is not None and bool(parts["plus"]) == bool(parts["base"] and parts["module"])
     if not hash_sign or parts is None or valid is None or not identifier or not summed:
         raise InputError(
             f"{text.strip()!r} is not a pattern of frames; write one as in '001#01', 'M#0301' or '020+M#..04': "
-            "identifier in hexadecimal or M, '#', bytes of data in hexadecimal, '..' for any, 'MM' for the module"
+            "identifier in hexadecimal or M, '#', bytes of data in hexadecimal, '..' for any, 'MM' for the module, "
+            "'$' at the end for no more"
         )
     digits = parts["base"] or ""
     base, extended = int(digits or "0", 16), len(digits) == 8
@@ -95,7 +107,7 @@ def parse_pattern(text: str) -> Pattern:
         )
     pieces = [data[at : at + 2] for at in range(0, len(data), 2)]
     wanted = tuple(piece if piece in ("..", "MM") else int(piece, 16) for piece in pieces)
-    return Pattern(base, parts["module"] is not None, extended, wanted)
+    return Pattern(base, parts["module"] is not None, extended, wanted, whole)
 
 
 def parse_pairs(text: str) -> list[Pair]:
@@ -108,7 +120,8 @@ def parse_pairs(text: str) -> list[Pair]:
             raise InputError(f"{entry!r} is not a pair; write it as in 'move start: M#0301 -> 000#04MM00'")
         if any(pair.name == name.strip() for pair in pairs):
             raise InputError(f"two pairs are called {name.strip()!r}; rename one")
-        pairs.append(Pair(name.strip(), parse_pattern(request), parse_pattern(answer)))
+        answers = tuple(parse_pattern(text) for text in answer.split("|"))
+        pairs.append(Pair(name.strip(), parse_pattern(request), answers))
     if not pairs:
         raise InputError("there is no pair; write at least one as in 'move start: M#0301 -> 000#04MM00'")
     return pairs
@@ -180,7 +193,7 @@ def _answers(
 ) -> None:
     fits, best = False, None
     for pair in pairs:
-        module = pair.answer.module(frame)
+        module = pair.answered_by(frame)
         if module is None:
             continue
         fits = True

@@ -144,3 +144,16 @@ def test_a_wrong_pattern_is_refused(text: str) -> None:
 def test_a_wrong_pair_is_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"write (it|at least one) as in|rename one"):
         parse_pairs(text)
+
+
+def test_our_modules_accept_a_move_before_it_is_carried_out_and_download_in_many_frames() -> None:
+    frames = [
+        *(frame(1.0, 4, "0200000000000000"), frame(1.0014, 0x124, "1080010158780000"), frame(1.002, 0x114, "30000000")),
+        *(frame(2.0, 4, "0301050100000000"), frame(2.008, 0, "0404005801000000"), frame(4.4, 0, "0404005800110000")),
+        *(frame(5.0, 4, "0301050000000000"), frame(5.008, 0, "0404005801000000"), frame(5.5, 0, "0404005809110000")),
+    ]
+    told = exchanges(frames, OACS, 1.0)
+    assert told.times["data download", 4] == pytest.approx([0.0014])
+    assert told.times["move start", 4] == pytest.approx([0.008, 0.008])
+    moved = exchanges(frames, parse_pairs(OACS_MOVES), 600.0)
+    assert moved.times == {("cw", 4): pytest.approx([2.4])} and moved.unanswered("ccw", 4) == 1  # a limit switch opened
