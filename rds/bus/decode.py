@@ -15,6 +15,7 @@ from rds.bus.frames import Kind, Status
 from rds.core.errors import InputError, MachineError
 
 OWN_DBC = "oacs.dbc"  # in rds/bus/oacs
+_LONGEST_REASON = 300  # characters
 
 
 class Decoded(NamedTuple):
@@ -103,9 +104,10 @@ def _load(path: Path) -> Any:
         return cantools.database.load_file(path, strict=False)
     # cantools raises errors of its parsers, of textparser and plain ones
     except Exception as error:
-        raise InputError(
-            f"it can't be read as a DBC file: {str(error).strip() or type(error).__name__}", str(path)
-        ) from error
+        reason = str(error).strip() or type(error).__name__
+        if len(reason) > _LONGEST_REASON:  # it quotes the line
+            reason = f"{reason[:_LONGEST_REASON]}..."
+        raise InputError(f"it can't be read as a DBC file: {reason}", str(path)) from error
 
 
 def _by_database(database: Any, message: can.Message) -> Decoded | None:

@@ -31,6 +31,7 @@ import can
 from can.io.blf import BLFParseError
 from can.util import dlc2len
 
+from rds.bus import log_lock
 from rds.bus.log_lines import TEXT, Lines
 from rds.core.errors import InputError
 
@@ -165,8 +166,8 @@ def _problem(message: can.Message) -> str | None:
 class LogWriter:
     """A log that is being written. `unkept` counts, by their kind, the frames that the format cannot hold.
 
-    Never overwrites an existing file without `force`. Raises InputError for that and for an unknown ending, OSError
-    where the disk says no (whenever it says so).
+    Never overwrites an existing file without `force`, and none that another one is writing. Raises InputError for that
+    and for an unknown ending, OSError where the disk says no (whenever it says so).
     """
 
     def __init__(self, path: str | Path, force: bool = False):
@@ -184,7 +185,14 @@ class LogWriter:
                 raise InputError(
                     "it exists already; choose another name, or overwrite it with --force", str(path)
                 ) from None
+        else:
+            log_lock.release(log_lock.hold(path))  # not while another one writes it
         self._writer = log_writers.open_writer(path, self._ending, packed)
+        try:
+            self._lock = log_lock.hold(path)
+        except InputError:
+            self._writer.stop()
+            raise
 
     def write(self, message: can.Message) -> None:
         """Add a frame. A time before the last frame's (a clock that was set back) becomes the last frame's."""
@@ -204,7 +212,11 @@ class LogWriter:
 
     def close(self) -> None:
         """Finish the file. May be called more than once."""
-        self._writer.stop()
+        try:
+            self._writer.stop()
+        finally:
+            log_lock.release(self._lock)
+            self._lock = None
 
     def _unkept(self, message: can.Message) -> str | None:
         if message.is_fd and self._ending in (".trc", ".csv", ".db"):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def record(
 
     receiver = Receiver(open_bus, note, name=name)
     queue = receiver.subscribe(name=f"the recording to {path.name}", limit=_QUEUE)
-    with receiver:
+    with receiver, _named(path):
         log = LogWriter(path, force)
         try:
             began = flushed = looked = time.monotonic()
@@ -93,3 +94,12 @@ def record(
             result.frames, result.lost, result.unkept = log.frames, queue.lost, dict(log.unkept)
             result.seconds = time.monotonic() - began
     return result
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Errors of the disk with the name of the log, which writing to an open file does not give."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), error.filename or str(path)) from error

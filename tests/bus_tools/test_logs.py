@@ -269,6 +269,22 @@ def test_a_full_disk_is_said(tmp_path: Path) -> None:
         log.flush()
 
 
+@pytest.mark.parametrize("ending", ["blf", "log", "db", "csv.gz"])
+def test_a_log_has_one_writer_at_a_time(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a.{ending}"
+    first = LogWriter(path)
+    first.write(frame(1))
+    with pytest.raises(InputError, match="another recording is writing it"):
+        LogWriter(path, force=True)
+    first.write(frame(2))
+    first.close()
+    assert [message.arbitration_id for message in LogFile(path)] == [1, 2]
+    second = LogWriter(path, force=True)
+    second.write(frame(3))
+    second.close()
+    assert [message.arbitration_id for message in LogFile(path)] == [3]
+
+
 @pytest.mark.parametrize("ending", ["asc", "blf", "log", "trc", "csv", "db"])
 def test_python_can_converts_what_was_written_here(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"a.{ending}"

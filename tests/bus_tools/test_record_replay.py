@@ -140,6 +140,17 @@ def test_a_killed_hub_is_in_the_result_and_recording_goes_on(
     assert {message.arbitration_id for message in LogFile(tmp_path / "a.log")} == {1, 2}
 
 
+def test_a_disk_that_is_full_is_said_with_the_file(tmp_path: Path, open_bus: Opener) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full on this system")
+    path = tmp_path / "a.log"
+    path.symlink_to("/dev/full")
+    sender = open_bus()
+    with pytest.raises(OSError, match="No space left") as failed:
+        record(path, open_bus, force=True, count=10, ready=lambda: [sender.send(frame(k)) for k in range(10)])
+    assert failed.value.filename == str(path)
+
+
 def test_no_bus_no_file(tmp_path: Path) -> None:
     with pytest.raises(MachineError, match="can't be opened"):
         record(tmp_path / "a.log", partial(open_any, "socketcan", "no-such-bus-0"))

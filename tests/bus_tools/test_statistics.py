@@ -168,6 +168,10 @@ def test_what_is_no_dbc_file_is_refused(tmp_path: Path) -> None:
     pytest.importorskip("cantools")
     with pytest.raises(InputError, match="no such DBC"):
         decoder([tmp_path / "none.dbc"])
+    (tmp_path / "long.dbc").write_text("a" * 100_000)
+    with pytest.raises(InputError, match="can't be read as a DBC file") as refused:
+        decoder([tmp_path / "long.dbc"])
+    assert len(str(refused.value)) < 1000
     (tmp_path / "bad.dbc").write_text("rubbish")
     with pytest.raises(InputError, match="can't be read as a DBC"):
         decoder([tmp_path / "bad.dbc"])
