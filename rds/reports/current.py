@@ -15,7 +15,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.reports.content import Report, Table
-from rds.reports.reading import Column, columns_in, read_columns
+from rds.reports.reading import Column, columns_in, read_columns, without_readings_of
 from rds.reports.settings import Setting
 from rds.reports.statistics import summary
 from rds.reports.windows import EXAMPLE, Window, parse_windows
@@ -79,7 +79,7 @@ def _drawing(path: Path, records: Sequence[Current], starting: int, idle: int) -
 
 
 def _read(path: Path, settings: Mapping[str, Any]) -> list[Current]:
-    columns = read_columns(path)
+    columns = without_readings_of(read_columns(path), "acceleration_[xyz]")  # for the report on vibration
     timed = next((column for column in columns if column.name.lower() in ("time", "t")), None)
     currents = columns_in(path, [c for c in columns if c is not timed], tuple(_AMPERES), "currents", "cw_A")
     time = _time(timed) if timed else None

@@ -7,6 +7,7 @@ semicolons or tabs; where they are not separated by commas, a decimal comma is r
 from __future__ import annotations
 
 import csv
+import re
 import tomllib
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -140,6 +141,16 @@ def columns_in(
     if not columns:
         raise InputError(f"it has no column with {what}; head one as in {example!r}", str(path))
     return list(columns)
+
+
+def without_readings_of(columns: Collection[Column], ending: str) -> list[Column]:
+    """The columns but those that another report is about: a module records `T_acceleration_x` and `T_current` together.
+
+    `ending` is what their names end with, as a regular expression. Where there is nothing else, all are kept: the
+    report says then what it would have.
+    """
+    kept = [column for column in columns if not re.search(rf"_{ending}$", column.name)]
+    return kept if any(column.name.lower() not in ("time", "t") for column in kept) else list(columns)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

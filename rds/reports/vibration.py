@@ -18,7 +18,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.reports.content import Report, Table
-from rds.reports.reading import Column, columns_in, read_columns
+from rds.reports.reading import Column, columns_in, read_columns, without_readings_of
 from rds.reports.settings import Setting
 from rds.reports.statistics import summary
 from rds.reports.windows import EXAMPLE, parse_windows
@@ -85,6 +85,7 @@ def _drawing(record: Vibration, settings: Mapping[str, Any]) -> Any:
 
 def _read(path: Path, settings: Mapping[str, Any]) -> Vibration:
     columns = [column for column in read_columns(path) if column.name.lower() not in ("time", "t")]
+    columns = without_readings_of(columns, "current")  # what a module recorded beside, for the report on currents
     columns = columns_in(path, columns, ("adc", "g"), "readings of an accelerometer", "x_adc")
     if len({column.unit for column in columns}) > 1:
         raise InputError("it has columns in adc and in g; give one or the other", str(path))

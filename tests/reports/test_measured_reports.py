@@ -173,3 +173,18 @@ def test_vibration_in_g_and_in_parts(tmp_path: Path) -> None:
     assert rms["work (7 to 8)", "x"] == pytest.approx(0.3)
     with pytest.raises(InputError, match=r"v\.csv: windows: work = '7-9'"):
         make_report("vibration", [log], {"windows": "work=7-9"})
+
+
+def test_a_modules_record_of_acceleration_and_current_serves_both_reports(tmp_path: Path) -> None:
+    rows = [f"{0.02 * k:.2f},{-1.05 + 0.01 * (k % 3)},0.1,-0.1,{0.7 + 0.1 * (k == 0)}" for k in range(20)]
+    path = tmp_path / "drill.csv"
+    path.write_text(
+        "time [s],T_acceleration_x [g],T_acceleration_y [g],T_acceleration_z [g],T_current [A]\n" + "\n".join(rows)
+    )
+    shaken = make_report("vibration", [path]).table("Acceleration")
+    assert [row[2] for row in shaken.rows] == [f"T_acceleration_{axis}" for axis in "xyz"]
+    (row,) = make_report("current", [path]).table("Starting and running").rows
+    assert row[1:4] == [20, pytest.approx(0.8), pytest.approx(0.7)]
+    path.write_text("time [s],T_current [A]\n0,1\n1,1\n")
+    with pytest.raises(InputError, match="'T_current \\[A\\]' is in 'A'; readings of an accelerometer are in adc or g"):
+        make_report("vibration", [path])
