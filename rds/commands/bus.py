@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
@@ -13,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands.common import Channel, Interface, Json, print_json, refusals, stdout_kept
+from rds.commands.common import Channel, Interface, Json, print_json, refusals, stdout_kept, until_ctrl_c
 
 app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
 
@@ -56,7 +54,7 @@ def monitor(
         opener = _opener(interface, channel, given, "monitor", errors=True)
         statistics = Statistics(bitrate or (interface == BUILTIN and _timing(opener)) or BITRATE, data_bitrate)
         decode = decoder(dbc or ())
-        with _quiet_log(live := _is_live(json)), _live(decode, live) as refresh, _until_ctrl_c() as stop:
+        with _quiet_log(live := _is_live(json)), _live(decode, live) as refresh, until_ctrl_c() as stop:
             view = watch(
                 opener,
                 statistics,
@@ -96,7 +94,7 @@ def record(
 
         channel = _channel(interface, channel)
         selection = Selection(identifiers or ())
-        with _quiet_log(False), _until_ctrl_c() as stop, _counter("frames recorded") as show:
+        with _quiet_log(False), until_ctrl_c() as stop, _counter("frames recorded") as show:
             result = record_bus(
                 file,
                 _opener(interface, channel, bitrate, "recorder", errors=True),
@@ -149,7 +147,7 @@ def replay(
             _command_of(interface, channel, with_commands),
             _opener(interface, channel, bitrate, "replay")() as bus,
             _quiet_log(False),
-            _until_ctrl_c() as stop,
+            until_ctrl_c() as stop,
             _counter("frames sent") as show,
         ):
             result = replay_log(
@@ -193,7 +191,7 @@ def serve_socketcand(
         name = channel or interface  # what clients open
         with (
             _quiet_log(False),
-            _until_ctrl_c() as stop,
+            until_ctrl_c() as stop,
             _command_of(interface, channel, with_commands),
             Server(opener, name, host=host, port=port, with_commands=with_commands) as server,
         ):
@@ -237,18 +235,6 @@ def _command_of(interface: str, channel: str | None, wanted: bool) -> Any:
     from rds.bus.command import Command
 
     return Command(str(channel))
-
-
-@contextmanager
-def _until_ctrl_c() -> Iterator[threading.Event]:
-    """An event that Ctrl-C and a polite kill set."""
-    stop = threading.Event()
-    before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json as json_text
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from typing import Annotated, Any
@@ -87,6 +89,18 @@ def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
             return lambda done, of: bars.update(task, completed=done, total=of)
 
         yield bar
+
+
+@contextmanager
+def until_ctrl_c() -> Iterator[threading.Event]:
+    """An event that Ctrl-C and a polite kill set."""
+    stop = threading.Event()
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def print_json(value: Any) -> None:

@@ -33,9 +33,34 @@ def channel_of(interface: str, channel: str | None) -> str | None:
     return channel if channel is not None or interface != "rds" else "mini-cnc"
 
 
-def scan(interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+def scan(
+    watching: Annotated[
+        bool, typer.Option("--watch", help="Go on, and say which distributed modules come and go, until Ctrl-C.")
+    ] = False,
+    events: Annotated[
+        Path | None,
+        typer.Option(help="With --watch: CSV file of what happens, for `rds report reconfiguration`."),
+    ] = None,
+    modules: Annotated[
+        int | None, typer.Option(help="With --watch: how many there should be (default: as many as at its beginning).")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="With --watch: end after so long.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="With --events: overwrite the file.")] = False,
+    interface: Interface = "rds",
+    channel: Channel = None,
+    json: Json = False,
+) -> None:
     """List the modules on a bus: number, type, dialect, version, state."""
     with refusals():
+        _check_watch(watching, events=events, modules=modules, seconds=seconds, force=force or None)
+        if force and events is None:
+            raise _refused("--force overwrites the file of --events, which is not given")
+        if watching:
+            from rds.commands.watch import watch
+
+            with bus_of(interface, channel) as bus:
+                watch(bus, json, events, modules, seconds, force)
+            return
         distributed = _oacs(interface, channel)
         known = {row["id"] for row in distributed}  # these take cyclic commands as well
         cyclic = [row for row in _cyclic(interface, channel) if row["id"] not in known]
@@ -50,6 +75,18 @@ def scan(interface: Interface = "rds", channel: Channel = None, json: Json = Fal
 
     columns = ["id", "type", "dialect", "version", "state"]
     show_table("Modules", columns, [["–" if row[c] is None else str(row[c]) for c in columns] for row in rows])
+
+
+def _check_watch(watching: bool, **words: Any) -> None:
+    given = [f"--{name}" for name, value in words.items() if value is not None]
+    if given and not watching:
+        raise _refused(f"{', '.join(given)} belongs to --watch, which is not given")
+
+
+def _refused(sentence: str) -> Exception:
+    from rds.core.errors import InputError
+
+    return InputError(sentence)
 
 
 def _oacs(interface: str, channel: str | None) -> list[dict[str, Any]]:
