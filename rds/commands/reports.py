@@ -45,10 +45,10 @@ def report(
     if json:
         print_json({**found, "files": [str(path) for path in files]})
         return
-    from rds.console import show_table
+    from rds.console import cell, show_table
 
     for table in tables:
-        show_table(table.title, table.columns, [[str(cell) for cell in row] for row in table.shown()], table.note)
+        show_table(table.title, table.columns, [[cell(value) for value in row] for row in table.shown()], table.note)
     for sentence in findings:
         typer.echo(f"- {sentence}")
     if files:
