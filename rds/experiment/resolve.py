@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -212,6 +213,13 @@ def _bus(words: Words, folder: Path) -> dict[str, Any]:
     table.choice("dialect", DEFAULT, dialect_names())
     if "cia402" in table and table.any("dialect") != "cia402":
         raise table.fault("cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it')
+    drives = table.any("cia402")
+    if isinstance(drives, Mapping) and drives.get("mode") in ("csp", "csv"):
+        raise InputError(
+            f'bus.cia402.mode = "{drives["mode"]}" takes positions or velocities, and every mode of an experiment '
+            'hands out voltages: use "cst"; rds.bus.cia402.follow sends references to drives in csp and csv',
+            table.place("cia402"),
+        )
     if interface == BUILTIN:
         table.whole("bitrate", None, "bit/s", *BITRATES)
         table.whole("data_bitrate", None, "bit/s, of CAN FD", *DATA_BITRATES)

@@ -25,7 +25,8 @@ from hypothesis.strategies import (
 )
 
 import rds
-from rds.core.errors import RdsError
+from rds.core.errors import InputError, RdsError
+from rds.experiment.resolve import resolve
 from rds.experiment.words import Words
 from rds.runtime.plan import Plan
 
@@ -383,3 +384,21 @@ def _without_none(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
     return [_without_none(item) for item in value if item is not None] if isinstance(value, list) else value
+
+
+@pytest.mark.parametrize("mode", ["simulation", "emulation", "implementation", "system-test", "model-validation"])
+@pytest.mark.parametrize("command", ["csp", "csv"])
+def test_drives_that_take_no_voltage_are_refused_in_every_mode(mode: str, command: str) -> None:
+    """A voltage of 5 V would be 5 mm to such a drive."""
+    driven = mode in ("system-test", "model-validation")
+    source: dict[str, Any] = (
+        {"signal": {"kind": "square", "amplitude": 5.0, "frequency": 1.0}}
+        if driven
+        else {"reference": {"kind": "constant", "value": 0.0}, "controller": {"name": "p"}}
+    )
+    table = {"axes": ["X"], "duration": 0.1, "mode": mode, **source}
+    bus = {"dialect": "cia402", "cia402": {"mode": command}}
+    with pytest.raises(InputError, match=rf'bus\.cia402\.mode = "{command}" takes positions or velocities.*use "cst"'):
+        resolve(Words(table | {"bus": bus}), Path())
+    plan, _ = resolve(Words(table | {"bus": bus | {"cia402": {"mode": "cst"}}}), Path())
+    assert plan.bus["cia402"]["mode"] == "cst"
