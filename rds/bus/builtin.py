@@ -333,7 +333,7 @@ def _record(msg: can.Message) -> bytes:
     try:
         # the stamp tells the hub how late it is
         header = wire.HEADER.pack(time.monotonic_ns(), msg.arbitration_id, wire.FRAME, flags, msg.dlc, length)
-        if flags or length > 8 or msg.arbitration_id > 0x7FF or msg.dlc > 8:
+        if flags or length > 8 or msg.arbitration_id > 0x7FF or msg.dlc != length:
             wire.check_frame(header[wire.KEY_AT])
     except (wire.WireError, struct.error) as error:
         raise ValueError(f"no such frame can be sent: {msg!r}: {error}") from None

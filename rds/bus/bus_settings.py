@@ -41,7 +41,7 @@ def read_settings(options: Mapping[str, Any]) -> wire.Settings:
 
 def _whole(given: Mapping[str, Any], name: str, least: int, most: int, default: int) -> int:
     value = given.get(name, default)
-    if value == default:
+    if name not in given or value == default == 0:
         return default
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise ValueError(f"{name} {value!r} must be a whole number from {least:,} to {most:,}")

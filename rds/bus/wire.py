@@ -194,6 +194,8 @@ def check_frame(key: bytes) -> tuple[int, bool]:
     lengths_ok = length in _FD_LENGTHS if flags & FD else length <= 8
     if not lengths_ok or dlc > (DATA if flags & FD else 8):
         raise WireError(f"{length} bytes (dlc {dlc}) are no length of a {'CAN FD' if flags & FD else 'CAN'} frame")
+    if not flags & (FD | REMOTE | ERROR) and dlc != length:
+        raise WireError(f"it has {length} bytes of data, and its length (dlc) says {dlc}")
     if flags & OWN or (flags & REMOTE and (length or flags & FD)):
         raise WireError(f"flags {flags:#x} contradict each other")
     return identifier, extended

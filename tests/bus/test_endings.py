@@ -293,3 +293,13 @@ def test_one_that_stood_still_long_enough_before_is_let_go_without_a_wait(
     with pytest.raises(can.CanOperationError, match="read nothing"):
         while True:
             lazy.recv(0)
+
+
+@pytest.mark.parametrize("bitrate", [None, 1_000_000])
+def test_a_frame_whose_length_is_not_that_of_its_data_is_not_sent(bitrate: int | None, open_bus: Opener) -> None:
+    sender, receiver = open_bus(bitrate=bitrate), open_bus()
+    with pytest.raises(ValueError, match="1 bytes of data, and its length \\(dlc\\) says 3"):
+        sender.send(can.Message(arbitration_id=1, is_extended_id=False, data=b"a", dlc=3))
+    sender.send(can.Message(arbitration_id=2, is_extended_id=False, is_remote_frame=True, dlc=3))
+    message = receiver.recv(2.0)
+    assert message is not None and (message.arbitration_id, message.dlc) == (2, 3)

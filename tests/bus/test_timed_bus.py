@@ -138,6 +138,7 @@ def test_the_next_first_node_chooses_anew(open_bus: Callable[..., can.BusABC]) -
         ({"data_bitrate": MBIT}, "without bitrate"),
         ({"name": "x" * 100}, "at most"),
         ({"restart_ms": -5}, "restart_ms"),
+        ({"restart_ms": -1}, "restart_ms"),
         ({"error_frames": 1}, "true or false"),
     ],
 )
