@@ -67,7 +67,10 @@ def ending(path: Path) -> tuple[str, bool]:
 
 def asammdf_missing(path: Path) -> InputError:
     """What to say where MDF can't be read or written."""
-    return InputError("MDF files need the package asammdf: pip install asammdf, or use .blf", str(path))
+    return InputError(
+        "MDF files need the package asammdf: pip install asammdf (or rds with its extra mdf), or use .blf",
+        str(path),
+    )
 
 
 # --- reading

@@ -116,19 +116,24 @@ def test_an_unknown_format_is_refused(name: str, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_mf4_says_what_to_install_or_works(tmp_path: Path) -> None:
-    try:
-        import asammdf  # noqa: F401
-    except ImportError:
-        with pytest.raises(InputError, match="pip install asammdf"):
-            LogWriter(tmp_path / "a.mf4")
-        assert not list(tmp_path.iterdir())
-    else:
-        write(tmp_path / "a.mf4", of_every_kind())
-        expected = sorted(kept(message) for message in of_every_kind() if not message.is_error_frame)
-        assert (
-            sorted(kept(message) for message in LogFile(tmp_path / "a.mf4") if not message.is_error_frame) == expected
-        )
+def test_mf4_without_its_package_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("can.io.mf4.asammdf", None)  # what python-can has where the package is missing
+    with pytest.raises(InputError, match=r"a\.mf4: .*pip install asammdf"):
+        LogWriter(tmp_path / "a.mf4")
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "b.mf4").write_bytes(b"MDF     4.10")
+    with pytest.raises(InputError, match=r"b\.mf4: .*pip install asammdf"):
+        list(LogFile(tmp_path / "b.mf4"))
+
+
+def test_what_is_written_as_mf4_comes_back(tmp_path: Path) -> None:
+    pytest.importorskip("asammdf", reason="MF4 needs the package asammdf: pip install asammdf")
+    write(tmp_path / "a.mf4", of_every_kind())
+    expected = sorted(kept(message) for message in of_every_kind() if not message.is_error_frame)
+    found = [message for message in LogFile(tmp_path / "a.mf4") if not message.is_error_frame]
+    assert sorted(kept(message) for message in found) == expected
+    with can.LogReader(tmp_path / "a.mf4") as reader:  # python-can's own way
+        assert sum(not message.is_error_frame for message in reader) == len(expected)
 
 
 def test_there_is_no_such_log(tmp_path: Path) -> None:

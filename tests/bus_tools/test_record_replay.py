@@ -316,3 +316,20 @@ def test_with_commands_ends_at_zero_volts(machine: None, open_bus: Opener) -> No
 
 def test_without_a_machine_commands_are_frames_like_others(pair: tuple[can.BusABC, can.BusABC]) -> None:
     assert replay([frame(0x010, bytes(8))], pair[0]).sent == 1
+
+
+def test_mf4_is_recorded_from_the_bus_and_replayed_onto_it(
+    tmp_path: Path, open_bus: Opener, pair: tuple[can.BusABC, can.BusABC]
+) -> None:
+    pytest.importorskip("asammdf", reason="MF4 needs the package asammdf: pip install asammdf")
+    sender, listener = pair
+    sent = spaced(50)
+    recorder = Recorder(tmp_path / "log.mf4")
+    for message in sent:
+        sender.send(message)
+    time.sleep(0.3)
+    assert recorder.end().frames == 50
+    drain(listener)
+    replay(LogFile(tmp_path / "log.mf4"), sender, speed=float("inf"))
+    heard = drain(listener)
+    assert [(m.arbitration_id, bytes(m.data)) for m in heard] == [(m.arbitration_id, bytes(m.data)) for m in sent]
