@@ -121,7 +121,7 @@ def test_the_bus_protocol() -> None:
     for bit in frames.Status:
         name = (bit.name or "").lower().replace("_", " ")
         assert f"| {bit.value} | {name} |" in TEXT
-    assert "20/65536 V" in TEXT and frames.VOLTS_PER_UNIT == 20 / 65536
+    assert "20/16384 V" in TEXT and frames.VOLTS_PER_UNIT == 20 / 16384
 
 
 @pytest.mark.parametrize("block", [b for b in BLOCKS if (b.file or "").endswith(".py")], ids=lambda b: b.file)

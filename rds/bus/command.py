@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 
 from rds.bus.address import lock_file, runtime_directory
 from rds.core.errors import MachineError
+
+_LONGEST = 400  # bytes of a holder's name
 
 
 class Command:
@@ -29,8 +32,17 @@ class Command:
             with contextlib.suppress(OSError):
                 if os.fstat(descriptor).st_ino == self._path.stat().st_ino:
                     self._descriptor = descriptor
+                    os.truncate(descriptor, 0)
+                    os.write(descriptor, f"process {os.getpid()} ({' '.join(sys.orig_argv)})".encode()[:_LONGEST])
                     return True
             os.close(descriptor)  # the holder before took this file away
+
+    def holder(self) -> str:
+        """Who has the command, for people: its process and command line."""
+        try:
+            return self._path.read_text(errors="replace") or "a process that does not say its name"
+        except OSError:  # it has just gone, or the system keeps locked files to itself
+            return "a process that can't be told"
 
     def release(self) -> None:
         """Give the command back."""
@@ -42,7 +54,9 @@ class Command:
 
     def __enter__(self) -> Command:
         if not self.acquire():
-            raise MachineError(f"another run commands the machine on channel {self.channel!r}; wait for it, or stop it")
+            raise MachineError(
+                f"another run commands the machine on channel {self.channel!r}: {self.holder()}; wait, or stop it"
+            )
         return self
 
     def __exit__(self, *_: object) -> None:

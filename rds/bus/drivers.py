@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import secrets
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +14,9 @@ import can
 
 from rds.bus import frames
 from rds.bus.frames import Answer, Kind, Status
-from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus
+from rds.bus.identity import WAIT as LISTENING
+from rds.bus.identity import listen, refuse_clashes
+from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus, standard_filters
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Axis, Machine
 
@@ -25,7 +28,12 @@ _STARTING = 1.0  # s for all modules to answer at the start
 _STANDSTILL = 20  # ticks in which no encoder moves until the axes count as standing
 _LONGEST_COAST = 3.0  # s until then
 _HALF_TURN = frames.COUNT_TURNS // 2
+_DUPLICATES = 64  # ticks that a module may have heard more than were sent: frames that came twice
+_SET_UP_AGAIN = 20  # ticks at the start until a module that was not set up is so again
 HOST = "host"  # what the built-in bus calls this node
+_RELEASE = "release its button, then `rds estop --reset`"
+_ALARMS = Status.EMERGENCY | Status.NOT_SET_UP | Status.REFUSED
+_HOSTS = (frames.COMMAND, frames.DRY_COMMAND, frames.SETUP)  # what only a host sends
 
 
 @dataclass
@@ -39,12 +47,13 @@ class Counters:
     watchdogs: int = 0  # reports that a module's watchdog has cut the voltage
     cut: int = 0  # periods of zero volts because a module was silent
     foreign: int = 0  # frames that no module of ours sent
+    refused: int = 0  # answers that tell of a command refused: too old, or of another host
 
 
 class _Module:
     """What the host knows of one module."""
 
-    __slots__ = ("axis", "counts", "expected", "identifier", "missed", "origin", "owed", "seen")
+    __slots__ = ("axis", "counts", "expected", "identifier", "missed", "origin", "owed", "seen", "since")
 
     def __init__(self, axis: Axis):
         self.axis = axis
@@ -55,6 +64,10 @@ class _Module:
         self.owed = 0  # answers to earlier ticks that may still come
         self.missed = 0  # periods in a row
         self.seen = False  # it has answered at all
+        self.since = 0  # ticks sent since its last answer
+
+    def __str__(self) -> str:
+        return f"{self.axis.name} (node {self.axis.node})"
 
 
 class AxisDrivers:
@@ -92,19 +105,24 @@ class AxisDrivers:
         self._setup = frames.encode_setup(self._period)
         self._timeout = self._period if timeout is None else timeout
         self._lost_after = max(SILENT_AFTER, ceil(LOST_AFTER / self._period))
+        self._listens_to = [frames.GENERAL, *_HOSTS, *sorted(self._by_identifier)]
         self._owns_bus = bus is None
         if bus is None:
             channel = default_channel(machine, interface, channel)
-            bus = open_bus(interface, channel, sorted(self._by_identifier), node=HOST, **options)
+            bus = open_bus(interface, channel, self._listens_to, node=HOST, **options)
             self._bus_name = bus_name(interface, channel)
         else:
             self._bus_name = bus.channel_info
         self._machine = machine
         self._bus = bus
         self._identifier = frames.DRY_COMMAND if dry_run else frames.COMMAND
+        self._started = False
+        # commands are numbered by this clock, in half sample periods, from an instant that no two hosts share
+        self._number_per_second = 2.0 / self._period
+        self._number_origin = secrets.randbelow(frames.NUMBERS)
         self._tick = can.Message(arbitration_id=self._identifier, is_extended_id=False, data=bytes(8))
         self._zero = frames.encode_voltages(())
-        self._waiting = self._zero
+        self._waiting = self._zero  # without its number
         self._waiting_voltages: tuple[float, ...] = (0.0,) * len(used)
         self._sent_voltages = self._waiting_voltages
         self._closed = False
@@ -113,8 +131,11 @@ class AxisDrivers:
     def start(self) -> None:
         """Set the sample period, check by zero-volt ticks that every module answers, and take the origins.
 
-        The axes stand when this returns. Raises MachineError naming the modules that don't answer.
+        The axes stand when this returns. Raises MachineError naming the modules that don't answer, both of those that
+        share a node, and whose emergency stop is latched; and if another host commands the bus.
         """
+        self._started = False
+        self._refuse_company()
         self._waiting = self._zero
         self._waiting_voltages = (0.0,) * len(self._modules)
         self._send(frames.SETUP, self._setup)
@@ -125,6 +146,8 @@ class AxisDrivers:
             for module in self._modules:
                 module.missed = 0
             try:
+                if self.counters.ticks % _SET_UP_AGAIN == _SET_UP_AGAIN - 1:  # a frame may be lost
+                    self._send(frames.SETUP, self._setup)
                 self.exchange()
             except MachineError as error:
                 if isinstance(error.__cause__, can.CanTimeoutError):  # with bit timing: nobody acknowledges the ticks
@@ -134,6 +157,24 @@ class AxisDrivers:
         for module in self._modules:
             module.origin = 0 if module.axis.unit == "rev/min" else module.counts
         self.counters = Counters()
+        self._started = True
+
+    def _refuse_company(self) -> None:
+        """MachineError if two modules share a node, or another host commands. A filtered bus hides both."""
+        if self._owns_bus:
+            self._bus.set_filters(None)
+        heard = listen(self._bus)
+        if self._owns_bus:
+            self._bus.set_filters(standard_filters(self._listens_to))
+        refuse_clashes(heard.modules)
+        if heard.commands:
+            raise MachineError(self._company(f"{heard.commands} commands in {LISTENING:g} s"))
+
+    def _company(self, what: str) -> str:
+        return (
+            f"another host commands the modules on bus {self._bus_name} ({what}); stop one of them (`rds estop` stops "
+            "the machine): two hosts never drive the same axes"
+        )
 
     def _wait_for_standstill(self) -> None:
         """An earlier run may have left an axis coasting."""
@@ -155,10 +196,10 @@ class AxisDrivers:
         """
         deadline = time.monotonic() + self._timeout
         tick = self._tick
-        tick.data[:] = self._waiting
         self._sent_voltages = self._waiting_voltages
         try:
             self._take_stragglers()
+            tick.data[:] = frames.number_voltages(self._waiting, self._number())
             self._bus.send(tick, self._timeout * SILENT_AFTER)
             self._count_tick()
             self._collect(deadline)
@@ -168,10 +209,15 @@ class AxisDrivers:
             ((m.counts - m.origin + 0x80000000) % 0x100000000 - 0x80000000) * m.axis.resolution for m in self._modules
         ]
 
+    def _number(self) -> int:
+        """The number of a command that is sent now."""
+        return 1 + (int(time.monotonic() * self._number_per_second) + self._number_origin) % frames.NUMBERS
+
     def _count_tick(self) -> None:
         self.counters.ticks += 1
         for module in self._modules:
             module.expected = (module.expected + 1) % frames.COUNT_TURNS
+            module.since += 1
 
     def _take_stragglers(self) -> None:
         """What has come before this tick is sent does not answer it.
@@ -183,9 +229,11 @@ class AxisDrivers:
         while (message := receive(0.0)) is not None:
             module = modules.get(message.arbitration_id)
             if module is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
-                self.counters.foreign += 1
+                self._take_foreign(message)
                 continue
             answer = frames.decode_answer(message.arbitration_id, message.data)
+            if answer.status & _ALARMS:
+                self._heed(module, answer)
             if answer.kind != Kind.ANSWER:
                 self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
             elif module.seen:
@@ -208,9 +256,11 @@ class AxisDrivers:
                 continue
             module = modules.get(message.arbitration_id)
             if module is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
-                self.counters.foreign += 1
+                self._take_foreign(message)
                 continue
             answer = frames.decode_answer(message.arbitration_id, message.data)
+            if answer.status & _ALARMS:
+                self._heed(module, answer)
             if answer.kind != Kind.ANSWER:
                 self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
             elif self._belongs(module, answer):
@@ -220,9 +270,35 @@ class AxisDrivers:
         if awaited:
             self._note_missing(awaited, doubtful)
 
+    def _take_foreign(self, message: can.Message) -> None:
+        """A frame that no module of ours sent. MachineError for an emergency stop, and for another host."""
+        self.counters.foreign += 1
+        if message.is_extended_id or message.is_error_frame or message.is_remote_frame or not message.is_rx:
+            return
+        if message.arbitration_id == frames.GENERAL and message.data[:1] == frames.EMERGENCY[:1]:
+            raise MachineError(f"emergency stop: called on bus {self._bus_name} from outside this run; {_RELEASE}")
+        if message.arbitration_id in _HOSTS:
+            raise MachineError(self._company(f"frame {message.arbitration_id:#05x} was heard"))
+
+    def _heed(self, module: _Module, answer: Answer) -> None:
+        """What a module says beside its position. MachineError if it has stopped, or is another than at the start."""
+        if answer.status & Status.EMERGENCY:
+            raise MachineError(f"emergency stop of {module}; {_RELEASE}")
+        if answer.status & Status.NOT_SET_UP and self._started:
+            raise MachineError(
+                f"{module} on bus {self._bus_name} has restarted, or was replaced by another, in the run; its position "
+                "is lost: start the run again"
+            )
+        self.counters.refused += bool(answer.status & Status.REFUSED)
+
     def _belongs(self, module: _Module, answer: Answer) -> bool:
         """Whether this is the answer to the last tick: its tick count says so."""
         ahead = (answer.ticks - module.expected + _HALF_TURN) % frames.COUNT_TURNS - _HALF_TURN
+        if module.seen and not -module.since - 1 <= ahead <= _DUPLICATES and self._started:
+            raise MachineError(
+                f"{module} on bus {self._bus_name} counts {answer.ticks} ticks instead of {module.expected}: it has "
+                "restarted, or was replaced by another, in the run; its position is lost: start the run again"
+            )
         if ahead < 0 and module.owed and module.seen:
             # the answer to an earlier tick, or to this one from a module that lost one: _note_missing() decides
             module.owed -= 1
@@ -237,6 +313,7 @@ class AxisDrivers:
         module.expected = answer.ticks
         module.counts = answer.counts
         module.owed = 0
+        module.since = 0
         module.missed = 0
         module.seen = True
 
@@ -261,7 +338,7 @@ class AxisDrivers:
     def write(self, voltages: Sequence[float]) -> tuple[float, ...]:
         """Take the voltages (V) that the next tick sends; return those of the last tick, which act from it on.
 
-        What is returned is what was sent, in whole units of 20/65536 V. InputError outside ±10 V.
+        What is returned is what was sent, in whole units of 20/16384 V. InputError outside ±10 V.
         """
         if len(voltages) != len(self._slots):
             raise InputError(f"{len(voltages)} voltages for {len(self._slots)} axes")
@@ -281,7 +358,7 @@ class AxisDrivers:
         self._waiting = self._zero
         self._waiting_voltages = (0.0,) * len(self._modules)
         try:
-            self._send(self._identifier, self._zero)
+            self._send(self._identifier, frames.number_voltages(self._zero, self._number()))
             self._sent_voltages = self._waiting_voltages
             self._count_tick()
             for module in self._modules:
@@ -305,7 +382,7 @@ class AxisDrivers:
             raise MachineError(f"bus {self._bus_name} failed: {error}") from error
 
     def _silent(self, modules: Sequence[_Module]) -> MachineError:
-        names = ", ".join(f"{module.axis.name} (node {module.axis.node})" for module in modules)
+        names = ", ".join(map(str, modules))
         return MachineError(
             f"no answer from {names} on bus {self._bus_name}; start the machine (rds machine serve "
             f"{self._machine.name}), or check [bus], power and cable"

@@ -8,6 +8,7 @@ import time
 import can
 
 from rds.bus import frames
+from rds.bus.frames import Status
 from rds.bus.oacs.host import estop as stop_oacs
 from rds.core.errors import MachineError
 
@@ -15,29 +16,71 @@ NMT = 0x000  # CANopen: network management; command 2 stops all nodes, whose dri
 _STOP_ALL_NODES = bytes((0x02, 0x00))
 _ANSWER_AGAIN = bytes((0x80, 0x00))  # PRE-OPERATIONAL: no process data, but who looks for them finds them
 _REPEATS = 3  # a frame may be lost
+_ANSWERS = 0.1  # s
 
 
 def stop_everything(bus: can.BusABC) -> list[int]:
-    """Zero volts on every module; numbers of the distributed modules that acknowledged.
+    """Zero volts on every module; numbers of the modules that acknowledged.
 
-    Cyclic modules get a command of zero volts (their host, if one lives, commands on: stop it too), distributed
-    modules their latched emergency stop, CANopen drives the stop of the network. Raises MachineError if the bus fails:
-    then cut the power.
+    Modules of the cyclic frames and distributed modules latch it (see reset_everything), and CANopen drives get the
+    stop of the network. A host that commands them ends its run. Hardware that knows no emergency stop gets a command
+    of zero volts. Raises MachineError if the bus fails: then cut the power.
     """
-    zero = can.Message(arbitration_id=frames.COMMAND, is_extended_id=False, data=frames.encode_voltages(()))
-    network = can.Message(arbitration_id=NMT, is_extended_id=False, data=_STOP_ALL_NODES)
-    again = can.Message(arbitration_id=NMT, is_extended_id=False, data=_ANSWER_AGAIN)
-    failures = []
+    emergency = _frame(frames.GENERAL, frames.EMERGENCY)
+    network, again = _frame(NMT, _STOP_ALL_NODES), _frame(NMT, _ANSWER_AGAIN)
+    zero = _frame(frames.COMMAND, frames.encode_voltages(()))
+    failures: list[Exception] = []
     for _ in range(_REPEATS):
-        for message in (zero, network, again):
+        for message in (emergency, network, again, zero):
             try:
                 bus.send(message, 0.2)
             except (can.CanError, OSError) as error:
                 failures.append(error)
         time.sleep(0.002)
-    stopped: list[int] = []
+    stopped: set[int] = set()
     with contextlib.suppress(MachineError):  # reported below with what failed here
-        stopped = stop_oacs(bus)
+        stopped = {node for node, status in _reports(bus).items() if status & Status.EMERGENCY}
+        stopped |= set(stop_oacs(bus))
     if failures:
         raise MachineError(f"bus {bus.channel_info} failed: {failures[0]}; cut the power") from failures[0]
-    return stopped
+    return sorted(stopped)
+
+
+def reset_everything(bus: can.BusABC) -> list[int]:
+    """Release the latch of the emergency stop on every module; numbers of those that are free now.
+
+    CANopen drives leave their fault when the next run starts. Raises MachineError naming the modules whose button is
+    still pressed, or if the bus fails.
+    """
+    try:
+        bus.send(_frame(frames.CALL, frames.RESET), 0.2)
+    except can.CanTimeoutError:  # nobody acknowledges where nobody is
+        return []
+    except (can.CanError, OSError) as error:
+        raise MachineError(f"bus {bus.channel_info} failed: {error}") from error
+    reports = _reports(bus)
+    held = [str(node) for node, status in sorted(reports.items()) if status & Status.EMERGENCY]
+    if held:
+        raise MachineError(f"the emergency stop of {', '.join(held)} stays: release its button first")
+    return sorted(reports)
+
+
+def _reports(bus: can.BusABC) -> dict[int, int]:
+    """The status of every module that speaks within a tenth of a second; MachineError if the bus fails."""
+    found: dict[int, int] = {}
+    deadline = time.monotonic() + _ANSWERS
+    try:
+        while (left := deadline - time.monotonic()) > 0:
+            message = bus.recv(left)
+            if message is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+                continue
+            node = message.arbitration_id - frames.ANSWER
+            if node in frames.NODES and len(message.data) == 8:
+                found[node] = frames.decode_answer(message.arbitration_id, message.data).status
+    except (can.CanError, OSError) as error:
+        raise MachineError(f"bus {bus.channel_info} failed: {error}") from error
+    return found
+
+
+def _frame(identifier: int, data: bytes) -> can.Message:
+    return can.Message(arbitration_id=identifier, is_extended_id=False, data=data)

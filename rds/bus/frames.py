@@ -1,17 +1,23 @@
 """The frames between host and axis modules: identifiers, and pure codecs from bytes to words.
 
-All frames are standard (11-bit) and little-endian:
+All frames are little-endian, and standard (11-bit) but for the last:
 
 | identifier | from   | bytes | content                                                                              |
 | ---------- | ------ | ----- | ------------------------------------------------------------------------------------ |
-| 0x010      | host   | 8     | cycle command and tick: four int16, voltages in 20/65536 V, slots in axis order      |
-| 0x011      | host   | 8     | the same as a dry run: modules answer, and apply zero volts                           |
-| 0x012      | host   | 8     | set-up: uint32 sample period in µs, uint32 reserved                                   |
-| 0x013      | host   | 0     | call: every module reports, nothing else happens                                      |
-| 0x020+node | module | 8     | int32 position counts, uint8 status, uint8 kind, uint16 count of ticks heard          |
+| 0x001      | anyone | 1-8   | first byte 8: emergency stop of every module (the same frame as in the oacs dialect) |
+| 0x010      | host   | 8     | cycle command and tick: four int16, see below                                        |
+| 0x011      | host   | 8     | the same as a dry run: modules answer, and apply zero volts                          |
+| 0x012      | host   | 8     | set-up: uint32 sample period in µs, uint32 reserved                                  |
+| 0x013      | host   | 0     | call: every module reports, nothing else happens                                     |
+|            |        | 1     | 8: emergency stop is reset, modules report; 9: every module says its identity        |
+| 0x020+node | module | 8     | int32 position counts, uint8 status, uint8 kind, uint16 count of ticks heard         |
+| 0x1C000000 | module | 8     | identity; + serial number (24 bits): uint8 node, uint8 version, 2 reserved,          |
+|            |        |       | uint32 process (0: firmware); extended, so that two modules of one node never collide |
 
-The lower identifier wins arbitration: a tick is never delayed by an answer. The voltage's unit makes the levels of a
-12-bit ±10 V converter (and of any other of up to 16 bits) exact.
+A command's int16 are voltages in 20/65536 V with their two lowest bits clear, in axis order. Those bits, slot 0 lowest,
+make the command's number: its host's clock in half sample periods, 1 to 255 and round again; 0 is a command by hand
+(see freshness.py). The lower identifier wins arbitration: a tick is never delayed by an answer. The voltages' unit
+makes the levels of a 12-bit ±10 V converter (and of any other of up to 14 bits) exact.
 """
 
 from __future__ import annotations
@@ -23,20 +29,31 @@ from typing import NamedTuple
 
 from rds.core.errors import InputError, MachineError
 
+GENERAL = 0x001  # a call to all modules of all dialects
 COMMAND = 0x010
 DRY_COMMAND = 0x011
 SETUP = 0x012
 CALL = 0x013
 ANSWER = 0x020  # + node
+IDENTITY = 0x1C000000  # + serial number; extended
+SERIALS = 1 << 24
+
+EMERGENCY = b"\x08" + bytes(7)  # data of GENERAL: zero volts until it is reset
+RESET = b"\x08"  # data of CALL: release the latch of the emergency stop
+WHO = b"\x09"  # data of CALL: say your identity
+VERSION = 1  # of these frames
 
 SLOTS = 4  # voltages in a command
 NODES = range(1, 0x60)  # so that answers end below 0x080, where CANopen's emergency and process data begin
-VOLTS_PER_UNIT = 20.0 / 65536.0
+VOLTS_PER_UNIT = 20.0 / 16384.0  # of a voltage: four of the int16's, whose two lowest bits carry the number
 HIGHEST_VOLTAGE = 10.0  # V; sent as 10 V less one unit, for an int16 ends there
+NUMBERS = 255  # of commands, 1 to 255; they count half sample periods
 COUNT_TURNS = 1 << 16  # the tick count starts again at 0
 
 _VOLTAGES = Struct(f"<{SLOTS}h")
+_NUMBER_BITS = 0x0003_0003_0003_0003
 _SETUP = Struct("<II")
+_IDENTITY = Struct("<BBHI")
 _ANSWER = Struct("<iBBH")
 _LONGEST_PERIOD = 0xFFFFFFFF  # µs
 
@@ -49,6 +66,10 @@ class Status(IntFlag):
     WATCHDOG = 2  # no command for 10 periods: zero volts until the next one
     DRY_RUN = 4  # the last command was a dry run: zero volts
     FAULT = 8  # it cannot do its part
+    LIMIT = 0x10  # a limit switch is open: zero volts that way
+    EMERGENCY = 0x20  # emergency stop: zero volts until it is reset
+    NOT_SET_UP = 0x40  # no set-up since it was switched on: zero volts for numbered commands
+    REFUSED = 0x80  # it has refused a command in the last 10 periods: too old, or of another host
 
 
 class Kind(IntEnum):
@@ -56,6 +77,19 @@ class Kind(IntEnum):
 
     ANSWER = 0  # to a tick: the position is that at the tick
     REPORT = 1  # by itself or to a call: the position is that of now
+
+
+class Identity(NamedTuple):
+    """Which module it is."""
+
+    node: int
+    serial: int  # its own, 24 bits; of a virtual module, new with each start
+    process: int = 0  # its process, if it is a virtual one
+    version: int = VERSION
+
+    def __str__(self) -> str:
+        where = f" in process {self.process}" if self.process else ""
+        return f"module with serial number {self.serial}{where}"
 
 
 class Answer(NamedTuple):
@@ -78,15 +112,31 @@ def encode_voltages(voltages: Sequence[float]) -> bytes:
     for slot, voltage in enumerate(voltages):
         if not -HIGHEST_VOLTAGE <= voltage <= HIGHEST_VOLTAGE:  # false for NaN too
             raise InputError(f"voltage {voltage!r} V of slot {slot} must be from -10 to 10 V; limit it before")
-        units[slot] = min(round(voltage / VOLTS_PER_UNIT), 32767)
+        units[slot] = 4 * min(round(voltage / VOLTS_PER_UNIT), 8191)
     return _VOLTAGES.pack(*units)
+
+
+def number_voltages(data: bytes, number: int) -> bytes:
+    """Data of a command with this number, 0 to 255."""
+    return (int.from_bytes(data, "little") & ~_NUMBER_BITS | _SPREAD[number]).to_bytes(8, "little")
+
+
+def decode_number(data: bytes | bytearray) -> int:
+    """The number of a command, 1 to 255; 0: it has none."""
+    return data[0] & 3 | (data[2] & 3) << 2 | (data[4] & 3) << 4 | (data[6] & 3) << 6
+
+
+_SPREAD = tuple(
+    number & 3 | (number >> 2 & 3) << 16 | (number >> 4 & 3) << 32 | (number >> 6) << 48
+    for number in range(NUMBERS + 1)
+)
 
 
 def decode_voltages(identifier: int, data: bytes | bytearray) -> tuple[float, ...]:
     """The four voltages of a command, V. MachineError if the length is wrong."""
     if len(data) != _VOLTAGES.size:
         raise _wrong(identifier, data, "a command", _VOLTAGES.size)
-    return tuple(unit * VOLTS_PER_UNIT for unit in _VOLTAGES.unpack(data))
+    return tuple((unit >> 2) * VOLTS_PER_UNIT for unit in _VOLTAGES.unpack(data))
 
 
 def encode_setup(sample_period: float) -> bytes:
@@ -125,6 +175,20 @@ def decode_answer(identifier: int, data: bytes | bytearray) -> Answer:
     if len(data) != _ANSWER.size:
         raise _wrong(identifier, data, "an answer", _ANSWER.size)
     return Answer(*_ANSWER.unpack(data))
+
+
+def encode_identity(identity: Identity) -> tuple[int, bytes]:
+    """Identifier (extended) and data of the answer to the call WHO."""
+    data = _IDENTITY.pack(identity.node, identity.version, 0, identity.process & 0xFFFFFFFF)
+    return IDENTITY + identity.serial % SERIALS, data
+
+
+def decode_identity(identifier: int, data: bytes | bytearray) -> Identity | None:
+    """Which module says it with this extended frame; None if it is another frame."""
+    if not IDENTITY <= identifier < IDENTITY + SERIALS or len(data) != _IDENTITY.size:
+        return None
+    node, version, _, process = _IDENTITY.unpack(data)
+    return Identity(node, identifier - IDENTITY, process, version)
 
 
 def _wrong(identifier: int, data: bytes | bytearray, what: str, size: int) -> MachineError:

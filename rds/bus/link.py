@@ -40,7 +40,7 @@ def open_bus(
         options.setdefault("name", node)
     filters = None
     if identifiers is not None:
-        filters = [{"can_id": wanted, "can_mask": mask, "extended": False} for wanted in identifiers]
+        filters = standard_filters(identifiers, mask)
     try:
         return can.Bus(
             interface=interface,
@@ -54,6 +54,11 @@ def open_bus(
         raise MachineError(
             f"bus {bus_name(interface, channel)} can't be opened: {error}; check the [bus] table"
         ) from error
+
+
+def standard_filters(identifiers: Sequence[int], mask: int = 0x7FF) -> list[Any]:
+    """Filters, in python-can's form, for the standard frames whose identifier, masked, is one of `identifiers`."""
+    return [{"can_id": wanted, "can_mask": mask, "extended": False} for wanted in identifiers]
 
 
 def pair(text: str) -> tuple[str, Any]:

@@ -8,22 +8,23 @@ from collections.abc import Callable
 
 import can
 
-from rds.bus.frames import COMMAND
+from rds.bus import frames
 from rds.bus.module import AxisModule
 from rds.core.errors import MachineError
 
 LOG = logging.getLogger(__name__)
 
-LISTENS_TO = (COMMAND,)  # with the mask: 0x010 to 0x013
-LISTEN_MASK = 0x7FC
+LISTENS_TO = (frames.GENERAL, frames.COMMAND, frames.DRY_COMMAND, frames.SETUP, frames.CALL)
+LISTEN_MASK = 0x7FF
 RETRY = 0.5  # s between attempts to open a bus that failed
 _SEND_TIMEOUT = 0.1  # s
 
 
 class BusTime:
-    """Bus time from time stamps: it never goes back, and goes on by the local clock between frames. In s.
+    """Bus time from time stamps: from frame to frame it never goes back, and between goes on by the local clock. In s.
 
     A stamp's clock may be stepped (some interfaces stamp with the wall clock); then time goes on from where it was.
+    To ask for the time now changes nothing: a frame that is still under way may have been stamped before.
     """
 
     def __init__(self) -> None:
@@ -45,8 +46,7 @@ class BusTime:
 
     def now(self) -> float:
         """The bus time now."""
-        self._last = max(self._last, time.monotonic() + self._offset)
-        return self._last
+        return max(self._last, time.monotonic() + self._offset)
 
 
 class ModuleNode:
@@ -78,6 +78,8 @@ class ModuleNode:
                 message = self.bus.recv(timeout)
             if message is not None and not message.is_error_frame and not message.is_extended_id:
                 at = self._clock.at(message.timestamp)
+                if message.arbitration_id == frames.CALL and message.data == frames.WHO:
+                    self._send(*frames.encode_identity(self.module.identity), extended=True)
                 self._say(self.module.receive(message.arbitration_id, message.data, at))
             elif self.module.expires is not None:
                 self._say(self.module.expire(self._clock.now()))
@@ -86,6 +88,21 @@ class ModuleNode:
             self.close()
             self._retry_at = time.monotonic() + RETRY
         return message is not None
+
+    @property
+    def number(self) -> int:
+        """Its node."""
+        return self.module.identity.node
+
+    def press(self, active: bool) -> None:
+        """The module's emergency stop button: pressed, it stops this module, which stops all others on its bus.
+
+        can.CanError if the bus fails; this module has stopped even so.
+        """
+        reports = self.module.set_emergency_input(active, self._clock.now())
+        if reports:
+            self._send(frames.GENERAL, frames.EMERGENCY)
+        self._say(reports)
 
     def reopen(self) -> bool:
         """Open the bus again if it failed and it is time to; true if it did."""
@@ -110,9 +127,9 @@ class ModuleNode:
                 LOG.warning("module %s could not close its bus: %s", self.module.name, error)
 
     def _say(self, answers: list[bytes]) -> None:
-        if self.bus is None:
-            return
         for data in answers:
-            self.bus.send(
-                can.Message(arbitration_id=self.module.identifier, is_extended_id=False, data=data), _SEND_TIMEOUT
-            )
+            self._send(self.module.identifier, data)
+
+    def _send(self, identifier: int, data: bytes, extended: bool = False) -> None:
+        if self.bus is not None:
+            self.bus.send(can.Message(arbitration_id=identifier, is_extended_id=extended, data=data), _SEND_TIMEOUT)

@@ -6,6 +6,7 @@ modules are on the bus, and reports on stderr. Its options and its end are those
 
 from __future__ import annotations
 
+import queue
 import sys
 import threading
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ from functools import partial
 from typing import Any
 
 from rds.bus import server_program
+from rds.bus.buttons import press_buttons
 from rds.bus.link import BUILTIN
 from rds.bus.module import AxisModule
 from rds.bus.module_node import LISTEN_MASK, LISTENS_TO, ModuleNode
@@ -53,7 +55,9 @@ def serve(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The program. Exit code 0: told to end; 1: the bus failed at the start; 2: bad input."""
-    return server_program.run(serve, "rds.bus.server", "serve a machine's axis modules", arguments)
+    lines = queue.SimpleQueue[str]()
+    with_buttons = partial(serve, chores=partial(press_buttons, lines))
+    return server_program.run(with_buttons, "rds.bus.server", "serve a machine's axis modules", arguments, lines)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def scan(
     channel: Channel = None,
     json: Json = False,
 ) -> None:
-    """List the modules on a bus: number, type, dialect, version, state."""
+    """List the modules on a bus: number, type, dialect, version, state. Numbers used twice are refused."""
     with refusals():
         _check_watch(watching, events=events, modules=modules, seconds=seconds, force=force or None)
         if force and events is None:
@@ -62,8 +62,7 @@ def scan(
                 watch(bus, json, events, modules, seconds, force)
             return
         distributed = _oacs(interface, channel)
-        known = {row["id"] for row in distributed}  # these take cyclic commands as well
-        cyclic = [row for row in _cyclic(interface, channel) if row["id"] not in known]
+        cyclic = _cyclic(interface, channel, {row["id"]: row for row in distributed})
         rows = [*cyclic, *distributed, *_drives(interface, channel)]
     if json:
         print_json({"channel": channel_of(interface, channel), "interface": interface, "modules": rows})
@@ -96,15 +95,26 @@ def _oacs(interface: str, channel: str | None) -> list[dict[str, Any]]:
         return [info.as_dict() for info in scan_oacs(bus)]
 
 
-def _cyclic(interface: str, channel: str | None) -> list[dict[str, Any]]:
-    """Modules that answer the cyclic call and speak no other dialect: those of `rds machine serve`."""
+def _cyclic(interface: str, channel: str | None, distributed: dict[int, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Modules that answer the cyclic call and speak no other dialect: those of `rds machine serve`.
+
+    The distributed modules take cyclic commands as well. MachineError naming both modules of a clash.
+    """
     import time
 
     import can
 
     from rds.bus import frames
+    from rds.bus.identity import clash, listen, refuse_clashes
+    from rds.core.errors import MachineError
 
     with bus_of(interface, channel) as bus:
+        identities = listen(bus).modules
+        refuse_clashes(identities)
+        for identity in identities:
+            if other := distributed.get(identity.node):
+                names = [str(identity), f"distributed module {other['type']} with serial number {other['serial']}"]
+                raise MachineError(clash(f"number {identity.node}", names))
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), 0.5)
         answers = {frames.answer_identifier(node): node for node in frames.NODES}
         found: dict[int, dict[str, Any]] = {}
@@ -115,7 +125,10 @@ def _cyclic(interface: str, channel: str | None) -> list[dict[str, Any]]:
                 continue
             answer = frames.decode_answer(message.arbitration_id, message.data)
             node = answers[message.arbitration_id]
-            state = (frames.Status(answer.status).name or "none").lower().replace("|", ", ").replace("none", "idle")
+            state = (frames.Status(answer.status).name or "none").lower()
+            state = state.replace("|", ", ").replace("_", " ").replace("none", "idle")
+            if node in distributed:
+                continue
             found[node] = {"id": node, "type": "axis", "dialect": "rds", "version": None, "state": state}
         return [found[node] for node in sorted(found)]
 
@@ -135,11 +148,23 @@ def _drives(interface: str, channel: str | None) -> list[dict[str, Any]]:
     ]
 
 
-def estop(interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+def estop(
+    reset: Annotated[bool, typer.Option("--reset", help="Release the latch of an emergency stop.")] = False,
+    interface: Interface = "rds",
+    channel: Channel = None,
+    json: Json = False,
+) -> None:
     """Emergency stop of every module on a bus: zero volts, whatever dialect it speaks."""
     with refusals(), bus_of(interface, channel) as bus:
-        from rds.bus.estop import stop_everything
+        from rds.bus.estop import reset_everything, stop_everything
 
+        if reset:
+            free = reset_everything(bus)
+            if json:
+                print_json({"reset": free})
+            else:
+                typer.echo(f"emergency stop reset; free: {', '.join(map(str, free)) or 'no module answers'}")
+            return
         stopped = stop_everything(bus)
     if json:
         print_json({"stopped": stopped})

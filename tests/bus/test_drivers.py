@@ -89,7 +89,7 @@ def test_write_returns_what_acts_from_this_tick_on(served: dict[str, Any]) -> No
         drivers.exchange()
         assert drivers.write([sent]) == (before,)
     drivers.exchange()
-    assert drivers.write([0.0])[0] == pytest.approx(0.1, abs=20 / 65536 / 2), "in units of the frame"
+    assert drivers.write([0.0])[0] == pytest.approx(0.1, abs=20 / 16384 / 2), "in units of the frame"
     for bad in ([11.0], [float("nan")], [1.0, 2.0]):
         with pytest.raises(InputError):
             drivers.write(bad)

@@ -19,13 +19,14 @@ voltage = st.floats(-10.0, 10.0)
 def test_voltages_come_back_within_half_a_unit(voltages: list[float]) -> None:
     decoded = frames.decode_voltages(0x10, frames.encode_voltages(voltages))
     for sent, got in zip(voltages, decoded, strict=False):
-        assert abs(sent - got) <= (frames.VOLTS_PER_UNIT / 2 if sent < 9.9997 else frames.VOLTS_PER_UNIT)
+        unit = frames.VOLTS_PER_UNIT
+        assert abs(sent - got) <= (unit / 2 if sent < 10 - unit / 2 else unit)
     assert decoded[len(voltages) :] == (0.0,) * (4 - len(voltages))
 
 
-@given(st.integers(-2048, 2047))
-def test_levels_of_a_12_bit_converter_are_exact(level: int) -> None:
-    volts = level * 20.0 / 4096
+@given(st.integers(-8192, 8191))
+def test_levels_of_a_14_bit_converter_are_exact(level: int) -> None:
+    volts = level * 20.0 / 16384
     assert frames.decode_voltages(0x10, frames.encode_voltages([volts]))[0] == volts
 
 
@@ -35,12 +36,28 @@ def test_impossible_voltages_are_refused(bad: float) -> None:
         frames.encode_voltages([0.0, bad])
 
 
+@given(st.lists(voltage, max_size=4), st.integers(0, frames.NUMBERS))
+def test_a_command_carries_its_number_beside_its_voltages(voltages: list[float], number: int) -> None:
+    plain = frames.encode_voltages(voltages)
+    numbered = frames.number_voltages(plain, number)
+    assert frames.decode_number(plain) == 0 and frames.decode_number(numbered) == number
+    assert frames.decode_voltages(0x10, numbered) == frames.decode_voltages(0x10, plain)
+    assert frames.number_voltages(numbered, 0) == plain
+
+
+@given(st.integers(1, 95), st.integers(0, frames.SERIALS - 1), st.integers(0, 2**32 - 1))
+def test_identities_come_back_and_differ_in_their_identifiers(node: int, serial: int, process: int) -> None:
+    identity = frames.Identity(node, serial, process)
+    assert frames.decode_identity(*frames.encode_identity(identity)) == identity
+    assert frames.encode_identity(identity)[0] != frames.encode_identity(identity._replace(serial=serial ^ 1))[0]
+
+
 def test_five_voltages_are_too_many() -> None:
     with pytest.raises(InputError, match="5 voltages"):
         frames.encode_voltages([0.0] * 5)
 
 
-@given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 15).map(Status), st.sampled_from(Kind), st.integers(0, 65535))
+@given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 255).map(Status), st.sampled_from(Kind), st.integers(0, 65535))
 def test_answers_come_back(counts: int, status: Status, kind: Kind, ticks: int) -> None:
     answer = Answer(counts, status, kind, ticks)
     assert frames.decode_answer(0x22, frames.encode_answer(answer)) == answer

@@ -32,10 +32,11 @@ def test_answers_with_the_position_at_the_stamp() -> None:
     module = make()
     (first,) = decode(module.receive(frames.COMMAND, command(5.0), 100.0))
     assert first == Answer(0, Status.ENABLED, Kind.ANSWER, 1)
-    (second,) = decode(module.receive(frames.COMMAND, command(5.0), 100.005))
-    moved = 5.0 - 0.2  # ms, after the delay
+    module.receive(frames.COMMAND, command(5.0), 100.002)
+    (second,) = decode(module.receive(frames.COMMAND, command(5.0), 100.004))
+    moved = 4.0 - 0.2  # ms, after the delay
     position = 10.0 * (moved - 10.0 * (1 - exp(-moved / 10.0)))  # µm, 10 mm/s at 5 V, τ = 10 ms
-    assert second == Answer(round(position), Status.ENABLED, Kind.ANSWER, 2)
+    assert second == Answer(round(position), Status.ENABLED, Kind.ANSWER, 3)
 
 
 def test_takes_its_own_slot() -> None:
@@ -55,8 +56,9 @@ def test_a_dry_run_answers_and_does_not_move() -> None:
 def test_ten_periods_without_a_command_cut_the_voltage_at_that_instant() -> None:
     module = make()
     module.receive(frames.COMMAND, command(5.0), 100.0)
-    assert module.expires == pytest.approx(100.010)
-    assert module.expire(100.0099) == []
+    assert module.expires == pytest.approx(100.0025), "its voltage ends"
+    assert module.expire(100.0099) == [] and module.motion.voltage == 0.0
+    assert module.expires == pytest.approx(100.010), "the watchdog speaks"
     (report,) = decode(module.expire(100.010001))
     assert report.status == Status.WATCHDOG and report.kind == Kind.REPORT and report.ticks == 1
     assert module.expires is None
@@ -73,11 +75,12 @@ def test_found_out_late_it_still_was_zero_volts_from_that_instant(found_out_at: 
     module.receive(frames.COMMAND, command(5.0), 100.0)
     report, answer = decode(module.receive(frames.COMMAND, command(0.0), found_out_at))
     assert report.status == Status.WATCHDOG and answer.status == Status.ENABLED
-    moved = 0.0098
+    moved = 0.0023  # two and a half periods, less the delay
     speed = 10.0 * (1 - exp(-moved / 0.01))
     at_cut = 10.0 * moved - 0.01 * speed
-    coast = 0.01 * speed * (1 - exp(-(found_out_at - 100.010) / 0.01))
-    assert report.counts == round(at_cut / 0.001)
+    coasting = 0.01 * speed * (1 - exp(-0.0075 / 0.01))
+    coast = 0.01 * speed * (1 - exp(-(found_out_at - 100.0025) / 0.01))
+    assert report.counts == round((at_cut + coasting) / 0.001)
     assert answer.counts == round((at_cut + coast) / 0.001)
 
 
@@ -85,6 +88,8 @@ def test_set_up_sets_the_period_that_the_watchdog_counts_in() -> None:
     module = make()
     module.receive(frames.SETUP, frames.encode_setup(0.005), 100.0)
     module.receive(frames.COMMAND, command(5.0), 100.0)
+    assert module.expires == pytest.approx(100.0125)
+    module.expire(100.0126)
     assert module.expires == pytest.approx(100.05)
 
 

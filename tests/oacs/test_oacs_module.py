@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oacs_bench import Bench
+from oacs_bench import MACHINE, Bench
 
 from rds.bus import frames
 from rds.bus.oacs import messages, words
@@ -292,9 +292,13 @@ def test_a_host_that_falls_silent_leaves_nothing_moving(bench: Benches, name: st
 def test_the_cyclic_watchdog_cuts_after_ten_periods(bench: Benches) -> None:
     rig = bench("X")
     rig.frame(frames.COMMAND, frames.encode_voltages([8.0]))
-    rig.run(0.009)
+    period = MACHINE.sample_period
+    rig.run(2.4 * period)
     assert rig.module.plant.voltage == pytest.approx(8.0, abs=1e-3)
-    rig.run(0.002)
+    rig.run(0.2 * period)
+    assert rig.module.plant.voltage == 0.0, "a command older than two periods acts no more"
+    assert not any(status.fields["WatchdogCut"] for status in rig.said("Status"))
+    rig.run(8.0 * period)
     assert rig.module.plant.voltage == 0.0
     assert rig.said("Status")[-1].fields["WatchdogCut"] == 1
 

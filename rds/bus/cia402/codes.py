@@ -116,14 +116,17 @@ ERROR_TEXTS = {
     0xFF00: "device specific",
     0xFF01: "negative limit switch (simulated drive)",
     0xFF02: "positive limit switch (simulated drive)",
+    0xFF03: "emergency stop button (simulated drive)",
 }
 
 HEARTBEAT_LOST = 0x8130
+IDENTIFIER_COLLISION = 0x8150
 PDO_TOO_SHORT = 0x8210
 RPDO_TIMEOUT = 0x8250
 FOLLOWING_ERROR = 0x8611
 REFERENCE_LIMIT = 0x8612
 SYNC_LOST = 0x8700
+EMERGENCY_STOP = 0xFF03
 NEGATIVE_SWITCH = 0xFF01
 POSITIVE_SWITCH = 0xFF02
 
@@ -192,6 +195,7 @@ TARGET_REACHED, INTERNAL_LIMIT, MODE_12, MODE_13 = 1 << 10, 1 << 11, 1 << 12, 1 
 
 # Controlword 0x6040: the commands, and the bits beside them.
 DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, FAULT_RESET = 0x00, 0x02, 0x06, 0x07, 0x0F, 0x80
+INTERLOCK = 1 << 3  # of the digital inputs 0x60FD: the emergency stop button is pressed
 BIT_4, BIT_5, BIT_6, HALT = 1 << 4, 1 << 5, 1 << 6, 1 << 8
 
 

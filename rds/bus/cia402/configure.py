@@ -19,6 +19,7 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
 from rds.bus.cia402 import codes
 from rds.bus.cia402.codes import Mode, NmtCommand, State, error_text, state_of, status_text
+from rds.bus.cia402.presence import refuse_clashes
 from rds.bus.cia402.settings import DriveSettings, Settings
 from rds.core.errors import InputError, MachineError
 
@@ -113,6 +114,7 @@ def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
     missing = [drive.name for drive in drives if not answers[drive.node]]
     if missing:
         raise MachineError(f"no drive answers for {', '.join(missing)}; check power, cable, bit rate and node-ID")
+    refuse_clashes(network, [drive.node for drive in drives])
     for drive in drives:
         if len(answers[drive.node]) > 1:
             raise MachineError(

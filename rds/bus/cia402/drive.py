@@ -6,6 +6,7 @@ drive learns of a frame, its axis, its deadlines and its faults keep the instant
 
 from __future__ import annotations
 
+import secrets
 from math import inf
 from typing import Any
 
@@ -20,6 +21,7 @@ from rds.bus.cia402.operation import Operation
 from rds.bus.cia402.pdo import COUNT, Rpdo, Tpdo
 from rds.bus.cia402.sdo import Server
 from rds.bus.cia402.servo import Servo
+from rds.bus.cia402.state_machine import Command, command
 from rds.bus.module import machine_parameters
 from rds.core.errors import InputError
 from rds.machines.machine import Axis
@@ -27,6 +29,7 @@ from rds.machines.machine import Axis
 Frame = tuple[int, bytes]
 NODES = range(1, 128)
 NMT, HEARTBEAT = 0x000, 0x700
+_CLOSE = 0.75  # periods: of any two hosts with one period, one comes closer than that after the other
 _MOVING = 2e-3  # s between two looks at an axis under power if no frame comes
 
 
@@ -40,6 +43,7 @@ class Drive:
             raise InputError(f"axis {axis.name}: CANopen node {self.node!r} must be from 1 to 127")
         self.nmt = Nmt.BOOT_UP
         self.syncs = 0
+        self.serial = secrets.randbelow(1 << 31) + 1
         self._out: list[Frame] = []
         self.objects = Dictionary(self.node)
         self.servo = Servo(axis, machine_parameters(axis), start, volts, self._axis_fault)
@@ -52,6 +56,7 @@ class Drive:
         self.objects.writers[0x1005, 0] = self._check_sync_identifier
         self.objects.writers[0x1014, 0] = self._check_emergency_identifier
         self.objects.writers[0x1019, 0] = self._check_sync_counter
+        self.objects.readers[0x1018, 4] = lambda: self.serial
         self._bad_length = False
         # what the objects say, looked up once for a thousand frames a second
         self._sync_identifier = 0x80
@@ -121,6 +126,18 @@ class Drive:
         """Inject a fault by its error code, such as 0x2310 (continuous over-current)."""
         self._advance(at)
         self.operation.fault(code)
+        self._send_events()
+        return self._flush()
+
+    def set_emergency_input(self, active: bool, at: float) -> list[Frame]:
+        """The drive's emergency stop button: pressed, the drive is in fault (0xFF03) and stays there until released.
+
+        It tells by its emergency message, on which the host stops the other drives.
+        """
+        self._advance(at)
+        was, self.operation.interlock = self.operation.interlock, active
+        if active and not was:
+            self.operation.fault(codes.EMERGENCY_STOP)
         self._send_events()
         return self._flush()
 
@@ -243,10 +260,24 @@ class Drive:
             if pdo in self._timed:
                 pdo.deadline = self.operation.now + pdo.event_time
             if pdo.synchronous:
-                pdo.waiting = data
+                if self._contradicts(pdo, data):
+                    self.operation.fault(codes.IDENTIFIER_COLLISION)
+                pdo.waiting, pdo.came_at = data, self.operation.now
             else:
                 pdo.apply(data, self._refused)
                 self.operation.actuate()
+
+    def _contradicts(self, pdo: Rpdo, data: bytes) -> bool:
+        """Whether two hosts command: two commands for one SYNC, too close for one whose SYNC was lost.
+
+        A host that takes the power away may always change its mind.
+        """
+        if pdo.waiting is None or pdo.waiting == data or self.state is not State.OPERATION_ENABLED:
+            return False
+        word = int.from_bytes(data[:2], "little") if pdo.mapped[0] == (0x6040, 0) else codes.ENABLE_OPERATION
+        if command(word) is not Command.ENABLE_OPERATION:
+            return False
+        return self.operation.now - pdo.came_at < _CLOSE * self.operation.period
 
     def _complain(self, code: int) -> None:
         """A frame was wrong: say so once, not for each of a thousand in a second."""

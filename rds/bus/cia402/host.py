@@ -23,12 +23,14 @@ from rds.bus.cia402.codes import Nmt, NmtCommand, State, error_text, status_text
 from rds.bus.cia402.configure import library, prepare
 from rds.bus.cia402.remote import Remote
 from rds.bus.cia402.settings import Command, read_settings
+from rds.bus.identity import WAIT as LISTENING
 from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 
 LOG = logging.getLogger(__name__)
 
+_NMT, _SYNC = 0x000, 0x080
 HOST = "host"  # what the built-in bus calls this node
 LOST_AFTER = 10  # periods in a row without an answer
 _HEARTBEATS = 3  # heartbeats that may be missing
@@ -85,15 +87,16 @@ class Cia402Drivers:
         for drive in self.drives:
             for base, kind in ((0x180, _TPDO), (0x080, _EMERGENCY), (0x700, _HEARTBEAT), (0x580, _OTHER)):
                 self._table[base + drive.node] = kind, drive
+        self._hosts = {_SYNC, *(0x200 + drive.node for drive in self.drives)}  # what only a host sends
         self._owns_bus = bus is None
         if bus is None:
             channel = default_channel(machine, interface, channel)
-            bus = open_bus(interface, channel, sorted(self._table), node=HOST, **options)
+            bus = open_bus(interface, channel, [_NMT, *sorted({*self._table, *self._hosts})], node=HOST, **options)
             self._bus_name = bus_name(interface, channel)
         else:
             self._bus_name = bus.channel_info
         self._bus = bus
-        self._sync = frame(0x080, b"")
+        self._sync = frame(_SYNC, b"")
         self._beat = frame(0x700 + self.settings.host, bytes([Nmt.OPERATIONAL]))
         self._next_beat = self._check_beats_at = inf
         # with SYNC, targets are sent as soon as they are known, and wait in the drives; else just before SYNC
@@ -112,9 +115,11 @@ class Cia402Drivers:
     def start(self) -> None:
         """Configure the drives, home them where asked for, bring them to SWITCHED ON, and take the origins.
 
-        The axes stand when this returns, without power. Raises MachineError naming node, state and error code.
+        The axes stand when this returns, without power. Raises MachineError naming node, state and error code, the
+        devices that share a node-ID, and if another host commands the drives.
         """
         with self._failing_bus():
+            self._refuse_company()
             with library(self._bus) as network:
                 prepare(network, self.settings, self._period)
             self._started = True
@@ -127,6 +132,32 @@ class Cia402Drivers:
             drive.hold()
         self._check_beats_at = 0.0
         self.counters = Counters()
+
+    def _refuse_company(self) -> None:
+        deadline = time.monotonic() + LISTENING
+        while (left := deadline - time.monotonic()) > 0.0:
+            message = self._bus.recv(left)
+            if message is not None and message.arbitration_id not in self._table:
+                self._take_foreign(message)
+
+    def _take_foreign(self, message: can.Message) -> None:
+        """A frame that no drive of ours sent. MachineError for a stop of the network, and for another host."""
+        self.counters.foreign += 1
+        if message.is_extended_id or message.is_error_frame or message.is_remote_frame or not message.is_rx:
+            return
+        identifier, data = message.arbitration_id, message.data
+        if identifier == _NMT and len(data) == 2 and data[0] == NmtCommand.STOP:
+            if data[1] in (0, *(drive.node for drive in self.drives)):
+                self.stop()
+                raise MachineError(
+                    f"emergency stop: the drives on bus {self._bus_name} were stopped from outside this run (NMT stop)"
+                )
+        elif identifier in self._hosts:
+            self.stop()
+            raise MachineError(
+                f"another host commands the drives on bus {self._bus_name} (frame {identifier:#05x} was heard); stop "
+                "one of them (`rds estop` stops the machine): two hosts never drive the same axes"
+            )
 
     def _switch_on(self) -> None:
         deadline = time.monotonic() + _SWITCHING
@@ -246,7 +277,7 @@ class Cia402Drivers:
                 continue
             entry = table.get(message.arbitration_id)
             if entry is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
-                self.counters.foreign += 1
+                self._take_foreign(message)
                 continue
             kind, drive = entry
             if kind != _TPDO:
@@ -265,7 +296,7 @@ class Cia402Drivers:
                 return
             kind, drive = self._table.get(message.arbitration_id, (_OTHER, None))
             if drive is None:
-                self.counters.foreign += 1
+                self._take_foreign(message)
             elif kind == _TPDO:
                 self.counters.late += 1
             else:

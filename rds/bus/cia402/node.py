@@ -53,6 +53,15 @@ class DriveNode(BusNode):
         """Inject a fault by its error code, now."""
         self.send(_standard(self.drive.fault(code, self.clock.now())))
 
+    @property
+    def number(self) -> int:
+        """Its node-ID."""
+        return self.drive.node
+
+    def press(self, active: bool) -> None:
+        """Its emergency stop button."""
+        self.send(_standard(self.drive.set_emergency_input(active, self.clock.now())))
+
     def _keep_filter(self) -> None:
         """The host may have given a PDO another identifier: listen to that from now on."""
         wanted = self.drive.listens_to

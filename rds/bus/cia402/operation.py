@@ -42,6 +42,7 @@ class Operation:
         self.objects, self.servo = objects, servo
         self.now = servo.axis.now
         self.remote = False  # whether NMT is OPERATIONAL
+        self.interlock = False  # whether the emergency stop button is pressed: no fault can be reset meanwhile
         self._report, self._cleared = report, cleared
         self._mode: OperationMode | None = None  # while OPERATION ENABLED
         self._stop: Ramp | None = None  # a stop under way
@@ -65,7 +66,7 @@ class Operation:
             (0x606C, 0): lambda: _wrap(round(servo.velocity)),
             (0x6077, 0): lambda: max(-32768, min(32767, round(servo.applied))),
             (0x60F4, 0): lambda: _wrap(round(servo.following_error)),
-            (0x60FD, 0): lambda: servo.inputs,
+            (0x60FD, 0): lambda: servo.inputs | (codes.INTERLOCK if self.interlock else 0),
         }
         writers |= {
             (0x6040, 0): self.control,
@@ -112,6 +113,8 @@ class Operation:
 
     def control(self, word: int) -> None:
         """Obey a controlword, 0x6040."""
+        if self.interlock and word & codes.FAULT_RESET:
+            return
         option = {Command.SWITCH_ON: 0x605C, Command.SHUTDOWN: 0x605B}.get(command(word))
         if self.machine.state is State.OPERATION_ENABLED and option and self.objects[option] and self._is_powered():
             if self._leaving is None:

@@ -191,6 +191,7 @@ class Rpdo(Pdo):
     def __init__(self, number: int, dictionary: Dictionary):
         super().__init__(number, dictionary)
         self.waiting: bytes | None = None  # data that the next SYNC makes act
+        self.came_at = 0.0  # s, those data
         self.deadline = inf  # s, by the event timer
 
     def apply(self, data: bytes, refused: Callable[[Key, Any], None]) -> None:

@@ -12,6 +12,7 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
 from rds.bus.cia402.codes import State, state_of
 from rds.bus.cia402.configure import library
+from rds.bus.cia402.presence import refuse_clashes
 from rds.bus.link import BUILTIN, bus_name, open_bus
 from rds.core.errors import MachineError
 
@@ -40,14 +41,17 @@ class Found:
 def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = _WAIT, **options: Any) -> list[Found]:
     """The devices that answer an SDO request within `timeout` s, by node-ID; nothing is changed on them.
 
-    `options` go to the python-can interface. Raises MachineError if the bus can't be opened or fails.
+    `options` go to the python-can interface. Raises MachineError naming the devices that share a node-ID, and if
+    the bus can't be opened or fails.
     """
     bus = open_bus(interface, channel, [0x580, 0x700], 0x780, node="scan", **options)
     try:
         with library(bus) as network:
             network.scanner.search()
             time.sleep(timeout)
-            return [_ask(network, node) for node in sorted(network.scanner.nodes)]
+            nodes = sorted(network.scanner.nodes)
+            refuse_clashes(network, nodes)
+            return [_ask(network, node) for node in nodes]
     except can.CanTimeoutError:  # with bit timing, nobody acknowledges where nobody is
         return []
     except (can.CanError, OSError) as error:

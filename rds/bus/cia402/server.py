@@ -7,6 +7,7 @@ rds/bus/server_program.py.
 
 from __future__ import annotations
 
+import queue
 import sys
 import threading
 from collections.abc import Callable, Sequence
@@ -14,6 +15,7 @@ from functools import partial
 from typing import Any
 
 from rds.bus import server_program
+from rds.bus.buttons import press_buttons
 from rds.bus.cia402.drive import Drive
 from rds.bus.cia402.node import DriveNode
 from rds.bus.link import BUILTIN
@@ -50,7 +52,9 @@ def _make_drive(axis: Axis, volts: float, start: float) -> Drive:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The program. Exit code 0: told to end; 1: the bus failed at the start; 2: bad input."""
-    return server_program.run(serve, "rds.bus.cia402.server", "serve simulated drives", arguments)
+    lines = queue.SimpleQueue[str]()
+    with_buttons = partial(serve, chores=partial(press_buttons, lines))
+    return server_program.run(with_buttons, "rds.bus.cia402.server", "serve simulated drives", arguments, lines)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from itertools import count
 from typing import NamedTuple
 
 from rds.bus import frames
+from rds.bus.frames import Status
 from rds.bus.module import AxisModule, machine_parameters
 from rds.bus.oacs import messages, words
 from rds.bus.oacs.iso_tp import Sender
@@ -34,7 +35,6 @@ from rds.machines.machine import Axis
 LOG = logging.getLogger(__name__)
 
 HEARTBEAT = 5e-3  # s between two looks at a module in motion; what it does then depends on bus time alone
-LIMIT_BIT, EMERGENCY_BIT = 0x10, 0x20  # in the status of a cyclic answer, beside frames.Status
 
 
 class Due(NamedTuple):
@@ -201,6 +201,8 @@ class OacsModule:
         if identifier in (frames.COMMAND, frames.DRY_COMMAND) and self.mover.motion is not None:
             self.advance(at)
             self.mover.give_way()
+        if identifier == frames.CALL and data == frames.RESET:
+            self.reset_emergency(at)
         answers = self._answers(self.cyclic.receive(identifier, data, at))
         # a thousand times a second, in which nothing else happens as a rule: then the answer is all
         state = (self.cyclic.status, self.plant.emergency, self.plant.changes)
@@ -211,9 +213,9 @@ class OacsModule:
 
     def _answers(self, answers: list[bytes]) -> list[Frame]:
         """The cyclic answers, with what this dialect knows of the module's state in their status."""
-        bits = EMERGENCY_BIT | frames.Status.FAULT if self.plant.emergency else 0
+        bits = Status.EMERGENCY | Status.FAULT if self.plant.emergency else Status.NONE
         if self.plant.opened:
-            bits |= LIMIT_BIT | frames.Status.FAULT
+            bits |= Status.LIMIT | Status.FAULT
         identifier = self.cyclic.identifier
         if bits:
             decoded = [frames.decode_answer(identifier, data) for data in answers]
@@ -303,7 +305,7 @@ class OacsModule:
             opened.get(1, False),
             self.plant.emergency,
             self.emergency_input,
-            bool(self.cyclic.status & frames.Status.WATCHDOG),
+            bool(self.cyclic.status & Status.WATCHDOG),
             self.mode,
             self.mover.last_result,
         )
