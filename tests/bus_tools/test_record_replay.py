@@ -333,3 +333,18 @@ def test_mf4_is_recorded_from_the_bus_and_replayed_onto_it(
     replay(LogFile(tmp_path / "log.mf4"), sender, speed=float("inf"))
     heard = drain(listener)
     assert [(m.arbitration_id, bytes(m.data)) for m in heard] == [(m.arbitration_id, bytes(m.data)) for m in sent]
+
+
+@pytest.mark.parametrize("ending", ["asc", "blf", "trc", "log"])
+def test_a_recording_opens_with_python_can_s_own_reader(ending: str, tmp_path: Path, open_bus: Opener) -> None:
+    recorder = Recorder(tmp_path / f"log.{ending}")
+    bus = open_bus()
+    sent = spaced(60)
+    for message in sent:
+        bus.send(message)
+    time.sleep(0.2)
+    assert recorder.end().frames == 60
+    with can.LogReader(tmp_path / f"log.{ending}") as reader:
+        found = list(reader)
+    assert [(m.arbitration_id, bytes(m.data)) for m in found] == [(m.arbitration_id, bytes(m.data)) for m in sent]
+    assert all(a.timestamp <= b.timestamp for a, b in itertools.pairwise(found))
