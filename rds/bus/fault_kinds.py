@@ -42,7 +42,8 @@ KINDS = {
     "restart": Kind("a node that is bus off is asked to come back", ("node",), ("node",), True),
 }
 # whole numbers: least, most, how to write them
-_WHOLE = (("count", 1, 10**9, ","), ("identifier", 0, 0x1FFFFFFF, "#x"), ("bit", 1, 1000, ","))
+BEHIND_ARBITRATION = 13  # the first bit that can be disturbed in any frame: start bit, 11 of the identifier, RTR
+_WHOLE = (("count", 1, 10**9, ","), ("identifier", 0, 0x1FFFFFFF, "#x"), ("bit", BEHIND_ARBITRATION, 1000, ","))
 FRAME_KINDS = ("lose", "corrupt", "delay", "duplicate")
 
 
@@ -93,8 +94,8 @@ class Fault:
         for name, least in (("at", False), ("duration", True), ("by", True)):
             value = getattr(self, name)
             if value is not None and not (_is_number(value) and (value > 0 or not (least or value)) and value < 1e6):
-                low = "more than" if least else "at least"
-                raise InputError(f"{_word(name)} = {value!r} must be {low} 0 s and less than 1,000,000 s")
+                bound = "more than" if least else "at least"
+                raise InputError(f"{_word(name)} = {value!r} must be {bound} 0 s and less than 1,000,000 s")
         for name, low, high, form in _WHOLE:
             value = getattr(self, name)
             if value is not None and not (_is_whole(value) and low <= value <= high):

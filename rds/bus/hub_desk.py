@@ -31,6 +31,7 @@ class Desk:
         self._busy_before = 0
         self._frames_before = 0
         self._errors_before = 0
+        self._struck_before = 0
         self.delivery = Lateness()
         self.pickup = Lateness()
         self._actions: dict[str, Callable[[dict[str, Any], Node, int], Any]] = {
@@ -98,14 +99,14 @@ class Desk:
             "frames": medium.frames - self._frames_before,
             "error_frames": medium.errors - self._errors_before,
             "load": (medium.busy - self._busy_before) / elapsed,
-            "struck": medium.frame_faults.struck,
+            "struck": medium.frame_faults.struck - self._struck_before,
             "delivery_lateness": self.delivery.summary(),
             "pickup_lateness": self.pickup.summary(),
         }
         if asked.get("reset"):
             self._since = now
             self._busy_before, self._frames_before = medium.busy, medium.frames
-            self._errors_before = medium.errors
+            self._errors_before, self._struck_before = medium.errors, medium.frame_faults.struck
             self.delivery.reset()
             self.pickup.reset()
         return found

@@ -12,8 +12,9 @@ from rds.commands.common import Json, print_json, refusals
 Channel = Annotated[str, typer.Option("--channel", "-c", help="Channel of the built-in bus: a machine's name.")]
 
 AT = ("at", 0.0)  # when nothing else is said
+TIMES = ("at", "for", "by")  # s
 _OPTIONS = {"duration": "for", "identifier": "id"}  # as the command line calls them
-NODE_TITLES = ("node", "state", "TEC", "REC", "frames", "bits", "errors", "lost", "waiting", "")
+NODE_TITLES = ("node", "state", "TEC", "REC", "frames", "bits", "errors", "lost", "waiting", "remark")
 
 
 def fault(
@@ -109,5 +110,8 @@ def _identifier(text: str | None) -> int | None:
 
 
 def _words(table: dict[str, Any]) -> str:
-    rest = ", ".join(f"{key} {value}" for key, value in table.items() if key != "kind" and (key, value) != AT)
+    said = {key: value for key, value in table.items() if key != "kind" and (key, value) != AT}
+    if "identifier" in said:
+        said["identifier"] = f"{said['identifier']:#05x}"
+    rest = ", ".join(f"{key} {value}{' s' if key in TIMES else ''}" for key, value in said.items())
     return f"{table['kind']} ({rest})" if rest else str(table["kind"])

@@ -68,6 +68,7 @@ def heard(medium: Medium[str], now: int) -> list[tuple[int, str]]:
         ({"kind": "die", "node": "X", "for": 1.0}, "nothing to do with 'for'"),
         ({"kind": "delay"}, "needs 'by'"),
         ({"kind": "lose", "count": 0}, "count = 0 must be"),
+        ({"kind": "corrupt", "bit": 12}, "bit = 12 must be a whole number from 13"),
         ({"kind": "lose", "count": True}, "count = True"),
         ({"kind": "lose", "at": -1.0}, "at = -1.0 must be at least 0"),
         ({"kind": "unplug", "node": "X", "for": 0}, "for = 0 must be more than 0"),

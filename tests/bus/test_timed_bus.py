@@ -106,6 +106,18 @@ def test_all_see_one_order_and_nobody_overtakes_himself(
         assert process.exitcode == 0
 
 
+def test_statistics_begin_anew_when_asked(timed: Callable[..., can.BusABC]) -> None:
+    sender, listener = timed("A"), timed("B")
+    with Faults("test") as line:
+        line.inject("corrupt", node="A", count=2)
+        sender.send(frame(0x123))
+        assert listener.recv(5.0) is not None
+        found = line.statistics(reset=True)
+        assert (found["frames"], found["error_frames"], found["struck"]) == (1, 2, 2)
+        again = line.statistics()
+        assert (again["frames"], again["error_frames"], again["struck"]) == (0, 0, 0)
+
+
 def test_another_bit_rate_is_refused_and_none_joins(
     timed: Callable[..., can.BusABC], open_bus: Callable[..., can.BusABC]
 ) -> None:
