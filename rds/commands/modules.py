@@ -197,8 +197,9 @@ def info(context: typer.Context, interface: Interface = "rds", channel: Channel 
     if json:
         print_json(found)
         return
-    for name, value in found.items():
-        typer.echo(f"{name}: {value}")
+    from rds.commands.module_tables import show_info
+
+    show_info(found)
 
 
 @module_app.command()
@@ -226,8 +227,9 @@ def tune(
     if json:
         print_json(values)
         return
-    for name, value in values.items():
-        typer.echo(f"{name} = {value}")
+    from rds.commands.module_tables import show_tuning
+
+    show_tuning(values)
 
 
 def _gains(path: Path, controller: str) -> dict[str, float]:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+from rds.bus.oacs.pid import Tuning
 from rds.cli import app
+from rds.commands.module_tables import TUNING
 
 pytestmark = pytest.mark.realtime
 Serve = Callable[..., subprocess.Popen[str]]
@@ -89,3 +92,17 @@ def test_refusals_say_what_and_why(serve: Serve, rds: Rds) -> None:
     assert "no tuning parameter 'Kq'" in refused(rds("module", 4, "tune", "--set", "Kq=1"))
     assert "--duti" in refused(rds("module", 4, "jog", "1", "--duti", "0.5"))
     assert "must be NAME=VALUE" in refused(rds("module", 4, "tune", "--set", "Kp"))
+
+
+def test_what_a_module_says_is_shown_with_units(serve: Serve, rds: Rds) -> None:
+    serve("X")
+    shown = " ".join(rds("module", 4, "info").stdout.replace("│", " ").split())
+    for line in ("highest 150 mm", "counts per unit 169 counts/mm", "clockwise speed 130 mm/min", "supply 12 V"):
+        assert line in shown
+    assert "the axis shifts along x" in shown and "1 0 0 583" in shown
+    tuning = " ".join(rds("module", 4, "tune").stdout.replace("│", " ").split())
+    assert tuning in shown and "Ki 1.5 duty/(count s) integral gain" in tuning
+
+
+def test_every_tuning_parameter_has_a_meaning() -> None:
+    assert list(TUNING) == [field.name for field in fields(Tuning)]
