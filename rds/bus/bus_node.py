@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable
 
 import can
 
-from rds.bus.module_node import RETRY, BusTime
+from rds.bus.bus_time import BusTime
 from rds.core.errors import MachineError
 
 LOG = logging.getLogger(__name__)
 
+RETRY = 0.5  # s between attempts to open a bus that failed
 _SEND_TIMEOUT = 0.1  # s
 Outgoing = tuple[int, bytes, bool]  # identifier, data, extended
 

@@ -17,22 +17,10 @@ from rds.bus import server_program
 from rds.bus.buttons import press_buttons
 from rds.bus.link import BUILTIN
 from rds.bus.module import AxisModule
-from rds.bus.module_node import LISTEN_MASK, LISTENS_TO, ModuleNode
+from rds.bus.module_node import ModuleNode
 from rds.bus.serve_loop import Opener, serve_nodes
 from rds.machines import Machine
 from rds.machines.machine import Axis
-
-
-class _CyclicNode(ModuleNode):
-    """A module that answers the cyclic frames of rds/bus/frames.py."""
-
-    @property
-    def name(self) -> str:
-        return self.module.name
-
-    @property
-    def heard(self) -> float:
-        return self.module.ticks
 
 
 def serve(
@@ -46,9 +34,8 @@ def serve(
 ) -> None:
     """Serve the modules of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`."""
 
-    def make_node(slot: int, axis: Axis, opener: Opener) -> _CyclicNode:
-        module = partial(AxisModule, axis, slot, machine.sample_period)
-        return _CyclicNode(module, partial(opener, LISTENS_TO, LISTEN_MASK))
+    def make_node(slot: int, axis: Axis, opener: Opener) -> ModuleNode:
+        return ModuleNode(axis.name, partial(AxisModule, axis, slot, machine.sample_period), opener)
 
     serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
 
