@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands import analyse, bus, fault, modules, reports
+from rds.commands import analyse, bus, estop, fault, modules, reports
 from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
 from rds.commands.guard import guarded
 
@@ -30,7 +30,7 @@ bus.app.command()(analyse.analyse)
 bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
 app.command()(modules.scan)
-app.command()(modules.estop)
+app.command()(estop.estop)
 app.command()(reports.report)
 
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]

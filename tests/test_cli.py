@@ -247,3 +247,36 @@ def test_progress_is_for_terminals(folder: Path) -> None:
     assert "simulation" in shown or "run" in shown
     only_json(on_terminal.stdout)
     assert command("run", "e.toml", "--out", "out", "--json").stderr == ""
+
+
+def test_ctrl_c_during_the_imports_is_no_traceback() -> None:
+    program = """
+import sys
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "typer":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Finder())
+from rds.__main__ import main
+main()
+"""
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "rds: stopped by Ctrl-C\n")
+
+
+def test_the_package_is_the_command() -> None:
+    shown = subprocess.run([sys.executable, "-m", "rds", "machine", "list"], capture_output=True, text=True, timeout=60)
+    assert shown.returncode == 0 and "mini-cnc" in shown.stdout
+
+
+def test_hints_fit_what_was_asked(tmp_path: Path) -> None:
+    report = call("report", "acuracy", "x.csv")
+    assert report.exit_code == 2 and "there is no report 'acuracy'" in report.stderr
+    assert "from a file" not in report.stderr
+    bus = call("scan", "--interface", "nothing", "--channel", "x")
+    assert bus.exit_code == 2 and "check interface, channel and options" in bus.stderr
+    for number in range(40):
+        (tmp_path / f"table{number:02}.csv").write_text("time\n0\n")
+    several = call("compare", str(tmp_path), str(tmp_path))
+    assert several.exit_code == 2 and "table05.csv and 34 more); name one" in several.stderr
+    assert "table06.csv" not in several.stderr

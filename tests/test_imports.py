@@ -44,7 +44,7 @@ ONLY = {
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record
 }
 LAZY = [("results", "runtime"), ("modes", "bus")]  # inside functions only
-TOP = {"cli", "commands", "console"}
+TOP = {"__main__", "cli", "commands", "console"}
 
 
 def imports(path: Path) -> list[tuple[str, bool]]:

@@ -31,6 +31,7 @@ LOG = logging.getLogger(__name__)
 _SIZE = wire.RECORD
 _AT_ONCE = getattr(socket, "MSG_DONTWAIT", 0)  # 0 on Windows, where `select` has to tell beforehand
 _WHOLE = socket.MSG_WAITALL
+_PERIODIC_END = 1.0  # s for a periodic task to send its last frame
 _HALF_SENT = 10.0  # s to finish a frame of which a part is on its way
 
 
@@ -289,7 +290,11 @@ class BuiltinBus(can.BusABC):
         """Leave the bus. May be called more than once. Frames sent before still reach the others."""
         if self._is_shutdown:
             return
+        periodic = [getattr(task, "thread", None) for task in self._periodic_tasks]
         super().shutdown()
+        for thread in periodic:  # told to stop; the frame that one is sending would meet a closed bus
+            if thread is not None and thread is not threading.current_thread():
+                thread.join(_PERIODIC_END)
         if os.getpid() == self._pid and self._lost is None:
             with contextlib.suppress(OSError):
                 self._sock.shutdown(socket.SHUT_WR)

@@ -353,6 +353,15 @@ class AxisDrivers:
         self._waiting_voltages = tuple(sent[slot] for slot in self._slots)
         return self._sent_voltages
 
+    def confirm(self) -> None:
+        """After the last sample: MachineError if a module that was silent for its last 10 periods goes on being so.
+
+        A module that died less than 0.1 s before the end has not ended the run. Zero volts meanwhile.
+        """
+        self.write((0.0,) * len(self._slots))
+        while any(module.missed >= SILENT_AFTER for module in self._modules):
+            self.exchange()
+
     def stop(self) -> None:
         """Zero volts on all axes, now. If the bus is broken, the modules' watchdogs do it; the log says so."""
         self._waiting = self._zero

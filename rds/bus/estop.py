@@ -8,6 +8,7 @@ import time
 import can
 
 from rds.bus import frames
+from rds.bus.cia402 import emergency as drives
 from rds.bus.frames import Status
 from rds.bus.oacs.host import estop as stop_oacs
 from rds.core.errors import MachineError
@@ -20,11 +21,12 @@ _ANSWERS = 0.1  # s
 
 
 def stop_everything(bus: can.BusABC) -> list[int]:
-    """Zero volts on every module; numbers of the modules that acknowledged.
+    """Zero volts on every module; numbers of the modules and node-IDs of the drives that acknowledged.
 
-    Modules of the cyclic frames and distributed modules latch it (see reset_everything), and CANopen drives get the
-    stop of the network. A host that commands them ends its run. Hardware that knows no emergency stop gets a command
-    of zero volts. Raises MachineError if the bus fails: then cut the power.
+    Modules of the cyclic frames and distributed modules latch it (see reset_everything). CANopen drives get the stop
+    of the network and then, each, the command to disable its voltage; one acknowledges by a state without voltage. A
+    host that commands them ends its run. Hardware that knows no emergency stop gets a command of zero volts. Raises
+    MachineError if the bus fails, or a drive stays under power: then cut the power.
     """
     emergency = _frame(frames.GENERAL, frames.EMERGENCY)
     network, again = _frame(NMT, _STOP_ALL_NODES), _frame(NMT, _ANSWER_AGAIN)
@@ -41,9 +43,19 @@ def stop_everything(bus: can.BusABC) -> list[int]:
     with contextlib.suppress(MachineError):  # reported below with what failed here
         stopped = {node for node, status in _reports(bus).items() if status & Status.EMERGENCY}
         stopped |= set(stop_oacs(bus))
+    without: dict[int, bool] = {}
+    if not failures:  # 127 nodes that nobody acknowledges would take long
+        try:
+            without = drives.cut(bus)
+        except (can.CanError, OSError) as error:
+            failures.append(error)
     if failures:
         raise MachineError(f"bus {bus.channel_info} failed: {failures[0]}; cut the power") from failures[0]
-    return sorted(stopped)
+    if powered := [str(node) for node, is_off in sorted(without.items()) if not is_off]:
+        raise MachineError(
+            f"drives of node-ID {', '.join(powered)} do not say that their voltage is off; cut the power"
+        )
+    return sorted(stopped | set(without))
 
 
 def reset_everything(bus: can.BusABC) -> list[int]:

@@ -46,7 +46,14 @@ class Faults:
         self.play([Fault(kind, **words)], own=False)
 
     def play(self, faults: Iterable[Fault], own: bool = True) -> None:
-        """Inject a schedule whose times count from now. With `own`, all of it ends when this line is closed."""
+        """Inject a schedule whose times count from now. With `own`, all of it ends when this line is closed.
+
+        InputError if one is no `Fault`.
+        """
+        faults = list(faults)
+        for fault in faults:
+            if not isinstance(fault, Fault):
+                raise InputError(f"{fault!r} is no fault: play() takes Fault objects, inject() a kind and its words")
         self._ask("inject", faults=[fault.to_table() for fault in faults], own=own)
 
     def check_names(self, faults: Iterable[Fault]) -> None:

@@ -52,7 +52,8 @@ def open_bus(
         )
     except (can.CanError, OSError, ValueError, TypeError, NotImplementedError) as error:
         raise MachineError(
-            f"bus {bus_name(interface, channel)} can't be opened: {error}; check the [bus] table"
+            f"bus {bus_name(interface, channel)} can't be opened: {error}; check interface, channel and "
+            "options (on the command line, or in the [bus] table)"
         ) from error
 
 

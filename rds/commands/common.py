@@ -103,6 +103,26 @@ def until_ctrl_c() -> Iterator[threading.Event]:
             signal.signal(number, handler)
 
 
+@contextmanager
+def ends_as_ctrl_c() -> Iterator[None]:
+    """A polite kill and a closed terminal end what runs here as Ctrl-C does, so that its clean-up is done."""
+
+    def interrupt(number: int, _: object) -> None:
+        raise KeyboardInterrupt
+
+    numbers = [number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None]
+    # what is ignored (nohup) stays so
+    before = {number: signal.getsignal(number) for number in numbers}
+    before = {number: handler for number, handler in before.items() if handler is not signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, interrupt)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def print_json(value: Any) -> None:
     """One JSON object on stdout."""
     typer.echo(json_text.dumps(value, allow_nan=False))

@@ -1,15 +1,15 @@
-"""Commands for the modules on a bus: who is there, one module's motions and tuning, emergency stop."""
+"""Commands for the modules on a bus: who is there, one module's motions and tuning."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from rds.commands.common import Channel, Interface, Json, print_json, progress_bars, refusals
+from rds.commands.common import Channel, Interface, Json, ends_as_ctrl_c, print_json, progress_bars, refusals
 
 module_app = typer.Typer(
     no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
@@ -64,6 +64,11 @@ def scan(
         distributed = _oacs(interface, channel)
         cyclic = _cyclic(interface, channel, {row["id"]: row for row in distributed})
         rows = [*cyclic, *distributed, *_drives(interface, channel)]
+        if not rows:
+            from rds.bus.traffic import refuse_taken
+
+            with bus_of(interface, channel) as bus:
+                refuse_taken(bus)
     if json:
         print_json({"channel": channel_of(interface, channel), "interface": interface, "modules": rows})
         return
@@ -148,30 +153,6 @@ def _drives(interface: str, channel: str | None) -> list[dict[str, Any]]:
     ]
 
 
-def estop(
-    reset: Annotated[bool, typer.Option("--reset", help="Release the latch of an emergency stop.")] = False,
-    interface: Interface = "rds",
-    channel: Channel = None,
-    json: Json = False,
-) -> None:
-    """Emergency stop of every module on a bus: zero volts, whatever dialect it speaks."""
-    with refusals(), bus_of(interface, channel) as bus:
-        from rds.bus.estop import reset_everything, stop_everything
-
-        if reset:
-            free = reset_everything(bus)
-            if json:
-                print_json({"reset": free})
-            else:
-                typer.echo(f"emergency stop reset; free: {', '.join(map(str, free)) or 'no module answers'}")
-            return
-        stopped = stop_everything(bus)
-    if json:
-        print_json({"stopped": stopped})
-    else:
-        typer.echo(f"emergency stop sent; acknowledged by {', '.join(map(str, stopped)) or 'no module'}")
-
-
 @module_app.callback()
 def module(
     context: typer.Context,
@@ -187,6 +168,17 @@ def _module(context: typer.Context, interface: str, channel: str | None) -> Iter
 
     with refusals(), bus_of(interface, channel) as bus:
         yield Module(bus, context.obj)
+
+
+@contextmanager
+def _moving(context: typer.Context, interface: str, channel: str | None) -> Iterator[Any]:
+    """A module that moves: Ctrl-C, a polite kill and a closed terminal stop it."""
+    with ends_as_ctrl_c(), _module(context, interface, channel) as module:
+        try:
+            yield module
+        except KeyboardInterrupt:
+            module.stop()
+            raise
 
 
 @module_app.command()
@@ -216,7 +208,7 @@ def tune(
 ) -> None:
     """Select PI or PID and set gains and limits; without options, show what is in force."""
     with _module(context, interface, channel) as module:
-        parameters = dict(_pair(text) for text in set_ or ())
+        parameters = _pairs(set_ or ())
         if from_step is not None:
             parameters = _gains(from_step, controller or "PID") | parameters
         changes = bool(parameters) or controller is not None
@@ -240,16 +232,27 @@ def _gains(path: Path, controller: str) -> dict[str, float]:
     return gains_from_step(result, result.axes[0], controller)._asdict()
 
 
-def _pair(text: str) -> tuple[str, float]:
-    from rds.core.errors import InputError
+def _pairs(texts: Sequence[str]) -> dict[str, float]:
+    """The values of --set by name; InputError for a name given twice."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, value = _pair(text)
+        if name in found:
+            raise _refused(f"--set {name} is given twice, {found[name]:g} and {value:g}; give it once")
+        found[name] = value
+    return found
 
+
+def _pair(text: str) -> tuple[str, float]:
     name, equals, value = text.partition("=")
+    if name.lower() == "controller":
+        raise _refused(f"--set {text}: the controller is chosen by --controller PI or --controller PID")
     try:
         if equals and name:
             return name, float(value)
     except ValueError:
         pass
-    raise InputError(f"--set {text!r} must be NAME=VALUE with a number, as in --set Kp=2.5")
+    raise _refused(f"--set {text!r} must be NAME=VALUE with a number, as in --set Kp=2.5")
 
 
 @module_app.command()
@@ -286,12 +289,8 @@ def home(context: typer.Context, interface: Interface = "rds", channel: Channel 
 
 
 def _moved(context: typer.Context, interface: str, channel: str | None, json: bool, act: Any) -> None:
-    with _module(context, interface, channel) as module:
-        try:
-            reached, unit = act(module), module.description.unit
-        except KeyboardInterrupt:
-            module.stop()
-            raise
+    with _moving(context, interface, channel) as module:
+        reached, unit = act(module), module.description.unit
     turns = unit == "rev/min"
     if json:
         print_json({"speed" if turns else "position": reached, "unit": unit})
@@ -336,7 +335,7 @@ def step(
     json: Json = False,
 ) -> None:
     """Step the set point, record the response and plot it."""
-    with _module(context, interface, channel) as module, progress_bars() as bar:
+    with _moving(context, interface, channel) as module, progress_bars() as bar:
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")
         from rds.results.files import save_all

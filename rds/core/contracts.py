@@ -25,6 +25,9 @@ class Drivers(Protocol):
     def write(self, voltages: Sequence[float]) -> Sequence[float]:
         """Take the next voltages (sent by the next tick); return those that act from this tick on."""
 
+    def confirm(self) -> None:
+        """After the last sample: MachineError if a module that was silent at the end is gone, not late."""
+
     def stop(self) -> None:
         """Zero volts on all axes, now."""
 

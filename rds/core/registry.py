@@ -16,6 +16,7 @@ class Registry:
 
     kind: str
     modules: Mapping[str, str]
+    own: bool = True  # whether a user's file may stand in for a library part
 
     def names(self) -> list[str]:
         """The names behind this door, in the order of the table."""
@@ -24,8 +25,6 @@ class Registry:
     def module(self, name: str) -> ModuleType:
         """The module called `name`, imported now if it was not before; InputError lists the known names."""
         if name not in self.modules:
-            raise InputError(
-                f"there is no {self.kind} {name!r}; known {self.kind}s: {', '.join(self.modules)}, "
-                f"or your own from a file"
-            )
+            own = ", or your own from a file" if self.own else ""
+            raise InputError(f"there is no {self.kind} {name!r}; known {self.kind}s: {', '.join(self.modules)}{own}")
         return import_module(self.modules[name])

@@ -70,6 +70,8 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
         with quiet_memory():
             clock.start()
             report["ending"] = loop.run()
+        if report["ending"] is Ending.DONE:
+            drivers.confirm()
     except MachineError as error:
         report |= {"ending": Ending.MACHINE_LOST, "reason": str(error)}
     except BaseException as error:  # the student's code may raise anything, SystemExit included

@@ -25,6 +25,7 @@ KINDS = Registry(
         "vibration": "rds.reports.vibration",
         "reconfiguration": "rds.reports.reconfiguration",
     },
+    own=False,
 )
 
 __all__ = ["KINDS", "Report", "Setting", "Table", "make_report", "option_table", "options_of", "write"]

@@ -15,7 +15,7 @@ from rds.reports.pairing import Pair, parse_pairs
 DIALECTS = {
     "oacs": (
         "general call: 001#01 -> 000#01MM; type call: 001#02 -> 000#02MM; data download: M#02 -> 000#02MM | 120+M#10; "
-        "move start: M#0301 -> 000#04MM00; move stop: M#0300 -> 000#04MM03"
+        "move start: M#0301 -> 000#04MM00 then 000#04MM00....; move stop: M#0300 -> 000#04MM03"
     ),
     "rds": "cycle: 010# -> 020+M#..........00; dry run: 011# -> 020+M#..........00; call: 013# -> 020+M#..........01",
     "sdo": "service data: 600+M# -> 580+M#",

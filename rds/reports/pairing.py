@@ -9,8 +9,9 @@ A pattern is an identifier, `#`, and how the data begin, in hexadecimal:
     000#04MM00..$   no more data after these four bytes
 
 An identifier of eight digits is an extended one. A pair is `name: request -> answer`, and where there is more than one
-answer that will do, `name: request -> answer | answer`; pairs are separated by `;`. A request without M is to all
-modules, and each module's first answer counts; a request with M is to that module alone.
+answer that will do, `name: request -> answer | answer`; pairs are separated by `;`. What a module says once more when
+the request is carried out is no answer, and stands behind `then`: `name: request -> answer then end`. A request without
+M is to all modules, and each module's first answer counts; a request with M is to that module alone.
 """
 
 from __future__ import annotations
@@ -78,11 +79,20 @@ class Pair(NamedTuple):
     name: str
     request: Pattern
     answers: tuple[Pattern, ...]
+    ends: tuple[Pattern, ...] = ()
 
     def answered_by(self, frame: Frame) -> int | None:
         """The module whose answer a frame is (EVERY where the pattern has no M); None if it is none."""
-        found = (answer.module(frame) for answer in self.answers)
-        return next((module for module in found if module is not None), None)
+        return _first(self.answers, frame)
+
+    def ended_by(self, frame: Frame) -> int | None:
+        """The same for a frame that says that an answered request is carried out."""
+        return _first(self.ends, frame)
+
+
+def _first(patterns: Iterable[Pattern], frame: Frame) -> int | None:
+    found = (pattern.module(frame) for pattern in patterns)
+    return next((module for module in found if module is not None), None)
 
 
 def parse_pattern(text: str) -> Pattern:
@@ -120,8 +130,10 @@ def parse_pairs(text: str) -> list[Pair]:
             raise InputError(f"{entry!r} is not a pair; write it as in 'move start: M#0301 -> 000#04MM00'")
         if any(pair.name == name.strip() for pair in pairs):
             raise InputError(f"two pairs are called {name.strip()!r}; rename one")
+        answer, then, end = answer.partition(" then ")
         answers = tuple(parse_pattern(text) for text in answer.split("|"))
-        pairs.append(Pair(name.strip(), parse_pattern(request), answers))
+        ends = tuple(parse_pattern(text) for text in end.split("|")) if then else ()
+        pairs.append(Pair(name.strip(), parse_pattern(request), answers, ends))
     if not pairs:
         raise InputError("there is no pair; write at least one as in 'move start: M#0301 -> 000#04MM00'")
     return pairs
@@ -133,6 +145,7 @@ class Exchanges:
 
     times: dict[tuple[str, int], list[float]] = field(default_factory=dict)  # s, by pair and module
     requests: dict[tuple[str, int], int] = field(default_factory=dict)  # by pair and module (EVERY: to all)
+    under_way: set[tuple[str, int]] = field(default_factory=set)  # answered, and not yet said to be carried out
     strays: int = 0  # answers without a request that waited for them
 
     def unanswered(self, pair: str, module: int) -> int:
@@ -205,11 +218,22 @@ def _answers(
             if in_time and (best is None or waiting[asked] > waiting[best[0]]):
                 best = asked, key
     if best is None:
-        found.strays += fits
+        found.strays += fits and not _ends(frame, pairs, found)
         return
     asked, key = best
+    found.under_way.add(key)
     found.times.setdefault(key, []).append(frame.time - waiting[asked])
     if asked[1] == EVERY:
         heard.add(key)
     else:
         del waiting[asked]
+
+
+def _ends(frame: Frame, pairs: Sequence[Pair], found: Exchanges) -> bool:
+    """Whether a frame says that a request which was answered before is carried out now; each may say so once."""
+    for pair in pairs:
+        key = pair.name, pair.ended_by(frame)
+        if key in found.under_way:
+            found.under_way.discard((pair.name, key[1] or EVERY))
+            return True
+    return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ _FORMATS = {
 }
 _STEM = "result"
 _RECORD = "record.rds"
+_SHOWN = 6  # names in a message
 
 
 def save_result(result: Result, path: str | Path) -> Path:
@@ -89,13 +91,19 @@ def _choose(directory: Path) -> Path:
             directory / f.name for suffix in _FORMATS for f in known if (f.stem, f.suffix.lower()) == (stem, suffix)
         )
     if stems:
-        raise InputError(f"holds several results ({', '.join(file.name for file in known)}); name one of the files")
+        raise InputError(f"holds several results ({_some([file.name for file in known])}); name one of the files")
     if (directory / _RECORD).is_file():
         return directory / _RECORD
     inside = [d.name for d in sorted(directory.iterdir()) if d.is_dir() and _holds_result(d)]
     if inside:
-        raise InputError(f"holds results in directories of their own ({', '.join(inside)}); name one of them")
+        raise InputError(f"holds results in directories of their own ({_some(inside)}); name one of them")
     raise InputError(f"holds no result; it needs {', '.join(_STEM + suffix for suffix in _FORMATS)} or {_RECORD}")
+
+
+def _some(names: Sequence[str]) -> str:
+    """The first few names, and how many more there are."""
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
 
 
 def _holds_result(directory: Path) -> bool:

@@ -155,8 +155,9 @@ def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest
 
     thread = threading.Thread(target=wait)
     thread.start()
-    os.kill(first.hub_pid, signal.SIGKILL)
-    with pytest.raises(can.CanOperationError, match=rf"hub \(process {first.hub_pid}\) ended without a word"):
+    hub: int = first.hub_pid  # type: ignore[attr-defined]
+    os.kill(hub, signal.SIGKILL)
+    with pytest.raises(can.CanOperationError, match=rf"hub \(process {hub}\) ended without a word"):
         first.recv(1.0)
     with pytest.raises(can.CanOperationError, match="ended without a word"):
         second.send(numbered(0))
@@ -194,7 +195,7 @@ def test_an_event_loop_hears_of_the_end_once(open_bus: Opener) -> None:
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(lambda _, context: errors.append(str(context["exception"])))
         notifier = can.Notifier(bus, [can.AsyncBufferedReader()], timeout=0.1, loop=loop)
-        os.kill(bus.hub_pid, signal.SIGKILL)
+        os.kill(bus.hub_pid, signal.SIGKILL)  # type: ignore[attr-defined]
         await asyncio.sleep(0.2)
         notifier.stop()
 
@@ -303,3 +304,17 @@ def test_a_frame_whose_length_is_not_that_of_its_data_is_not_sent(bitrate: int |
     sender.send(can.Message(arbitration_id=2, is_extended_id=False, is_remote_frame=True, dlc=3))
     message = receiver.recv(2.0)
     assert message is not None and (message.arbitration_id, message.dlc) == (2, 3)
+
+
+def test_a_bus_that_is_shut_down_ends_fast_periodic_sending_quietly(
+    open_bus: Opener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", said.append)
+    for _ in range(20):
+        sender = open_bus()
+        tasks = [sender.send_periodic(numbered(k), 0.0001) for k in range(4)]
+        time.sleep(0.005)
+        sender.shutdown()
+        assert not any(task.thread.is_alive() for task in tasks)  # type: ignore[attr-defined]
+    assert said == []

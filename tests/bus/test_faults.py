@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from rds.bus.bits import frame_time
 from rds.bus.fault_file import read_faults
 from rds.bus.fault_kinds import KINDS, Fault
+from rds.bus.faults import Faults
 from rds.bus.injector import Injector
 from rds.bus.medium import FaultRefused, Medium, UntimedMedium
 from rds.bus.station import Station
@@ -354,6 +356,13 @@ def test_a_node_that_leaves_takes_its_faults_along(medium: Medium[str]) -> None:
     hand.injector.withdraw(None, 3 * SECOND)
     medium.offer("A", record(1), 3 * SECOND)
     assert [delivery.sender for delivery in drain(medium, 4 * SECOND)] == ["A"]
+
+
+@pytest.mark.parametrize("schedule", ["abc", [{"kind": "unplug"}], [None]])
+def test_what_is_no_fault_is_refused(schedule: Any, open_bus: Callable[..., Any]) -> None:
+    open_bus("test")
+    with Faults("test") as faults, pytest.raises(InputError, match=r"is no fault: play\(\) takes Fault objects"):
+        faults.play(schedule)
 
 
 # --- the document

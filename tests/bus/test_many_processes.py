@@ -24,7 +24,7 @@ def collect(count: int, result: Any, ready: Any, pause_every: int = 0) -> None:
     """Receive `count` frames, slowly if asked; send back (identifier, number, stamp) of each."""
     with can.Bus(interface="rds", channel="test") as bus:
         ready.release()
-        seen = []
+        seen: list[tuple[int, int, float]] = []
         while len(seen) < count:
             message = bus.recv(10.0)
             assert message is not None, f"only {len(seen)} of {count} frames came"
@@ -94,7 +94,7 @@ def test_a_full_bus_refuses_within_the_timeout(hub: Callable[..., Any], open_bus
 def join_once(go: Any, result: Any) -> None:
     go.wait()
     with can.Bus(interface="rds", channel="test") as bus:
-        result.put(bus.hub_pid)
+        result.put(bus.hub_pid)  # type: ignore[attr-defined]
         go_on = time.monotonic() + 0.3
         while time.monotonic() < go_on:
             bus.recv(0.05)
@@ -119,7 +119,7 @@ def test_the_hub_ends_after_the_last_node_and_starts_again(
     assert process.wait(3) == 0
     assert list((runtime_directory / "rds").iterdir()) == []
     bus = open_bus()
-    assert bus.hub_pid != process.pid
+    assert bus.hub_pid != process.pid  # type: ignore[attr-defined]
 
 
 def open_and_close(rounds: int) -> None:

@@ -61,7 +61,7 @@ def test_stamps_are_spaced_by_exact_frame_times(timed: Callable[..., can.BusABC]
         line.inject("babble", node="B", identifier=0, duration=0.02)  # so that all wait for the bus together
         for number in range(30):
             sender.send(frame(0x100 + number, bytes(range(number % 9))))
-        seen = []
+        seen: list[can.Message] = []
         while len(seen) < 30:
             message = receiver.recv(2.0)
             assert message is not None
@@ -191,7 +191,7 @@ def test_bus_off_and_back_on_request(timed: Callable[..., can.BusABC], faults: F
     for name, bus in (("A", node), ("B", quick)):
         faults.inject("corrupt", node=name, count=32)
         bus.send(frame(5))
-        wait_for(lambda bus=bus: bus.state is can.BusState.ERROR)
+        wait_for(lambda bus=bus: bus.state is can.BusState.ERROR)  # type: ignore[misc]
     with pytest.raises(can.CanOperationError, match=r"bus off.*restart\(\)"):
         node.send(frame(6))
     wait_for(lambda: quick.state is can.BusState.ACTIVE)
@@ -354,6 +354,21 @@ def test_a_fault_during_a_run_ends_as_documented(tmp_path: Path, fault: str, end
     assert reason in (result.meta.get("ending_reason") or "")
     if ending == "machine lost":
         assert 0.3 - 2 * PERIOD <= result.table["time"].iloc[-1] <= 0.3 + 13 * PERIOD
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(
+    ("fault", "ending"), [('kind = "die"', "machine lost"), ('kind = "hang"\nfor = 0.07', "done")], ids=["die", "hang"]
+)
+def test_a_module_silent_at_the_end_is_lost_unless_it_comes_back(tmp_path: Path, fault: str, ending: str) -> None:
+    """Less than 0.1 s before the end: too late for the run itself to notice."""
+    schedule = tmp_path / "faults.toml"
+    schedule.write_text(f'[[fault]]\nat = 0.25\nnode = "Y"\n{fault}\n')
+    period = 0.005  # lost after 20 periods without an answer
+    words = experiment(period, 0.3, bitrate=500_000, faults=str(schedule))
+    result = run(words, tmp_path, ending)
+    assert result.meta["ending"] == ending, result.meta.get("ending_reason")
+    assert ("no answer from Y (node 3)" in (result.meta.get("ending_reason") or "")) == (ending == "machine lost")
 
 
 @pytest.mark.realtime

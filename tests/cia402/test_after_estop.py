@@ -6,12 +6,15 @@ import subprocess
 from collections.abc import Callable
 
 import can
+import canopen
 import pytest
 
-from rds.bus.cia402.codes import State
+from rds.bus.cia402.codes import State, state_of
+from rds.bus.cia402.configure import library
 from rds.bus.cia402.host import Cia402Drivers
 from rds.bus.cia402.scan import scan
 from rds.bus.estop import stop_everything
+from rds.bus.link import open_bus
 from rds.core.errors import MachineError
 from rds.machines import Machine
 
@@ -38,6 +41,29 @@ def test_a_run_ends_and_the_next_one_starts(machine: Machine, program: Program) 
     again.start()
     assert run(again, 0.2, -3.0)[-1] < 0.0
     again.close()
+
+
+@pytest.mark.parametrize("option", [0, 1, 2, 3])
+def test_no_option_code_leaves_voltage(option: int, machine: Machine, program: Program) -> None:
+    """A drive whose 0x6007 is 0 goes on when the network stops: it is told to disable its voltage."""
+    serve(program, "X")
+    with open_bus("rds", "drives") as bus, library(bus) as network:
+        node = network.add_node(machine.axis("X").node, canopen.ObjectDictionary())
+        for index, value, size in ((0x6007, option, 2), (0x6060, 3, 1), (0x60FF, 8000, 4)):
+            node.sdo.download(index, 0, value.to_bytes(size, "little"))
+        node.nmt.state = "OPERATIONAL"
+        for word in (0x06, 0x07, 0x0F):
+            node.sdo.download(0x6040, 0, word.to_bytes(2, "little"))
+        node.sdo.download(0x60FF, 0, (8000).to_bytes(4, "little"))
+        assert state_of(int.from_bytes(node.sdo.upload(0x6041, 0), "little")) is State.OPERATION_ENABLED
+        node.nmt.send_command(0x02)
+        if option == 0:  # as CiA 402 has it
+            node.nmt.send_command(0x80)
+            assert state_of(int.from_bytes(node.sdo.upload(0x6041, 0), "little")) is State.OPERATION_ENABLED
+    with can.Bus(interface="rds", channel="drives") as bus:
+        assert stop_everything(bus) == [machine.axis("X").node]
+    (found,) = scan(channel="drives")
+    assert found.state in (State.SWITCH_ON_DISABLED, State.FAULT)
 
 
 def test_drives_that_another_master_stopped_are_used(machine: Machine, program: Program) -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
+import sys
+import time
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from typer.testing import CliRunner
 
@@ -92,6 +96,46 @@ def test_refusals_say_what_and_why(serve: Serve, rds: Rds) -> None:
     assert "no tuning parameter 'Kq'" in refused(rds("module", 4, "tune", "--set", "Kq=1"))
     assert "--duti" in refused(rds("module", 4, "jog", "1", "--duti", "0.5"))
     assert "must be NAME=VALUE" in refused(rds("module", 4, "tune", "--set", "Kp"))
+    for value in ("1", "PI"):
+        assert "chosen by --controller" in refused(rds("module", 4, "tune", "--set", f"controller={value}"))
+    assert "Kp is given twice, 2 and 3" in refused(rds("module", 4, "tune", "--set", "Kp=2", "--set", "Kp=3"))
+
+
+def test_an_emergency_stop_that_nobody_acknowledges_fails(rds: Rds, bus: can.BusABC) -> None:
+    for words in ((), ("--json",)):
+        stopped = rds("estop", *words)
+        assert stopped.exit_code == 1
+        assert "nobody acknowledged" in stopped.stderr and "cut the power" in stopped.stderr
+        assert "rds, oacs, cia402" in stopped.stderr
+    assert json.loads(stopped.stdout) == {"stopped": []}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("words", [["move", "--by", "100"], ["jog", "1", "--seconds", "20"], ["step", "--by", "100"]])
+def test_what_ends_the_command_ends_the_motion(
+    serve: Serve, bus: can.BusABC, channel: str, number: int, words: list[str], tmp_path: Path
+) -> None:
+    """At once: by a stop on the bus, not by the module's own watchdog, 2 s after the host's last word."""
+    serve("X")
+    command = [sys.executable, "-m", "rds.cli", "module", "4", *words, "--channel", channel]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as process:
+        heard = hear(bus, lambda message: message.arbitration_id == 4 and message.data[:1] == b"\x03")
+        assert heard.data[1] != 0  # a motion begins
+        hear(bus, lambda message: message.arbitration_id == 0 and message.data[:2] == b"\x04\x04")  # it is accepted
+        process.send_signal(number)
+        hear(bus, lambda message: message.arbitration_id == 4 and message.data[:2] == b"\x03\x00")
+        _, said = process.communicate(timeout=20)
+    assert process.returncode != 0 and b"Traceback" not in said
+
+
+def hear(bus: can.BusABC, wanted: Callable[[can.Message], bool]) -> can.Message:
+    """The next such frame."""
+    deadline = time.monotonic() + 20.0
+    while time.monotonic() < deadline:
+        message = bus.recv(1.0)
+        if message is not None and not message.is_extended_id and wanted(message):
+            return message
+    raise AssertionError("it did not come")
 
 
 def test_what_a_module_says_is_shown_with_units(serve: Serve, rds: Rds) -> None:

@@ -88,6 +88,22 @@ def test_unanswered_repeated_late_and_stray() -> None:
     assert found.strays == 3
 
 
+def test_the_end_of_a_move_that_was_accepted_is_no_stray() -> None:
+    asked, accepted, done, stopped = "0301500100000000", "0403000101000000", "0403000001000000", "0403000501000000"
+    frames = [
+        frame(0.0, 3, asked),
+        frame(0.1, 0, accepted),
+        frame(5.0, 0, done),
+        frame(6.0, 0, done),  # to none
+        frame(7.0, 3, asked),
+        frame(7.1, 0, accepted),
+        frame(8.0, 0, stopped),
+        frame(9.0, 0, "0404000001000000"),  # a module that was asked nothing
+    ]
+    found = exchanges(frames, OACS, 1.0)
+    assert found.times == {("move start", 3): pytest.approx([0.1, 0.1])} and found.strays == 2
+
+
 def test_each_module_answers_a_general_call_once() -> None:
     call = [frame(0.0, 1, "0100000000000000"), frame(0.1, 0, "0102"), frame(0.2, 0, "0103"), frame(0.3, 0, "0102")]
     found = exchanges([*call, frame(1.0, 1, "0100000000000000"), frame(1.1, 0, "0102")], OACS, 5.0)

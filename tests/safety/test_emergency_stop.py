@@ -19,8 +19,7 @@ def test_from_the_command_line_in_a_run(bench: Bench, tmp_path: Path) -> None:
     run = bench.run(tmp_path)
     stop = bench.rds("estop")
     assert stop.returncode == 0, stop.stderr
-    if bench.dialect != "cia402":  # drives have no answer to it but that they stop
-        assert f"acknowledged by {bench.node}" in stop.stdout
+    assert f"acknowledged by {bench.node}" in stop.stdout
     ending, reason = ended(run, tmp_path)
     assert ending == "machine lost" and "emergency stop" in reason
     bench.stands_without_voltage()

@@ -349,6 +349,9 @@ class Cia402Drivers:
 
     # --- the end
 
+    def confirm(self) -> None:
+        """After the last sample: a drive that was silent for 10 periods has ended the run already."""
+
     def stop(self) -> None:
         """Power off on all axes, now: voltage disabled in mode cst, a quick stop in csp and csv.
 
