@@ -1,0 +1,104 @@
+"""Canonical calls: what an interpreted part program tells the machine to do, one call after the other.
+
+Names, arguments and their order are those of LinuxCNC's canonical functions (canon.hh; its `rs274 -g` prints them):
+lengths in the program's units (USE_LENGTH_UNITS says which), rotary axes in degrees, positions absolute in program
+coordinates (before offsets, which have calls of their own).
+
+Moves and feed rates come in blocks, as rows of a numpy array; the rare other calls one by one, in order between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+TRAVERSE, FEED, ARC, RATE = 0, 1, 2, 3
+BLOCK_ROWS = 65536  # at most, in a MotionBlock
+
+# values by kind: TRAVERSE and FEED: x, y, z, a, b, c of the end.
+# ARC: first end, second end, first centre, second centre (absolute, along the plane's axes: XY; ZX in G18; YZ in G19),
+#   turns (+ counter-clockwise, a whole number), end along the third axis, a, b, c.
+# RATE: the feed rate (units/min; in inverse time 1/min, per revolution units/rev).
+# n, digits: the line number of the word N and the number of digits that it is written with (0: the line has none).
+MOTION = np.dtype(
+    [("kind", "i1"), ("digits", "i1"), ("n", "i4"), ("line", "i4"), ("values", "f8", (9,))],
+    align=True,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class MotionBlock:
+    """Moves and feed rates in program order: at most BLOCK_ROWS rows of dtype MOTION, all from one file."""
+
+    rows: np.ndarray
+    file: str = ""
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Any other canonical call: name, arguments (int, float or str, in canon's order) and the program line it is of."""
+
+    name: str
+    args: tuple[Any, ...] = ()
+    line: int = 0
+    n: str = ""  # digits of the line's word N, as written
+    file: str = field(default="", compare=False)
+
+
+# How each call is written; others are written with %.4f for floats and %s for the rest, separated by commas.
+_FORMATS = {
+    "USE_LENGTH_UNITS": "CANON_UNITS_%s",  # MM, INCHES
+    "SELECT_PLANE": "CANON_PLANE_%s",  # XY, XZ, YZ
+    "SET_FEED_REFERENCE": "%s",
+    "COMMENT": '"%s"',
+    "MESSAGE": '"%s"',
+    "SET_MOTION_CONTROL_MODE": "CANON_%s",  # EXACT_PATH, EXACT_STOP, CONTINUOUS (with its tolerance)
+    "USE_TOOL_LENGTH_OFFSET": "%.4f %.4f %.4f, %.4f %.4f %.4f, %.4f %.4f %.4f",
+    "SET_SPINDLE_MODE": "%d %.4f",
+}
+
+
+def _call_text(call: Call) -> str:
+    if call.name == "SET_MOTION_CONTROL_MODE" and len(call.args) == 2:
+        return f"{call.name}(CANON_{call.args[0]}, {call.args[1]:f})"
+    pattern = _FORMATS.get(call.name)
+    if pattern is None:
+        pattern = ", ".join("%.4f" if isinstance(value, float) else "%s" for value in call.args)
+    return f"{call.name}({pattern % call.args})"
+
+
+_STRAIGHT = "(%.4f, %.4f, %.4f, %.4f, %.4f, %.4f)"
+_ROW_FORMATS = {
+    TRAVERSE: ("STRAIGHT_TRAVERSE" + _STRAIGHT, 6),
+    FEED: ("STRAIGHT_FEED" + _STRAIGHT, 6),
+    ARC: ("ARC_FEED(%.4f, %.4f, %.4f, %.4f, %d, %.4f, %.4f, %.4f, %.4f)", 9),
+    RATE: ("SET_FEED_RATE(%.4f)", 1),
+}
+
+
+def _row_texts(rows: np.ndarray) -> Iterator[tuple[str, str]]:
+    columns = (rows[name].tolist() for name in ("kind", "digits", "n", "values"))
+    for kind, digits, n, values in zip(*columns, strict=True):
+        pattern, count = _ROW_FORMATS[kind]
+        yield (str(n).zfill(digits) if digits else ""), pattern % tuple(values[:count])
+
+
+def texts(items: Iterable[MotionBlock | Call]) -> Iterator[tuple[str, str]]:
+    """Of each call, the digits of its line's word N ("" without) and its text: `SELECT_PLANE(CANON_PLANE_XY)`."""
+    for item in items:
+        if isinstance(item, Call):
+            yield item.n, _call_text(item)
+        else:
+            yield from _row_texts(item.rows)
+
+
+def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
+    """The lines that LinuxCNC's `rs274 -g` prints: running number, the program's line number (or N.....), the call."""
+    for number, (n, call) in enumerate(texts(items), start=1):
+        yield f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}"
