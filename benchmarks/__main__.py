@@ -1,6 +1,6 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
-python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [--json]
+python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [--json]
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from benchmarks import bus, imports, machine, realtime, simulation, timed_bus
+from benchmarks import bus, cia402, imports, machine, realtime, simulation, timed_bus
 from benchmarks.figures import TITLES, Figure
 from rds.console import show_table
 
@@ -23,6 +23,7 @@ SUBJECTS = {
     "realtime": "The real-time loop at 1 kHz beside cyclictest",
     "bus": "The built-in bus beside python-can's virtual",
     "timed-bus": "Four modules on the bus with bit timing: 1 Mbit/s, 1 kHz",
+    "cia402": "CiA 402 drives at 1 Mbit/s: our cyclic loop beside the canopen library's",
 }
 
 
@@ -41,6 +42,12 @@ def run_timed_bus() -> list[Figure]:
     """The bus with bit timing, in a process of its own: it raises its priority too."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as process:
         return process.submit(timed_bus.run).result()
+
+
+def run_cia402() -> list[Figure]:
+    """Drives, in a process of its own."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as process:
+        return process.submit(cia402.run).result()
 
 
 def main() -> int:
@@ -63,6 +70,7 @@ def main() -> int:
         "realtime": lambda: realtime.run(seconds=options.seconds),
         "bus": run_bus,
         "timed-bus": run_timed_bus,
+        "cia402": run_cia402,
     }
     report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}
     for name in options.subjects or SUBJECTS:

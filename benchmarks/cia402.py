@@ -6,8 +6,6 @@ more than half a period late in it or in the one before, `host` where sending al
 otherwise `bus` (the hub, or the drives' process). The library's way: RPDOs by `transmit()`, SYNC by
 `network.sync.transmit()`, TPDOs by `wait_for_reception()`, which is what its documentation shows.
 
-Columns: wire time at most at 1 Mbit/s, cycle (median, 99th percentile, longest), lateness (99th percentile).
-
 `python -m benchmarks.cia402 [--seconds 20] [--bitrate 1000000]`; without a bit rate, the bus is untimed.
 """
 
@@ -15,27 +13,29 @@ from __future__ import annotations
 
 import argparse
 import gc
-import platform
 import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
+from dataclasses import dataclass
 from uuid import uuid4
 
 import can
 import canopen
-from rich.console import Console
-from rich.table import Table
 
+from benchmarks.cyclictest import Cyclictest
+from benchmarks.figures import TITLES, Figure
 from rds.bus.cia402.configure import prepare
 from rds.bus.cia402.host import Cia402Drivers
 from rds.bus.cia402.settings import read_settings
+from rds.console import show_table
+from rds.core.errors import MachineError
 from rds.machines import load_machine
 from rds.runtime.scheduling import raise_priority
 
 MACHINE = "mini-cnc"
+Kept = tuple[list[int], list[int], Counter[str]]  # cycle times and latenesses in ns, missed cycles by reason
 Cycle = Callable[[], tuple[int, bool]]  # -> (instant at which all is sent in ns, whether all positions came)
 
 
@@ -44,7 +44,7 @@ def wire_time(drives: int) -> int:
     return 55 + drives * (95 + 115)
 
 
-def keep(period: float, seconds: float, cycle: Cycle) -> tuple[list[int], list[int], Counter[str]]:
+def keep(period: float, seconds: float, cycle: Cycle) -> Kept:
     """Run `cycle` every `period` s; return cycle times and latenesses in ns, and the missed cycles by reason."""
     step, times, late, missed = round(period * 1e9), [], [], Counter[str]()
     due = time.monotonic_ns() + step
@@ -69,7 +69,7 @@ def keep(period: float, seconds: float, cycle: Cycle) -> tuple[list[int], list[i
     return times, late, missed
 
 
-def ours(channel: str, axes: Sequence[str], period: float, seconds: float) -> tuple:
+def ours(channel: str, axes: Sequence[str], period: float, seconds: float) -> Kept:
     """Cia402Drivers in mode cst at zero volts."""
     machine = load_machine(MACHINE)
     drivers = Cia402Drivers(machine, axes, channel=channel, sample_period=period)
@@ -89,7 +89,7 @@ def ours(channel: str, axes: Sequence[str], period: float, seconds: float) -> tu
         drivers.close()
 
 
-def library(channel: str, axes: Sequence[str], period: float, seconds: float) -> tuple:
+def library(channel: str, axes: Sequence[str], period: float, seconds: float) -> Kept:
     """The same cycle through canopen, with its receiving thread."""
     machine = load_machine(MACHINE)
     settings = read_settings({"rpdo_transmission": 1}, machine, axes)
@@ -120,56 +120,114 @@ def library(channel: str, axes: Sequence[str], period: float, seconds: float) ->
         network.disconnect()
 
 
+@dataclass(frozen=True)
+class Case:
+    """One loop with some drives; times in µs, sorted."""
+
+    axes: tuple[str, ...]
+    period: float  # s
+    loop: str
+    times: list[float]
+    late: list[float]
+    missed: Counter[str]
+    lost: int  # times that host or drives stood still for so long that the run had to begin again
+
+    @property
+    def title(self) -> str:
+        """For a row."""
+        drives = f"{len(self.axes)} drive{'s' if len(self.axes) > 1 else ''}"
+        return f"{drives} at {1 / self.period:g} Hz, {self.loop}"
+
+    def figures(self) -> list[Figure]:
+        """Ours have a target: 99 of 100 cycles within the period."""
+        limit = self.period * 1e6 if self.loop == OURS else None
+        missed = sum(self.missed.values())
+        why = ", ".join(f"{reason} {count}" for reason, count in self.missed.items())
+        if self.lost:
+            why += f"; begun again {self.lost} times: the drives, or the host, stood still for a second"
+        return [
+            Figure(f"{self.title}: cycle p50", "µs", (_at(self.times, 0.5),)),
+            Figure(f"{self.title}: cycle p99", "µs", (_at(self.times, 0.99),), limit),
+            Figure(f"{self.title}: cycle max", "µs", (self.times[-1],)),
+            Figure(f"{self.title}: woken late p99", "µs", (_at(self.late, 0.99),)),
+            Figure(f"{self.title}: missed", f"of {len(self.times)}", (float(missed),), note=why),
+        ]
+
+
+def measure(axes: tuple[str, ...], period: float, loop: str, seconds: float, bitrate: int | None) -> Case:
+    """One case. Where host or drives are kept from running until they give each other up, it begins again, thrice."""
+    for lost in range(4):
+        try:
+            times, late, missed = _once(axes, period, loop, seconds, bitrate)
+        except MachineError:
+            if lost == 3:
+                raise
+        else:
+            break
+    return Case(axes, period, loop, sorted(t / 1e3 for t in times), sorted(t / 1e3 for t in late), missed, lost)
+
+
+def _once(axes: tuple[str, ...], period: float, loop: str, seconds: float, bitrate: int | None) -> Kept:
+    """With drives of its own on a channel of its own."""
+    channel = f"bench-{uuid4().hex[:8]}"
+    where = ["--channel", channel, "--axes", ",".join(axes)]
+    if bitrate:
+        where += ["--option", f"bitrate={bitrate}"]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "rds.bus.cia402.server", MACHINE, *where, "--exit-with-stdin"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        assert server.stdout is not None and server.stdout.readline().startswith(b"ready")
+        gc.collect()
+        gc.freeze()
+        return LOOPS[loop](channel, axes, period, seconds)
+    finally:
+        gc.unfreeze()
+        server.terminate()
+        server.wait()
+
+
+def run(seconds: float = 20.0, bitrate: int | None = 1_000_000) -> list[Figure]:
+    """The figures of all cases, beside cyclictest. It raises this process's priority."""
+    raise_priority(80)
+    cyclictest = Cyclictest()
+    cyclictest.start()
+    figures = []
+    try:
+        for axes, period in CASES:
+            figures.append(Figure(f"wire time of {len(axes)} drives, at most, 1 Mbit/s", "µs", (wire_time(len(axes)),)))
+            for loop in LOOPS:
+                figures += measure(axes, period, loop, seconds, bitrate).figures()
+    finally:
+        theirs = cyclictest.stop()
+    if cyclictest.obstacle:
+        return [*figures, Figure("cyclictest", note=cyclictest.obstacle)]
+    return [*figures, *(Figure(f"cyclictest {part}", "µs", (theirs[part],)) for part in ("p50", "p99", "max"))]
+
+
+def _at(values: list[float], part: float) -> float:
+    return values[min(len(values) - 1, int(part * len(values)))]
+
+
+OURS = "ours"
+LOOPS: dict[str, Callable[..., Kept]] = {OURS: ours, "canopen": library}
+CASES = ((("X",), 0.001), (("X", "Y", "Z"), 0.002))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table. Exit code 1 if a target was not met."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--bitrate", type=int, default=None, help="bit/s of the built-in bus (default: untimed)")
     options = parser.parse_args(arguments)
-    console = Console()
-    priority = raise_priority(80)
-    cases = [(["X"], 0.001), (["X", "Y", "Z"], 0.002)]
+    figures = run(options.seconds, options.bitrate)
     rate = f"{options.bitrate} bit/s" if options.bitrate else "untimed"
-    table = Table(title=f"CiA 402 cycles in µs, built-in bus ({rate}), {options.seconds:g} s each, {priority}")
-    for column in ("drives", "ms", "loop", "wire", "median", "p99", "max", "late", "missed, why"):
-        table.add_column(column, justify="left" if column in ("loop", "missed, why") else "right")
-    for axes, period in cases:
-        for name, loop in (("ours", ours), ("canopen", library)):
-            channel = f"bench-{uuid4().hex[:8]}"
-            where = ["--channel", channel, "--axes", ",".join(axes)]
-            if options.bitrate:
-                where += ["--option", f"bitrate={options.bitrate}"]
-            server = subprocess.Popen(
-                [sys.executable, "-m", "rds.bus.cia402.server", MACHINE, *where, "--exit-with-stdin"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-            )
-            try:
-                assert server.stdout is not None and server.stdout.readline().startswith(b"ready")
-                gc.collect()
-                gc.freeze()
-                times, late, missed = loop(channel, axes, period, options.seconds)
-            finally:
-                server.terminate()
-                server.wait()
-            times, late = sorted(times), sorted(late)
-            table.add_row(
-                str(len(axes)),
-                f"{period * 1e3:g}",
-                name,
-                f"{wire_time(len(axes))}",
-                f"{times[len(times) // 2] / 1e3:.0f}",
-                f"{times[len(times) * 99 // 100] / 1e3:.0f}",
-                f"{times[-1] / 1e3:.0f}",
-                f"{late[len(late) * 99 // 100] / 1e3:.0f}",
-                f"{sum(missed.values())} of {len(times)}"
-                + "".join(f", {reason} {count}" for reason, count in missed.items()),
-            )
-    console.print(table)
-    console.print(
-        f"Python {platform.python_version()}, python-can {version('python-can')}, canopen {version('canopen')}"
-    )
-    return 0
+    title = f"CiA 402 cycles, built-in bus ({rate}), {options.seconds:g} s each"
+    show_table(title, TITLES, [figure.cells() for figure in figures])
+    return 1 if any(figure.met is False for figure in figures) else 0
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks import c_program, cyclictest
 from rds.runtime.environment import surroundings
 
-PACKAGES = ("rds", "numpy", "numba", "llvmlite", "scipy", "control", "bdsim", "python-can")
+PACKAGES = ("rds", "numpy", "numba", "llvmlite", "scipy", "control", "bdsim", "python-can", "canopen")
 
 
 def versions() -> dict[str, str]:
