@@ -13,6 +13,7 @@ from typing import Any
 import can
 
 from rds.bus import frames
+from rds.bus.answer_order import AnswerOrder, Place
 from rds.bus.frames import Answer, Kind, Status
 from rds.bus.identity import WAIT as LISTENING
 from rds.bus.identity import listen, refuse_clashes
@@ -27,12 +28,10 @@ LOST_AFTER = 0.1  # s without an answer, and SILENT_AFTER periods at least: the 
 _STARTING = 1.0  # s for all modules to answer at the start
 _STANDSTILL = 20  # ticks in which no encoder moves until the axes count as standing
 _LONGEST_COAST = 3.0  # s until then
-_HALF_TURN = frames.COUNT_TURNS // 2
-_DUPLICATES = 64  # ticks that a module may have heard more than were sent: frames that came twice
 _SET_UP_AGAIN = 20  # ticks at the start until a module that was not set up is so again
 HOST = "host"  # what the built-in bus calls this node
 _RELEASE = "release its button, then `rds estop --reset`"
-_ALARMS = Status.EMERGENCY | Status.NOT_SET_UP | Status.REFUSED
+_ALARMS = int(Status.EMERGENCY | Status.NOT_SET_UP | Status.REFUSED)  # a plain number: flags cost 1 µs
 _HOSTS = (frames.COMMAND, frames.DRY_COMMAND, frames.SETUP)  # what only a host sends
 
 
@@ -53,18 +52,15 @@ class Counters:
 class _Module:
     """What the host knows of one module."""
 
-    __slots__ = ("axis", "counts", "expected", "identifier", "missed", "origin", "owed", "seen", "since")
+    __slots__ = ("axis", "counts", "identifier", "missed", "order", "origin")
 
     def __init__(self, axis: Axis):
         self.axis = axis
         self.identifier = frames.answer_identifier(axis.node)
         self.counts = 0
         self.origin = 0  # counts where the reported position is 0
-        self.expected = 0  # tick count of the answer to the last tick
-        self.owed = 0  # answers to earlier ticks that may still come
         self.missed = 0  # periods in a row
-        self.seen = False  # it has answered at all
-        self.since = 0  # ticks sent since its last answer
+        self.order = AnswerOrder()
 
     def __str__(self) -> str:
         return f"{self.axis.name} (node {self.axis.node})"
@@ -140,9 +136,9 @@ class AxisDrivers:
         self._waiting_voltages = (0.0,) * len(self._modules)
         self._send(frames.SETUP, self._setup)
         deadline = time.monotonic() + _STARTING
-        while not all(module.seen for module in self._modules):
+        while not all(module.order.seen for module in self._modules):
             if time.monotonic() > deadline:
-                raise self._silent([module for module in self._modules if not module.seen])
+                raise self._silent([module for module in self._modules if not module.order.seen])
             for module in self._modules:
                 module.missed = 0
             try:
@@ -151,7 +147,7 @@ class AxisDrivers:
                 self.exchange()
             except MachineError as error:
                 if isinstance(error.__cause__, can.CanTimeoutError):  # with bit timing: nobody acknowledges the ticks
-                    raise self._silent([module for module in self._modules if not module.seen]) from error
+                    raise self._silent([module for module in self._modules if not module.order.seen]) from error
                 raise
         self._wait_for_standstill()
         for module in self._modules:
@@ -216,8 +212,7 @@ class AxisDrivers:
     def _count_tick(self) -> None:
         self.counters.ticks += 1
         for module in self._modules:
-            module.expected = (module.expected + 1) % frames.COUNT_TURNS
-            module.since += 1
+            module.order.tick()
 
     def _take_stragglers(self) -> None:
         """What has come before this tick is sent does not answer it.
@@ -236,11 +231,10 @@ class AxisDrivers:
                 self._heed(module, answer)
             if answer.kind != Kind.ANSWER:
                 self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
-            elif module.seen:
+            elif module.order.seen:
                 self.counters.late += 1
-                module.owed = max(0, module.owed - 1)
-                if 0 < (answer.ticks - module.expected) % frames.COUNT_TURNS < _HALF_TURN:
-                    module.expected = answer.ticks
+                if self._place(module, answer) is not Place.ASTRAY:
+                    self._count_lost(module.order.straggler(answer))
 
     def _collect(self, deadline: float) -> None:
         """Take answers until all are here or the deadline has passed."""
@@ -263,10 +257,17 @@ class AxisDrivers:
                 self._heed(module, answer)
             if answer.kind != Kind.ANSWER:
                 self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
-            elif self._belongs(module, answer):
-                awaited.discard(module.identifier)
             else:
-                doubtful[module.identifier] = answer
+                place = self._place(module, answer)
+                if place is Place.LAST:
+                    self._count_lost(module.order.take(answer))
+                    module.counts = answer.counts
+                    module.missed = 0
+                    awaited.discard(module.identifier)
+                    continue
+                self.counters.late += 1
+                if place is Place.EARLIER:
+                    doubtful[module.identifier] = answer
         if awaited:
             self._note_missing(awaited, doubtful)
 
@@ -285,53 +286,49 @@ class AxisDrivers:
         if answer.status & Status.EMERGENCY:
             raise MachineError(f"emergency stop of {module}; {_RELEASE}")
         if answer.status & Status.NOT_SET_UP and self._started:
-            raise MachineError(
-                f"{module} on bus {self._bus_name} has restarted, or was replaced by another, in the run; its position "
-                "is lost: start the run again"
-            )
+            raise self._replaced(module)
         self.counters.refused += bool(answer.status & Status.REFUSED)
 
-    def _belongs(self, module: _Module, answer: Answer) -> bool:
-        """Whether this is the answer to the last tick: its tick count says so."""
-        ahead = (answer.ticks - module.expected + _HALF_TURN) % frames.COUNT_TURNS - _HALF_TURN
-        if module.seen and not -module.since - 1 <= ahead <= _DUPLICATES and self._started:
-            raise MachineError(
-                f"{module} on bus {self._bus_name} counts {answer.ticks} ticks instead of {module.expected}: it has "
-                "restarted, or was replaced by another, in the run; its position is lost: start the run again"
-            )
-        if ahead < 0 and module.owed and module.seen:
-            # the answer to an earlier tick, or to this one from a module that lost one: _note_missing() decides
-            module.owed -= 1
-            self.counters.late += 1
-            return False
-        if ahead < 0 and module.seen:
-            self.counters.lost_ticks -= ahead
-        self._accept(module, answer)
-        return True
+    def _place(self, module: _Module, answer: Answer) -> Place:
+        """Where the answer stands among those of its module. MachineError if they are another module's."""
+        place = module.order.place(answer)
+        if place is not Place.ASTRAY:
+            return place
+        if not self._started:
+            return Place.LAST
+        if module.order.is_another():
+            raise self._replaced(module)
+        return place
 
-    def _accept(self, module: _Module, answer: Answer) -> None:
-        module.expected = answer.ticks
-        module.counts = answer.counts
-        module.owed = 0
-        module.since = 0
-        module.missed = 0
-        module.seen = True
+    def _replaced(self, module: _Module) -> MachineError:
+        return MachineError(
+            f"{module} on bus {self._bus_name} has restarted, or was replaced by another, in the run; its position "
+            "is lost: start the run again"
+        )
+
+    def _count_lost(self, ticks: int) -> None:
+        if ticks:
+            self.counters.lost_ticks = max(0, self.counters.lost_ticks + ticks)
 
     def _note_missing(self, awaited: set[int], doubtful: dict[int, Answer]) -> None:
         lost = []
         for identifier in awaited:
             module = self._by_identifier[identifier]
             if identifier in doubtful:
-                # nothing better came: either the module is slow, and its next answer sets the count right, or it
-                # lost a tick, and this is its answer. Either way it lives.
-                self._accept(module, doubtful[identifier])
-                module.owed = 1
+                # either the module is slow, and its next answer sets the count right, or it lost a tick, and this is
+                # its answer. Either way it lives.
+                module.order.take_for_want_of_better(doubtful[identifier])
+                module.counts = doubtful[identifier].counts
+                module.missed = 0
             else:
-                module.owed += 1
+                module.order.owed += 1
                 module.missed += 1
             self.counters.missing += 1
-            if module.missed >= self._lost_after and module.seen:
+            if module.missed >= self._lost_after and module.order.seen:
                 lost.append(module)
+        for module in lost:
+            if module.order.is_another(silent=True):
+                raise self._replaced(module)
         if lost:
             raise self._silent(lost)
 
@@ -371,7 +368,7 @@ class AxisDrivers:
             self._sent_voltages = self._waiting_voltages
             self._count_tick()
             for module in self._modules:
-                module.owed += 1
+                module.order.owed += 1
         except MachineError as error:
             LOG.error("zero volts could not be sent (%s); the modules' watchdogs cut the voltage", error)
 

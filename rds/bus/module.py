@@ -125,7 +125,7 @@ class AxisModule:
             verdict = self._freshness.judge(number, at)
         elif self._freshness.followed(at) or at < self._refused_until:
             verdict = Verdict.STRANGE
-        if verdict in (Verdict.OLD, Verdict.STRANGE):
+        if verdict is Verdict.OLD or verdict is Verdict.STRANGE:
             self._refuse("a command", verdict.value, at)
             return []
         dry = identifier == frames.DRY_COMMAND
@@ -155,6 +155,8 @@ class AxisModule:
 
     def _whole_status(self, at: float) -> Status:
         status = self.status
+        if not self.emergency and at >= self._refused_until:
+            return status  # a thousand times a second
         if self.emergency:
             status = status & ~Status.ENABLED | Status.EMERGENCY | Status.FAULT
         return status | Status.REFUSED if at < self._refused_until else status
