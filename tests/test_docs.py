@@ -112,6 +112,7 @@ def test_machine_files() -> None:
     assert set(module_table.KEYS) <= NAMED
     assert {"name", "title", "sample_period"} <= NAMED
     assert set(machine._TOP) == {"name", "title", "sample_period", "converter", "axis"}
+    assert machine._LIMITS <= NAMED
     assert {f"axis.NAME.{key}" for key in machine._AXIS} | {"converter.range", "converter.bits"} <= NAMED
 
 

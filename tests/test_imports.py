@@ -23,6 +23,7 @@ ALLOWED: dict[str, set[str]] = {
     "signals": {"core"},
     "interface": {"core"},
     "machines": {"core"},
+    "motion": {"core", "machines"},
     "checks": {"core"},
     "bus": {"core", "machines", "models", "runtime", "results"},  # see ONLY
     "runtime": {"core", "interface", "machines"},

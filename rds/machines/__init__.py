@@ -1,5 +1,5 @@
 """Machines as data."""
 
-from rds.machines.machine import Axis, Converter, Machine, load_machine, machine_names
+from rds.machines.machine import Axis, AxisLimits, Converter, Machine, load_machine, machine_names
 
-__all__ = ["Axis", "Converter", "Machine", "load_machine", "machine_names"]
+__all__ = ["Axis", "AxisLimits", "Converter", "Machine", "load_machine", "machine_names"]

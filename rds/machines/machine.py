@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass, field
 from importlib.resources import files
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,21 @@ class Converter:
 
 
 @dataclass(frozen=True)
+class AxisLimits:
+    """What an axis may be asked for by planned motion: mm/s, mm/s², mm/s³ (degrees of a rotary axis)."""
+
+    velocity: float
+    acceleration: float
+    jerk: float
+
+
+@dataclass(frozen=True)
 class Axis:
     """One axis of a machine.
 
     `model` names the library model that a student starts from, with its parameters; `machine` holds the
     parameters of the simulated machine behind the bus, which the student does not see. `module` is what a distributed
-    module of this axis knows of itself (module_table.py).
+    module of this axis knows of itself (module_table.py). `limits` are those of planned motion.
     """
 
     name: str
@@ -37,6 +47,7 @@ class Axis:
     model: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, float] = field(default_factory=dict)
     module: dict[str, Any] = field(default_factory=dict)
+    limits: AxisLimits | None = None
 
 
 @dataclass(frozen=True)
@@ -80,7 +91,8 @@ def load_machine(name: str) -> Machine:
 
 
 _TOP = {"name", "title", "sample_period", "converter", "axis"}
-_AXIS = {"node", "unit", "travel", "resolution", "model", "machine", "module"}
+_AXIS = {"node", "unit", "travel", "resolution", "model", "machine", "module", "limits"}
+_LIMITS = {"velocity", "acceleration", "jerk"}
 
 
 def _machine(data: dict[str, Any], path: str) -> Machine:
@@ -104,6 +116,7 @@ def _machine(data: dict[str, Any], path: str) -> Machine:
             model=dict(table.get("model", {})),
             machine=dict(table.get("machine", {})),
             module=module_table(table.get("module", {}), f"{path}, [axis.{name}.module]"),
+            limits=_limits(table["limits"], path, name) if "limits" in table else None,
         )
     nodes = [axis.node for axis in axes.values()]
     if len(set(nodes)) != len(nodes):
@@ -118,6 +131,18 @@ def _machine(data: dict[str, Any], path: str) -> Machine:
         axes=axes,
         path=path,
     )
+
+
+def _limits(table: Any, path: str, name: str) -> AxisLimits:
+    place = f"{path}, [axis.{name}.limits]"
+    if not isinstance(table, dict):
+        raise InputError(f"limits = {table!r} must be a table", place)
+    _known(table, _LIMITS, path, f"axis.{name}.limits.")
+    values = {key: _number(table, key, place) for key in sorted(_LIMITS)}
+    for key, value in values.items():
+        if not (isfinite(value) and value > 0):
+            raise InputError(f"{key} = {value!r} must be more than 0 and finite", place)
+    return AxisLimits(**{key: float(value) for key, value in values.items()})
 
 
 def _table(data: dict[str, Any], key: str, path: str) -> dict[str, Any]:

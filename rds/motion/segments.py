@@ -1,0 +1,154 @@
+"""The programmed path: rows of dtype SEGMENT, in machine coordinates, mm and degrees.
+
+A segment is a straight move of all axes at once (`plane` −1), or an arc or helix of X, Y, Z with the rotary axes (and
+the axis normal to the plane) moving in proportion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, hypot, inf, pi
+
+import numpy as np
+
+from rds.core.errors import InputError
+
+AXES = ("X", "Y", "Z", "A", "B", "C")
+LINE, XY, ZX, YZ = -1, 0, 1, 2  # planes
+EXACT_PATH, EXACT_STOP, BLEND = 0, 1, 2  # modes: G61, G61.1, G64
+
+SEGMENT = np.dtype(
+    [
+        ("line", "i4"),  # of the program
+        ("rapid", "?"),
+        ("plane", "i1"),
+        ("mode", "i1"),
+        ("start", "f8", (6,)),  # X Y Z A B C
+        ("end", "f8", (6,)),
+        ("centre", "f8", (3,)),  # of an arc, X Y Z; its component along the normal is not used
+        ("sweep", "f8"),  # rad, + counter-clockwise seen from the positive end of the plane's normal (Z, Y, X)
+        ("length", "f8"),  # mm in X, Y, Z (of a helix in three dimensions); degrees where only rotary axes move
+        ("rate", "f8"),  # mm/s along the path, degrees/s where only rotary axes move; not used by rapids
+        ("tolerance", "f8"),  # mm, G64 P; inf where no P was given
+        ("collinear", "f8"),  # mm, G64 Q: lines nearer than this to being one are taken as one; 0 where none was given
+    ],
+    align=True,
+)
+
+_IN_PLANE = ((0, 1, 2), (2, 0, 1), (1, 2, 0))  # first, second axis and normal of XY, ZX, YZ
+
+
+def in_plane(plane: int) -> tuple[int, int, int]:
+    """First axis, second axis and normal of an arc's plane, as indices."""
+    return _IN_PLANE[plane]
+
+
+def line(
+    start: Sequence[float],
+    end: Sequence[float],
+    rate: float,
+    *,
+    rapid: bool = False,
+    mode: int = EXACT_PATH,
+    tolerance: float = inf,
+    collinear: float = 0.0,
+    program_line: int = 0,
+) -> np.ndarray:
+    """A straight move (array of one SEGMENT). Positions may leave out axes at the end; `rate` in mm/s or degrees/s."""
+    row = _row(start, end, rate, mode, tolerance, collinear, program_line)
+    row["plane"], row["rapid"] = LINE, rapid
+    row["length"] = length_of_line(row["start"][0], row["end"][0])
+    return row
+
+
+def arc(
+    start: Sequence[float],
+    end: Sequence[float],
+    centre: Sequence[float],
+    rate: float,
+    *,
+    clockwise: bool = False,
+    turns: int = 0,
+    plane: int = XY,
+    mode: int = EXACT_PATH,
+    tolerance: float = inf,
+    program_line: int = 0,
+) -> np.ndarray:
+    """An arc or helix (array of one SEGMENT) about `centre` (X, Y, Z, or the first of them).
+
+    `clockwise` is seen from the positive end of the plane's normal; `turns` are whole turns more; an end equal to the
+    start in the plane is a full circle. Raises InputError when start or end is on the centre.
+    """
+    row = _row(start, end, rate, mode, tolerance, 0.0, program_line)
+    row["plane"] = plane
+    row["centre"][0, : len(centre)] = centre
+    first, second, normal = in_plane(plane)
+    a, b, c = row["start"][0], row["end"][0], row["centre"][0]
+    from_centre = (a[first] - c[first], a[second] - c[second])
+    to_centre = (b[first] - c[first], b[second] - c[second])
+    radius = hypot(*from_centre)
+    if radius == 0.0 or hypot(*to_centre) == 0.0:
+        raise InputError(f"an arc from {tuple(a)} to {tuple(b)} has its centre {tuple(c)} on an end; move the centre")
+    sweep = atan2(to_centre[1], to_centre[0]) - atan2(from_centre[1], from_centre[0])
+    closed = a[first] == b[first] and a[second] == b[second]
+    if clockwise:
+        sweep = -2 * pi if closed else sweep - 2 * pi * (sweep >= 0)
+        sweep -= 2 * pi * turns
+    else:
+        sweep = 2 * pi if closed else sweep + 2 * pi * (sweep <= 0)
+        sweep += 2 * pi * turns
+    row["sweep"] = sweep
+    row["length"] = hypot(radius * sweep, b[normal] - a[normal])
+    return row
+
+
+def length_of_line(start: np.ndarray, end: np.ndarray) -> float:
+    """mm in X, Y, Z; degrees where only rotary axes move."""
+    way = np.asarray(end) - np.asarray(start)
+    return float(np.sqrt(np.sum(way[:3] ** 2)) or np.sqrt(np.sum(way[3:] ** 2)))
+
+
+def point_at(segment: np.ndarray, distance: float) -> np.ndarray:
+    """Where the programmed path is, `distance` mm (degrees) after the start of `segment` (one row): 6 positions.
+
+    On an arc whose end is a little off its circle the radius stays and the difference is spread along it, so that
+    the path ends on the programmed end.
+    """
+    share = distance / segment["length"] if segment["length"] > 0.0 else 1.0
+    start, end = segment["start"], segment["end"]
+    point = start + (end - start) * share
+    if segment["plane"] == LINE:
+        return point
+    first, second, _ = in_plane(int(segment["plane"]))
+    centre = segment["centre"]
+    arm = np.array([start[first] - centre[first], start[second] - centre[second]])
+
+    def turned(angle: float) -> np.ndarray:  # from the start, about the centre
+        lost = 2.0 * np.sin(angle / 2.0) ** 2  # 1 − cos, without cancellation
+        return np.sin(angle) * np.array([-arm[1], arm[0]]) - lost * arm
+
+    off = np.array([end[first] - start[first], end[second] - start[second]]) - turned(float(segment["sweep"]))
+    point[[first, second]] = start[[first, second]] + turned(float(share * segment["sweep"])) + share * off
+    return point
+
+
+def chain(*segments: np.ndarray) -> np.ndarray:
+    """Segments one after the other, as one array."""
+    return np.concatenate(segments) if segments else np.empty(0, SEGMENT)
+
+
+def _row(
+    start: Sequence[float],
+    end: Sequence[float],
+    rate: float,
+    mode: int,
+    tolerance: float,
+    collinear: float,
+    program_line: int,
+) -> np.ndarray:
+    row = np.zeros(1, SEGMENT)
+    row["start"][0, : len(start)] = start
+    row["end"][0, : len(end)] = end
+    row["rate"], row["mode"], row["tolerance"], row["collinear"] = rate, mode, tolerance, collinear
+    row["line"] = program_line
+    return row
