@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -144,9 +146,9 @@ def _drives(interface: str, channel: str | None) -> list[dict[str, Any]]:
     return [
         {
             "id": device.node,
-            "type": device.name or ("drive" if device.is_drive else "device"),
+            "type": device.name or device.kind,
             "dialect": "cia402" if device.is_drive else "canopen",
-            "version": device.revision,
+            "version": device.version,
             "state": device.state.name.lower().replace("_", " ") if device.state is not None else None,
         }
         for device in scan_drives(interface, channel_of(interface, channel))
@@ -265,7 +267,11 @@ def move(
     json: Json = False,
 ) -> None:
     """Move by a distance or to a point, and say where it stands then."""
-    _moved(context, interface, channel, json, lambda module: module.move(by=by, to=to))
+    if (by is None) == (to is None):
+        with refusals():
+            given = "neither is given" if by is None else "both are given"
+            raise _refused(f"{given}: move by a distance with --by, or to a point with --to, as in --by 5")
+    _moved(context, interface, channel, json, lambda module, show: module.move(by=by, to=to, progress=show))
 
 
 @module_app.command(context_settings={"ignore_unknown_options": True})  # or -1 would be taken for an option
@@ -279,23 +285,41 @@ def jog(
     json: Json = False,
 ) -> None:
     """Run for a time, a tool too; it also ends if this command is killed."""
-    _moved(context, interface, channel, json, lambda module: module.jog(direction, seconds, duty))
+    _moved(context, interface, channel, json, lambda module, show: module.jog(direction, seconds, duty))
 
 
 @module_app.command()
 def home(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
     """Find the zero."""
-    _moved(context, interface, channel, json, lambda module: module.home())
+    _moved(context, interface, channel, json, lambda module, show: module.home(progress=show))
 
 
 def _moved(context: typer.Context, interface: str, channel: str | None, json: bool, act: Any) -> None:
     with _moving(context, interface, channel) as module:
-        reached, unit = act(module), module.description.unit
+        unit = module.description.unit
+        with _position(f"module {context.obj}", unit) as show:
+            reached = act(module, show)
     turns = unit == "rev/min"
     if json:
         print_json({"speed" if turns else "position": reached, "unit": unit})
     else:
         typer.echo(f"{'turned at' if turns else 'stands at'} {reached:g} {unit}")
+
+
+@contextmanager
+def _position(name: str, unit: str) -> Iterator[Any]:
+    """What shows where a module stands on its way, and for how long it has been moving: a line on a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda position: None
+        return
+    from time import monotonic
+
+    from rich.console import Console
+    from rich.status import Status
+
+    began = monotonic()
+    with Status(f"{name} moves", console=Console(stderr=True)) as status:
+        yield lambda at: status.update(f"{name} moves: at {at:.1f} {unit} after {monotonic() - began:.0f} s")
 
 
 @module_app.command()
@@ -329,23 +353,40 @@ def step(
         float,
         typer.Option(help="End when it has stood still for so long, s; 0: when the module gives up (3 s) or is there."),
     ] = 1.0,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the record and its plot.")] = Path("step"),
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for the record and its plot; default: a new one, step-1..."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace what is in the folder of --out.")] = False,
     interface: Interface = "rds",
     channel: Channel = None,
     json: Json = False,
 ) -> None:
     """Step the set point, record the response and plot it."""
     with _moving(context, interface, channel) as module, progress_bars() as bar:
+        folder = folder_for(out, force)
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")
+        from rds.commands.step_plot import plot
         from rds.results.files import save_all
 
-        files = {kind: str(path) for kind, path in save_all(result, out).items()}
-        files["plot"] = str(out / "step.png")
-        result.plot().savefig(files["plot"])
+        files = {kind: str(path) for kind, path in save_all(result, folder).items()}
+        files["plot"] = str(folder / "step.png")
+        plot(result).savefig(files["plot"])
     if json:
         print_json({"samples": len(result), "notes": result.meta.get("notes", []), "files": files})
     else:
-        typer.echo(f"{len(result)} samples in {out}")
+        typer.echo(f"{len(result)} samples in {folder}")
         for note in result.meta.get("notes", []):
             typer.echo(f"note: {note}")
+
+
+def folder_for(out: Path | None, force: bool) -> Path:
+    """Where a record goes, looked at before anything moves: a new folder, or the one asked for if nothing is there."""
+    if out is None:
+        if force:
+            raise _refused("--force replaces what is in the folder of --out, which is not given")
+        return next(path for k in count(1) if not (path := Path(f"step-{k}")).exists())
+    if not force and out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise _refused(f"{out}: something is there already; choose another folder, or replace it with --force")
+    return out

@@ -325,3 +325,15 @@ def test_scan(served: Served) -> None:
         (3, True, "RDS simulated axis"),
     ]
     assert found[0].state is State.SWITCH_ON_DISABLED and found[0].product == 0x402
+    assert found[0].version == "1.0"
+
+
+def test_a_scan_beside_a_host_names_it_and_is_quiet(served: Served, caplog: pytest.LogCaptureFixture) -> None:
+    channel, _ = served("X")
+    with can.Bus(interface="virtual", channel=channel) as host:
+        beat = can.Message(arbitration_id=0x700 + 127, is_extended_id=False, data=[Nmt.OPERATIONAL])
+        task = host.send_periodic(beat, 0.02)
+        found = scan("virtual", channel)
+        task.stop()
+    assert [(device.node, device.kind) for device in found] == [(2, "drive"), (127, "host, or a silent device")]
+    assert not caplog.records, "the library's word on requests that nobody answers is none of an error"

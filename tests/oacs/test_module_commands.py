@@ -89,10 +89,13 @@ def test_a_tool_jogs_and_has_no_position(serve: Serve, rds: Rds, said: Rds) -> N
 def test_refusals_say_what_and_why(serve: Serve, rds: Rds) -> None:
     serve("X")
     absent = refused(rds("module", 7, "info"))
-    assert absent.startswith("rds: module 7: the data download is not whole") and "rds scan" in absent
+    assert absent.startswith("rds: module 7: nobody answers with this number") and "rds scan" in absent
     assert "number 99 must be from 2 to 15" in refused(rds("module", 99, "info"))
     assert "outside its travel" in refused(rds("module", 4, "move", "--by", 400))
-    assert "give one of by" in refused(rds("module", 4, "move"))
+    assert "neither is given: move by a distance with --by, or to a point with --to" in refused(
+        rds("module", 4, "move")
+    )
+    assert "both are given" in refused(rds("module", 4, "move", "--by", 1, "--to", 2))
     assert "no tuning parameter 'Kq'" in refused(rds("module", 4, "tune", "--set", "Kq=1"))
     assert "--duti" in refused(rds("module", 4, "jog", "1", "--duti", "0.5"))
     assert "must be NAME=VALUE" in refused(rds("module", 4, "tune", "--set", "Kp"))

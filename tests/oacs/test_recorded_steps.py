@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from pathlib import Path
 
 import can
 import numpy as np
@@ -17,8 +18,11 @@ from rds.bus.oacs.module_data import read_modules
 from rds.bus.oacs.recording import PositionRecorder
 from rds.bus.oacs.talk import Heard
 from rds.bus.oacs.words import Says
+from rds.commands.modules import folder_for
+from rds.commands.step_plot import plot
 from rds.core.errors import InputError
 from rds.machines import load_machine
+from rds.results import Result
 
 X = read_modules(load_machine("mrmt-oacs"))["X"].describe(1)  # 169 counts per mm
 PERIOD = 0.01
@@ -90,3 +94,50 @@ def test_a_step_that_settles_short_of_its_point_ends_early_and_says_so(
     for wrong in (-1.0, float("nan")):
         with pytest.raises(InputError, match=r"settled = .* must be at least 0"):
             x.step(0.5, settled=wrong)
+
+
+def response(measured: np.ndarray) -> Result:
+    time = np.arange(len(measured)) * PERIOD
+    columns = {"time": time, "X_reference": np.full(len(time), measured[-1]), "X_measured": measured}
+    return Result(columns, {"X_reference": "mm", "X_measured": "mm"}, {"axes": ["X"], "sample_period": PERIOD})
+
+
+def legend_of(result: Result) -> str:
+    legend = plot(result).axes[0].get_legend()
+    assert legend is not None
+    return " ".join(text.get_text() for text in legend.get_texts())
+
+
+def test_the_plot_shows_delay_and_time_constant() -> None:
+    ramp = np.clip((np.arange(200) * PERIOD - 0.2) / 0.5, 0.0, 1.0)  # its tangent is the ramp itself
+    assert "delay 200 ms, time constant 500 ms" in legend_of(response(ramp))
+    assert "mean" not in legend_of(response(ramp))
+
+
+def test_the_plot_says_why_there_is_no_tangent() -> None:
+    assert "no delay and time constant: the response overshoots by 30 %" in legend_of(
+        response(np.array([0.0, 0.5, 1.3, *[1.0] * 100]))
+    )
+
+
+def test_a_record_never_replaces_another_unasked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert folder_for(None, False) == Path("step-1")
+    Path("step-1").mkdir()
+    assert folder_for(None, False) == Path("step-2")
+    assert folder_for(Path("step-1"), False) == Path("step-1"), "nothing is in it"
+    Path("step-1/step.png").touch()
+    with pytest.raises(InputError, match=r"step-1: something is there already.*--force"):
+        folder_for(Path("step-1"), False)
+    assert folder_for(Path("step-1"), True) == Path("step-1")
+    with pytest.raises(InputError, match="--force replaces"):
+        folder_for(None, True)
+
+
+@pytest.mark.realtime
+def test_a_motion_tells_where_it_is(serve: Callable[..., subprocess.Popen[str]], bus: can.BusABC) -> None:
+    serve("X")
+    told: list[float] = []
+    reached = Module(bus, 4).move(by=2.0, progress=told.append)
+    assert len(told) >= 5 and told == sorted(told)
+    assert 0.0 <= told[0] < 1.5 and told[-1] == pytest.approx(reached, abs=0.3)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,22 +34,35 @@ class Found:
     product: int | None  # 0x1018:02
     revision: int | None  # 0x1018:03
     state: State | None  # of a drive
+    answers: bool = True  # to SDO requests; a host that sends heartbeats does not
 
     @property
     def is_drive(self) -> bool:
         """Whether it is a CiA 402 drive."""
         return self.profile == _DRIVE
 
+    @property
+    def kind(self) -> str:
+        """What it is, in a word. A run's host, too, is heard by its heartbeats, and answers no request."""
+        if not self.answers:
+            return "host, or a silent device"
+        return "drive" if self.is_drive else "device"
+
+    @property
+    def version(self) -> str | None:
+        """The revision number's halves, major and minor (CiA 301, object 0x1018:03)."""
+        return None if self.revision is None else f"{self.revision >> 16}.{self.revision & 0xFFFF}"
+
 
 def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = _WAIT, **options: Any) -> list[Found]:
-    """The devices that answer an SDO request within `timeout` s, by node-ID; nothing is changed on them.
+    """The devices that answer an SDO request or are heard within `timeout` s, by node-ID; nothing is changed on them.
 
     `options` go to the python-can interface. Raises MachineError naming the devices that share a node-ID, and if
     the bus can't be opened or fails.
     """
     bus = open_bus(interface, channel, [0x580, 0x700], 0x780, node="scan", **options)
     try:
-        with library(bus) as network:
+        with library(bus) as network, _quiet():
             network.scanner.search()
             time.sleep(timeout)
             nodes = sorted(network.scanner.nodes)
@@ -60,10 +76,27 @@ def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = 
         bus.shutdown()
 
 
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the library's own word on each request that nobody answers: here that is no error."""
+    log = logging.getLogger("canopen.sdo.client")
+    before, log.disabled = log.disabled, True
+    try:
+        yield
+    finally:
+        log.disabled = before
+
+
 def _ask(network: canopen.Network, number: int) -> Found:
     node = network.add_node(number, canopen.ObjectDictionary())
     node.sdo.RESPONSE_TIMEOUT = 0.2
-    kind, status, name = _number(node, 0x1000), _number(node, 0x6041), _read(node, 0x1008)
+    try:
+        kind = int.from_bytes(node.sdo.upload(0x1000, 0), "little")
+    except SdoCommunicationError:  # every device has this object: nobody answers
+        return Found(number, None, None, None, None, None, None, answers=False)
+    except SdoAbortedError:
+        kind = None
+    status, name = _number(node, 0x6041), _read(node, 0x1008)
     profile = None if kind is None else kind & 0xFFFF
     return Found(
         node=number,

@@ -109,17 +109,24 @@ def fetch(bus: can.BusABC, node: int, request: can.Message, timeout: float = 1.0
     receiver = Receiver(node)
     wanted = words.DOWNLOAD + node
     bus.send(request, 0.5)
+    heard = False
     deadline = time.monotonic() + timeout
     while (left := deadline - time.monotonic()) > 0:
         message = bus.recv(min(left, 0.05))
         if message is not None and message.arbitration_id == wanted and not message.is_extended_id:
+            heard = True
             receiver.feed(message.data)
         for data in receiver.pump():
             bus.send(can.Message(arbitration_id=words.FLOW + node, is_extended_id=False, data=data), 0.5)
         payload = receiver.result()
         if payload is not None:
             return payload
-    why = receiver.problem or "nothing came"
+    if not heard:
+        raise MachineError(
+            f"nobody answers with this number: nothing came within {timeout:g} s; `rds scan` shows who is "
+            "there, and in which dialect: check channel, power and cable"
+        )
+    why = receiver.problem or "a part is missing"
     raise MachineError(
         f"the data download is not whole after {timeout:g} s ({why}); ask again (`rds scan` shows who is there, and in "
         "which dialect)"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
@@ -14,7 +15,7 @@ from rds.bus.oacs.iso_tp import fetch
 from rds.bus.oacs.link import Conversation, Done
 from rds.bus.oacs.pid import FIELDS, Tuning
 from rds.bus.oacs.recording import PositionRecorder, ReadingsRecorder
-from rds.bus.oacs.refusals import reason
+from rds.bus.oacs.refusals import REASONS, reason
 from rds.bus.oacs.talk import Heard
 from rds.bus.oacs.transfer import ModuleDescription, decode_description
 from rds.bus.oacs.words import (
@@ -25,6 +26,7 @@ from rds.bus.oacs.words import (
     Move,
     Parameter,
     Quantity,
+    Says,
     Select,
 )
 from rds.bus.oacs.words import Result as Ended
@@ -135,15 +137,23 @@ class Module:
 
     # --- motions
 
-    def move(self, by: float | None = None, to: float | None = None, timeout: float | None = None) -> float:
+    def move(
+        self,
+        by: float | None = None,
+        to: float | None = None,
+        timeout: float | None = None,
+        progress: Callable[[float], None] = lambda position: None,
+    ) -> float:
         """Move by a distance or to a point (mm, degrees), wait until it stands, and return where.
 
         `by` is positive clockwise. Raises InputError unless exactly one is given, MachineError if the module refuses,
-        fails, or takes more than `timeout` s (default: by its speed); it is stopped then. A tool has jog() and start().
+        fails, or takes more than `timeout` s (default: by its speed); it is stopped then. `progress` is called with
+        where it stands, ten times a second. A tool has jog() and start().
         """
         self._check_axis("move to a point or by a distance")
         what, answers = self._start(by, to)
-        done = self._link.finish(what, answers, self._patience(by, to) if timeout is None else timeout)
+        with self._followed(progress):
+            done = self._link.finish(what, answers, self._patience(by, to) if timeout is None else timeout)
         return done.counts * self.description.resolution
 
     def start(self, by: float | None = None, to: float | None = None) -> None:
@@ -184,12 +194,16 @@ class Module:
         self._link.command(what, Acknowledges.JOG, Value=value, Argument=time, **fields)
         return self._link.finish(what, Acknowledges.JOG, seconds + 5.0).counts * self.description.resolution
 
-    def home(self, timeout: float | None = None) -> float:
-        """Find the zero at the lower limit switch (an axis without switches: it is here); return where it stands."""
+    def home(self, timeout: float | None = None, progress: Callable[[float], None] = lambda position: None) -> float:
+        """Find the zero at the lower limit switch (an axis without switches: it is here); return where it stands.
+
+        `progress` is called as by move(); positions count from the new zero once it is found.
+        """
         d = self.description
         seconds = timeout if timeout is not None else self._time(d.highest - d.lowest) * 2.0
         self._link.command("to home", Acknowledges.HOME, Code=Code.MOVE, Move=Move.HOME)
-        return self._link.finish("to home", Acknowledges.HOME, seconds).counts * d.resolution
+        with self._followed(progress):
+            return self._link.finish("to home", Acknowledges.HOME, seconds).counts * d.resolution
 
     def reset_emergency(self) -> Done:
         """Release the latch of the emergency stop."""
@@ -261,6 +275,30 @@ class Module:
 
     # --- parts
 
+    @contextmanager
+    def _followed(self, progress: Callable[[float], None]) -> Iterator[None]:
+        """`progress` hears of the positions that the module tells of its motion."""
+
+        def listen(heard: Heard) -> None:
+            fields = heard.message.fields
+            if heard.message.kind == "Reply" and fields["Code"] == Says.POSITION:
+                progress(fields["Position"] * self.description.resolution)
+
+        self._link.listen = listen
+        try:
+            yield
+        finally:
+            self._link.listen = lambda heard: None
+
+    def _travel(self, error: MachineError) -> MachineError:
+        """A refusal with the module's travel in it, if that is what it is about."""
+        d, text = self.description, str(error)
+        if REASONS[Ended.OUTSIDE_TRAVEL] not in text:
+            return error
+        what = "speed" if d.kind == Kind.TOOL else "travel"
+        inside = f"that is outside its {what}, {d.lowest:g} to {d.highest:g} {d.unit}; choose a target inside"
+        return MachineError(text.replace(REASONS[Ended.OUTSIDE_TRAVEL], inside))
+
     def _check_axis(self, what: str) -> None:
         if self.description.kind == Kind.TOOL:
             raise InputError(
@@ -275,6 +313,12 @@ class Module:
         return self.stop().counts * self.description.resolution
 
     def _start(self, by: float | None, to: float | None) -> tuple[str, Acknowledges]:
+        try:
+            return self._begin(by, to)
+        except MachineError as error:
+            raise self._travel(error) from error.__cause__
+
+    def _begin(self, by: float | None, to: float | None) -> tuple[str, Acknowledges]:
         d = self.description
         amount = to if by is None else by
         if amount is None or (by is not None and to is not None):
