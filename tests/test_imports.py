@@ -24,6 +24,7 @@ ALLOWED: dict[str, set[str]] = {
     "interface": {"core"},
     "machines": {"core"},
     "motion": {"core", "machines"},
+    "nc": {"core", "machines", "motion", "results"},  # see ONLY
     "checks": {"core"},
     "bus": {"core", "machines", "models", "runtime", "results"},  # see ONLY
     "runtime": {"core", "interface", "machines"},
@@ -40,6 +41,7 @@ ONLY = {
     ("bus", "runtime"): {"rds.runtime.scheduling"},  # hub and machine are on time as well
     # what a [bus] table may say
     ("experiment", "bus"): {"rds.bus.bus_settings", "rds.bus.dialects", "rds.bus.fault_file"},
+    ("nc", "results"): {"rds.results.atomic", "rds.results.figure"},  # compiled programs, pictures
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     ("reports", "bus"): {"rds.bus.frames", "rds.bus.logs"},  # which frames are commands and answers; their logs
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record

@@ -1,0 +1,323 @@
+"""From canonical calls to machine motion: offsets, units, planes and feed modes become segments and events.
+
+A position of the program becomes one of the machine as in LinuxCNC (emccanon.cc): program units to mm, plus the G92
+offset, turned about Z by the rotation of the coordinate system, plus the system's origin (G54 to G59.3), plus the tool
+length offset. The motion begins with all axes at machine zero, in G64 without P, as LinuxCNC starts up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+
+from rds.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT
+from rds.nc.canon import RATE, Call, MotionBlock
+from rds.nc.errors import ProgramError
+from rds.nc.frame import Frame, only_rotary, segments_of
+
+BLOCK_SEGMENTS = 65536  # a PathBlock is handed on when it has at least so many
+MODES = {"EXACT_PATH": EXACT_PATH, "EXACT_STOP": EXACT_STOP, "CONTINUOUS": BLEND}
+# Calls that say nothing to axes and spindle. A pallet shuttle (M60, M30) comes with a stop or the end.
+WITHOUT_EFFECT = {"COMMENT", "MESSAGE", "ON_RESET", "SET_FEED_REFERENCE", "START_CHANGE", "PALLET_SHUTTLE"}
+
+Report = Callable[[ProgramError], None]
+
+
+class Event(NamedTuple):
+    """What happens after the segment `after` of its block (−1: before the first), by the program's line `line`.
+
+    Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0, M60) or 1 (M1, optional);
+    "tool" its number; "coolant" "flood on", "flood off", "mist on" or "mist off"; "end" 0 (M2, M30, or the last line).
+    """
+
+    after: int
+    kind: str
+    value: float | str
+    line: int
+
+
+@dataclass(frozen=True)
+class PathBlock:
+    """Segments (dtype SEGMENT) in machine coordinates, and the events among them, all of one file and one tool.
+
+    `feed_lines` gives for each segment the line whose word F it obeys (0: one in another file).
+    """
+
+    segments: np.ndarray
+    events: list[Event] = field(default_factory=list)
+    file: str = ""
+    tool: int = 0
+    feed_lines: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+
+    def __len__(self) -> int:
+        return len(self.segments)
+
+
+def raise_it(fault: ProgramError) -> NoReturn:
+    """The default report: the first fault ends it."""
+    raise fault
+
+
+def toolpath(
+    items: Iterable[MotionBlock | Call],
+    *,
+    report: Report = raise_it,
+) -> Iterator[PathBlock]:
+    """The machine's motion for a stream of canonical calls, block by block; memory does not grow with its length.
+
+    What no machine can do (an arc in a plane that the rotation tilts, a feed per revolution of a standing spindle, a
+    call that nothing here carries out) goes to `report` as a ProgramError; if that returns, the path goes on.
+    """
+    converter = _Converter(report)
+    for item in items:
+        if isinstance(item, MotionBlock):
+            converter.take(item)
+        else:
+            converter.call(item)
+        yield from converter.ready()
+    converter.end()
+    yield from converter.ready()
+
+
+class _Converter:
+    """Gathers rows while nothing changes that matters to them, then makes segments of them at once."""
+
+    def __init__(self, report: Report):
+        self._report = report
+        self._frame = Frame()
+        self._mode, self._tolerance, self._collinear = BLEND, inf, 0.0
+        self._per_revolution = False
+        self._speed = 0.0  # rev/min, as last said
+        self._turning = 0  # +1 clockwise, −1 counter-clockwise
+        self._tool = self._selected = 0
+        self._position = np.zeros(6)
+        self._rate = (0.0, 0.0)  # program units/min (per revolution) and mm/min
+        self._rate_line = 0
+        self._file = ""
+        self._rows: list[np.ndarray] = []
+        self._segments: list[np.ndarray] = []
+        self._feed_lines: list[np.ndarray] = []
+        self._count = self._waiting = 0
+        self._events: list[Event] = []
+        self._done: list[PathBlock] = []
+        self._last_line = 0
+        self._ended = False
+
+    def ready(self) -> Iterator[PathBlock]:
+        if self._waiting >= BLOCK_SEGMENTS:
+            self._convert()
+        if self._count >= BLOCK_SEGMENTS:
+            self._hand_on()
+        yield from self._done
+        self._done.clear()
+
+    def end(self) -> None:
+        """A program without M2 or M30 ends with its last line."""
+        self._convert()
+        if not self._ended:
+            self._event("end", 0.0, self._last_line)
+        self._hand_on()
+
+    def take(self, block: MotionBlock) -> None:
+        self._in_file(block.file)
+        self._rows.append(block.rows)
+        self._waiting += len(block.rows)
+        if len(block.rows):
+            self._last_line = int(block.rows["line"][-1])
+
+    def call(self, call: Call) -> None:
+        if call.file:
+            self._in_file(call.file)
+        self._last_line = call.line or self._last_line
+        if call.name in WITHOUT_EFFECT:
+            return
+        self._convert()
+        action = _ACTIONS.get(call.name)
+        if action is None:
+            self._fault(call, f"{call.name} is nothing that a machine here can do; leave its word out")
+        else:
+            action(self, call)
+
+    def _in_file(self, name: str) -> None:
+        if name != self._file:
+            self._convert()
+            self._hand_on()
+            self._file = name
+            self._rate_line = 0
+
+    def _fault(self, call: Call, message: str) -> None:
+        self._report(ProgramError(message, file=call.file or self._file, line=call.line))
+
+    def _event(self, kind: str, value: float | str, line: int) -> None:
+        self._events.append(Event(self._count - 1, kind, value, line))
+
+    def _hand_on(self) -> None:
+        if self._segments or self._events:
+            segments = np.concatenate(self._segments) if self._segments else np.zeros(0, SEGMENT)
+            feed_lines = np.concatenate(self._feed_lines) if self._feed_lines else np.zeros(0, np.int32)
+            self._done.append(PathBlock(segments, self._events, self._file, self._tool, feed_lines))
+        self._segments, self._feed_lines, self._events, self._count = [], [], [], 0
+
+    def _convert(self) -> None:
+        """The rows that wait become segments."""
+        if not self._rows:
+            return
+        rows = np.concatenate(self._rows) if len(self._rows) > 1 else self._rows[0]
+        self._rows, self._waiting = [], 0
+        rates, angular, rate_lines = self._rates(rows)
+        moves = rows["kind"] != RATE
+        rows, rates, angular, rate_lines = rows[moves], rates[moves], angular[moves], rate_lines[moves]
+        if not len(rows):
+            return
+        segments, tilted = segments_of(rows, self._position, self._frame)
+        self._position = segments["end"][-1].copy()
+        segments["rate"] = np.where(only_rotary(segments), angular, rates)
+        segments["mode"], segments["tolerance"], segments["collinear"] = self._mode, self._tolerance, self._collinear
+        for line in segments["line"][tilted]:
+            self._report(
+                ProgramError(
+                    f"an arc of {self._frame.plane_word} lies in no plane of the machine's axes while the coordinate "
+                    f"system is turned by {self._frame.rotation:g} degrees about Z; turn it back (G10 L2 R0), or make "
+                    "the arc of short lines",
+                    file=self._file,
+                    line=int(line),
+                )
+            )
+        moving = segments["length"] > 0.0
+        still = moving & ~segments["rapid"] & ~(segments["rate"] > 0.0)
+        if still.any():
+            self._no_feed(int(segments["line"][np.argmax(still)]))
+        self._segments.append(segments[moving])
+        self._feed_lines.append(rate_lines[moving])
+        self._count += int(moving.sum())
+
+    def _no_feed(self, line: int) -> None:
+        if self._per_revolution and not self._turning:
+            message = "a feed per revolution (G95) while the spindle stands still moves nothing; start it (S, M3)"
+        elif self._per_revolution and not self._speed:
+            message = "a feed per revolution (G95) at S0 moves nothing; give a spindle speed before"
+        else:
+            message = "the move has no feed rate; give one (F) in this line or before it"
+        self._report(ProgramError(message, file=self._file, line=line))
+
+    def _rates(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of each row: mm/s, degrees/s for moves of rotary axes alone, and the line of its word F."""
+        given = rows["kind"] == RATE
+        last = np.maximum.accumulate(np.where(given, np.arange(1, len(rows) + 1), 0))  # 0: from before
+        plain = np.concatenate(([self._rate[0]], rows["values"][:, 0]))[last]
+        linear = np.concatenate(([self._rate[1]], rows["values"][:, 0] * self._frame.unit))[last]
+        lines = np.concatenate(([self._rate_line], rows["line"])).astype(np.int32)[last]
+        self._rate, self._rate_line = (float(plain[-1]), float(linear[-1])), int(lines[-1])
+        scale = (self._speed * abs(self._turning) if self._per_revolution else 1.0) / 60.0
+        return linear * scale, plain * scale, lines
+
+    # what single calls do
+
+    def _units(self, call: Call) -> None:
+        self._frame.set_units(call.args[0])
+
+    def _plane(self, call: Call) -> None:
+        self._frame.plane = call.args[0]
+
+    def _g5x(self, call: Call) -> None:
+        self._frame.set_origin(call.args[0], call.args[1:7])
+
+    def _g92(self, call: Call) -> None:
+        self._frame.set_g92(call.args)
+
+    def _rotate(self, call: Call) -> None:
+        self._frame.rotation = float(call.args[0])
+
+    def _tool_length(self, call: Call) -> None:
+        self._frame.set_tool_length(call.args)
+
+    def _motion_mode(self, call: Call) -> None:
+        self._mode = MODES[call.args[0]]
+        given = float(call.args[1]) * self._frame.unit if len(call.args) > 1 else 0.0
+        self._tolerance = given if self._mode == BLEND and given > 0.0 else inf
+        if self._mode != BLEND:
+            self._collinear = 0.0
+
+    def _naive_cam(self, call: Call) -> None:
+        self._collinear = float(call.args[0]) * self._frame.unit
+
+    def _feed_mode(self, call: Call) -> None:
+        self._per_revolution = bool(call.args[-1])
+
+    def _dwell(self, call: Call) -> None:
+        self._event("dwell", float(call.args[0]), call.line)
+
+    def _set_speed(self, call: Call) -> None:
+        self._speed = float(call.args[-1])
+        if self._turning:
+            self._spin(call.line)
+
+    def _clockwise(self, call: Call) -> None:
+        self._turning = 1
+        self._spin(call.line)
+
+    def _counterclockwise(self, call: Call) -> None:
+        self._turning = -1
+        self._spin(call.line)
+
+    def _spin(self, line: int) -> None:
+        self._event("spindle", self._turning * self._speed, line)
+
+    def _stop_spindle(self, call: Call) -> None:
+        if self._turning:
+            self._turning = 0
+            self._event("spindle", 0.0, call.line)
+
+    def _spindle_mode(self, call: Call) -> None:
+        if call.args[-1]:
+            self._fault(call, "a constant surface speed (G96) is nothing that the spindle here can keep; use G97 and S")
+
+    def _select(self, call: Call) -> None:
+        self._selected = int(call.args[0])
+
+    def _change(self, call: Call) -> None:
+        self._hand_on()
+        self._tool = self._selected  # its argument is the row of the tool table
+        self._event("tool", float(self._tool), call.line)
+
+    def _stop(self, call: Call) -> None:
+        self._event("stop", 1.0 if call.name.startswith("OPTIONAL") else 0.0, call.line)
+
+    def _coolant(self, call: Call) -> None:
+        self._event("coolant", call.name.replace("_", " ").lower(), call.line)
+
+    def _end(self, call: Call) -> None:
+        self._event("end", 0.0, call.line)
+        self._ended = True
+
+
+_ACTIONS: dict[str, Callable[[_Converter, Call], Any]] = {
+    "USE_LENGTH_UNITS": _Converter._units,
+    "SELECT_PLANE": _Converter._plane,
+    "SET_G5X_OFFSET": _Converter._g5x,
+    "SET_G92_OFFSET": _Converter._g92,
+    "SET_XY_ROTATION": _Converter._rotate,
+    "USE_TOOL_LENGTH_OFFSET": _Converter._tool_length,
+    "SET_MOTION_CONTROL_MODE": _Converter._motion_mode,
+    "SET_NAIVECAM_TOLERANCE": _Converter._naive_cam,
+    "SET_FEED_MODE": _Converter._feed_mode,
+    "DWELL": _Converter._dwell,
+    "SET_SPINDLE_SPEED": _Converter._set_speed,
+    "START_SPINDLE_CLOCKWISE": _Converter._clockwise,
+    "START_SPINDLE_COUNTERCLOCKWISE": _Converter._counterclockwise,
+    "STOP_SPINDLE_TURNING": _Converter._stop_spindle,
+    "SET_SPINDLE_MODE": _Converter._spindle_mode,
+    "SELECT_TOOL": _Converter._select,
+    "CHANGE_TOOL": _Converter._change,
+    "PROGRAM_STOP": _Converter._stop,
+    "OPTIONAL_PROGRAM_STOP": _Converter._stop,
+    "FLOOD_ON": _Converter._coolant,
+    "FLOOD_OFF": _Converter._coolant,
+    "MIST_ON": _Converter._coolant,
+    "MIST_OFF": _Converter._coolant,
+    "PROGRAM_END": _Converter._end,
+}
