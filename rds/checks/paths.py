@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from math import hypot, pi
-
 import numpy as np
 
+from rds.core.geometry import radius, sweep
 from rds.core.types import ArcSegment, LineSegment, Segment
 
 FEED = 20.0  # mm/s
@@ -25,29 +24,6 @@ def name_of(segment: Segment) -> str:
         return f"a LineSegment of {n} {'axes' if n > 1 else 'axis'}"
     direction = "clockwise" if segment.clockwise else "counter-clockwise"
     return f"an ArcSegment ({direction}, {abs(np.degrees(sweep(segment))):.0f}°)"
-
-
-def length(segment: Segment) -> float:
-    """Length of the path, mm."""
-    if isinstance(segment, LineSegment):
-        return float(np.linalg.norm(np.subtract(segment.end, segment.start)))
-    return radius(segment) * abs(sweep(segment))
-
-
-def radius(segment: ArcSegment) -> float:
-    """mm."""
-    i, j = segment.plane
-    return hypot(segment.start[i] - segment.centre[i], segment.start[j] - segment.centre[j])
-
-
-def sweep(segment: ArcSegment) -> float:
-    """Angle from start to end, rad: positive counter-clockwise; a full turn where the end is the start."""
-    i, j = segment.plane
-    start, end = (
-        np.arctan2(point[j] - segment.centre[j], point[i] - segment.centre[i]) for point in (segment.start, segment.end)
-    )
-    turn = float((end - start) % (2 * pi)) or 2 * pi
-    return turn if not segment.clockwise else turn - 2 * pi if turn < 2 * pi else -turn
 
 
 def swept(segment: ArcSegment, positions: np.ndarray) -> float:
