@@ -11,12 +11,13 @@ it overshoots less, and with c = 0 it gives no derivative kick. The price is a f
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from math import exp
 from typing import Any
 
 from rds.controllers.axis_data import axis_data
 from rds.controllers.tuning import pid_gains, set_point_weight
-from rds.controllers.words import BIAS, ERROR_LIMITS, FILTER, GAINS, OUTPUT_LIMIT, limit_or_none, output_limit
+from rds.controllers.words import BIAS, ERROR_LIMITS, FILTER, GAINS, OUTPUT_LIMIT, limit_or_none, output_limit, retuned
 from rds.core.options import Option, read_options
 from rds.core.types import Controller, Reference, Source
 
@@ -82,4 +83,6 @@ def make(
         limit_or_none(gains["maxerrorI"]),
         output_limit(gains["maxoutput"], axis.converter_range),
     )
-    return Controller(control, (0.0, 0.0, 0.0, 0.0), gains | {"coefficients": coefficients}, Source(NAME))
+    retune = partial(retuned, make, dict(axis_model), T, converter_range, unit)
+    params = gains | {"coefficients": coefficients}
+    return Controller(control, (0.0, 0.0, 0.0, 0.0), params, Source(NAME), tunable=OPTIONS, retune=retune)

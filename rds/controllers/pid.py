@@ -17,6 +17,7 @@ count in the integral.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from math import exp
 from typing import Any
 
@@ -32,6 +33,7 @@ from rds.controllers.words import (
     OUTPUT_LIMIT,
     limit_or_none,
     output_limit,
+    retuned,
 )
 from rds.core.options import read_options
 from rds.core.types import Controller, Reference, Source
@@ -111,4 +113,6 @@ def make(
         *(limit_or_none(gains[name]) for name in ("maxerror", "maxerrorI", "maxerrorD")),
         output_limit(gains["maxoutput"], axis.converter_range),
     )
-    return Controller(control, (0.0, 0.0, 0.0, 0.0), gains | {"coefficients": coefficients}, Source(NAME))
+    retune = partial(retuned, make, dict(axis_model), T, converter_range, unit)
+    params = gains | {"coefficients": coefficients}
+    return Controller(control, (0.0, 0.0, 0.0, 0.0), params, Source(NAME), tunable=OPTIONS, retune=retune)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from rds.controllers.axis_data import axis_data
 from rds.controllers.tuning import proportional_gain
-from rds.controllers.words import BIAS, GAINS, OUTPUT_LIMIT, output_limit
+from rds.controllers.words import BIAS, GAINS, OUTPUT_LIMIT, output_limit, retuned
 from rds.core.options import read_options
 from rds.core.types import Controller, Reference, Source
 
@@ -44,4 +45,6 @@ def make(
     axis = axis_data(axis_model, T, converter_range, unit, owner)
     gains = {"Pgain": proportional_gain(axis), "bias": 0.0, "maxoutput": 0.0} | given
     coefficients = (gains["Pgain"], gains["bias"], output_limit(gains["maxoutput"], axis.converter_range))
-    return Controller(control, (0.0,), gains | {"coefficients": coefficients}, Source(NAME))
+    retune = partial(retuned, make, dict(axis_model), T, converter_range, unit)
+    params = gains | {"coefficients": coefficients}
+    return Controller(control, (0.0,), params, Source(NAME), tunable=OPTIONS, retune=retune)

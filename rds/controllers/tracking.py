@@ -9,6 +9,7 @@ axis really gets. Friction is not in the law. In steady motion it leaves an erro
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from rds.controllers import observer
@@ -21,6 +22,7 @@ NAME = "tracking"
 OPTIONS = ("poles", "observer_pole", "gains")
 POLES = ((-32.0, 24.0), (-32.0, -24.0))  # 1/s: the paper's, settling in 0.125 s
 OBSERVER_POLE = -320.0  # 1/s: the paper's
+TUNABLE = {"g1": Option("position gain, 1/s²"), "g2": Option("velocity gain, 1/s")}
 
 
 def law(position, velocity, acceleration, y, state, c):
@@ -76,7 +78,17 @@ def make(
     L, F, G, H = observer.coefficients(axis.tau, axis.K, pole, axis.T)
     readable = {"g1": g1, "g2": g2, "L": L, "F": F, "G": G, "H": H, "observer_pole": pole}
     coefficients = (1.0 / axis.K, axis.tau / axis.K, g1, g2, L, F, G, H, axis.converter_range)
-    return Controller(control, (0.0, 0.0), readable | {"coefficients": coefficients}, Source(NAME))
+    params = readable | {"coefficients": coefficients}
+    retune = partial(_retuned, dict(axis_model), T, converter_range, pole)
+    return Controller(control, (0.0, 0.0), params, Source(NAME), tunable=TUNABLE, retune=retune)
+
+
+def _retuned(
+    axis_model: Mapping[str, Any], T: float, converter_range: float, pole: float, values: Mapping[str, float]
+) -> Mapping[str, Any]:
+    """The parameters after the gains were changed while it runs. The observer stays: its state is made for its pole."""
+    gains = [values["g1"], values["g2"]]
+    return make(axis_model, T, converter_range, gains=gains, observer_pole=pole).params
 
 
 def _check_sampled(axis: AxisData, g1: float, g2: float, owner: str) -> None:
@@ -107,6 +119,6 @@ def _gains(options: Mapping[str, Any], tau: float, owner: str) -> tuple[float, f
     if not isinstance(gains, list | tuple) or len(gains) != 2:
         raise InputError(f"{owner}: gains = {gains!r} must be [g1, g2], in 1/s² and 1/s")
     return (
-        Option("position gain, 1/s²").check(gains[0], "gains[0]", owner),
-        Option("velocity gain, 1/s").check(gains[1], "gains[1]", owner),
+        TUNABLE["g1"].check(gains[0], "gains[0]", owner),
+        TUNABLE["g2"].check(gains[1], "gains[1]", owner),
     )

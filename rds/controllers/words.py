@@ -5,9 +5,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from math import inf
+from typing import Any
 
 from rds.core.options import Option
+from rds.core.types import Controller
 
 GAINS = {
     "Pgain": Option("proportional gain, V/mm", at_least=0.0),
@@ -38,3 +41,15 @@ def limit_or_none(value: float) -> float:
 def output_limit(maxoutput: float, converter_range: float) -> float:
     """The voltage at which a law's output saturates: the converter's range, or less if `maxoutput` asks for less."""
     return min(limit_or_none(maxoutput), converter_range)
+
+
+def retuned(
+    make: Callable[..., Controller],
+    axis_model: Mapping[str, Any],
+    T: float,
+    converter_range: float,
+    unit: str,
+    values: Mapping[str, float],
+) -> Mapping[str, Any]:
+    """The parameters of a law after its options were changed while it runs: those that `make` gives with `values`."""
+    return make(axis_model, T, converter_range, unit=unit, **values).params

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+from rds.core.options import Option
+
 
 class Reference(NamedTuple):
     """What the axis should do at one sample; arrays in axis order for a controller of several axes."""
@@ -65,6 +67,9 @@ class Controller:
     `control(t, r, y, state, params) -> (voltage, next_state)`: time s, `Reference`, measured position,
     the state it returned last, its parameters; voltage in V. All its memory is in `state`.
     With `coupled`, one law drives all axes: reference, position and voltage are arrays in axis order.
+    `tunable` are those of its parameters that may be changed while it runs, with what each means and its bounds, and
+    `retune(values of all of them)` gives the parameters that follow from new values, or raises InputError. Without
+    `retune`, any number in `params` may be changed and is handed to `control` as it is.
     """
 
     control: Callable[..., tuple[Any, Any]]
@@ -72,6 +77,8 @@ class Controller:
     params: Mapping[str, Any] = field(default_factory=dict)
     source: Source = Source("user-defined")
     coupled: bool = False
+    tunable: Mapping[str, Option] = field(default_factory=dict)
+    retune: Callable[[Mapping[str, float]], Mapping[str, Any]] | None = None
 
 
 @dataclass(frozen=True)

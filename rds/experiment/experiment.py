@@ -13,11 +13,16 @@ from rds.core.errors import ContractError, MachineError, RdsError
 from rds.core.types import Ending
 from rds.experiment.outcome import outcome
 from rds.experiment.resolve import resolve
+from rds.experiment.run import Run
 from rds.experiment.words import Words
 from rds.modes import load_mode
 from rds.modes.host import Progress, Rows, run_plan
+from rds.modes.live import Live
 from rds.results import Result
+from rds.runtime.changes import FILE as CHANGES
+from rds.runtime.changes import as_text
 from rds.runtime.plan import Plan
+from rds.runtime.record import write_whole
 
 
 class Experiment:
@@ -102,25 +107,56 @@ class Experiment:
 
     def plan(self, mode: str | None = None) -> Plan:
         """What would run: every part made and checked. Raises InputError for what will not do."""
-        return resolve(self._words, self._folder, mode)[0]
+        return self._resolve(mode)[0]
 
     def run(
-        self, mode: str | None = None, *, out: str | Path | None = None, progress: Progress | None = None
+        self,
+        mode: str | None = None,
+        *,
+        out: str | Path | None = None,
+        progress: Progress | None = None,
+        changes: Iterable[Any] = (),
     ) -> Result:
         """Run in `mode` (default: the experiment's own) and return the result.
 
         With `out`, the result is saved in that folder (CSV, MAT, Parquet); a real-time run keeps its raw record
         there while it runs, and in a new folder under `runs/` where none is given. `progress(samples taken, samples
-        in all)` is called now and then.
+        in all)` is called now and then. `changes` of live values, as (time in s, name, value), are made at their times;
+        those of an earlier run are in its `meta["changes"]`, and repeat it in a simulation sample for sample.
 
         Raises ContractError if the student's code breaks its contract or raises, and MachineError if the machine
         was never there; the samples of a real-time run are kept in its record. A run that ended early for another
         reason says so in the result's `meta["ending"]`.
         """
-        plan, known = resolve(self._words, self._folder, mode)
-        real_time = load_mode(plan.mode).real_time
-        folder = Path(out) if out is not None else (new_folder(plan) if real_time else None)
-        rows = self._rows(plan, folder, progress)
+        run = self._prepared(mode, out, changes)
+        return run.start().wait(progress) if load_mode(run.plan.mode).real_time else run.here(progress)
+
+    def start(self, mode: str | None = None, *, out: str | Path | None = None, changes: Iterable[Any] = ()) -> Run:
+        """Begin to run in `mode`, and return at once: a handle on the run, which can be watched, changed and stopped.
+
+            run = experiment.start("emulation")
+            run.ready()
+            run.desk.set("X.Pgain", 30.0)
+            result = run.wait()
+
+        `out` and `changes` as for `run`. Raises InputError for what will not do; the run's own errors come from
+        `wait()`. A simulation takes no more time than it needs, so there is little to watch in it.
+        """
+        return self._prepared(mode, out, changes).start()
+
+    def _prepared(self, mode: str | None, out: str | Path | None, changes: Iterable[Any]) -> Run:
+        plan, known = self._resolve(mode)
+        plan = plan.with_changes(changes)
+        folder = Path(out) if out is not None else (new_folder(plan) if load_mode(plan.mode).real_time else None)
+
+        def work(live: Live | None, progress: Progress | None) -> Result:
+            return self._finished(plan, known, self._rows(plan, folder, progress, live), folder, out)
+
+        return Run(plan, folder, work)
+
+    def _finished(
+        self, plan: Plan, known: dict[str, Any], rows: Rows, folder: Path | None, out: str | Path | None
+    ) -> Result:
         if rows.ending is Ending.FAULT:
             kept = f" (the samples up to then are in {folder})" if len(rows.values) else ""
             raise ContractError(f"{rows.reason}{kept}")
@@ -129,18 +165,23 @@ class Experiment:
         result = outcome(plan, rows, known)
         if out is not None:
             result.save(out)
+            if rows.changes:
+                write_whole(Path(out) / CHANGES, as_text(rows.changes).encode())
         return result
 
-    def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None) -> Rows:
+    def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
+        return resolve(self._words, self._folder, mode)
+
+    def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None, live: Live | None) -> Rows:
         note = None
         if self._words.flag("compiled", False):
             from rds.experiment.compiled import obstacle, run_compiled
 
-            note = obstacle(plan)
+            note = obstacle(plan) or (None if live is None else "somebody may change it while it runs")
             if note is None:
                 return run_compiled(plan)
             note = f"not compiled: {note}"
-        rows = run_plan(plan, folder, progress)
+        rows = run_plan(plan, folder, progress, live)
         return replace(rows, notes=(note,)) if note else rows
 
 

@@ -31,7 +31,7 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     columns, units = table(rows.columns, rows.units, rows.values, plan.T)
     sample = rows.values[:, 0].astype(np.int64)
     if mode.followed and plan.controlled:
-        columns |= _simulated(plan, sample)
+        columns |= _simulated(plan, rows, sample)
     meta = _description(plan, rows) | known
     if mode.real_time:
         meta |= _judged(plan, rows, sample)
@@ -40,10 +40,11 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     return Result(columns, units, meta)
 
 
-def _simulated(plan: Plan, sample: np.ndarray) -> dict[str, np.ndarray]:
+def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
     """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
-    rows = run_plan(replace(plan, mode="simulation", samples=int(sample[-1]) + 1), None)
-    of = dict(zip(rows.columns, rows.values.T, strict=True))
+    same = replace(plan, mode="simulation", samples=int(sample[-1]) + 1).with_changes(rows.changes)
+    simulated = run_plan(same, None)
+    of = dict(zip(simulated.columns, simulated.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
 
 
@@ -92,6 +93,7 @@ def _description(plan: Plan, rows: Rows) -> dict[str, Any]:
         "model": {p.axis.name: _part(p.model.source, p.model.params) for p in plan.axes},
         "ending": str(rows.ending),
         "ending_reason": rows.reason,
+        "changes": [list(change) for change in rows.changes],
         "notes": list(rows.notes),
         "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
         "versions": _versions(),

@@ -24,7 +24,10 @@ from rds.core.errors import ContractError, InputError
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.blame import fault
+from rds.modes.live import Live
 from rds.modes.machine import machine_behind
+from rds.runtime.changes import Change, read_changes, timed
+from rds.runtime.desk import Desk
 from rds.runtime.plan import Plan, dump
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
 from rds.runtime.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
@@ -49,10 +52,13 @@ class Rows:
     reason: str
     report: dict[str, Any]
     notes: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()  # of live values
 
 
-def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = None) -> Rows:
+def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = None, live: Live | None = None) -> Rows:
     """Run a plan in its mode. A real-time run keeps its raw record in `directory` (made if it doesn't exist).
+
+    `live` shows the run to others while it goes on, and lets them change its live values.
 
     Raises InputError or ContractError for what a simulated run finds wrong in a student's code; a real-time run
     reports it in its ending.
@@ -60,29 +66,38 @@ def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = Non
     if load_mode(plan.mode).real_time:
         assert directory is not None
         with machine_behind(plan) as reached:
-            return _in_target(reached, directory, progress)
-    return _here(plan, progress)
+            return _in_target(reached, directory, progress, live or Live())
+    return _here(plan, progress, live)
 
 
-def _here(plan: Plan, progress: Progress | None) -> Rows:
+def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     """A simulation, in this process and in virtual time."""
     mode = load_mode(plan.mode)
     columns, units = plan.columns(mode.followed)
     recorded = array("d")
     loop = replace(mode.build(plan, None), record=recorded.extend)
+    heed = loop.heed
+    assert heed is not None
+    attached: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
+    if live is not None:
+        heed.desk = Desk.create(None, plan.channels())
+        attached = live.attach(plan, heed.desk, columns, units, recorded=recorded)
+    elif heed.is_idle:
+        loop = replace(loop, heed=None)
     ending = None
     try:
-        while ending is None:
-            ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
-            if progress:
-                progress(loop.k, plan.samples)
+        with attached:
+            while ending is None:
+                ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+                if progress:
+                    progress(loop.k, plan.samples)
     except STUDENT_ERRORS as error:
         raise ContractError(fault(plan, error, loop.k)) from error
     values = np.frombuffer(recorded).reshape(-1, len(columns))
-    return Rows(columns, units, values, ending, "", {})
+    return Rows(columns, units, values, ending, "", {}, changes=tuple(timed(heed.taken, plan.T)))
 
 
-def _in_target(plan: Plan, directory: Path, progress: Progress | None) -> Rows:
+def _in_target(plan: Plan, directory: Path, progress: Progress | None, live: Live) -> Rows:
     """A real-time run, in a target process that a recorder starts."""
     columns, units = plan.columns(load_mode(plan.mode).followed)
     columns[1:1] = TIMING_COLUMNS
@@ -90,23 +105,31 @@ def _in_target(plan: Plan, directory: Path, progress: Progress | None) -> Rows:
     data = _dumped(plan)
     with _folder(directory) as lock:
         write_whole(directory / PLAN, data)
-        has_rows = _recorded(plan, directory, columns, units, lock, progress)
+        has_rows = _recorded(plan, directory, columns, units, lock, progress, live)
         report = read_ending(directory, ENDING if has_rows else UNSTARTED)
         ending, reason = Ending(report["ending"]), report.get("reason", "")
         if has_rows:
-            return Rows(columns, units, read_raw(directory)[1], ending, reason, report)
+            values, changes = read_raw(directory)[1], tuple(read_changes(directory))
+            return Rows(columns, units, values, ending, reason, report, changes=changes)
         (directory / UNSTARTED).unlink()
         return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
 
 
 def _recorded(
-    plan: Plan, directory: Path, columns: list[str], units: dict[str, str], lock: int, progress: Progress | None
+    plan: Plan,
+    directory: Path,
+    columns: list[str],
+    units: dict[str, str],
+    lock: int,
+    progress: Progress | None,
+    live: Live,
 ) -> bool:
     """Let a recorder start the target, and wait for the end of the run; whether there is a sample."""
     about: dict[str, Any] = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
     about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8), "ready": READY}
     capacity = min(plan.samples, max(_RING_BYTES // (8 * len(columns)), 1000))
     ring = Ring.create(_ring_path(about["run"]), columns, capacity, **about)
+    desk = Desk.create(ring.desk_path, plan.channels())
     try:
         recorder = subprocess.Popen(
             [sys.executable, "-P", "-m", "rds.runtime.recorder", str(directory), str(ring.path), "rds.modes.target"],
@@ -117,7 +140,8 @@ def _recorded(
             pass_fds=(lock,) if os.name == "posix" else (),
         )
         try:
-            _follow(recorder, ring, plan, progress)
+            with live.attach(plan, desk, columns, units, ring=ring):
+                _follow(recorder, ring, plan, progress)
         finally:
             if recorder.poll() is None:
                 ring.ask_to_stop()
@@ -127,8 +151,10 @@ def _recorded(
         return bool(ring.head)
     finally:
         ring.close()
-        with contextlib.suppress(OSError):
-            ring.path.unlink()
+        desk.close()
+        for left in (ring.path, ring.desk_path):
+            with contextlib.suppress(OSError):
+                left.unlink()
 
 
 def _dumped(plan: Plan) -> bytes:

@@ -94,7 +94,8 @@ def loop(
     follow: Callable[[Sequence[float]], Sequence[float]],
 ) -> Loop:
     """The loop of these parts in virtual time, its rows going nowhere."""
-    return Loop(plan.samples, _due, read, plan.laws(), write, follow, _dropped, _going_on)
+    drive = plan.start()
+    return Loop(plan.samples, _due, read, drive.laws, write, follow, _dropped, _going_on, drive.heed)
 
 
 def at_once(voltages: Sequence[float]) -> Sequence[float]:

@@ -24,8 +24,10 @@ PATIENCE = 5.0  # s for all of them
 def own_times(plan: Plan, rows: Rows) -> np.ndarray | None:
     """The time of each sample's control() and model, ns, at the least of some passes; None if they can't be repeated.
 
-    Each pass starts from the initial states and gets the positions and the voltages that were recorded.
+    Each pass starts from the initial states and gets the positions and the voltages that were recorded, and the
+    changes of live values.
     """
+    plan = plan.with_changes(rows.changes)
     of = dict(zip(rows.columns, rows.values.T, strict=True))
     samples = of["sample"].astype(int).tolist()
     measured = np.array([of[f"{name}_measured"] for name in plan.names]).T.tolist()
@@ -56,7 +58,8 @@ def _pass(
     acting: list[list[float]],
     deadline: float,
 ) -> np.ndarray | None:
-    laws, now, taken = plan.laws(), clock.now, clock.taken
+    drive, now, taken = plan.start(), clock.now, clock.taken
+    laws, heed = drive.laws, drive.heed
     times = np.empty(len(samples))
     next_sample = 0
     voltages: list[float] = []
@@ -65,6 +68,7 @@ def _pass(
             for motion, voltage in zip(motions, voltages, strict=False):
                 motion.write(voltage)
         next_sample = k + 1
+        heed(k)
         before, started = taken(), now()
         row: list[float] = [k]
         for law in laws:

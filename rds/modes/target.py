@@ -24,6 +24,7 @@ from rds.core.errors import MachineError, RdsError
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.blame import fault
+from rds.runtime.desk import Desk
 from rds.runtime.environment import prepare, stolen_ticks, surroundings
 from rds.runtime.plan import Plan, load
 from rds.runtime.record import write_whole
@@ -35,7 +36,7 @@ from rds.runtime.stopwatch import Stopwatch, quiet_memory
 log = logging.getLogger(__name__)
 
 
-def run(plan: Plan, ring: Ring) -> dict[str, Any]:
+def run(plan: Plan, ring: Ring, desk: Desk) -> dict[str, Any]:
     """Take every sample of the plan; returns how it ended, why, and the environment."""
     from rds.bus.command import Command
     from rds.bus.dialects import DEFAULT, open_drivers
@@ -61,6 +62,8 @@ def run(plan: Plan, ring: Ring) -> dict[str, Any]:
             watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
         loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
+        assert loop.heed is not None
+        loop.heed.desk = desk
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
         counted = asdict(drivers.counters)
         if watch is not None:
@@ -102,7 +105,7 @@ def main(arguments: list[str]) -> None:
         signal.signal(number, lambda *_: ring.ask_to_stop())
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     plan = load(directory / PLAN)
-    report = run(plan, ring)
+    report = run(plan, ring, Desk.open(ring.desk_path))
     write_whole(directory / REPORT, json.dumps(report, default=str).encode())
     sys.stdout.flush()
     sys.stderr.flush()

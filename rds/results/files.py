@@ -22,6 +22,7 @@ _FORMATS = {
 }
 _STEM = "result"
 _RECORD = "record.rds"
+_BESIDE = "changes.csv"  # of live values: no result
 _SHOWN = 6  # names in a message
 
 
@@ -83,7 +84,11 @@ def _format(path: Path) -> Any:
 
 def _choose(directory: Path) -> Path:
     """The one result in `directory`; InputError lists them if there are several or none."""
-    known = [file for file in sorted(directory.iterdir()) if file.suffix.lower() in _FORMATS and file.is_file()]
+    known = [
+        file
+        for file in sorted(directory.iterdir())
+        if file.suffix.lower() in _FORMATS and file.is_file() and file.name != _BESIDE
+    ]
     stems = sorted({file.stem for file in known})
     stem = _STEM if _STEM in stems else stems[0] if len(stems) == 1 else None
     if stem is not None:

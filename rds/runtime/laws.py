@@ -22,19 +22,57 @@ class ReferenceSamples:
     velocity: np.ndarray
     acceleration: np.ndarray
 
+    def columns(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
+        """Position, velocity and acceleration by sample: plain floats are several times faster one by one."""
+        return self.position.tolist(), self.velocity.tolist(), self.acceleration.tolist()
+
+
+class Now(Sequence[float]):
+    """A column whose value is made as the run goes on: whichever sample is asked for, it is the one of now."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: float = 0.0):
+        self.value = value
+
+    def __getitem__(self, k: Any) -> Any:
+        return self.value
+
+    def __len__(self) -> int:
+        return 1
+
+
+class LiveReference:
+    """The reference of one axis, made while it runs: what drives it sets the values of now before the laws ask."""
+
+    def __init__(self, position: float = 0.0):
+        self.position, self.velocity, self.acceleration = Now(position), Now(), Now()
+
+    def columns(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
+        """Position, velocity and acceleration of now."""
+        return self.position, self.velocity, self.acceleration
+
 
 class BrokenContract(ContractError):
     """The controller of an axis broke its contract during a run, at sample `k`."""
 
 
 def controlled(
-    axis: int, name: str, controller: Controller, reference: ReferenceSamples, T: float, limit: Callable[[Any], float]
+    axis: int,
+    name: str,
+    controller: Controller,
+    reference: ReferenceSamples | LiveReference,
+    T: float,
+    limit: Callable[[Any], float],
+    params: dict[str, Any],
 ) -> Law:
-    """One axis under its own controller; records reference, measured position and command voltage."""
-    control, params = controller.control, dict(controller.params)
+    """One axis under its own controller; records reference, measured position and command voltage.
+
+    `params` are the controller's, in a table that may be changed while it runs.
+    """
+    control = controller.control
     state = controller.initial_state
-    columns = (reference.position, reference.velocity, reference.acceleration)
-    p, v, a = (column.tolist() for column in columns)  # plain floats are several times faster one by one
+    p, v, a = reference.columns()
     make = Reference._make
 
     def law(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
@@ -59,19 +97,22 @@ def coupled(
     axes: Sequence[int],
     names: Sequence[str],
     controller: Controller,
-    references: Sequence[ReferenceSamples],
+    references: Sequence[ReferenceSamples | LiveReference],
     T: float,
     limits: Sequence[Callable[[Any], float]],
+    params: dict[str, Any],
 ) -> Law:
-    """Several axes under one controller that gets and gives arrays in axis order."""
-    control, params = controller.control, dict(controller.params)
+    """Several axes under one controller that gets and gives arrays in axis order; `params` as of `controlled`."""
+    control = controller.control
     state = controller.initial_state
     n = len(axes)
-    tables = [np.array([getattr(r, part) for r in references]).T for part in Reference._fields]
+    # for each part of a reference, one column per axis
+    parts = list(zip(*(reference.columns() for reference in references), strict=True))
 
     def law(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
         nonlocal state
-        r = Reference(*(table[k] for table in tables))
+        values = [[column[k] for column in columns] for columns in parts]
+        r = Reference(*map(np.array, values))  # type: ignore[arg-type]
         y = np.array([positions[axis] for axis in axes])
         answer = control(k * T, r, y.copy(), state, params)
         try:
@@ -81,7 +122,7 @@ def coupled(
         except (TypeError, ValueError, OverflowError, ContractError):
             raise BrokenContract(_fault(answer, k * T, ", ".join(names), n), controller.source.path) from None
         for i in range(n):
-            row += (*(float(table[k, i]) for table in tables), float(y[i]), commands[i])
+            row += (*(of_axes[i] for of_axes in values), float(y[i]), commands[i])
 
     return law
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,11 @@ from rds.core.load import STUDENT_MODULE
 from rds.core.types import Controller, Model
 from rds.interface import converter
 from rds.machines import Axis, Machine
+from rds.runtime.changes import Heed, plan_changes, stop_channel
+from rds.runtime.desk import Channel
 from rds.runtime.laws import ReferenceSamples, controlled, coupled, played
 from rds.runtime.loop import Law
+from rds.runtime.tuning import Tuning
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class Plan:
     cpu: int | None = None  # pin the target to this processor
     rehearsal: float = 0.25  # s of clock and I/O without the student's code, before a real-time run
     import_path: tuple[str, ...] = ()  # folders of the students' files, for what they import from there
+    changes: tuple[tuple[int, str, float], ...] = ()  # of live values: (sample, channel, value), in order
 
     @property
     def names(self) -> list[str]:
@@ -62,20 +66,50 @@ class Plan:
         board = self.machine.converter
         return converter(board.range, board.bits, saturation=self.saturation, quantization=self.quantization)
 
-    def laws(self) -> list[Law]:
-        """What drives the axes, fresh from its initial state."""
+    def channels(self) -> list[Channel]:
+        """What may be changed while it runs: the parameters of controllers, the override of a program, the stop."""
+        return [channel for tuning in self._tunings() for channel in tuning.channels] + [stop_channel()]
+
+    def with_changes(self, changes: Iterable[Any]) -> Plan:
+        """The same run, in which live values change at known times; see `changes.plan_changes`."""
+        channels = {channel.name: channel for channel in self.channels()}
+        return replace(self, changes=plan_changes(changes, channels, self.T))
+
+    def verify(self, values: Mapping[str, float]) -> None:
+        """InputError if a controller cannot be made with these live values."""
+        for tuning in self._tunings():
+            tuning.verify(values)
+
+    def start(self) -> Drive:
+        """What drives the axes, fresh from its initial state, and what takes the changes of live values."""
+        tunings = self._tunings()
+        actions = {name: act for tuning in tunings for name, act in tuning.actions().items()}
+        heed = Heed(self.channels(), actions, self.changes)
+        return Drive(self._laws([tuning.params for tuning in tunings]), heed)
+
+    def _tunings(self) -> list[Tuning]:
+        """The live parameters of each controller; of one controller, if it drives all axes."""
+        first = self.axes[0].controller
+        if first is not None and first.coupled:
+            return [Tuning("controller", first)]
+        return [
+            Tuning(plan.axis.name, plan.controller, plan.axis.unit) for plan in self.axes if plan.controller is not None
+        ]
+
+    def _laws(self, params: list[dict[str, Any]]) -> list[Law]:
         limit, plans = self.limit(), self.axes
         first = plans[0].controller
         if first is not None and first.coupled:
             references = [plan.reference for plan in plans if plan.reference is not None]
-            return [coupled(range(len(plans)), self.names, first, references, self.T, [limit] * len(plans))]
+            limits = [limit] * len(plans)
+            return [coupled(range(len(plans)), self.names, first, references, self.T, limits, params[0])]
         laws = []
         for i, plan in enumerate(plans):
             if plan.signal is not None:
                 laws.append(played(i, plan.signal, limit))
             else:
                 assert plan.controller is not None and plan.reference is not None
-                laws.append(controlled(i, plan.axis.name, plan.controller, plan.reference, self.T, limit))
+                laws.append(controlled(i, plan.axis.name, plan.controller, plan.reference, self.T, limit, params[i]))
         return laws
 
     def columns(self, followed: str | None) -> tuple[list[str], dict[str, str]]:
@@ -99,6 +133,14 @@ class Plan:
                 columns.append(f"{plan.axis.name}_{part}")
                 units[columns[-1]] = part_unit or plan.axis.unit
         return columns, units
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What drives the axes of a run that has begun: its laws, and what takes the changes of live values."""
+
+    laws: list[Law]
+    heed: Heed
 
 
 def dump(plan: Plan) -> bytes:

@@ -19,6 +19,8 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.types import Ending
+from rds.runtime.changes import FILE as CHANGES
+from rds.runtime.changes import read_changes
 
 NAME = "record.rds"
 ENDING = "ending.json"
@@ -84,7 +86,7 @@ def claim(directory: str | Path) -> int:
 def clear(directory: str | Path) -> None:
     """Remove what an earlier run left in `directory`: its record, its ending and its results."""
     directory = Path(directory)
-    for name in (NAME, ENDING, *(entry.name for entry in directory.glob("result.*"))):
+    for name in (NAME, ENDING, CHANGES, *(entry.name for entry in directory.glob("result.*"))):
         with contextlib.suppress(FileNotFoundError):
             (directory / name).unlink()
 
@@ -191,6 +193,7 @@ def read_record(directory: str | Path) -> tuple[dict[str, Any], dict[str, str], 
             "ending": left.get("ending", str(Ending.KILLED)),
             "ending_reason": left.get("reason", ""),
             "environment": left.get("environment", {}),
+            "changes": [list(change) for change in read_changes(directory)],
             "notes": [f"read from the run's raw record: {len(rows)} of {expected} samples"],
         }
     except (KeyError, TypeError, ValueError) as error:

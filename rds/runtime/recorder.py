@@ -18,7 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.types import Ending
-from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending
+from rds.runtime.changes import FILE as CHANGES
+from rds.runtime.changes import as_text, read_changes, timed
+from rds.runtime.desk import Desk
+from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
 from rds.runtime.ring import Ring
 
 DRAIN_EVERY = 0.05  # s
@@ -36,6 +39,8 @@ class Recorder:
         self.lost = 0  # rows that the ring had overwritten before they were copied
         self._file: RecordFile | None = None
         self._next = 0
+        self._desk = Desk.open(ring.desk_path)
+        self._noted = -1  # changes of live values that have been copied; -1: not known yet
 
     def drain(self) -> int:
         """Copy what is new; returns how many rows have been copied in all."""
@@ -48,7 +53,22 @@ class Recorder:
         if rows:
             self.lost += self._file.append(first, rows)
             self._next = first + len(rows) // (8 * len(self.ring.columns))
+        self._drain_changes()
         return self._next
+
+    def _drain_changes(self) -> None:
+        """After the rows: a record that begins has removed what an earlier run left."""
+        path = self.directory / CHANGES
+        if self._noted < 0:  # what an earlier writer of this run has copied, without the line that it was about to
+            before = read_changes(self.directory)
+            self._noted = len(before)
+            if before:
+                write_whole(path, as_text(before).encode())
+        first, notes = self._desk.notes(self._noted)
+        if notes:
+            with open(path, "a") as file:
+                file.write(as_text(timed(notes, self.ring.about["sample_period"]), headings=not file.tell()))
+            self._noted = first + len(notes)
 
     def close(self) -> None:
         """Copy the rest; the record is on the disk."""
@@ -130,8 +150,9 @@ def main(arguments: list[str]) -> int:
     recorder.close()
     finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
     ring.close()
-    with contextlib.suppress(OSError):
-        ring.path.unlink()
+    for path in (ring.path, ring.desk_path):
+        with contextlib.suppress(OSError):
+            path.unlink()
     return 0
 
 

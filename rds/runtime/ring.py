@@ -87,6 +87,11 @@ class Ring:
         lost = max(self.head - self.capacity - first + 1, 0) if self.head > self.capacity else 0
         return first + lost, data[lost * size :]
 
+    @property
+    def desk_path(self) -> Path:
+        """Where the live values of the same run are (see `runtime.desk`)."""
+        return self.path.with_suffix(".desk")
+
     def ask_to_stop(self) -> None:
         """Ask the writer for a safe end at its next sample."""
         self._memory[_STOP] = 1
