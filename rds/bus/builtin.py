@@ -185,8 +185,9 @@ class BuiltinBus(can.BusABC):
             raise ValueError("error frames can't be sent on a bus with bit timing; inject a fault (rds.bus.faults)")
         if self._glance.state() == ErrorState.OFF:
             raise can.CanOperationError(
-                f"{self.channel_info}: this node is bus off: too many of its frames met errors. "
-                "Call restart(), open the bus again, or open it with restart_ms"
+                f"{self.channel_info}: this node is bus off: too many of its frames met errors. Mend the "
+                "fault and start the run again ([bus] restart_ms lets it come back by itself); in Python, call "
+                "restart() or open the bus again"
             )
 
     def _obstacle(self) -> str:

@@ -44,11 +44,39 @@ def open_drivers(
 
 
 def is_served(dialect: str, machine: Machine, interface: str, channel: str) -> bool:
-    """Whether modules of this dialect answer on a channel; nothing else happens there."""
+    """Whether modules of this dialect answer on a channel; nothing moves there.
+
+    InputError naming the dialects of those that answer, if none of them speaks this one.
+    """
+    if _answers(dialect, machine, interface, channel):
+        return True
+    others = [other for other in _DRIVERS if other != dialect and _answers(other, machine, interface, channel)]
+    if not others:
+        return False
+    speak = " and ".join(others)
+    raise InputError(
+        f"what answers on bus {interface}:{channel} speaks {speak}, not {dialect}: set [bus] dialect = "
+        f'"{others[0]}", or choose another channel'
+    )
+
+
+def _answers(dialect: str, machine: Machine, interface: str, channel: str) -> bool:
     if dialect == "cia402":
         from rds.bus.cia402.scan import scan
 
         return any(device.is_drive for device in scan(interface, channel))
     from rds.bus.drivers import find_machine
 
-    return bool(find_machine(machine, interface, channel))
+    # the modules of the oacs dialect answer cyclic frames as well
+    nodes = {machine.axis(name).node for name in find_machine(machine, interface, channel)}
+    if not nodes:
+        return False
+    from rds.bus.link import open_bus
+    from rds.bus.oacs.host import identify
+
+    bus = open_bus(interface, channel, node="scan")
+    try:
+        distributed = {info.id for info in identify(bus)}
+    finally:
+        bus.shutdown()
+    return bool(nodes & distributed if dialect == "oacs" else nodes - distributed)

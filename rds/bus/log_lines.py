@@ -19,6 +19,10 @@ _CANDUMP = re.compile(
 )
 # time, channel, identifier and, if it was not cut off there, the direction: an event has a word for an identifier
 _ASC_FRAME = re.compile(r"\d+\.\d+\s+(CANFD\s+)?\d+(\s+(Rx|Tx))?(\s+[0-9A-F]+x?(\s.*)?)?", re.IGNORECASE)
+_ASC_HEADING = re.compile(
+    r"(date|base|begin|end|previous log file)\b.*|(no\s*)?internal\s+events\s+logged.*|[/;*].*", re.IGNORECASE
+)
+_EVENT = re.compile(r"\d")  # something at some time, or with some number
 _ASC_TIME_ONLY = re.compile(r"\d+(\.\d*)?")
 _TRC_FRAME = {"DT", "FD", "FB", "FE", "BI", "RR", "RX", "TX"}
 _TRC_OTHER = {"ST", "EC", "ER", "EV"}  # status, error counters, error frames, events: python-can reads none of them
@@ -39,6 +43,7 @@ class Lines:
         self.number = 0
         self.frames = 0  # that came of the last line
         self.skipped = 0  # lines of other things than frames, comments and headings
+        self._first_strange = 0  # number of the first of them that is no event either
 
     def __iter__(self) -> Iterator[str]:
         return self
@@ -62,8 +67,21 @@ class Lines:
             is_frame = self._is_frame(line)
             if is_frame:
                 raise self.fault(f"it is cut off or damaged: {_short(line)}")
-            self.skipped += is_frame is False
+            if is_frame is False:
+                self.skipped += 1
+                if not _EVENT.match(line):
+                    self._first_strange = self._first_strange or self.number
             self.frames = 1  # it is looked at once
+
+    def nothing(self) -> InputError | None:
+        """The error to raise if no frame came of these lines; None if all are headings, comments and events."""
+        if not self._first_strange:
+            return None
+        return InputError(
+            "no line of the file is a frame, and this is the first that is no heading, comment or event either; is "
+            "it a log of this format?",
+            f"{self._path}:{self._first_strange}",
+        )
 
     def fault(self, problem: str) -> InputError:
         """The error to raise for the last line."""
@@ -96,7 +114,7 @@ def _anything(line: str, number: int) -> str | None:
 def _asc_frame(line: str) -> bool | None:
     if _ASC_FRAME.fullmatch(line) or _ASC_TIME_ONLY.fullmatch(line):
         return True
-    return False if re.match(r"\d+\.\d+\s", line) and "Start of measurement" not in line else None
+    return None if _ASC_HEADING.fullmatch(line) or "Start of measurement" in line else False
 
 
 def _trc_frame(line: str) -> bool | None:

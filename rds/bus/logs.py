@@ -100,15 +100,20 @@ class LogFile:
     def _lines(self) -> Iterator[can.Message]:
         with self._open() as file:
             lines = Lines(file, str(self.path), self._ending)
+            found = False
             try:
                 for message in _READERS[self._ending](cast(TextIO, lines)):
                     lines.frames += 1
                     problem = _problem(message)
                     if problem:
                         raise lines.fault(problem)
+                    found = True
                     yield message
             except (*_DAMAGE, zlib.error, gzip.BadGzipFile) as error:
                 raise lines.fault(f"it can't be read as {self._ending}: {error or 'damaged'}") from error
+            nothing = None if found else lines.nothing()
+            if nothing:
+                raise nothing
             self.skipped = lines.skipped
 
     def _open(self) -> TextIO:

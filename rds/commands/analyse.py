@@ -52,4 +52,6 @@ def analyse(
         print_json(analysis.to_json())
     else:
         typer.echo(str(analysis))
+        if plot is not None:
+            typer.echo(f"plot: {plot}")
     raise typer.Exit(0 if analysis.met else 1)

@@ -167,7 +167,7 @@ def replay(
     else:
         typer.echo(f"{result.sent} frames in {result.seconds:.1f} s, at most {result.latest * 1e3:.1f} ms late")
     for reason, number in result.skipped.items():
-        _say(f"{number} frames were left out: {reason}")
+        _say(f"{number} frame{' was' if number == 1 else 's were'} left out: {reason}")
     if log.skipped:
         _say(f"{log.skipped} lines of the log describe no frame and were passed over")
     raise typer.Exit(0)

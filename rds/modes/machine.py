@@ -24,7 +24,8 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
 
     On a bus other than the built-in one, the machine is what is connected there. On the built-in bus, a machine
     that is served on the channel (by default the machine's name) is used; where there is none, or another run
-    commands it, one is started for this run, on a channel of its own unless the channel was given.
+    commands it, one is started for this run, on a channel of its own unless the channel was given. InputError if
+    what answers on the channel speaks another dialect.
     """
     bus = {"interface": BUILTIN, **plan.bus}
     if bus["interface"] != BUILTIN:
@@ -38,8 +39,8 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
     channel = str(given or plan.machine.name)
     if (
         channel in channels()
-        and is_served(dialect, plan.machine, BUILTIN, channel)
         and (given or not commanded(channel))
+        and is_served(dialect, plan.machine, BUILTIN, channel)
     ):
         yield replace(plan, bus=bus | {"channel": channel})
         return

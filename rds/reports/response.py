@@ -113,7 +113,8 @@ def _findings(found: Exchanges) -> list[str]:
     for pair, module in found.sides():
         missing = found.unanswered(pair, module)
         if missing:
-            said.append(f"{pair}: module {name_of(module)} left {missing} requests without an answer in time.")
+            requests = "1 request" if missing == 1 else f"{missing} requests"
+            said.append(f"{pair}: module {name_of(module)} left {requests} without an answer in time.")
     return said
 
 

@@ -104,7 +104,7 @@ def judge(
     count = int(late_samples(timing, period).sum())
     lost = f"{count} of {len(timing.sample)} samples were late"
     if discarded:
-        lost += f" and {discarded} periods were discarded"
+        lost += f" and {discarded} period{' was' if discarded == 1 else 's were'} discarded"
     if count + discarded <= limit:
         return Judgement(Verdict.MET, _met(count, limit, len(timing.sample)), count, 0, discarded)
     io = float(np.median(timing.io))

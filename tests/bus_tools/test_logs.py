@@ -188,6 +188,29 @@ def test_a_damaged_line_is_named(name: str, text: str, line: int, tmp_path: Path
     assert str(caught.value).startswith(f"{path}.gz:{line}: ")
 
 
+@pytest.mark.parametrize(
+    "text, line",
+    [
+        ("garbage\nmore\n", 1),
+        ("date today\nhello\n", 2),
+        ("\x89PNG\x00\xff", 1),
+        (ASC_HEAD + "0.1 1 Statistic: D 1\n%", 5),
+    ],
+)
+def test_a_file_without_frames_that_is_no_log_is_named_with_its_line(text: str, line: int, tmp_path: Path) -> None:
+    path = tmp_path / "bad.asc"
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(InputError, match="no line of the file is a frame") as caught:
+        list(LogFile(path))
+    assert str(caught.value).startswith(f"{path}:{line}: ")
+
+
+def test_a_log_without_frames_is_one(tmp_path: Path) -> None:
+    path = tmp_path / "empty.asc"
+    path.write_text(ASC_HEAD + "// comment\n0.0 Start of measurement\n0.1 1 Statistic: D 1\nEnd TriggerBlock\n")
+    assert list(LogFile(path)) == []
+
+
 def test_events_and_comments_are_no_damage(tmp_path: Path) -> None:
     path = tmp_path / "a.asc"
     path.write_text(

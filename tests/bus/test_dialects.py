@@ -1,0 +1,52 @@
+"""What answers on a channel is asked before a run: another dialect than the run's is refused, with its name."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from importlib import import_module
+from uuid import uuid4
+
+import pytest
+
+from rds.bus.dialects import dialect_names, is_served, server_module
+from rds.core.errors import InputError
+from rds.machines import Machine, load_machine
+
+MACHINES = {"rds": "mini-cnc", "oacs": "mrmt-oacs", "cia402": "mini-cnc"}
+
+
+@pytest.fixture
+def served() -> Iterator[Callable[[str], tuple[Machine, str]]]:
+    """Serves a machine's modules in a dialect on a channel of python-can's virtual bus, until the test ends."""
+    with ExitStack() as stack:
+
+        def start(dialect: str) -> tuple[Machine, str]:
+            machine, channel = load_machine(MACHINES[dialect]), uuid4().hex
+            stop, ready = threading.Event(), threading.Event()
+            server = import_module(server_module(dialect))
+            serve = server.serve_oacs if dialect == "oacs" else server.serve
+            thread = threading.Thread(target=lambda: serve(machine, "virtual", channel, ready=ready.set, stop=stop))
+            thread.start()
+            stack.callback(thread.join, 5.0)
+            stack.callback(stop.set)
+            assert ready.wait(10.0)
+            return machine, channel
+
+        yield start
+
+
+@pytest.mark.parametrize("there", dialect_names())
+def test_only_the_dialect_that_is_there_is_served(there: str, served: Callable[[str], tuple[Machine, str]]) -> None:
+    machine, channel = served(there)
+    assert is_served(there, machine, "virtual", channel)
+    for other in set(dialect_names()) - {there}:
+        with pytest.raises(InputError) as told:
+            is_served(other, machine, "virtual", channel)
+        assert f'speaks {there}, not {other}: set [bus] dialect = "{there}"' in str(told.value)
+
+
+@pytest.mark.parametrize("dialect", dialect_names())
+def test_an_empty_channel_serves_nothing(dialect: str) -> None:
+    assert not is_served(dialect, load_machine("mini-cnc"), "virtual", uuid4().hex)
