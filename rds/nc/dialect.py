@@ -7,17 +7,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Dialect:
-    """Options of the language. The defaults read a program as LinuxCNC's `rs274 -g` does.
+    """Options of the language. The defaults read a program as LinuxCNC's `rs274 -g` does, on a machine in mm.
 
     block_delete: blocks that begin with `/` are left out (LinuxCNC's default is to run them).
-    gr: the `GR` subroutine call of dcs-thesis (its table 6.1).
-    program_numbers: the `P` program number of oacs-thesis (section 7.3), where `;` ends a block.
-    max_blocks: after so many executed blocks the program is taken for one that does not end (ProgramError).
-    max_depth: subroutine calls inside one another (LinuxCNC's limit is 10).
+    gr: the subroutine call of dcs-thesis (its table 6.1): `GR100` does what `O100 CALL` does.
+    program_numbers: the first block may be a program number `P001` and `;` ends a block, as in oacs-thesis, section 7.3
+        (then there are no comments behind `;`).
+    inch_machine: lengths in the tool table and the parameter file are in inches (as they are for `rs274 -g`), not mm.
+    max_jumps: after so many calls and jumps back the program is taken for one that does not end (ProgramError).
+    max_depth: subroutine calls inside one another (9 in LinuxCNC).
     """
 
     block_delete: bool = False
     gr: bool = False
     program_numbers: bool = False
-    max_blocks: int = 100_000_000
-    max_depth: int = 10
+    inch_machine: bool = False
+    max_jumps: int = 1_000_000
+    max_depth: int = 9

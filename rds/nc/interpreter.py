@@ -1,24 +1,297 @@
-"""From the text of a part program to its canonical calls."""
+"""From the text of a part program to its canonical calls: block after block, in LinuxCNC's order of execution."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TextIO
+from typing import IO, TYPE_CHECKING, Any
 
+from rds.nc.blocks import AXIS_SET, CHECKED, NON_MODAL, Block, check, settle_motion
 from rds.nc.canon import Call, MotionBlock
+from rds.nc.context import Context
 from rds.nc.dialect import Dialect
 from rds.nc.errors import ProgramError
+from rds.nc.expressions import Fault
+from rds.nc.modes import execute
+from rds.nc.moves import move
+from rds.nc.names import known_names
+from rds.nc.offsets import start
+from rds.nc.owords import Control, Word
+from rds.nc.parameters import Parameters, read_parameters
+from rds.nc.source import LONGEST, open_source
+from rds.nc.state import NO_MOTION, State
+from rds.nc.stream import Stream
+from rds.nc.tools import Tool, ToolTable, read_tools
+from rds.nc.words import columns, fill, line_number, place_of, read_plain, read_words, tidy, word_at
+
+if TYPE_CHECKING:
+    from rds.nc.compensation_moves import Stretch
+
+_PROGRAM_NUMBER = re.compile(r"p[0-9]+")
 
 
 def interpret(
-    source: str | Path | TextIO,
+    source: str | Path | IO[Any],
     *,
-    tools: object = None,
-    parameters: object = None,
+    tools: Path | Iterable[Tool] | None = None,
+    parameters: Path | Mapping[int, float] | None = None,
     options: Dialect = Dialect(),  # noqa: B008 (frozen)
     name: str = "",
+    stretches: list[Stretch] | None = None,
 ) -> Iterator[MotionBlock | Call]:
-    """The canonical calls of a program: a Path is a file, a str the program itself, a file object is read as it goes."""
-    raise ProgramError("the interpreter is being written; use a later version", file=name)
-    yield
+    """The canonical calls of a program, as it is read.
+
+    `source`: a Path is a file, a str is the program itself, a file object is read as it goes. Subroutine files are
+    looked for beside a file. `tools` and `parameters`: LinuxCNC's files, or what they hold, in the machine's units.
+    `name` stands for the program in messages. `stretches`, when given, gets what cutter compensation made of what.
+    Raises ProgramError at the first fault; what came before it has been handed out by then.
+    """
+    interpreter = Interpreter(
+        source, tools=tools, parameters=parameters, options=options, name=name, stretches=stretches
+    )
+    try:
+        yield from interpreter.run()
+    finally:
+        interpreter.close()
+
+
+class Interpreter:
+    """One run of one program. `context.state` is what the next block finds."""
+
+    def __init__(
+        self,
+        source: str | Path | IO[Any],
+        *,
+        tools: Path | Iterable[Tool] | None = None,
+        parameters: Path | Mapping[int, float] | None = None,
+        options: Dialect = Dialect(),  # noqa: B008 (frozen)
+        name: str = "",
+        stretches: list[Stretch] | None = None,
+    ):
+        table = ToolTable(read_tools(tools) if isinstance(tools, Path) else tools or ())
+        kept = read_parameters(parameters) if isinstance(parameters, Path) else parameters
+        self.options = options
+        self.source = open_source(source, name, semicolons=options.program_numbers)
+        self.out = Stream()
+        state = State()
+        self.context = Context(options, table, Parameters(state, kept), state, self.out, stretches)
+        self.control = Control(self.source, self.context.parameters, options)
+        self.context.parameters.known = known_names(self.context, self.control, lambda: self.control.source.line)
+        self._percent = False
+        self._first = True  # no block has been executed
+        self._text = ""
+        self._places: dict[str, int] = {}
+
+    def close(self) -> None:
+        self.control.close()
+
+    def run(self) -> Iterator[MotionBlock | Call]:
+        """The canonical calls. Raises ProgramError."""
+        out = self.out
+        out.file = self.source.name
+        start(self.context)
+        out.call("SET_FEED_REFERENCE", "CANON_XYZ")
+        out.call("ON_RESET")
+        try:
+            self._open()
+            ended = False
+            while not ended:
+                raw = self.control.source.read()
+                if not raw:
+                    self._file_ended()
+                ended = self._line(raw)
+                if out.items:
+                    yield from self._take()
+        except ProgramError:
+            out.flush()
+            yield from self._take()  # what was right before the fault
+            raise
+        out.line, out.digits = 0, 0
+        out.call("ON_RESET")
+        out.call("ON_RESET")
+        yield from self._take()
+
+    def _take(self) -> list[MotionBlock | Call]:
+        items, self.out.items = self.out.items, []
+        return items
+
+    # -- lines --------------------------------------------------------------------------------------------------------
+
+    def _open(self) -> None:
+        """See whether the program stands between % and %."""
+        first = self.source.following()
+        while raw := self.source.read():
+            if len(raw) > LONGEST + 1:
+                break
+            if stripped := raw.strip():
+                self._percent = stripped == b"%"
+                break
+        else:
+            raise ProgramError("the program is empty; write blocks and end with M2", file=self.source.name, line=1)
+        if not self._percent:
+            self.source.go_to(first)
+
+    def _file_ended(self) -> None:
+        source = self.control.source
+        try:
+            self.control.check_end()
+        except ProgramError as error:
+            raise error.at(source.name, source.line) from None
+        what = "%" if self._percent else "M2, M30 or % (then with % on the first line, too)"
+        raise ProgramError(
+            f"the program does not end; write {what} on its last line", file=source.name, line=source.line
+        )
+
+    def _line(self, raw: bytes) -> bool:
+        """Read and execute a block. True when the program ends by it."""
+        source, out = self.control.source, self.out
+        self._text = ""
+        self._places = {}
+        try:
+            if len(raw) > LONGEST + 1:
+                raise Fault(f"the line is longer than {LONGEST} characters; break it")
+            if source.name != out.file:
+                out.file = source.name
+            self._text = text = tidy(raw)
+            out.line = source.line
+            if self.options.program_numbers:
+                text = text.rstrip(";")
+            if not text or (text[0] == "/" and self.options.block_delete):
+                return False
+            return self._block(text)
+        except Fault as fault:
+            raise self._error(fault, raw) from None
+        except ProgramError as error:
+            if error.line:
+                raise
+            raise error.at(source.name, source.line) from None
+
+    def _block(self, text: str) -> bool:
+        plain = None if self.control.skipping else read_plain(text)
+        if plain is None:
+            return self._other(text)
+        digits, words = plain
+        out = self.out
+        out.digits = len(digits)
+        if digits:
+            if out.digits > 9:
+                line_number(text)
+            out.n = int(digits)
+        if self._first and self._program_number(text):
+            return False
+        block = Block()
+        fill(block, words)
+        return self._execute(block)
+
+    def _other(self, text: str) -> bool:
+        """A block with more than plain words: %, comments, parameters, expressions, O words; or one passed over."""
+        control, out = self.control, self.out
+        if text == "%" and (self._percent or control.skipping):
+            return self._percent_sign()
+        out.digits, out.n, at = line_number(text)
+        first = text[at : at + 1]
+        if first == "o" or (self.options.gr and text.startswith("gr", at)):
+            self._first = False
+            word = control.read(text, at) if first == "o" else self._read_gr(text, at)
+            control.execute(word)
+            return False
+        if control.skipping:
+            return False
+        block = Block()
+        self._places = read_words(text, at, block, self.context.parameters)
+        return self._execute(block)
+
+    def _read_gr(self, text: str, at: int) -> Word:
+        return Word() if self.control.skipping else self.control.read_gr(text, at)
+
+    def _execute(self, block: Block) -> bool:
+        context, words = self.context, block.words
+        self._first = False
+        state = context.state
+        if not block.g and not block.m and not block.comment and state.motion != NO_MOTION:
+            if AXIS_SET.isdisjoint(words):
+                settle_motion(block, state)
+            else:
+                block.motion = state.motion
+            if CHECKED.isdisjoint(words) and "s" not in words and "t" not in words:
+                if "f" in words and state.feed_mode != 1:
+                    state.feed_rate = words["f"]
+                    self.out.rate(words["f"])
+                context.parameters.settle()
+                if block.motion != -1:
+                    move(context, block)
+                return False
+        else:
+            settle_motion(block, state)
+        if block.g.get(NON_MODAL) is not None or not CHECKED.isdisjoint(words):
+            check(block, state)
+        context.parameters.settle()
+        ended = execute(context, block)
+        if ended:
+            self._after_end()
+        return ended
+
+    def _program_number(self, text: str) -> bool:
+        """The option's program number, P001, on the first block."""
+        if not (self.options.program_numbers and _PROGRAM_NUMBER.fullmatch(text)):
+            return False
+        self._first = False
+        self.out.comment(f"program {text.upper()}")
+        return True
+
+    def _percent_sign(self) -> bool:
+        """% ends a program that began with one; in a subroutine's file that is being searched it says nothing."""
+        if self.control.skipping:
+            if self.control.source is not self.source:
+                return False
+            self._file_ended()
+        self.out.digits = 0
+        if self.control.source is not self.source:
+            raise Fault("% inside a subroutine; end it with ENDSUB before", at=0)
+        compensation = self.out.compensation
+        if compensation is not None:
+            self.out.put(compensation.stop(self.out.line))
+        self.out.call("FINISH")
+        return True
+
+    def _after_end(self) -> None:
+        """A program that began with % ends with one, after M2."""
+        if not self._percent:
+            return
+        source = self.control.source
+        last = b""
+        while raw := source.read():
+            if len(raw) <= LONGEST + 1:
+                if raw.strip() == b"%":
+                    return
+                last = raw
+        if last:
+            self.out.digits = 0
+            match = re.match(rb"[\t /]*[nN]([0-9]{1,9})", last)
+            if match:
+                self.out.digits, self.out.n = len(match[1]), int(match[1])
+        self.out.comment("interpreter: percent sign missing from end of file")
+
+    # -- faults -------------------------------------------------------------------------------------------------------
+
+    def _error(self, fault: Fault, raw: bytes) -> ProgramError:
+        """The fault with file, line, column and word."""
+        source, text, at = self.control.source, self._text, fault.at
+        word = ""
+        if fault.key:
+            at = self._places.get(fault.key, -1)
+            if at < 0:
+                at = text.find("(") if fault.key == "(" else place_of(fault.key, text)
+        if at == -2:
+            column = raw.rfind(b"(") + 1
+            word = "("
+        elif at >= 0 and text:
+            places = columns(raw)
+            column = places[at] if at < len(places) else len(raw.rstrip()) + 1
+            word = word_at(text, at)
+        else:
+            column = 0
+        if column:
+            column += source.column
+        return ProgramError(fault.message, file=source.name, line=source.line, column=column, word=word)

@@ -1,0 +1,135 @@
+"""Numbered and named parameters (#5, #<name>, #<_global>), and the file that keeps numbered ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from rds.nc.errors import ProgramError
+from rds.nc.expressions import Fault
+from rds.nc.state import State
+
+COUNT = 5602  # numbers 1 to 5601, as in LinuxCNC
+ARGUMENTS = 30  # #1 to #30 are a subroutine's own
+READ_ONLY = frozenset([*range(5400, 5414), *range(5420, 5429)])
+TOOL = 5400  # number; 5401 to 5409 offsets X Y Z A B C U V W; 5410 diameter
+POSITION = 5420  # X Y Z A B C
+G28_HOME, G30_HOME = 5161, 5181
+G92_APPLIED, G92 = 5210, 5211
+SYSTEM = 5220  # which coordinate system is selected
+SYSTEMS = 5200  # + 20 * system + 1...: origin X Y Z A B C U V W, rotation
+
+
+class Parameters:
+    """All parameters of a run. Named ones that begin with _ are global, others belong to the subroutine that runs."""
+
+    def __init__(self, state: State, initial: Mapping[int, float] | None = None):
+        self.numbers = [0.0] * COUNT
+        for number, value in (initial or {}).items():
+            self.numbers[number] = float(value)
+        self.globals: dict[str, float] = {}
+        self.locals: list[dict[str, float]] = [{}]  # one for each subroutine being executed
+        self.state = state
+        self.known: dict[str, Callable[[], float]] = {}  # read-only names
+        self._numbered: list[tuple[int, float]] = []
+        self._named: list[tuple[str, float]] = []
+
+    def has(self, index: int) -> bool:
+        return 1 <= index < COUNT
+
+    def get(self, index: int) -> float:
+        if not 1 <= index < COUNT:
+            raise Fault(f"there is no parameter #{index}; numbers go from 1 to {COUNT - 1}")
+        if POSITION <= index < POSITION + 9:
+            if self.state.comp_side:
+                raise Fault(
+                    f"#{index}, the position, cannot be read while the cutter is compensated; read it after G40"
+                )
+            return self.state.position()[index - POSITION] if index < POSITION + 6 else 0.0
+        return self.numbers[index]
+
+    def find(self, name: str) -> float | None:
+        """The value of #<name>; None when it has none."""
+        known = self.known.get(name)
+        if known is not None:
+            return known()
+        return (self.globals if name[:1] == "_" else self.locals[-1]).get(name)
+
+    # -- settings: read with the block, done when it is executed ------------------------------------------------------
+
+    def check_settable(self, index: int) -> None:
+        if not 1 <= index < COUNT:
+            raise Fault(f"there is no parameter #{index}; numbers go from 1 to {COUNT - 1}")
+        if index in READ_ONLY:
+            raise Fault(f"#{index} can only be read; use another number")
+
+    def declare(self, name: str) -> None:
+        """A name is about to be set: from here on the block may ask for it (0 until the block is executed)."""
+        if name in self.known:
+            raise Fault(f"#<{name}> can only be read; use another name")
+        (self.globals if name[:1] == "_" else self.locals[-1]).setdefault(name, 0.0)
+
+    def set_later(self, index: int | str, value: float) -> None:
+        if isinstance(index, str):
+            self._named.append((index, value))
+        else:
+            self._numbered.append((index, value))
+
+    def settle(self) -> None:
+        """Do the settings of the block, in order."""
+        for index, value in self._numbered:
+            self.numbers[index] = value
+        for name, value in self._named:
+            (self.globals if name[:1] == "_" else self.locals[-1])[name] = value
+        self._numbered.clear()
+        self._named.clear()
+
+    # -- subroutines ---------------------------------------------------------------------------------------------------
+
+    def enter(self, arguments: list[float]) -> list[float]:
+        """A subroutine begins with its arguments in #1 to #30. Returns what they were, for leave()."""
+        kept = self.numbers[1 : ARGUMENTS + 1]
+        self.numbers[1 : ARGUMENTS + 1] = arguments + [0.0] * (ARGUMENTS - len(arguments))
+        self.locals.append({})
+        return kept
+
+    def leave(self, kept: list[float]) -> None:
+        self.numbers[1 : ARGUMENTS + 1] = kept
+        self.locals.pop()
+
+
+def read_parameters(path: Path) -> dict[int, float]:
+    """A parameter file as LinuxCNC keeps it (.var): a number and a value on each line, numbers ascending.
+
+    Lines that do not begin with two numbers are passed over, as LinuxCNC does; lengths are in the machine's units.
+    Raises ProgramError with the line for a number out of range or out of order.
+    """
+    values: dict[int, float] = {}
+    last = 0
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise ProgramError(
+            f"the parameter file cannot be read ({error.strerror}); check its path", file=str(path)
+        ) from None
+    for line, text in enumerate(lines, start=1):
+        words = text.split()
+        try:
+            number, value = int(words[0]), float(words[1])
+        except (ValueError, IndexError):
+            continue
+        if not 1 <= number < COUNT:
+            raise ProgramError(
+                f"there is no parameter {number}; numbers go from 1 to {COUNT - 1}", file=str(path), line=line
+            )
+        if number <= last:
+            raise ProgramError(
+                f"parameter {number} comes after {last}; put the lines in ascending order", file=str(path), line=line
+            )
+        if value - value != 0.0:
+            raise ProgramError(
+                f"{words[1]} is no finite number; correct the value of parameter {number}", file=str(path), line=line
+            )
+        values[number] = value
+        last = number
+    return values
