@@ -76,6 +76,8 @@ class Chain:
 
     def corner(self, index: int) -> str:
         """The role of the arc around the corner before move `index`."""
+        if index == 0:
+            return ENTRY
         return LEAD_IN if index < self.first - 1e-9 else LEAD_OUT if index > self.last + 1e-9 else CONTOUR
 
 
