@@ -1,0 +1,120 @@
+"""The speed profile: fastest within an envelope of speed and acceleration, in phases of constant acceleration.
+
+A phase is a row (length, speed at its start, speed at its end).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from rds.motion.compiling import kernel
+
+
+@kernel
+def fastest(edges, cap, push, speed):
+    """Phases from `speed` at edges[0] to rest at edges[-1]; `cap` and `push` are the limits between edges."""
+    n = len(cap)
+    v = np.empty(n + 1)
+    v[0] = speed
+    for e in range(n):
+        reached = sqrt(v[e] ** 2 + 2.0 * push[e] * (edges[e + 1] - edges[e]))
+        v[e + 1] = min(cap[e], reached) if e == n - 1 else min(cap[e], cap[e + 1], reached)
+    v[n] = 0.0
+    for e in range(n - 1, 0, -1):
+        v[e] = min(v[e], sqrt(v[e + 1] ** 2 + 2.0 * push[e] * (edges[e + 1] - edges[e])))
+    phases = np.empty((3 * n, 3))
+    count = 0
+    for e in range(n):
+        length, a, c = edges[e + 1] - edges[e], push[e], cap[e]
+        v0, v1 = v[e], v[e + 1]
+        top = min(c, sqrt(0.5 * (v0 * v0 + v1 * v1) + a * length))
+        up, down = (top * top - v0 * v0) / (2.0 * a), (top * top - v1 * v1) / (2.0 * a)
+        if up < 1e-9 * length:
+            up, top = 0.0, v0
+            down = (top * top - v1 * v1) / (2.0 * a)
+        if down < 1e-9 * length:
+            down, top = 0.0, v1
+            up = length if top < c and v0 < v1 else min(up, length)
+        if up == 0.0 and top < c and v1 < v0:
+            down = length
+        steady = max(length - up - down, 0.0)
+        if up > 0.0:
+            phases[count, 0], phases[count, 1], phases[count, 2] = up, v0, top
+            count += 1
+        if steady > 0.0:
+            phases[count, 0], phases[count, 1], phases[count, 2] = steady, top, top
+            count += 1
+        if down > 0.0:
+            phases[count, 0], phases[count, 1], phases[count, 2] = down, top, v1
+            count += 1
+    return phases[:count]
+
+
+@kernel
+def hold_tops(phases, tau):
+    """The phases with each top of the speed held for τ at least, by lowering it: (phases, count up to the last top's
+    end).
+
+    Between speeding up and slowing down lie then τ seconds without acceleration. (Between slowing down and speeding up
+    they do anyway, as each limit of the speed reaches far enough to either side.)
+    """
+    n = len(phases)
+    out = np.empty((n + n, 3))
+    count = held = i = 0
+    while i < n:
+        j = i
+        while j < n and phases[j, 2] >= phases[j, 1]:
+            j += 1
+        k = j  # slowing down from here
+        while k < n and phases[k, 2] <= phases[k, 1]:
+            k += 1
+        left, right = j - 1, j  # the next phases to be lowered, outwards
+        level = phases[left, 2] if left >= i else phases[right, 1]
+        length, cut_left, cut_right = 0.0, 0.0, 0.0  # of the top, and of the phases beside it that it takes a part of
+        while True:
+            if left >= i and phases[left, 1] >= level:
+                length += phases[left, 0]
+                left -= 1
+                continue
+            if right < k and phases[right, 2] >= level:
+                length += phases[right, 0]
+                right += 1
+                continue
+            if length >= level * tau or left < i or right >= k:
+                break
+            u, w = phases[left, 1], phases[right, 2]
+            gain_left = phases[left, 0] / (phases[left, 2] ** 2 - u * u)
+            gain_right = phases[right, 0] / (phases[right, 1] ** 2 - w * w)
+            gain = gain_left + gain_right
+            lower = (sqrt(tau * tau + 4.0 * gain * (length + gain * level * level)) - tau) / (2.0 * gain)
+            below = max(lower, u, w)
+            cut = level * level - below * below
+            cut_left, cut_right = gain_left * cut, gain_right * cut
+            length += cut_left + cut_right
+            if below == u:
+                left -= 1
+            else:
+                phases[left, 0] -= cut_left
+                phases[left, 2] = below
+            if below == w:
+                right += 1
+            else:
+                phases[right, 0] -= cut_right
+                phases[right, 1] = below
+            level = below
+            if lower >= u and lower >= w:
+                break
+        for m in range(i, left + 1):
+            out[count] = phases[m]
+            count += 1
+        if length > 0.0:
+            out[count, 0], out[count, 1], out[count, 2] = length, level, level
+            count += 1
+        held = count
+        for m in range(right, k):
+            out[count] = phases[m]
+            count += 1
+        i = k
+    return out[:count], held
