@@ -1,0 +1,170 @@
+"""From a part program's file to its verdict and its compiled form, and back from that when nothing has changed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.machines import Machine
+from rds.nc.canon import Call, MotionBlock
+from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_compiled, write_compiled
+from rds.nc.dialect import Dialect
+from rds.nc.interpreter import interpret
+from rds.nc.parameters import read_parameters
+from rds.nc.toolpath import PathBlock, toolpath
+from rds.nc.tools import Tool, read_tools
+from rds.nc.validate import Validation, Validator
+from rds.results.atomic import write_files
+
+Item = MotionBlock | Call
+Progress = Callable[[int, int], None]
+_CALLS = re.compile(rb"(?:o|gr)\s*(?:<\s*([^>\n]+?)\s*>|(\d+))", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a part program is read with: tool table and parameter file of LinuxCNC's formats, options of the dialect."""
+
+    tools: Path | None = None
+    parameters: Path | None = None
+    options: Dialect = field(default_factory=Dialect)
+
+    def tool_list(self) -> list[Tool]:
+        """The tools of the table; none without one. Raises ProgramError for a table that is wrong."""
+        return read_tools(self.tools) if self.tools else []
+
+    def interpret(self, program: Path) -> Iterator[Item]:
+        """The canonical calls of a program. Raises ProgramError."""
+        parameters = read_parameters(self.parameters) if self.parameters else None
+        return interpret(
+            program, tools=self.tool_list(), parameters=parameters, options=self.options, name=str(program)
+        )
+
+
+def motion(program: Path, machine: Machine, setup: Setup, progress: Progress | None = None) -> Iterator[PathBlock]:
+    """The machine's motion for a program, checked as it comes: raises ProgramError at the first fault."""
+    validator = Validator(machine, setup.tool_list(), str(program))
+    for block in toolpath(followed(setup.interpret(program), program, progress)):
+        validator.look(block)
+        if not validator.ok:
+            raise validator.result().faults[0]
+        yield block
+
+
+def check_program(
+    program: Path, machine: Machine, setup: Setup, progress: Progress | None = None
+) -> tuple[Validation, Path | None]:
+    """Whether a machine can run a program: all faults, and the compiled form that a valid one leaves beside it.
+
+    A program with faults leaves none, and one of before is removed. Raises InputError for files that cannot be read or
+    written, and where the place of the compiled form is taken by a file that is none.
+    """
+    place = beside(program)
+    if place.exists() and not is_ours(place):
+        raise InputError("is where the compiled program would go, and is none; rename or move it", str(place))
+    header = describe(program, machine, setup)
+    validator = Validator(machine, setup.tool_list(), str(program))
+    items = followed(setup.interpret(program), program, progress)
+    blocks = validator.watch(toolpath(items, report=validator.report))
+    try:
+        write_files({place: write_compiled(header, _while_valid(blocks, validator), lambda: _summary(validator))})
+    except _Faulty:
+        for _ in blocks:  # the rest is looked at all the same
+            pass
+        place.unlink(missing_ok=True)
+        return validator.result(), None
+    return validator.result(), place
+
+
+class _Faulty(Exception):
+    """A fault was found: nothing is written."""
+
+
+def _while_valid(blocks: Iterable[PathBlock], validator: Validator) -> Iterator[PathBlock]:
+    for block in blocks:
+        if not validator.ok:
+            raise _Faulty
+        yield block
+    if not validator.ok:
+        raise _Faulty
+
+
+def _summary(validator: Validator) -> dict[str, Any]:
+    result = validator.result()
+    return {"cutting_mm": result.cutting, "rapid_mm": result.rapid, "tools": list(result.tools)}
+
+
+def compiled_if_current(program: Path, machine: Machine, setup: Setup) -> Compiled | None:
+    """The compiled form beside a program, if it was made of just this program, machine, tools and options.
+
+    None where there is none, or it is of something else, or damaged. Raises InputError when the program can't be read.
+    """
+    wanted = describe(program, machine, setup)
+    try:
+        found = open_compiled(beside(program))
+    except InputError:
+        return None
+    return found if dict(found.header) == wanted else None
+
+
+def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:
+    """Everything that the motion depends on, with its SHA-256: the header of the compiled form."""
+    return {
+        "rds": version("rds"),
+        "program": program.name,
+        "sources": {path.name: file_sha256(path) for path in sources(program)},
+        "machine": machine.name,
+        "machine_sha256": file_sha256(Path(machine.path)),
+        "tools_sha256": file_sha256(setup.tools) if setup.tools else None,
+        "parameters_sha256": file_sha256(setup.parameters) if setup.parameters else None,
+        "options": asdict(setup.options),
+    }
+
+
+def sources(program: Path) -> list[Path]:
+    """A program's file and the files beside it of subroutines that it may call (O<name> CALL is name.ngc)."""
+    found: dict[Path, None] = {}
+    waiting = [program]
+    while waiting:
+        path = waiting.pop()
+        found[path] = None
+        for name in _called(path):
+            other = program.parent / f"{name}.ngc"
+            if other not in found and other.is_file():
+                waiting.append(other)
+    return list(found)
+
+
+def _called(path: Path) -> set[str]:
+    try:
+        with path.open("rb") as stream:
+            if not stream.seek(0, 2):
+                return set()
+            with mmap(stream.fileno(), 0, access=ACCESS_READ) as text:
+                names = {match[1] or match[2] for match in _CALLS.finditer(text)}
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror}); check the path", str(path)) from error
+    given = {name.decode("utf-8", "replace") for name in names}
+    return {name for name in given | {name.lower() for name in given} if "/" not in name and "\0" not in name}
+
+
+def followed(items: Iterable[Item], program: Path, progress: Progress | None) -> Iterator[Item]:
+    """The same items; `progress` hears how many of the program's lines have been read, and of how many."""
+    if progress is None:
+        yield from items
+        return
+    with program.open("rb") as stream:
+        lines = sum(chunk.count(b"\n") for chunk in iter(lambda: stream.read(1 << 20), b""))
+    seen = 0
+    for item in items:
+        line = int(item.rows["line"][-1]) if isinstance(item, MotionBlock) and len(item) else getattr(item, "line", 0)
+        if line > seen + lines // 200:
+            seen = line
+            progress(min(seen, lines), lines)
+        yield item

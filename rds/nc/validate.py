@@ -1,0 +1,299 @@
+"""Validation of a part program against a machine (oacs-thesis, section 7.3 and appendices D and E).
+
+Along the whole path, exactly: each axis within its travel; the feed no faster than the slowest axis; the spindle within
+its range; both within what the tool bears; no move of an axis that the machine does not have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rds.machines import Machine
+from rds.motion.limits import Limits
+from rds.motion.segments import AXES
+from rds.nc.errors import ProgramError
+from rds.nc.extent import extents
+from rds.nc.frame import only_rotary
+from rds.nc.places import at_their_words
+from rds.nc.tool_limits import ToolLimits, limits_of
+
+if TYPE_CHECKING:
+    from rds.nc.toolpath import Event, PathBlock
+    from rds.nc.tools import Tool
+
+TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
+MOST_FAULTS = 1000  # are kept; others are counted
+_FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
+_UNITS = ("mm", "mm", "mm", "degrees", "degrees", "degrees")
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What became of a program: `faults` in the order of files and lines; `more` of them were counted only.
+
+    `low` and `high` are how far the path reaches along the axes that move (machine coordinates, mm and degrees);
+    lengths are in mm.
+    """
+
+    program: str
+    machine: str
+    faults: tuple[ProgramError, ...] = ()
+    more: int = 0
+    segments: int = 0
+    cutting: float = 0.0
+    rapid: float = 0.0
+    low: Mapping[str, float] = field(default_factory=dict)
+    high: Mapping[str, float] = field(default_factory=dict)
+    tools: tuple[int, ...] = ()
+    spindle: float = 0.0  # rev/min, the fastest
+
+    @property
+    def ok(self) -> bool:
+        """Whether the machine can run it."""
+        return not self.faults
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain dicts, lists, strings and numbers."""
+        return {
+            "program": self.program,
+            "machine": self.machine,
+            "ok": self.ok,
+            "faults": [
+                {
+                    "file": fault.file,
+                    "line": fault.line,
+                    "column": fault.column,
+                    "word": fault.word,
+                    "message": fault.reason,
+                }
+                for fault in self.faults
+            ],
+            "more_faults": self.more,
+            "segments": self.segments,
+            "cutting_mm": self.cutting,
+            "rapid_mm": self.rapid,
+            "reach": {axis: [self.low[axis], self.high[axis]] for axis in self.low},
+            "tools": list(self.tools),
+            "fastest_spindle_rev_min": self.spindle,
+        }
+
+    def __str__(self) -> str:
+        if self.ok:
+            reach = ", ".join(
+                f"{axis} {plain(self.low[axis])} to {plain(self.high[axis])} {_UNITS[AXES.index(axis)]}"
+                for axis in self.low
+            )
+            return (
+                f"{self.program}: {self.machine} can run it: {self.segments} moves, {self.cutting:.6g} mm at feed, "
+                f"{self.rapid:.6g} mm rapid; {reach or 'nothing moves'}"
+            )
+        lines = [str(fault) for fault in self.faults]
+        if self.more:
+            lines.append(f"and {self.more} faults more")
+        count = len(self.faults) + self.more
+        lines.append(f"{self.program}: {self.machine} can't run it: {count} fault{'s' * (count > 1)}")
+        return "\n".join(lines)
+
+
+class Validator:
+    """Looks at a program's motion as it goes by, and keeps the faults: of each kind on each line the worst.
+
+    Raises InputError for a machine whose axes have no limits.
+    """
+
+    def __init__(self, machine: Machine, tools: Iterable[Tool] = (), name: str = ""):
+        self._machine, self._name = machine, name
+        self._tools = limits_of(tools)
+        limits = Limits.of(machine)
+        self._present = limits.present
+        self._velocity = limits.velocity
+        axes = [machine.axes[axis] if here else None for axis, here in zip(AXES, self._present, strict=True)]
+        self._least = np.array([axis.travel[0] if axis else -inf for axis in axes]) - TOLERANCE
+        self._most = np.array([axis.travel[1] if axis else inf for axis in axes]) + TOLERANCE
+        self._slowest = {False: self._slowest_of(slice(0, 3)), True: self._slowest_of(slice(3, 6))}
+        self._spindle = next((axis for axis in machine.axes.values() if axis.unit == "rev/min"), None)
+        self._worst: dict[tuple[str, int, str], tuple[float, ProgramError, str]] = {}
+        self._files: dict[str, int] = {}
+        self._more = self._segments = 0
+        self._cutting = self._rapid = self._fastest = 0.0
+        self._low, self._high = np.full(6, inf), np.full(6, -inf)
+        self._used: dict[int, None] = {}
+
+    @property
+    def ok(self) -> bool:
+        """Whether no fault has been found so far."""
+        return not self._worst
+
+    def _slowest_of(self, some: slice) -> tuple[str, float]:
+        """The slowest of some axes, and its velocity; inf when the machine has none of them."""
+        speeds = np.where(self._present, self._velocity, inf)[some]
+        return AXES[some][int(np.argmin(speeds))], float(np.min(speeds))
+
+    def watch(self, blocks: Iterable[PathBlock]) -> Iterator[PathBlock]:
+        """The same blocks, looked at. What ends the program (its ProgramError) ends it here as one fault more."""
+        try:
+            for block in blocks:
+                self.look(block)
+                yield block
+        except ProgramError as fault:
+            self.report(fault)
+
+    def report(self, fault: ProgramError, kind: str = "", excess: float = 0.0, letters: str = "") -> None:
+        """Keep a fault, if it is the worst of its kind on its line; `letters` of the word it is about."""
+        key = (fault.file, fault.line, kind or fault.reason)
+        self._files.setdefault(fault.file, len(self._files))
+        known = self._worst.get(key)
+        if known is None and len(self._worst) >= MOST_FAULTS:
+            self._more += 1
+        elif known is None or excess > known[0]:
+            self._worst[key] = (excess, fault, letters)
+
+    def look(self, block: PathBlock) -> None:
+        """Check one block."""
+        self._files.setdefault(block.file, len(self._files))
+        limits = self._tools.get(block.tool, ToolLimits())
+        for event in block.events:
+            if event.kind == "spindle":
+                self._look_at_spindle(event, block, limits)
+            elif event.kind == "tool" and event.value:
+                self._used.setdefault(int(event.value))
+        segments = block.segments
+        if not len(segments):
+            return
+        self._segments += len(segments)
+        linear = ~only_rotary(segments)
+        self._cutting += float(segments["length"][linear & ~segments["rapid"]].sum())
+        self._rapid += float(segments["length"][linear & segments["rapid"]].sum())
+        low, high = extents(segments)
+        self._low, self._high = np.minimum(self._low, low.min(axis=0)), np.maximum(self._high, high.max(axis=0))
+        self._look_at_travel(block, low, high)
+        self._look_at_feed(block, linear, limits)
+
+    def _fault(self, block: PathBlock, line: int, message: str, kind: str, excess: float, letters: str) -> None:
+        self.report(ProgramError(message, file=block.file or self._name, line=int(line)), kind, excess, letters)
+
+    def _look_at_travel(self, block: PathBlock, low: np.ndarray, high: np.ndarray) -> None:
+        lines = block.segments["line"]
+        for axis, name in enumerate(AXES):
+            letters = f"{name} G2 G3 R G0 G1 G28 G30"
+            if not self._present[axis]:
+                for at in np.flatnonzero(high[:, axis] - low[:, axis] > TOLERANCE):
+                    has = ", ".join(other for other, here in zip(AXES, self._present, strict=True) if here)
+                    message = (
+                        f"{self._machine.name} has no axis {name} to move (it has {has}); leave {name} where it is"
+                    )
+                    self._fault(block, lines[at], message, name, 0.0, letters)
+                continue
+            below, above = self._least[axis] - low[:, axis], high[:, axis] - self._most[axis]
+            # a move that begins outside is another one's fault, unless it goes farther out
+            begin = block.segments["start"][:, axis]
+            worse_below = below > np.maximum(self._least[axis] - begin, 0.0) + TOLERANCE
+            worse_above = above > np.maximum(begin - self._most[axis], 0.0) + TOLERANCE
+            for at in np.flatnonzero(worse_below | worse_above):
+                down = bool(worse_below[at] and (below[at] > above[at] or not worse_above[at]))
+                value = low[at, axis] if down else high[at, axis]
+                message = self._travel_message(axis, float(value), bool(block.segments["plane"][at] >= 0))
+                self._fault(block, lines[at], message, name, float(max(below[at], above[at])), letters)
+
+    def _travel_message(self, axis: int, value: float, arc: bool) -> str:
+        name, unit = AXES[axis], _UNITS[axis]
+        least, most = self._machine.axes[name].travel
+        beyond = max(least - value, value - most)
+        return (
+            f"{'on this arc ' if arc else ''}{name} would reach {plain(value)} {unit} (machine coordinates), "
+            f"{plain(beyond)} {unit} beyond its travel of {least:g} to {most:g}; shorten the path, or move its origin"
+        )
+
+    def _look_at_feed(self, block: PathBlock, linear: np.ndarray, limits: ToolLimits) -> None:
+        segments = block.segments
+        feeds = ~segments["rapid"]
+        for only in (False, True):
+            name, limit = self._slowest[only]
+            some = feeds & (linear != only)
+            self._too_fast(block, some, limit, f"{name}, the slowest {'rotary ' * only}axis, can do")
+        tool = limits.feed / 60.0
+        self._too_fast(block, feeds & linear, tool, f"the tool table allows tool {block.tool}")
+        way = np.abs(segments["end"] - segments["start"])[:, 3:]
+        turning = np.flatnonzero(feeds & linear & np.any(way > TOLERANCE, axis=1))
+        if len(turning):
+            speed = way[turning] * (segments["rate"][turning] / segments["length"][turning])[:, None]
+            for axis in range(3):
+                limit = self._velocity[3 + axis] if self._present[3 + axis] else inf
+                for at in np.flatnonzero(speed[:, axis] > limit * _FASTER):
+                    message = (
+                        f"{AXES[3 + axis]} would turn at {plain(speed[at, axis] * 60)} degrees/min to keep up, and can "
+                        f"do {plain(limit * 60)}; lower F"
+                    )
+                    line = segments["line"][turning[at]]
+                    name = AXES[3 + axis]
+                    self._fault(block, line, message, f"turn {name}", float(speed[at, axis]), f"F {name}")
+
+    def _too_fast(self, block: PathBlock, some: np.ndarray, limit: float, who: str) -> None:
+        """`limit` in mm/s or degrees/s. The fault is on the line of the word F, for all moves that obey it."""
+        rate = block.segments["rate"]
+        too_fast = np.flatnonzero(some & (rate > limit * _FASTER))
+        if not len(too_fast):
+            return
+        rotary = bool(only_rotary(block.segments[too_fast[:1]])[0])
+        unit = "degrees/min" if rotary else "mm/min"
+        given = block.feed_lines[too_fast]
+        at_line = np.where(given > 0, given, block.segments["line"][too_fast])
+        for line in np.unique(at_line):
+            fastest = float(rate[too_fast[at_line == line]].max())
+            message = f"a feed of {plain(fastest * 60)} {unit} is more than {who} ({plain(limit * 60)}); lower it"
+            self._fault(block, line, message, f"feed {who} {unit}", fastest, "F")
+
+    def _look_at_spindle(self, event: Event, block: PathBlock, limits: ToolLimits) -> None:
+        speed = float(event.value)
+        if not speed:
+            return
+        self._fastest = max(self._fastest, abs(speed))
+        says: Callable[[str, str], None] = lambda kind, message: self._fault(  # noqa: E731
+            block, event.line, message, kind, abs(speed), "S M3 M4"
+        )
+        way = "" if speed > 0 else " counter-clockwise"
+        if self._spindle is None:
+            says("no spindle", f"{self._machine.name} has no spindle to turn; leave M3 and M4 away")
+            return
+        least, most = self._spindle.travel
+        if not least <= speed <= most:
+            says(
+                "spindle",
+                f"{abs(speed):g} rev/min{way} is outside of what the spindle does ({least:g} to {most:g} rev/min); "
+                "change S",
+            )
+        if abs(speed) > limits.speed:
+            allowed = f"the tool table allows tool {block.tool} ({limits.speed:g})"
+            says("tool", f"{abs(speed):g} rev/min is more than {allowed}; lower S")
+
+    def result(self) -> Validation:
+        """The faults found, at their words, and what was seen."""
+        kept = [(fault, letters) for _, fault, letters in self._worst.values()]
+        faults = at_their_words(kept)
+        order = {file: at for file, at in self._files.items() if file != self._name} | {self._name: -1}
+        faults.sort(key=lambda fault: (order.get(fault.file, 0), fault.line, fault.column))
+        moved = np.flatnonzero(self._high - self._low > TOLERANCE)
+        return Validation(
+            program=self._name,
+            machine=self._machine.name,
+            faults=tuple(faults),
+            more=self._more,
+            segments=self._segments,
+            cutting=self._cutting,
+            rapid=self._rapid,
+            low={AXES[axis]: float(self._low[axis]) for axis in moved},
+            high={AXES[axis]: float(self._high[axis]) for axis in moved},
+            tools=tuple(self._used),
+            spindle=self._fastest,
+        )
+
+
+def plain(value: float) -> str:
+    """A number as people write it: up to four decimals, and as many as it takes to be anything."""
+    text = f"{value:.4f}".rstrip("0").rstrip(".")
+    return text if float(text) or not value else f"{value:.2g}"
