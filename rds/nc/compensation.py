@@ -75,6 +75,7 @@ class Compensation:
         self.entered = False
         self._line = 0
         self._stopped = False
+        self._over = False  # G40 has come
         self._stretch = Stretch(self.side, self.radius, plane, units)
         self._nose = NOSE.get(orientation, (0, 0)) if plane == XZ else (0, 0)
         self._recording = record is not None
@@ -128,24 +129,31 @@ class Compensation:
 
     def off(self, line: int = 0, mark: tuple[int, int] = (0, 0)) -> list[Item]:
         """G40: what is held back is made. When `entered`, the next motion is to be given to `leave`."""
-        return self.stop(line, mark)
+        items = self.stop(line, mark)
+        self._over = True
+        return items
 
-    def leave(self, rapid: bool, end: Triple, line: int = 0) -> None:
-        """Check the first motion after G40, a straight one (the interpreter refuses an arc, as LinuxCNC does)."""
+    def leave(self, rapid: bool, start: Point, end: Triple, line: int = 0) -> None:
+        """Check the first motion after G40, straight from the programmed point `start` to `end`, both in the units and
+        offsets of now. The interpreter refuses an arc, as LinuxCNC does.
+        """
         goal = end[:2]
-        length = math.dist(self.programmed, goal)
+        length = math.dist(start, goal)
         if length <= self.radius:
             raise ProgramError(
                 f"the exit move is {length:.4f} long in the {self.plane} plane, not longer than the cutter's radius"
-                f" {self.radius:.4f}; after G40, leave the contour by a straight move longer than that"
+                f" {self.radius:.4f}, and would take the cutter's centre back to the contour; after G40 leave it"
+                " by a straight move longer than that, before going up"
             )
-        if self._recording:
+        if self._recording and start == self.programmed:
             kind = TRAVERSE if rapid else FEED
             self._stretch.cut.append(Element("exit", kind, line, self._queue.made, goal, height=end[2]))
 
     def scale(self, factor: float, units: str) -> None:
         """G20 or G21 while on: everything in the new units, which are `factor` to an old one."""
-        if self._recording:
+        if self._over:
+            self._recording = False  # an exit in other units is not recorded
+        elif self._recording:
             raise ProgramError("the proof needs one length unit from G41 or G42 to G40; change units before or after")
         self.radius *= factor
         self.height *= factor

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rds.nc.compensation_moves import Stretch
 
 _PROGRAM_NUMBER = re.compile(r"p[0-9]+")
+_MOTION_WORD = re.compile(r"(?:n[0-9]+)?(?!o).*?(g40(?![0-9])|[xyz]|m[0-9])")  # of a block that compensation refuses
 
 
 def interpret(
@@ -165,7 +166,8 @@ class Interpreter:
         except ProgramError as error:
             if error.line:
                 raise
-            raise error.at(source.name, source.line) from None
+            word = _MOTION_WORD.match(self._text)  # compensation knows moves, not words
+            raise self._error(Fault(error.reason, at=word.start(1) if word else -1), raw) from None
 
     def _block(self, text: str) -> bool:
         plain = None if self.control.skipping else read_plain(text)

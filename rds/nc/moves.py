@@ -119,10 +119,18 @@ def _compensated(m: Context, rapid: bool, end: list[float]) -> None:
         out.put(out.compensation.straight(rapid, ordered, rotary, out.line, (out.digits, out.n)))
         return
     if m.leaving is not None:
-        first, second, third = AXES_OF[PLANES.index(m.leaving.plane)]
-        m.leaving.leave(rapid, (end[first], end[second], end[third]), out.line)
-        m.leaving = None
+        _leave(m, rapid, end)
     out.straight(TRAVERSE if rapid else FEED, tuple(end))  # type: ignore[arg-type]
+
+
+def _leave(m: Context, rapid: bool, end: list[float]) -> None:
+    """The first move after G40 must get the cutter away from the contour. Raises ProgramError."""
+    compensation, m.leaving = m.leaving, None
+    if compensation is not None:
+        start = m.state.position()
+        first, second, third = AXES_OF[PLANES.index(compensation.plane)]
+        goal = end[first], end[second], end[third]
+        compensation.leave(rapid, (start[first], start[second]), goal, m.out.line)
 
 
 def _length(start: list[float], end: list[float]) -> float:
@@ -155,7 +163,11 @@ def arc(m: Context, block: Block, code: int) -> None:
     if offsets is None:
         centre = by_radius(begin, goal, words["r"], clockwise, state)
     else:
-        centre = by_centre(begin, goal, offsets, state)
+        try:
+            centre = by_centre(begin, goal, offsets, state)
+        except Fault as fault:
+            fault.key = next(letter for letter in words if letter in "ijk")
+            raise
     turns = round(words.get("p", 1.0))
     if clockwise:
         turns = -turns
@@ -178,6 +190,7 @@ def home(m: Context, block: Block, code: int) -> None:
     if state.comp_side:
         raise Fault("it cannot be used while the cutter is compensated; write it after G40", f"g{code}")
     end = target(state, words)
+    _leave(m, True, end)
     m.out.straight(TRAVERSE, tuple(end))  # type: ignore[arg-type]
     state.move_to(end)
     goal = home_of(m, code)

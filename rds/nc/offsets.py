@@ -243,5 +243,6 @@ def set_units(m: Context, code: int) -> None:
         setattr(state, name, getattr(state, name) * factor)
     for vector in (state.origin, state.axis_offset, state.tool_offset):
         vector[:3] = [length * factor for length in vector[:3]]
-    if m.out.compensation is not None:
-        m.out.compensation.scale(factor, "INCHES" if inches else "MM")
+    for compensation in (m.out.compensation, m.leaving):
+        if compensation is not None:
+            compensation.scale(factor, "INCHES" if inches else "MM")

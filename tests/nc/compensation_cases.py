@@ -71,7 +71,7 @@ def made(case: Case, record: list[Stretch] | None = None) -> list[Call_]:
         elif isinstance(op, Round):
             items += machine.arc(op.end, op.centre, op.turn, (0, 0, 0), line)
         elif isinstance(op, Straight) and off:
-            machine.leave(op.rapid, op.end, line)
+            machine.leave(op.rapid, machine.programmed, op.end, line)
             items.append(_plain(case, op.rapid, op.end))
         elif isinstance(op, Straight):
             items += machine.straight(op.rapid, op.end, (0, 0, 0), line)
