@@ -14,6 +14,7 @@ import can
 import pytest
 
 from bus_tools.made_frames import frame
+from rds.bus.faults import Faults
 from rds.bus.logs import LogFile, LogWriter
 
 Opener = Callable[..., can.BusABC]
@@ -71,8 +72,13 @@ def test_monitor_reports_a_killed_hub(
     rds: Callable[..., subprocess.Popen[str]], hub: Callable[..., subprocess.Popen[str]]
 ) -> None:
     process = hub("test")
-    watcher = rds("monitor", "--seconds", "3", "--json")
-    time.sleep(1.5)
+    with Faults("test") as desk:
+        others = len(desk.nodes())
+        watcher = rds("monitor", "--seconds", "3", "--json")
+        deadline = time.monotonic() + 20.0
+        while len(desk.nodes()) == others and time.monotonic() < deadline:
+            time.sleep(0.05)
+    time.sleep(0.5)  # it is reading, not only there
     process.kill()
     out, err = end(watcher, 1)
     assert len(json.loads(out)["faults"]) == 1
