@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands import analyse, bus, estop, fault, modules, reports
+from rds.commands import analyse, bus, estop, fault, modules, nc, reports
 from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
 from rds.commands.guard import guarded
 
@@ -26,6 +26,7 @@ machine_app = typer.Typer(no_args_is_help=True, help="Machines: list them, or se
 app.add_typer(machine_app, name="machine")
 app.add_typer(modules.module_app, name="module")
 app.add_typer(bus.app, name="bus")
+app.add_typer(nc.app, name="nc")
 bus.app.command()(analyse.analyse)
 bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)

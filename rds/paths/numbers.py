@@ -1,0 +1,41 @@
+"""The numbers that paths are made of: finite, with a unit in the message, within a kilometre."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.core.options import Option
+
+FARTHEST = 1e6  # mm; beyond it a double has fewer decimals than a program prints, and the unit is wrong anyway
+
+FEED_RATE = Option("feed rate along the path, mm/s", more_than=0.0)
+POSITIVE = Option("length, mm", more_than=0.0)
+NOT_NEGATIVE = Option("length, mm", at_least=0.0)
+COORDINATE = Option("coordinate, mm")
+ANGLE = Option("angle, degrees")
+
+
+def number(value: Any, name: str, owner: str, option: Option) -> float:
+    """The value as a checked float; InputError says what it must be. Lengths end at a kilometre, as do angles at a
+    million degrees."""
+    checked = option.check(value, name, owner)
+    if abs(checked) > FARTHEST:
+        raise InputError(f"{owner}: {name} = {value!r} must be at most {FARTHEST:g} ({option.meaning})")
+    return checked
+
+
+def point(values: Sequence[float], name: str, owner: str, sizes: tuple[int, ...] = (2, 3)) -> tuple[float, ...]:
+    """`values` as x, y, z in mm; a missing z is 0. InputError where there are too few, too many or no numbers."""
+    try:
+        given = tuple(values)
+    except TypeError:
+        given = ()
+    if len(given) not in sizes or isinstance(values, str | bytes):
+        words = " or ".join({2: "x, y", 3: "x, y, z"}[size] for size in sizes)
+        raise InputError(f"{owner}: {name} = {values!r} must be {words} in mm")
+    checked = tuple(
+        number(value, f"{axis} of {name}", owner, COORDINATE) for axis, value in zip("xyz", given, strict=False)
+    )
+    return checked if len(checked) == 3 else (*checked, 0.0)
