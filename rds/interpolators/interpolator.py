@@ -1,0 +1,124 @@
+"""An interpolator with its parameters: from the library or from a user's file, and its rows as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rds.core.blame import STUDENT_ERRORS, student_error
+from rds.core.errors import ContractError
+from rds.core.geometry import length
+from rds.core.load import StudentFile, load_student
+from rds.core.options import read_options
+from rds.core.signature import form
+from rds.core.types import ArcSegment, Segment, Source
+from rds.interpolators import LIBRARY
+from rds.interpolators.reference_word import Method, Steps, steps
+
+Rows = Iterator[tuple[np.ndarray, ...]]
+_ROWS_PER_ROW, _SPARE_ROWS = 10, 5000  # a slow start and stop are still allowed
+
+
+@dataclass(frozen=True)
+class Interpolator:
+    """`function(segment, T, params)` with its `params`.
+
+    With `blu` (mm) the positions are whole BLU, and `theory`, of the same arguments, yields them before that. `word` is
+    the reference word method, whose steps can be reported.
+    """
+
+    name: str
+    function: Callable[[Segment, float, Mapping[str, Any]], Any]
+    source: Source
+    params: Mapping[str, Any] = field(default_factory=dict)
+    blu: float | None = None
+    theory: Callable[[Segment, float, Mapping[str, Any]], Any] | None = None
+    word: Method | None = None
+
+    def interpolate(self, segment: Segment, T: float) -> Rows:
+        """Its rows (mm, mm/s, mm/s²) every `T` s."""
+        yield from self.function(segment, T, dict(self.params))
+
+    def theoretical(self, segment: Segment, T: float) -> Rows:
+        """Its rows before positions are made whole BLU."""
+        yield from (self.theory or self.function)(segment, T, dict(self.params))
+
+    def rows(self, segment: Segment, T: float) -> np.ndarray:
+        """Its theoretical rows as an array of shape (rows, 3, axes).
+
+        Raises ContractError where a user's function breaks its interface; `rds check` names every fault.
+        """
+        most = _ROWS_PER_ROW * int(length(segment) / segment.feed_rate / T) + _SPARE_ROWS
+        axes = len(segment.start)
+        rows: list[np.ndarray] = []
+        with_errors = self._errors(segment)
+        for row in with_errors(self.theoretical(segment, T)):
+            rows.append(self._row(row, axes, len(rows)))
+            if len(rows) > most:
+                raise self._broken(f"has yielded {most} rows of a segment of {length(segment):g} mm, and no end")
+        return np.array(rows) if rows else np.empty((0, 3, axes))
+
+    def steps(self, segment: Segment) -> Steps | None:
+        """How a reference word method takes an arc; None for other methods and for lines."""
+        if self.word is None or not isinstance(segment, ArcSegment):
+            return None
+        return steps(segment, self.params, self.word)
+
+    def _errors(self, segment: Segment) -> Callable[[Rows], Rows]:
+        return (lambda rows: rows) if self.source.path is None else partial(self._blamed, segment)
+
+    def _blamed(self, segment: Segment, rows: Rows) -> Rows:
+        try:
+            yield from rows
+        except STUDENT_ERRORS as error:
+            kind = type(segment).__name__
+            raise self._broken(f"failed for {kind}: {student_error(error, self.source)}") from error
+
+    def _row(self, row: Any, axes: int, k: int) -> np.ndarray:
+        try:
+            values = np.array([np.atleast_1d(np.asarray(part, dtype=float)) for part in row])
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        if values.shape != (3, axes) or not np.isfinite(values).all():
+            wanted = f"(position, velocity, acceleration), {axes} finite number{'s' if axes > 1 else ''} each"
+            raise self._broken(f"yielded {row!r:.100} as row {k}, not {wanted}")
+        return values
+
+    def _broken(self, said: str) -> ContractError:
+        remedy = f"`rds check {self.source.name}` names its faults" if self.source.path else "correct it"
+        return ContractError(f"interpolate() {said}; {remedy}", self.source.path or self.name)
+
+
+def find_interpolator(name: str, options: Mapping[str, Any] | None = None) -> Interpolator:
+    """By library name, or the file at this path. InputError for what is neither, or an option that won't do."""
+    if name not in LIBRARY.modules and (name.endswith(".py") or Path(name).is_file()):
+        return from_student(load_student(name), options)
+    return from_library(name, options or {})
+
+
+def from_library(name: str, options: Mapping[str, Any]) -> Interpolator:
+    """The library's interpolator called `name`, with its options checked."""
+    module = LIBRARY.module(name)
+    params = getattr(module, "DEFAULTS", {}) | read_options(options, module.OPTIONS, f"interpolator {name!r}")
+    return Interpolator(
+        name,
+        module.interpolate,
+        Source(name),
+        params,
+        blu=params["blu"] if hasattr(module, "theory") else None,
+        theory=getattr(module, "theory", None),
+        word=getattr(module, "METHOD", None),
+    )
+
+
+def from_student(student: StudentFile, options: Mapping[str, Any] | None = None) -> Interpolator:
+    """A user's interpolator; ContractError if there is none."""
+    function = student.functions.get("interpolate")
+    if function is None:
+        raise ContractError(f"no interpolator: it defines no {form('interpolate')}", student.source.name)
+    return Interpolator(student.source.name, function, student.source, student.parameters(options))

@@ -1,0 +1,149 @@
+"""Pictures of an interpolation: motion of the axes, path, errors."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from rds.interpolators.reference_word import Steps
+from rds.interpolators.result import Interpolation
+from rds.results.figure import BLUE, CYCLE, GREY, VERMILLION, Picture, dress, legend
+
+_STYLES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
+
+
+def pictures(done: Interpolation) -> dict[str, Picture]:
+    """All that there is to draw, by name."""
+    found = {"motion": motion(done), "errors": errors(done)}
+    if done.worst_steps is not None:
+        found["steps"] = steps(done.worst_steps)
+    if len(done.axes) > 1:
+        found["path"] = path(done)
+    if done.generation_error is not None:
+        found["generation-error"] = generation_error(done)
+    return found
+
+
+def motion(done: Interpolation) -> Picture:
+    """Position, velocity and acceleration of each axis over time."""
+    picture = Picture(7.5)
+    grid = picture.subplots(3, 1, sharex=True)
+    quantities = (
+        ("position [mm]", done.position),
+        ("velocity [mm/s]", done.velocity),
+        ("acceleration [mm/s²]", done.acceleration_rows),
+    )
+    for axes, (name, values) in zip(grid, quantities, strict=True):
+        for k, axis in enumerate(done.axes):
+            axes.plot(done.time, values[:, k], color=CYCLE[k], linestyle=_STYLES[k], linewidth=1.3, label=axis)
+        dress(axes, name, "time [s]" if axes is grid[-1] else None)
+    legend(grid[0], columns=6)
+    picture.align_ylabels()
+    return picture
+
+
+def path(done: Interpolation) -> Picture:
+    """The path in each plane in which it goes somewhere: programmed, and as interpolated."""
+    going = [k for k in range(len(done.axes)) if np.ptp(done.theory[:, k]) > 0.0] or [0]
+    planes = list(combinations(going, 2))[:3] or [(going[0], (going[0] + 1) % len(done.axes))]
+    picture = Picture(4.8, max(6.0, 4.8 * len(planes)))
+    grid = picture.subplots(1, len(planes), squeeze=False)[0]
+    programmed = _programmed(done)
+    for axes, (i, j) in zip(grid, planes, strict=True):
+        axes.plot(programmed[:, i], programmed[:, j], color=GREY, linewidth=4.0, alpha=0.45, label="programmed")
+        axes.plot(done.position[:, i], done.position[:, j], color=BLUE, linewidth=1.1, label="interpolated")
+        axes.plot(*done.position[0, [i, j]], "o", color=BLUE, markersize=6, label="start")
+        axes.plot(*done.position[-1, [i, j]], "s", color=VERMILLION, markersize=6, label="end")
+        dress(axes, f"{done.axes[j]} [mm]", f"{done.axes[i]} [mm]")
+        axes.set_aspect("equal", adjustable="datalim")
+    legend(grid[0])
+    return picture
+
+
+def errors(done: Interpolation) -> Picture:
+    """Distance from the programmed path over time: of the samples, and of the middles between them."""
+    picture = Picture(3.4)
+    axes = picture.subplots()
+    scale, unit = _scale(max(done.path_error.max(), done.chord_error.max()))
+    axes.plot(done.time, scale * done.chord_error, color=VERMILLION, linewidth=1.1, label="between samples")
+    axes.plot(done.time, scale * done.path_error, color=BLUE, linewidth=1.1, linestyle=(0, (5, 2)), label="at samples")
+    worst = done.worst_steps
+    if worst is not None:
+        axes.axhline(scale * worst.blu, color=GREY, linewidth=1.0, linestyle=(0, (1, 1.5)), label="one BLU")
+    dress(axes, f"distance from path [{unit}]")
+    axes.set_ylim(bottom=0.0)
+    legend(axes)
+    return picture
+
+
+def steps(taken: Steps) -> Picture:
+    """Corners and middles of the chords of an arc taken by reference word, beside its circle (mrm-control, figure 6)."""
+    picture = Picture(3.6)
+    axes = picture.subplots()
+    scale, unit = _scale(max(taken.radial_error, taken.chord_error))
+    k = np.arange(taken.count + 1)
+    size = 4.0 if taken.count <= 200 else 0.0
+    axes.plot(k, scale * taken.corners, "o-", color=BLUE, markersize=size, linewidth=0.8, label="corners")
+    axes.plot(
+        k[1:] - 0.5, scale * taken.middles, "s--", color=VERMILLION, markersize=size, linewidth=0.8, label="middles"
+    )
+    for bound in (-1, 1):
+        label = f"one BLU ({taken.blu:g} mm)" if bound > 0 else None
+        axes.axhline(bound * scale * taken.blu, color=GREY, linewidth=1.0, linestyle=(0, (1, 1.5)), label=label)
+    dress(axes, f"{taken.method}: outside\nthe circle [{unit}]", "step")
+    legend(axes)
+    return picture
+
+
+def generation_error(done: Interpolation) -> Picture:
+    """Commanded minus theoretical position of each axis, and what it would be without the carried remainder."""
+    from rds.interpolators.reference_pulse import generation_error as decoded
+    from rds.interpolators.reference_pulse import pulses_without_carry
+
+    assert done.generation_error is not None and done.blu is not None  # who calls has looked
+    dropped = decoded(done.theory, pulses_without_carry(done.theory, done.blu), done.blu)
+    count = len(done.axes)
+    picture = Picture(1.7 * count + 2.4)
+    grid = picture.subplots(count + 1, 1, sharex=True)
+    for k, (axes, axis) in enumerate(zip(grid, done.axes, strict=False)):
+        values = done.generation_error[:, k] / done.blu
+        axes.plot(done.time, values, ".", color=CYCLE[k], markersize=1.2, label=f"{axis}, remainder carried")
+        for bound in (-1.0, 1.0):
+            axes.axhline(
+                bound, color=GREY, linewidth=1.0, linestyle=(0, (1, 1.5)), label="one BLU" if bound > 0 else None
+            )
+        axes.set_ylim(-1.15, 1.15)
+        dress(axes, f"{axis} error [BLU]", None)
+        legend(axes)
+    for k, axis in enumerate(done.axes):
+        grid[-1].plot(
+            done.time,
+            dropped[:, k] / done.blu,
+            color=CYCLE[k],
+            linestyle=_STYLES[k],
+            label=f"{axis}, remainder dropped",
+        )
+    dress(grid[-1], "error [BLU]")
+    legend(grid[-1])
+    picture.align_ylabels()
+    return picture
+
+
+def _programmed(done: Interpolation) -> np.ndarray:
+    """Points of the programmed path, close enough to draw."""
+    from rds.core.types import ArcSegment
+    from rds.interpolators.segment import Arc
+
+    pieces = [np.array([done.segments[0].start])]
+    for segment in done.segments:
+        if isinstance(segment, ArcSegment):
+            arc = Arc.of(segment)
+            pieces.append(arc.points(np.linspace(0.0, 1.0, 2 + int(abs(arc.sweep) * 60))))
+        else:
+            pieces.append(np.array([segment.end]))
+    return np.concatenate(pieces)
+
+
+def _scale(largest: float) -> tuple[float, str]:
+    return (1.0, "mm") if largest >= 0.1 else (1000.0, "µm")
