@@ -65,15 +65,15 @@ def by_centre(
     if radius < smallest or end_radius < smallest:
         raise Fault(
             f"the arc's radius is {radius:.5f} at its start and {end_radius:.5f} at its end, where {smallest:g} is the"
-            f" least; {_places(start, end, centre, state)}; correct the centre"
+            f" least ({_places(start, end, centre, state)}); correct the centre"
         )
     error = abs(radius - end_radius)
     relative = error / max(radius, end_radius)
     if error > spiral * SPIRAL_MOST or (relative > SPIRAL_RELATIVE and error > spiral):
         raise Fault(
-            f"the arc's end is off its circle by {error:.4f} ({100 * relative:.2f} %): its radius is {radius:.4f} at"
-            f" the start and {end_radius:.4f} at the end, and may differ by {spiral:.4f} or {100 * SPIRAL_RELATIVE:g} %;"
-            f" {_places(start, end, centre, state)}; correct the end or the centre"
+            f"the arc's end is off its circle by {error:.4f} ({100 * relative:.2f} %), more than {spiral:.4f} and"
+            f" {100 * SPIRAL_RELATIVE:g} %: its radius is {radius:.4f} at the start and {end_radius:.4f} at the end"
+            f" ({_places(start, end, centre, state)}); correct the end or the centre"
         )
     return centre
 

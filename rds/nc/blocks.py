@@ -199,6 +199,12 @@ def check(block: Block, state: State) -> None:
     }
     for letter in words:
         used, by = users.get(letter, (True, ""))
+        if not used and letter == "p" and not g and not block.m and len(words) == 1:
+            raise Fault(
+                "P alone, a program number of oacs-thesis, is an option of the dialect; switch it on"
+                " (program_numbers) or leave it away",
+                letter,
+            )
         if not used:
             raise Fault(f"nothing on the line uses {letter.upper()}; it goes with {by}", letter)
     if arc and "p" in words:

@@ -10,6 +10,7 @@ from typing import IO, TYPE_CHECKING, Any
 from rds.nc.blocks import AXIS_SET, CHECKED, NON_MODAL, Block, check, settle_motion
 from rds.nc.canon import Call, MotionBlock
 from rds.nc.context import Context
+from rds.nc.control import Control
 from rds.nc.dialect import Dialect
 from rds.nc.errors import ProgramError
 from rds.nc.expressions import Fault
@@ -17,7 +18,6 @@ from rds.nc.modes import execute
 from rds.nc.moves import move
 from rds.nc.names import known_names
 from rds.nc.offsets import start
-from rds.nc.owords import Control, Word
 from rds.nc.parameters import Parameters, read_parameters
 from rds.nc.source import LONGEST, open_source
 from rds.nc.state import NO_MOTION, State
@@ -180,7 +180,7 @@ class Interpreter:
             if out.digits > 9:
                 line_number(text)
             out.n = int(digits)
-        if self._first and self._program_number(text):
+        if self.options.program_numbers and self._program_number(text):
             return False
         block = Block()
         fill(block, words)
@@ -195,7 +195,7 @@ class Interpreter:
         first = text[at : at + 1]
         if first == "o" or (self.options.gr and text.startswith("gr", at)):
             self._first = False
-            word = control.read(text, at) if first == "o" else self._read_gr(text, at)
+            word = control.read(text, at) if first == "o" else control.read_gr(text, at)
             control.execute(word)
             return False
         if control.skipping:
@@ -203,9 +203,6 @@ class Interpreter:
         block = Block()
         self._places = read_words(text, at, block, self.context.parameters)
         return self._execute(block)
-
-    def _read_gr(self, text: str, at: int) -> Word:
-        return Word() if self.control.skipping else self.control.read_gr(text, at)
 
     def _execute(self, block: Block) -> bool:
         context, words = self.context, block.words
@@ -236,8 +233,10 @@ class Interpreter:
 
     def _program_number(self, text: str) -> bool:
         """The option's program number, P001, on the first block."""
-        if not (self.options.program_numbers and _PROGRAM_NUMBER.fullmatch(text)):
+        if not _PROGRAM_NUMBER.fullmatch(text):
             return False
+        if not self._first:
+            raise Fault("a program number stands on the first block; remove it here", "p")
         self._first = False
         self.out.comment(f"program {text.upper()}")
         return True
@@ -291,9 +290,9 @@ class Interpreter:
         elif at >= 0 and text:
             places = columns(raw)
             column = places[at] if at < len(places) else len(raw.rstrip()) + 1
-            word = word_at(text, at)
+            word = word_at(text, at).encode("latin-1").decode("utf-8", "replace")
         else:
             column = 0
-        if column:
-            column += source.column
+        if column:  # of the line's characters, not bytes
+            column = len(raw[: column - 1].decode("utf-8", "replace")) + 1 + source.column
         return ProgramError(fault.message, file=source.name, line=source.line, column=column, word=word)

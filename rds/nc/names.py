@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rds.nc.context import Context
+from rds.nc.control import Control
 from rds.nc.expressions import Fault
 from rds.nc.offsets import in_machine
-from rds.nc.owords import Control
 from rds.nc.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION
 
 

@@ -50,6 +50,10 @@ _LETTERS = {
     "\x00": "a character 0 does not belong in a program; save the file as plain text",
 }
 
+GR_IS_OFF = (
+    "GR, the subroutine call of dcs-thesis, is an option of the dialect; switch it on (gr) or write O<name> CALL"
+)
+
 
 def no_such_g(code: int) -> str:
     """Why a G word (ten times its number) cannot be used, and what to do."""
@@ -68,6 +72,8 @@ def no_such_m(code: int) -> str:
 
 def no_such_letter(letter: str) -> str:
     """Why no word can begin with this character."""
+    if letter >= "\x80":
+        return "only letters, digits and signs of ASCII make words; remove it or put it into a comment ( )"
     return _LETTERS.get(letter, f"no word begins with {letter!r}; words are a letter and a number, comments ( ) or ;")
 
 

@@ -1,23 +1,12 @@
-"""O words: subroutines, branches and loops, as LinuxCNC runs them.
-
-A block that begins with an O word is read by `read` and done by `execute`. While `skipping` names a label, every other
-block is passed over. Labels of branches and loops belong to the subroutine that they stand in.
-
-Where LinuxCNC goes on in a strange way, this does not: a loop left by BREAK does not stop a later DO loop, a REPEAT
-left early counts anew, and a subroutine ends only with its own name.
-"""
+"""O words as they are read: their kind, what they name, and the values that they are given."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from rds.nc.dialect import Dialect
-from rds.nc.errors import ProgramError
 from rds.nc.expressions import Fault, Reader
 from rds.nc.parameters import ARGUMENTS, Parameters
-from rds.nc.source import Place, Source, open_file
 
 _KINDS = (
     *("sub", "endsub", "call", "do", "while", "repeat", "if", "elseif", "else", "endif"),
@@ -26,21 +15,13 @@ _KINDS = (
 _KIND = re.compile("|".join(sorted(_KINDS, key=len, reverse=True)))
 _GLOBAL = frozenset(("sub", "endsub", "call", "return"))
 _TESTS = frozenset(("while", "repeat", "if", "elseif"))
-_FILE_NAME = re.compile(r"[^/\\\x00]+")
-
-
-@dataclass(slots=True)
-class Label:
-    """Where an O word stands that can be jumped to: the file and the place of its block, and what kind it is."""
-
-    kind: str
-    source: Source
-    place: Place
 
 
 @dataclass(slots=True)
 class Word:
-    """An O word that has been read. `name`: of labels inside subroutines `sub#label`."""
+    """An O word that has been read. `kind` is "" when there is nothing to do; `name`, of labels inside subroutines, is
+    `sub#label`; `spelled` is for messages; `at` where it begins in its block.
+    """
 
     kind: str = ""
     name: str = ""
@@ -48,380 +29,79 @@ class Word:
     at: int = 0
     test: float = 0.0
     arguments: list[float] = field(default_factory=list)
+    value: float | None = None  # that RETURN or ENDSUB gives back
 
 
-@dataclass(slots=True)
-class Frame:
-    """A subroutine being executed: where it was called from, and what it found."""
+def read_word(text: str, at: int, parameters: Parameters, *, scope: str, defining: str, skipping: str) -> Word:
+    """The O word that begins at `at`. Raises Fault.
 
-    name: str
-    source: Source
-    place: Place
-    kept: list[float]
-    repeats: dict[str, int] = field(default_factory=dict)  # rounds left, by label
-
-
-class Control:
-    """The flow of one program."""
-
-    def __init__(self, source: Source, parameters: Parameters, dialect: Dialect):
-        self.source = source
-        self.skipping = ""  # the label that execution goes on at
-        self.since = 0  # line at which skipping began
-        self._main = source
-        self._parameters = parameters
-        self._dialect = dialect
-        self._labels: dict[str, Label] = {}
-        self._frames: list[Frame] = []
-        self._repeats: dict[str, int] = {}  # of the main program
-        self._seeking = ""  # the subroutine whose definition is being looked for
-        self._defining = ""
-        self._done_if = True  # whether a branch of the present IF has been executed
-        self._breaking = self._continuing = False
-        self._jumps = 0
-        self._opened: dict[Path, Source] = {}
-        self.value = 0.0  # what the last subroutine returned
-        self.returned = False
-
-    @property
-    def depth(self) -> int:
-        """Subroutine calls inside one another."""
-        return len(self._frames)
-
-    def close(self) -> None:
-        """Close the program and the files of its subroutines."""
-        for source in (self._main, *self._opened.values()):
-            source.close()
-
-    # -- reading ------------------------------------------------------------------------------------------------------
-
-    def read(self, text: str, at: int) -> Word:
-        """The O word that begins at `at`. Raises Fault."""
-        reader = Reader(text, self._parameters, at + 1)
-        try:
-            label = reader.name() if reader.peek() == "<" else str(reader.integer())
-        except Fault:
-            if self.skipping:
-                return Word(at=at)  # worked out from parameters that have no value yet
-            raise
-        match = _KIND.match(text, reader.at)
-        word = Word(match[0] if match else "", at=at)
-        reader.at = match.end() if match else reader.at
-        word.spelled = f"O{label if label.lstrip('-').isdigit() else f'<{label}>'}"
-        if word.kind in _GLOBAL:
-            word.name = label
-        else:
-            word.name = f"{self._frames[-1].name if self._frames else self._defining}#{label}"
-        if not word.kind and not self._defining:
-            raise Fault(
-                f"{word.spelled} is followed by no control word; write one of {', '.join(_KINDS).upper()}", at=at
-            )
-        self._read_values(word, reader)
-        if self.skipping:
-            return word
+    `scope`: the subroutine that labels belong to; `defining`: the one that is being defined; `skipping`: the label up
+    to which blocks are passed over, so that only what ends that is worked out ("": none).
+    """
+    reader = Reader(text, parameters, at + 1)
+    try:
+        label = reader.name() if reader.peek() == "<" else str(reader.integer())
+    except Fault:
+        if skipping:
+            return Word(at=at)  # worked out from parameters that have no value yet
+        raise
+    match = _KIND.match(text, reader.at)
+    word = Word(match[0] if match else "", at=at)
+    word.spelled = f"O{label if label.lstrip('-').isdigit() else f'<{label}>'}"
+    word.name = label if word.kind in _GLOBAL else f"{scope}#{label}"
+    if match:
+        reader.at = match.end()
+    elif not defining:
+        alone = " stands alone (a program number elsewhere); leave it away or" if not reader.peek() else " is followed"
+        said = "" if not reader.peek() else " by no control word;"
+        raise Fault(f"{word.spelled}{alone}{said} write one of {', '.join(_KINDS).upper()} after it", at=at)
+    _read_values(word, reader, defining, skipping)
+    if not skipping:
         while reader.peek() == "(":
             reader.at = text.index(")", reader.at) + 1
         if reader.peek() not in ("", ";"):
-            raise reader.fault(
-                f"only a comment can follow {word.spelled} {word.kind.upper()}; move the rest to a new line"
-            )
-        return word
-
-    def _read_values(self, word: Word, reader: Reader) -> None:
-        if word.kind == "sub":
-            if self._defining:
-                raise Fault(
-                    f"a subroutine inside the subroutine {self._defining!r}; end that one with ENDSUB first", at=word.at
-                )
-        elif word.kind in ("endsub", "return"):
-            if self.skipping:
-                return
-            self.returned = reader.peek() == "["
-            self.value = reader.expression() if self.returned else 0.0
-        elif self._defining:
-            word.kind = ""  # belongs to the subroutine: passed over now
-        elif word.kind == "call":
-            if self.skipping:
-                word.kind = ""
-                return
-            self._read_arguments(word, reader)
-        elif word.kind in _TESTS and not (self.skipping and self.skipping != word.name):
-            if reader.peek() != "[":
-                raise reader.fault(f"{word.kind.upper()} needs an expression in brackets; add [...]")
-            word.test = reader.expression()
-
-    def _read_arguments(self, word: Word, reader: Reader) -> None:
-        while reader.peek() in ("[", "(") and reader.peek():
-            if reader.peek() == "(":
-                reader.at = reader.text.index(")", reader.at) + 1
-                continue
-            if len(word.arguments) >= ARGUMENTS:
-                raise reader.fault(f"more than {ARGUMENTS} arguments; hand the rest over in parameters from #31 on")
-            word.arguments.append(reader.expression())
-
-    def read_gr(self, text: str, at: int) -> Word:
-        """GR100 or GR<name>, with arguments in brackets: the same as O100 CALL (dcs-thesis, table 6.1)."""
-        reader = Reader(text, self._parameters, at + 2)
-        label = reader.name() if reader.peek() == "<" else str(reader.integer())
-        word = Word("call", label, f"GR{label}", at)
-        self._read_arguments(word, reader)
-        if reader.peek() not in ("", ";"):
-            raise reader.fault("only arguments [...] and a comment can follow GR; move the rest to a new line")
-        return word
-
-    # -- executing ----------------------------------------------------------------------------------------------------
-
-    def execute(self, word: Word) -> None:
-        """Do what an O word says. Raises Fault."""
-        if not word.kind or (self.skipping and self.skipping != word.name):
-            return
-        if self._seeking and word.kind != "sub":
-            return
-        _ACTIONS[word.kind](self, word)
-
-    def check_end(self) -> None:
-        """The file ends. Raises ProgramError when something is still open."""
-        if self._seeking:
-            raise ProgramError(
-                f"the subroutine {self._seeking!r} called in line {self.since} is not defined in this file; define it"
-                f" between O<{self._seeking}> SUB and ENDSUB, or in a file {self._seeking}.ngc beside the program"
-            )
-        if self.skipping:
-            label = self.skipping.rpartition("#")[2]
-            raise ProgramError(
-                f"the file ends inside the part that O<{label}> in line {self.since} passes over; close it"
-            )
-
-    def _skip_to(self, name: str) -> None:
-        self.skipping = name
-        self.since = self.source.line
-
-    def _define(self, word: Word) -> None:
-        self._labels[word.name] = Label(word.kind, self.source, self.source.place)
-
-    def _label(self, word: Word, *kinds: str) -> Label:
-        label = self._labels.get(word.name)
-        if label is None or label.kind not in kinds:
-            names = " or ".join(kind.upper() for kind in kinds)
-            found = f"; {word.spelled} is a {label.kind.upper()} in line {label.place.line}" if label else ""
-            raise Fault(
-                f"{word.spelled} {word.kind.upper()} has no {word.spelled} {names} before it{found}; write it with the"
-                " same number or name",
-                at=word.at,
-            )
-        return label
-
-    def _new_label(self, word: Word, *others: str) -> None:
-        """Remember a label; the same one elsewhere is a fault."""
-        label = self._labels.get(word.name)
-        if label is None:
-            self._define(word)
-        elif label.kind not in others and (label.place != self.source.place or label.source is not self.source):
-            raise Fault(
-                f"{word.spelled} is already a {label.kind.upper()} in line {label.place.line}; take another number",
-                at=word.at,
-            )
-
-    def _jump(self, label: Label) -> None:
-        self._jumps += 1
-        if self._jumps > self._dialect.max_jumps:
-            raise ProgramError(
-                f"more than {self._dialect.max_jumps} calls and jumps back: the program does not seem to end; check its"
-                " loops, or allow more (max_jumps)"
-            )
-        self.source = label.source
-        self.source.go_to(label.place)
-
-    def _rounds(self) -> dict[str, int]:
-        return self._frames[-1].repeats if self._frames else self._repeats
-
-    def _forget_rounds(self, label: Label) -> None:
-        """A loop begins anew or is left: REPEAT loops inside it count anew."""
-        rounds = self._rounds()
-        for name in list(rounds):
-            inner = self._labels[name]
-            if inner.source is label.source and inner.place.offset > label.place.offset:
-                del rounds[name]
-
-    # -- subroutines --------------------------------------------------------------------------------------------------
-
-    def _sub(self, word: Word) -> None:
-        if self.skipping:  # its definition was looked for, and is found
-            self._seeking = self.skipping = ""
-            self._define(word)
-        elif not self._frames:
-            if word.name in self._labels:
-                line = self._labels[word.name].place.line
-                raise Fault(
-                    f"the subroutine {word.spelled} is defined already, in line {line}; take another name", at=word.at
-                )
-            self._define(word)
-            self._skip_to(word.name)
-            self._defining = word.name
-        elif word.name != self._frames[-1].name:
-            raise Fault(
-                f"a subroutine inside the subroutine {self._frames[-1].name!r}; end that one with ENDSUB first",
-                at=word.at,
-            )
-
-    def _call(self, word: Word) -> None:
-        if len(self._frames) >= self._dialect.max_depth:
-            raise Fault(
-                f"more than {self._dialect.max_depth} subroutine calls inside one another; call fewer", at=word.at
-            )
-        frame = Frame(word.name, self.source, self.source.following(), self._parameters.enter(word.arguments))
-        line = self.source.line
-        self._frames.append(frame)
-        label = self._labels.get(word.name)
-        if label is not None and label.kind == "sub":
-            self._jump(label)
-            return
-        self._jumps += 1
-        found = self._file(word)
-        if found is not None:
-            self.source = found
-        self._skip_to(word.name)
-        self.since = line
-        self._seeking = word.name
-
-    def _file(self, word: Word) -> Source | None:
-        """The file beside the program that is named like the subroutine."""
-        folder: Path | None = self._main.folder
-        if folder is None or not _FILE_NAME.fullmatch(word.name) or len(word.name) > 100:
-            return None
-        path = folder / f"{word.name}.ngc"
-        if not path.is_file():
-            return None
-        found = open_file(path, str(path), semicolons=self._dialect.program_numbers)
-        self._opened[path] = found
-        return found
-
-    def _return(self, word: Word) -> None:
-        if self._frames:
-            frame = self._frames[-1]
-            if word.name != frame.name:
-                raise Fault(
-                    f"{word.spelled} {word.kind.upper()} inside the subroutine {frame.name!r}; write its name",
-                    at=word.at,
-                )
-            self.skipping = ""
-            self._frames.pop()
-            self._parameters.leave(frame.kept)
-            self.source = frame.source
-            self.source.go_to(frame.place)
-        elif not self._defining:
-            raise Fault(f"{word.spelled} {word.kind.upper()} outside of a subroutine; remove it", at=word.at)
-        elif word.kind == "endsub":
-            self.skipping = self._defining = ""
-
-    # -- branches -----------------------------------------------------------------------------------------------------
-
-    def _if(self, word: Word) -> None:
-        self._new_label(word)
-        self._done_if = word.test != 0.0
-        if self._done_if:
-            self.skipping = ""
-        else:
-            self._skip_to(word.name)
-
-    def _elseif(self, word: Word) -> None:
-        self._label(word, "if")
-        if self._done_if:
-            self._skip_to(word.name)
-        elif word.test != 0.0:
-            self.skipping = ""
-            self._done_if = True
-
-    def _else(self, word: Word) -> None:
-        self._label(word, "if")
-        if self._done_if:
-            self._skip_to(word.name)
-        elif self.skipping:
-            self._done_if = True
-            self.skipping = ""
-
-    def _endif(self, word: Word) -> None:
-        self._label(word, "if")
-        self.skipping = ""
-        self._done_if = True
-
-    # -- loops --------------------------------------------------------------------------------------------------------
-
-    def _do(self, word: Word) -> None:
-        self.skipping = ""
-        if word.name not in self._labels:
-            self._define(word)
-
-    def _while(self, word: Word) -> None:
-        self._new_label(word, "do")
-        label = self._labels[word.name]
-        self.skipping = ""
-        if label.kind != "do":
-            if word.test == 0.0:
-                self._skip_to(word.name)
-            return
-        breaking, self._breaking, self._continuing = self._breaking, False, False
-        if word.test != 0.0 and not breaking:
-            self._jump(label)
-
-    def _endwhile(self, word: Word) -> None:
-        label = self._label(word, "while")
-        skipped, self.skipping = bool(self.skipping), ""
-        continuing, self._continuing, self._breaking = self._continuing, False, False
-        if not skipped or continuing:
-            self._jump(label)
-
-    def _repeat(self, word: Word) -> None:
-        self._new_label(word)
-        label = self._label(word, "repeat")
-        rounds = self._rounds()
-        self.skipping = ""
-        left = rounds.get(word.name)
-        if left is None:
-            left = round(word.test)
-        if left > 0:
-            rounds[word.name] = left - 1
-        else:
-            rounds.pop(word.name, None)
-            self._skip_to(word.name)
-        self._forget_rounds(label)
-
-    def _endrepeat(self, word: Word) -> None:
-        label = self._label(word, "repeat")
-        if self.skipping:
-            self.skipping = ""
-        else:
-            self._jump(label)
-
-    def _break(self, word: Word) -> None:
-        label = self._label(word, "while", "do")
-        self._forget_rounds(label)
-        self._skip_to(word.name)
-        self._breaking = True
-
-    def _continue(self, word: Word) -> None:
-        label = self._label(word, "while", "do")
-        if self.skipping:
-            return
-        self._forget_rounds(label)
-        self._skip_to(word.name)
-        self._continuing = True
+            said = f"{word.spelled} {word.kind.upper()}"
+            raise reader.fault(f"only a comment can follow {said}; move the rest to a new line")
+    return word
 
 
-_ACTIONS = {
-    "sub": Control._sub,
-    "endsub": Control._return,
-    "return": Control._return,
-    "call": Control._call,
-    "if": Control._if,
-    "elseif": Control._elseif,
-    "else": Control._else,
-    "endif": Control._endif,
-    "do": Control._do,
-    "while": Control._while,
-    "endwhile": Control._endwhile,
-    "repeat": Control._repeat,
-    "endrepeat": Control._endrepeat,
-    "break": Control._break,
-    "continue": Control._continue,
-}
+def _read_values(word: Word, reader: Reader, defining: str, skipping: str) -> None:
+    if word.kind == "sub":
+        if defining:
+            raise nested(defining, word)
+    elif word.kind in ("endsub", "return"):
+        if not skipping and reader.peek() == "[":
+            word.value = reader.expression()
+    elif defining or (word.kind == "call" and skipping):
+        word.kind = ""  # passed over now
+    elif word.kind == "call":
+        _read_arguments(word, reader)
+    elif word.kind in _TESTS and skipping in ("", word.name):
+        if reader.peek() != "[":
+            raise reader.fault(f"{word.kind.upper()} needs an expression in brackets; add [...]")
+        word.test = reader.expression()
+
+
+def nested(outer: str, word: Word) -> Fault:
+    return Fault(f"a subroutine inside the subroutine {outer!r}; end that one with ENDSUB first", at=word.at)
+
+
+def _read_arguments(word: Word, reader: Reader) -> None:
+    while reader.peek() in ("[", "("):
+        if reader.peek() == "(":
+            reader.at = reader.text.index(")", reader.at) + 1
+            continue
+        if len(word.arguments) >= ARGUMENTS:
+            raise reader.fault(f"more than {ARGUMENTS} arguments; hand the rest over in parameters from #31 on")
+        word.arguments.append(reader.expression())
+
+
+def read_gr(text: str, at: int, parameters: Parameters) -> Word:
+    """GR100 or GR<name>, with arguments in brackets: the same as O100 CALL (dcs-thesis, table 6.1)."""
+    reader = Reader(text, parameters, at + 2)
+    label = reader.name() if reader.peek() == "<" else str(reader.integer())
+    word = Word("call", label, f"GR{label}", at)
+    _read_arguments(word, reader)
+    if reader.peek() not in ("", ";"):
+        raise reader.fault("only arguments [...] and a comment can follow GR; move the rest to a new line")
+    return word

@@ -6,7 +6,7 @@ import re
 
 from rds.nc.blocks import Block
 from rds.nc.expressions import Fault, Reader
-from rds.nc.outside import no_such_letter
+from rds.nc.outside import GR_IS_OFF, no_such_letter
 from rds.nc.parameters import Parameters
 
 _BLANKS = b" \t\r"
@@ -17,6 +17,9 @@ _WORD = re.compile(r"([a-z])([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _LINE_NUMBER = re.compile(r"/?(?:n([0-9]*)(\.?)([0-9]*))?")
 _OTHERS = frozenset("abcdfhijklpqrstxyz")
 _DIGITS_MOST = 9
+_ANYTHING = re.compile(
+    r"gr[0-9]*|[a-z]?[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)|#(?:<[^>]*>|[0-9]+)|[\x80-\xff]+|.", re.DOTALL
+)
 
 
 def tidy(raw: bytes) -> str:
@@ -49,9 +52,9 @@ def line_number(text: str) -> tuple[int, int, int]:
     if digits is None:
         return 0, 0, match.end()
     if not digits or (point and not fraction):
-        raise Fault("a line number is digits; write for example N10", at=match.start(1))
+        raise Fault("a line number is digits; write for example N10", at=match.start(1) - 1)
     if len(digits) > _DIGITS_MOST:
-        raise Fault(f"a line number of {len(digits)} digits; write at most {_DIGITS_MOST}", at=match.start(1))
+        raise Fault(f"a line number of {len(digits)} digits; write at most {_DIGITS_MOST}", at=match.start(1) - 1)
     return len(digits), int(digits), match.end()
 
 
@@ -101,6 +104,8 @@ def read_words(text: str, at: int, block: Block, parameters: Parameters) -> dict
         elif letter == "#":
             _read_setting(reader, parameters)
         elif letter in _OTHERS or letter in "gm":
+            if letter == "g" and reader.peek() == "r":
+                raise Fault(GR_IS_OFF, at=start)
             value = reader.value()
             try:
                 if letter == "g":
@@ -149,5 +154,5 @@ def place_of(key: str, text: str) -> int:
 
 def word_at(text: str, at: int) -> str:
     """The word, parameter or character that begins at `at`, as far as it is plain, in upper case."""
-    match = re.compile(r"[a-z]?[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)|#(?:<[^>]*>|[0-9]+)|.", re.DOTALL).match(text, at)
+    match = _ANYTHING.match(text, at)
     return match[0].upper() if match else ""
