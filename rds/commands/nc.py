@@ -39,7 +39,7 @@ def check(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Say whether a machine can run a program: all faults by line. A valid one leaves its compiled form, FILE's .dat."""
+    """Say whether a machine can run a program: all faults, by line. A valid one leaves its compiled form (.dat)."""
     with refusals():
         from rds.machines import load_machine
         from rds.nc.check import check_program

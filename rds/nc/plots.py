@@ -136,7 +136,7 @@ def _space(axes: Any, trace: Trace, points: dict[int, np.ndarray], beyond: np.nd
     low, high = _frame(trace, None)
     for axis, name in enumerate("xyz"):
         getattr(axes, f"set_{name}lim")(low[axis], high[axis])
-        getattr(axes, f"set_{name}label")(AXES[axis], fontsize="small", labelpad=-2)
+        getattr(axes, f"set_{name}label")(AXES[axis], fontsize="small", labelpad=(5, 5, -2)[axis])
     axes.set_box_aspect(np.maximum(high - low, 0.12 * np.max(high - low)), zoom=0.8)
     axes.set_title("in space [mm]", loc="left", fontsize="medium")
     axes.tick_params(labelsize="small")

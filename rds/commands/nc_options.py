@@ -1,0 +1,33 @@
+"""The options that all commands on part programs share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rds.nc.check import Setup
+
+Program = Annotated[Path, typer.Argument(help="The part program (RS274NGC, as LinuxCNC reads it).", metavar="FILE")]
+MachineName = Annotated[str, typer.Option("--machine", help="A machine's name, or the path of its TOML file.")]
+Tools = Annotated[Path | None, typer.Option(help="Tool table, as LinuxCNC keeps it, lengths in mm.")]
+Parameters = Annotated[Path | None, typer.Option(help="Parameter file, as LinuxCNC keeps it (offsets, #parameters).")]
+With = Annotated[
+    list[str] | None,
+    typer.Option("--with", metavar="OPTION", help="An option of the dialect: block-delete, gr or program-numbers."),
+]
+DIALECT = ("block-delete", "gr", "program-numbers")
+
+
+def setup(tools: Path | None, parameters: Path | None, options: list[str] | None) -> Setup:
+    """What a program is read with. InputError for an option that there is not."""
+    from rds.core.errors import InputError
+    from rds.nc.check import Setup
+    from rds.nc.dialect import Dialect
+
+    for name in options or ():
+        if name not in DIALECT:
+            raise InputError(f"--with {name!r} is no option of the dialect; there are {', '.join(DIALECT)}")
+    return Setup(tools, parameters, Dialect(**{name.replace("-", "_"): True for name in options or ()}))
