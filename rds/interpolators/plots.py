@@ -78,7 +78,7 @@ def errors(done: Interpolation) -> Picture:
 
 
 def steps(taken: Steps) -> Picture:
-    """Corners and middles of the chords of an arc taken by reference word, beside its circle (mrm-control, figure 6)."""
+    """Corners and middles of the chords of an arc, taken by reference word (as figure 6 of mrm-control)."""
     picture = Picture(3.6)
     axes = picture.subplots()
     scale, unit = _scale(max(taken.radial_error, taken.chord_error))

@@ -1,0 +1,267 @@
+"""`rds interpolate`: a part program or a segment through an interpolator, as numbers, table and pictures."""
+
+from __future__ import annotations
+
+import json as json_text
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
+
+import typer
+
+from rds.commands.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.commands.nc_options import MachineName, Parameters, Tools, With, setup
+
+if TYPE_CHECKING:
+    from rds.core.types import Segment
+    from rds.interpolators.acceleration import Acceleration
+    from rds.interpolators.interpolator import Interpolator
+    from rds.interpolators.result import Interpolation
+
+MOST = 2_000_000  # samples of a program
+_FOLDER = Path("interpolation")
+
+
+def interpolate(
+    file: Annotated[Path | None, typer.Argument(help="A part program; instead of it, --line or --arc.")] = None,
+    line: Annotated[
+        str | None, typer.Option(help="Straight moves over points, mm: 0,0:30,40 or 0,0,0:10,0,5:20,0,0.")
+    ] = None,
+    arc: Annotated[str | None, typer.Option(help="An arc START:END:CENTRE, mm: 10,0:0,10:0,0.")] = None,
+    clockwise: Annotated[bool, typer.Option("--clockwise", help="With --arc: the other way round.")] = False,
+    plane: Annotated[str | None, typer.Option(help="With --arc of three axes: XY (default), ZX or YZ.")] = None,
+    feed: Annotated[
+        str | None, typer.Option(help="Feed rate of --line and --arc: mm/min, or with a unit: 10mm/s, 24in/min.")
+    ] = None,
+    period: Annotated[float, typer.Option(help="Sample period, s.")] = 0.001,
+    method: Annotated[
+        str, typer.Option("--method", "-m", help="Interpolator: a library name, or a file with interpolate().")
+    ] = "constant-velocity",
+    arc_method: Annotated[str | None, typer.Option(help="Another one for arcs, with its default options.")] = None,
+    option: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Of --method: blu=0.001, steps=39, a file's params.")
+    ] = None,
+    acceleration: Annotated[str | None, typer.Option(help="Filter on top: linear, exponential or s-shape.")] = None,
+    acceleration_time: Annotated[
+        float | None, typer.Option(help="How long the velocity rises, s; of exponential its time constant.")
+    ] = None,
+    multipliers: Annotated[str | None, typer.Option(help="Of s-shape, one for each sample: 1,2,3,2,1.")] = None,
+    exact_stop: Annotated[
+        bool, typer.Option("--exact-stop", help="With --acceleration: come to rest at the end of each segment.")
+    ] = False,
+    machine: MachineName = "mini-cnc",
+    tools: Tools = None,
+    parameters: Parameters = None,
+    with_: With = None,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Save pictures too, in --out or the folder interpolation.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the table (made if missing).")] = None,
+    json: Json = False,
+) -> None:
+    """Position, velocity and acceleration of each axis along a path, and how far it is from what was programmed."""
+    with refusals(), stdout_kept(json):
+        from rds.interpolators.path import interpolate as follow
+
+        words = {"--line": line, "--arc": arc}
+        _check_words(file, words, clockwise, plane, feed)
+        notes: list[str] = []
+        chosen = _method(method, option, period, notes)
+        arcs = None if arc_method is None else _method(arc_method, None, period, notes)
+        filter_ = _acceleration(acceleration, acceleration_time, multipliers, exact_stop)
+        if file is not None:
+            segments, left_out = _program(file, machine, period, (tools, parameters, with_))
+            notes += left_out
+        else:
+            _check_program_words(machine=machine != "mini-cnc", tools=tools, parameters=parameters, with_=with_)
+            segments = _segments(line, arc, clockwise, plane, feed or "")
+        done = follow(segments, period, chosen, arcs=arcs, acceleration=filter_, exact_stop=exact_stop)
+        files = _save(done, out, plot)
+    if json:
+        print_json({**done.to_json(), "notes": notes, "files": [str(path) for path in files]})
+    else:
+        _show(done, notes, files)
+    worst = done.worst_steps
+    if worst is not None and not worst.within:
+        typer.echo(
+            f"rds: {worst.count} steps of {worst.method} are {max(worst.radial_error, worst.chord_error):.4g} mm from "
+            f"the arc, more than one BLU ({worst.blu:g} mm); without --option steps there are as many as needed",
+            err=True,
+        )
+    raise typer.Exit(0 if done.within else 1)
+
+
+def _check_words(
+    file: Path | None, words: dict[str, str | None], clockwise: bool, plane: str | None, feed: str | None
+) -> None:
+    from rds.core.errors import InputError
+
+    given = ["FILE"] * (file is not None) + [name for name, value in words.items() if value is not None]
+    if len(given) != 1:
+        said = f"{' and '.join(given)} were given" if given else "there is nothing to interpolate"
+        raise InputError(f"{said}; give one of a part program, --line and --arc")
+    if file is not None and feed is not None:
+        raise InputError("--feed is for --line and --arc; the program's word F says its feed rate")
+    if file is None and feed is None:
+        raise InputError(f"{given[0]} needs a feed rate, as in --feed 600 (mm/min) or --feed 10mm/s")
+    if given != ["--arc"] and (clockwise or plane is not None):
+        raise InputError(f"--{'clockwise' if clockwise else 'plane'} is for --arc, and {given[0]} was given")
+
+
+def _check_program_words(**given: Any) -> None:
+    from rds.core.errors import InputError
+
+    for name, value in given.items():
+        if value:
+            raise InputError(f"--{name.strip('_')} is for a part program; --line and --arc are taken as they are")
+
+
+def _method(name: str, options: list[str] | None, T: float, notes: list[str]) -> Interpolator:
+    from rds.interpolators import LIBRARY
+    from rds.interpolators.interpolator import find_interpolator
+
+    given = dict(_option(text) for text in options or ())
+    found = find_interpolator(name, given)
+    if name not in LIBRARY.modules:
+        notes += _check_student(name, T)
+    return found
+
+
+def _check_student(file: str, T: float) -> list[str]:
+    """What `rds check` warns of, in a process of its own; ContractError with every fault that it finds."""
+    from rds.checks import check_file
+    from rds.core.errors import ContractError
+
+    warnings: list[str] = []
+    for report in check_file(file, T).reports:
+        if report.interface in ("interpolator", "file") and not report.ok:
+            faults = "; ".join(f"{fault.clause}: {fault.message}" for fault in report.faults)
+            raise ContractError(f"interpolate() does not keep its interface: {faults}", file)
+        if report.interface == "interpolator":
+            warnings += [f"{file}: {warning.clause}: {warning.message}" for warning in report.warnings]
+    return warnings
+
+
+def _option(text: str) -> tuple[str, Any]:
+    from rds.core.errors import InputError
+
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise InputError(f"--option {text!r} must be NAME=VALUE, as in --option blu=0.001")
+    try:
+        return name.strip(), json_text.loads(value)
+    except ValueError:
+        return name.strip(), value
+
+
+def _acceleration(
+    name: str | None, time: float | None, multipliers: str | None, exact_stop: bool
+) -> Acceleration | None:
+    from rds.core.errors import InputError
+    from rds.interpolators.acceleration import make_acceleration
+
+    if name is None:
+        given = {"--acceleration-time": time is not None, "--multipliers": multipliers is not None}
+        given["--exact-stop"] = exact_stop
+        for option, used in given.items():
+            if used:
+                raise InputError(f"{option} goes with --acceleration, which is not given; add --acceleration s-shape")
+        return None
+    options = {} if time is None else {"time_constant" if name == "exponential" else "time": time}
+    try:
+        values = [float(cell) for cell in multipliers.split(",")] if multipliers is not None else []
+    except ValueError as error:
+        raise InputError(f"--multipliers {multipliers!r}: {error}; write them as numbers, as in 1,2,3,2,1") from error
+    if values and options:
+        raise InputError("--multipliers and --acceleration-time both say how long the filter is; give one of them")
+    return make_acceleration(name, multipliers=values, **options)
+
+
+def _segments(line: str | None, arc: str | None, clockwise: bool, plane: str | None, feed: str) -> list[Segment]:
+    from rds.commands import interpolate_path as words
+
+    rate = words.feed_rate(feed)
+    if line is not None:
+        return words.line(line, rate)
+    return words.arc(arc or "", rate, clockwise, plane or "XY")
+
+
+def _program(file: Path, machine: str, T: float, reading: tuple[Any, Any, Any]) -> tuple[list[Segment], list[str]]:
+    from rds.commands.interpolate_path import program
+    from rds.core.errors import InputError
+    from rds.core.options import Option
+    from rds.machines import load_machine
+    from rds.nc.check import motion
+
+    Option("sample period, s", more_than=0.0).check(T, "--period", "rds interpolate")
+    if not file.is_file():
+        raise InputError("there is no such part program; check the name and the folder", str(file))
+    loaded = load_machine(machine)
+    with progress_bars() as bar:
+        found = program(motion(file, loaded, setup(*reading), bar("read")), loaded, T, MOST)
+    if not found.left_out:
+        return found.segments, []
+    return found.segments, [
+        f"{' and '.join(found.left_out)} left out here, where only moves take time; `rds nc time` counts them"
+    ]
+
+
+def _save(done: Interpolation, out: Path | None, plot: bool) -> list[Path]:
+    if out is None and not plot:
+        return []
+    folder = out or _FOLDER
+    files = [done.save(folder / "interpolation.csv")]
+    if plot:
+        from rds.interpolators.plots import pictures
+        from rds.results.atomic import write_files
+
+        drawn = {folder / f"{name}.png": picture.png() for name, picture in pictures(done).items()}
+        write_files({path: partial(_write, png) for path, png in drawn.items()})
+        files += drawn
+    return files
+
+
+def _write(data: bytes, stream: BinaryIO) -> None:
+    stream.write(data)
+
+
+def _show(done: Interpolation, notes: list[str], files: list[Path]) -> None:
+    from rds.console import show_table
+
+    about = done.to_json()
+    top = (
+        f"{about['method'] if isinstance(about['method'], str) else ' and '.join(about['method'])}"
+        f"{', ' + about['acceleration'] + ' acceleration' if about['acceleration'] else ''}: "
+        f"{about['segments']} segment{'s' if about['segments'] > 1 else ''}, a sample every {1000 * done.T:g} ms"
+    )
+    rows = [
+        ("samples", str(done.samples), ""),
+        ("time", f"{done.duration:.6g}", "s"),
+        ("programmed length", f"{done.programmed_length:.4f}", "mm"),
+        ("length", f"{done.length:.4f}", "mm"),
+        ("largest distance from the path, samples", f"{about['path_error_mm']:.6f}", "mm"),
+        ("largest distance from the path, between them", f"{about['chord_error_mm']:.6f}", "mm"),
+    ]
+    worst = done.worst_steps
+    if worst is not None:
+        rows += [
+            ("steps of the arc" if len(done.segments) == 1 else "steps of the worst arc", str(worst.count), ""),
+            ("steps by the formula", f"{worst.formula:.2f}", ""),
+            ("radial error", f"{worst.radial_error:.6f}", "mm"),
+            ("chord height error", f"{worst.chord_error:.6f}", "mm"),
+            (f"within one BLU of {worst.blu:g} mm", "yes" if worst.within else "NO", ""),
+        ]
+    if about["generation_error_mm"] is not None:
+        kept = "yes" if done.within else "NO"
+        rows += [
+            ("commanded minus theoretical, largest", f"{about['generation_error_mm']:.6f}", "mm"),
+            (f"within one BLU of {done.blu:g} mm", kept, ""),
+        ]
+    for name, unit in (("velocity", "mm/s"), ("acceleration", "mm/s²")):
+        largest = about[f"largest_{name}_{'mm_s' if name == 'velocity' else 'mm_s2'}"]
+        rows += [(f"largest {name} {axis}", f"{value:.6g}", unit) for axis, value in largest.items()]
+    show_table(top, ("quantity", "value", "unit"), rows)
+    for note in notes:
+        typer.echo(f"note: {note}")
+    for path in files:
+        typer.echo(f"wrote {path}")
