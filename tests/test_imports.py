@@ -25,6 +25,7 @@ ALLOWED: dict[str, set[str]] = {
     "machines": {"core"},
     "motion": {"core", "machines"},
     "nc": {"core", "machines", "motion", "results"},  # see ONLY
+    "programs": {"core", "machines", "motion", "nc", "runtime", "modes", "experiment", "results"},
     "paths": {"core", "results"},  # see ONLY
     "checks": {"core"},
     "bus": {"core", "machines", "models", "runtime", "results"},  # see ONLY

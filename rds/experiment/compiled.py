@@ -24,6 +24,8 @@ def obstacle(plan: Plan) -> str | None:
         import_module("numba")
     except ImportError:
         return "numba is not installed (pip install 'rds[fast]')"
+    if plan.program is not None:
+        return "a part program drives the axes"
     if plan.changes:
         return "live values change while it runs"
     if plan.mode != "simulation":

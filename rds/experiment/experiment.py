@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import secrets
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -152,6 +152,9 @@ class Experiment:
         def work(live: Live | None, progress: Progress | None) -> Result:
             return self._finished(plan, known, self._rows(plan, folder, progress, live), folder, out)
 
+        return self._handle(plan, folder, work)
+
+    def _handle(self, plan: Plan, folder: Path | None, work: Callable[[Live | None, Progress | None], Result]) -> Run:
         return Run(plan, folder, work)
 
     def _finished(
@@ -162,7 +165,7 @@ class Experiment:
             raise ContractError(f"{rows.reason}{kept}")
         if not len(rows.values):
             raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
-        result = outcome(plan, rows, known)
+        result = self._complete(outcome(plan, rows, known))
         if out is not None:
             result.save(out)
             if rows.changes:
@@ -171,6 +174,10 @@ class Experiment:
 
     def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
         return resolve(self._words, self._folder, mode)
+
+    def _complete(self, result: Result) -> Result:
+        """What else is to be said of a result; a run of another kind adds to it."""
+        return result
 
     def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None, live: Live | None) -> Rows:
         note = None

@@ -15,6 +15,7 @@ import numpy as np
 from rds.core.types import Ending, Source
 from rds.experiment.bus_note import bus_note
 from rds.modes import load_mode
+from rds.modes.again import as_recorded
 from rds.modes.host import Rows, run_plan
 from rds.modes.second_look import own_times
 from rds.results import Result
@@ -42,7 +43,7 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
 
 def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
     """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
-    same = replace(plan, mode="simulation", samples=int(sample[-1]) + 1).with_changes(rows.changes)
+    same = replace(as_recorded(plan, rows), mode="simulation", samples=int(sample[-1]) + 1)
     simulated = run_plan(same, None)
     of = dict(zip(simulated.columns, simulated.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
@@ -54,7 +55,8 @@ def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
     recorded = dict(zip(rows.columns, rows.values.T, strict=True))
     timing = Timing(sample, *(recorded[name] for name in TIMING_COLUMNS))
     period = round(plan.T * 1e9)
-    passed = plan.samples if rows.ending is Ending.DONE else int(sample[-1]) + 1
+    whole = rows.ending is Ending.DONE and plan.program is None
+    passed = plan.samples if whole else int(sample[-1]) + 1
     judgement = judge(
         timing,
         period,

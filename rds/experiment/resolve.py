@@ -23,15 +23,19 @@ from rds.modes.machine import BUILTIN
 from rds.runtime.laws import ReferenceSamples
 from rds.runtime.mode import Mode
 from rds.runtime.plan import AxisPlan, Plan
+from rds.runtime.program import Program
 
 MOST_SAMPLES = 20_000_000
 PERIODS = (1e-6, 1000.0)  # s: the shortest and the longest sample period
 AXIS_WORDS = ("reference", "signal", "controller", "model")
 
 
-def resolve(words: Words, folder: Path, mode_name: str | None = None) -> tuple[Plan, dict[str, Any]]:
+def resolve(
+    words: Words, folder: Path, mode_name: str | None = None, program: Program | None = None
+) -> tuple[Plan, dict[str, Any]]:
     """The plan of the experiment, in `mode_name` if that is given, and what is known of it for the result's meta.
 
+    With a part program, that drives its axes and the spindle: the words say their controllers, and no reference.
     Raises InputError with file, line, key, value and remedy for anything that will not do.
     """
     words.text("title")
@@ -39,14 +43,14 @@ def resolve(words: Words, folder: Path, mode_name: str | None = None) -> tuple[P
     written = words.choice("mode", "simulation", mode_names())
     mode = load_mode(mode_name or written)
     T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
-    samples = _samples(words, T)
+    samples = _samples(words, T) if program is None else program.samples
     words.flag("compiled", False)
     saturation, quantization = _interface(words, mode)
     limit = machine.converter.range if saturation else inf
     timing = _timing(words, mode)
-    driven = _drive(words, mode)
+    driven = _drive(words, mode) if program is None else _program(words, mode)
     axes, periods = [], {}
-    for axis, own in _axes(words, machine):
+    for axis, own in _axes(words, machine) if program is None else _program_axes(words, machine, program):
         made, periods[axis.name] = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
         axes.append(made)
     bus = _bus(words, folder)
@@ -62,6 +66,7 @@ def resolve(words: Words, folder: Path, mode_name: str | None = None) -> tuple[P
         quantization=quantization,
         bus=bus,
         import_path=_import_path(axes),
+        program=program,
         **timing,
     )
     return plan, {"period": periods}
@@ -107,6 +112,12 @@ def _axes(words: Words, machine: Machine) -> list[tuple[Axis, Words]]:
         if name not in machine.axes:
             remedy = f"names {name!r}, which machine {machine.name!r} does not have; it has {', '.join(machine.axes)}"
             raise words.fault(key, remedy)
+    return _with_words(words, machine, several)
+
+
+def _with_words(words: Words, machine: Machine, several: list[str]) -> list[tuple[Axis, Words]]:
+    """Each axis with its own tables over the general ones."""
+    given = words.any("axis")
     for key in AXIS_WORDS:
         _ = key in words  # known even where every axis has its own
     overrides = words.inner("axis") if isinstance(given, dict) else None
@@ -154,7 +165,9 @@ def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tup
     times = np.arange(samples) * setting.T
     model = make_model(words, setting)
     period: float | None
-    if driven == "signal":
+    if driven == "program":
+        plan, period = AxisPlan(axis, model, make_controller(words, setting, model)), None
+    elif driven == "signal":
         if "signal" not in words:
             raise InputError(f"axis {axis.name} has no [signal]", words.place())
         signal = make_drive(words, "signal", setting, "V")
@@ -170,6 +183,32 @@ def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tup
     if words.name:
         words.done()
     return plan, period
+
+
+def _program(words: Words, mode: Mode) -> str:
+    """What a part program takes the place of is refused."""
+    if "controller" not in mode.drives:
+        raise InputError(f"mode {mode.name} has no controllers, which a part program needs", words.place("mode"))
+    axes = words.any("axis")
+    tables = [words, *(filter(None, map(words.table_of("axis", axes).inner, axes)) if isinstance(axes, dict) else ())]
+    for table in tables:
+        for key in ("reference", "signal", "duration", "axes"):
+            if key in table:
+                raise InputError(f"the part program says what the axes do: remove {key}", table.place(key))
+    return "program"
+
+
+def _program_axes(words: Words, machine: Machine, program: Program) -> list[tuple[Axis, Words]]:
+    """The axes that a program moves and the spindle, in the machine's order."""
+    given = words.any("axis")
+    if given is not None and not isinstance(given, dict):
+        raise words.fault("axis", "names an axis; the part program drives all of them: remove it")
+    used = {*program.axes, program.spindle}
+    axes = [name for name in machine.axes if name in used]
+    for name in given or ():
+        if name not in axes:
+            raise InputError(f"the program drives {', '.join(axes)}, and no axis {name!r}", words.place("axis"))
+    return _with_words(words, machine, axes)
 
 
 def _check_travel(reference: ReferenceSamples, axis: Axis, words: Words) -> None:

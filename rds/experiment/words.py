@@ -31,6 +31,10 @@ class Words:
         self._text, self._general, self._shared = text, general, shared
         self._asked: list[str] = []
 
+    def over_written(self, table: dict[str, Any]) -> Words:
+        """The same file with another top table: errors still tell the file's places."""
+        return Words(table, self._text, self.path)
+
     @classmethod
     def read(cls, path: str | Path) -> Words:
         """The top table of a TOML file; InputError if it cannot be read or is not TOML."""

@@ -81,6 +81,7 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     attached: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
     if live is not None:
         heed.desk = Desk.create(None, plan.channels())
+        heed.in_virtual_time = True
         attached = live.attach(plan, heed.desk, columns, units, recorded=recorded)
     elif heed.is_idle:
         loop = replace(loop, heed=None)
@@ -94,7 +95,7 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     except STUDENT_ERRORS as error:
         raise ContractError(fault(plan, error, loop.k)) from error
     values = np.frombuffer(recorded).reshape(-1, len(columns))
-    return Rows(columns, units, values, ending, "", {}, changes=tuple(timed(heed.taken, plan.T)))
+    return Rows(columns, units, values, ending, heed.reason, {}, changes=tuple(timed(heed.taken, plan.T)))
 
 
 def _in_target(plan: Plan, directory: Path, progress: Progress | None, live: Live) -> Rows:
@@ -127,7 +128,7 @@ def _recorded(
     """Let a recorder start the target, and wait for the end of the run; whether there is a sample."""
     about: dict[str, Any] = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
     about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8), "ready": READY}
-    capacity = min(plan.samples, max(_RING_BYTES // (8 * len(columns)), 1000))
+    capacity = min(plan.most_samples, max(_RING_BYTES // (8 * len(columns)), 1000))
     ring = Ring.create(_ring_path(about["run"]), columns, capacity, **about)
     desk = Desk.create(ring.desk_path, plan.channels())
     try:

@@ -13,6 +13,7 @@ import numpy as np
 from rds.core.blame import STUDENT_ERRORS
 from rds.core.clock import RealTimeClock
 from rds.core.contracts import Motion
+from rds.modes.again import as_recorded
 from rds.modes.host import Rows
 from rds.modes.parts import start
 from rds.runtime.plan import Plan
@@ -27,7 +28,7 @@ def own_times(plan: Plan, rows: Rows) -> np.ndarray | None:
     Each pass starts from the initial states and gets the positions and the voltages that were recorded, and the
     changes of live values.
     """
-    plan = plan.with_changes(rows.changes)
+    plan = as_recorded(plan, rows)
     of = dict(zip(rows.columns, rows.values.T, strict=True))
     samples = of["sample"].astype(int).tolist()
     measured = np.array([of[f"{name}_measured"] for name in plan.names]).T.tolist()

@@ -73,6 +73,7 @@ def run(plan: Plan, ring: Ring, desk: Desk) -> dict[str, Any]:
         with quiet_memory():
             clock.start()
             report["ending"] = loop.run()
+        report["reason"] = loop.heed.reason
         if report["ending"] is Ending.DONE:
             drivers.confirm()
     except MachineError as error:

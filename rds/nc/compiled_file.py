@@ -140,7 +140,8 @@ def _check(stream: BinaryIO, path: Path) -> None:
 def _last_line(stream: BinaryIO) -> bytes:
     end = stream.seek(0, 2) - _DIGEST
     stream.seek(max(0, end - 4096))
-    return stream.read(min(end, 4096)).rstrip(b"\n").rpartition(b"\n")[2]
+    data = stream.read(min(end, 4096))
+    return data[max(data.rfind(b'{"end":true'), 0) :]  # the records before it end with no line feed
 
 
 def _read_json(line: bytes, path: Path) -> dict[str, Any]:

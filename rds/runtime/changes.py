@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from math import ceil, isfinite
 from pathlib import Path
+from time import sleep
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
@@ -15,6 +16,7 @@ from rds.runtime.desk import Channel, Desk, Note, find
 
 FILE = "changes.csv"
 STOP = "stop"
+_LOOK = 0.005  # s between two looks at the desk while time stands still
 _HEADINGS = ("time [s]", "name", "old", "new")
 
 
@@ -37,7 +39,8 @@ class Heed:
 
     `actions` say what a new value does, by channel ("stop" ends the run unless they say otherwise); `planned` are
     changes known before the run, as (sample, channel, value) in order. Set `desk` to heed somebody who changes values
-    while it runs. `over()` is asked at each sample whether what drives the axes is at its end.
+    while it runs. `over()` is asked at each sample whether what drives the axes is at its end, and
+    why. `in_virtual_time`, time stands still for as long as `waits()` says that only somebody at the desk can go on.
     """
 
     def __init__(
@@ -45,20 +48,26 @@ class Heed:
         channels: Sequence[Channel],
         actions: Mapping[str, Callable[[float], None]],
         planned: Sequence[tuple[int, str, float]] = (),
-        over: Callable[[], Ending | None] | None = None,
+        over: Callable[[], tuple[Ending, str] | None] | None = None,
+        waits: Callable[[], bool] | None = None,
     ):
         self.values = {channel.name: channel.value for channel in channels}
         self.taken: list[Note] = []
         self.desk: Desk | None = None
+        self.in_virtual_time = False
+        self.reason = ""  # why the run ended early, in a sentence
         self._names = list(self.values)
         self._actions = {STOP: self._stop} | dict(actions)
         self._planned = list(planned)
         self._next = 0  # of the planned changes
         self._ending: Ending | None = None
-        self._over = over
+        self._over, self._waits = over, waits
 
     def __call__(self, k: int) -> Ending | None:
         """Take what has changed before sample `k`; how the run ends here, if it does."""
+        if self._waits is not None and self.in_virtual_time and self.desk is not None:
+            while self._waits() and not self.desk.news():
+                sleep(_LOOK)
         planned = self._planned
         while self._next < len(planned) and planned[self._next][0] <= k:
             self._apply(k, *planned[self._next][1:])
@@ -71,16 +80,19 @@ class Heed:
                     self._apply(k, name, value)
         if self._ending is not None:
             return self._ending
-        return None if self._over is None else self._over()
+        if self._over is None or (over := self._over()) is None:
+            return None
+        ending, self.reason = over
+        return ending
 
     @property
     def is_idle(self) -> bool:
         """Whether nobody can have a say: then the loop need not ask."""
         return self.desk is None and not self._planned and self._over is None
 
-    def is_alone(self) -> bool:
-        """Whether no further change can come: nobody is at the desk, and no planned one is left."""
-        return self.desk is None and self._next == len(self._planned)
+    def expects(self, names: Container[str]) -> bool:
+        """Whether one of these live values can still change: somebody is at the desk, or a change of it is planned."""
+        return self.desk is not None or any(change[1] in names for change in self._planned[self._next :])
 
     def _stop(self, value: float) -> None:
         self._ending = Ending.STOPPED if value else None

@@ -15,14 +15,19 @@ from rds.interface import converter
 from rds.machines import Axis, Machine
 from rds.runtime.changes import Heed, plan_changes, stop_channel
 from rds.runtime.desk import Channel
-from rds.runtime.laws import ReferenceSamples, controlled, coupled, played
+from rds.runtime.execution import Execution
+from rds.runtime.laws import LiveReference, ReferenceSamples, controlled, coupled, played
 from rds.runtime.loop import Law
+from rds.runtime.program import COLUMNS, Program, program_channels
+from rds.runtime.retimed import Retimed
 from rds.runtime.tuning import Tuning
+
+_UNBOUNDED = 1 << 50  # samples
 
 
 @dataclass(frozen=True)
 class AxisPlan:
-    """One axis of a run: its model, and either a controller with a reference or a voltage signal."""
+    """One axis of a run: its model, and a controller with a reference (unless a program gives it) or a signal."""
 
     axis: Axis
     model: Model
@@ -50,6 +55,7 @@ class Plan:
     rehearsal: float = 0.25  # s of clock and I/O without the student's code, before a real-time run
     import_path: tuple[str, ...] = ()  # folders of the students' files, for what they import from there
     changes: tuple[tuple[int, str, float], ...] = ()  # of live values: (sample, channel, value), in order
+    program: Program | None = None  # instead of references; `samples` is then what it takes without waiting
 
     @property
     def names(self) -> list[str]:
@@ -61,6 +67,11 @@ class Plan:
         """Whether controllers drive the axes (otherwise voltage signals do)."""
         return self.axes[0].signal is None
 
+    @property
+    def most_samples(self) -> int:
+        """After so many samples the run ends in any case; a program waits for as long as somebody lets it."""
+        return self.samples if self.program is None else _UNBOUNDED
+
     def limit(self) -> Callable[[Any], float]:
         """The converter of this run."""
         board = self.machine.converter
@@ -68,7 +79,8 @@ class Plan:
 
     def channels(self) -> list[Channel]:
         """What may be changed while it runs: the parameters of controllers, the override of a program, the stop."""
-        return [channel for tuning in self._tunings() for channel in tuning.channels] + [stop_channel()]
+        own = [] if self.program is None else program_channels()
+        return [channel for tuning in self._tunings() for channel in tuning.channels] + own + [stop_channel()]
 
     def with_changes(self, changes: Iterable[Any]) -> Plan:
         """The same run, in which live values change at known times; see `changes.plan_changes`."""
@@ -84,8 +96,24 @@ class Plan:
         """What drives the axes, fresh from its initial state, and what takes the changes of live values."""
         tunings = self._tunings()
         actions = {name: act for tuning in tunings for name, act in tuning.actions().items()}
-        heed = Heed(self.channels(), actions, self.changes)
-        return Drive(self._laws([tuning.params for tuning in tunings]), heed)
+        params = [tuning.params for tuning in tunings]
+        program = self.program
+        if program is None:
+            references = [plan.reference for plan in self.axes if plan.reference is not None]
+            return Drive(self._laws(params, references), Heed(self.channels(), actions, self.changes))
+        live = {name: LiveReference() for name in self.names}
+        spindle = None if program.spindle is None else self.names.index(program.spindle)
+        execution = Execution(
+            program,
+            self.T,
+            Retimed(program, self.T),
+            [live[name] for name in (*program.axes, *([program.spindle] if program.spindle else []))],
+            spindle,
+            0.0 if spindle is None else self.axes[spindle].axis.resolution,
+            lambda names: heed.expects(names),
+        )
+        heed = Heed(self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits)
+        return Drive([execution.law, *self._laws(params, list(live.values()))], heed)
 
     def _tunings(self) -> list[Tuning]:
         """The live parameters of each controller; of one controller, if it drives all axes."""
@@ -96,11 +124,10 @@ class Plan:
             Tuning(plan.axis.name, plan.controller, plan.axis.unit) for plan in self.axes if plan.controller is not None
         ]
 
-    def _laws(self, params: list[dict[str, Any]]) -> list[Law]:
+    def _laws(self, params: list[dict[str, Any]], references: Sequence[ReferenceSamples | LiveReference]) -> list[Law]:
         limit, plans = self.limit(), self.axes
         first = plans[0].controller
         if first is not None and first.coupled:
-            references = [plan.reference for plan in plans if plan.reference is not None]
             limits = [limit] * len(plans)
             return [coupled(range(len(plans)), self.names, first, references, self.T, limits, params[0])]
         laws = []
@@ -108,8 +135,8 @@ class Plan:
             if plan.signal is not None:
                 laws.append(played(i, plan.signal, limit))
             else:
-                assert plan.controller is not None and plan.reference is not None
-                laws.append(controlled(i, plan.axis.name, plan.controller, plan.reference, self.T, limit, params[i]))
+                assert plan.controller is not None
+                laws.append(controlled(i, plan.axis.name, plan.controller, references[i], self.T, limit, params[i]))
         return laws
 
     def columns(self, followed: str | None) -> tuple[list[str], dict[str, str]]:
@@ -119,6 +146,9 @@ class Plan:
         """
         columns = ["sample"]
         units = {"sample": ""}
+        if self.program is not None:
+            columns += COLUMNS
+            units |= COLUMNS
         for plan in self.axes:
             name, unit = plan.axis.name, plan.axis.unit
             parts = {"measured": unit, "command": "V"}

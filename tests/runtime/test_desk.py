@@ -126,7 +126,7 @@ def test_a_change_is_taken_at_the_sample_of_its_time() -> None:
         assert heed(k) is None
     assert said == [(0, 1.0), (11, 2.0)]
     assert heed.taken == [Note(0, "X.Pgain", 10.0, 1.0), Note(11, "X.Pgain", 1.0, 2.0)]
-    assert heed.is_alone()
+    assert not heed.expects(["X.Pgain"])
 
 
 @given(sample=st.integers(0, 10**9), T=st.sampled_from([0.001, 0.002, 1e-4, 0.0123, 1 / 3000]))

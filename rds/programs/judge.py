@@ -1,0 +1,114 @@
+"""What was measured of a program's run, against the program: where each axis lags most, and the contour error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rds.motion.planner import TOLERANCE
+from rds.motion.segments import AXES, BLEND
+from rds.programs.contour import contour_error
+from rds.programs.prepare import Prepared
+from rds.results import Result
+from rds.runtime.execution import State
+
+WAITS = {
+    State.HELD: "held_s",
+    State.STOP: "stops_s",
+    State.TOOL: "tool_changes_s",
+    State.SPINDLE: "spindle_s",
+    State.HOME: "homing_s",
+}
+_LINEAR = AXES[:3]
+
+
+def judged(result: Result, prepared: Prepared) -> Result:
+    """The result with the column `contour_error` (mm; 0 on the way home) and with `meta["program"]`."""
+    state = result["program_state"].astype(int)
+    error, line = _contour(result, prepared, state)
+    columns = dict(result.columns)
+    units = dict(result.units)
+    columns["contour_error"], units["contour_error"] = error, "mm"
+    about = {
+        "file": prepared.file.name,
+        **_times(result, prepared, state),
+        "contour_error": _worst(error, line, result["time"], "mm") if len(prepared.path) else None,
+        "following_error": {
+            name: _worst(
+                np.abs(result[f"{name}_reference"] - result[f"{name}_measured"]),
+                result["program_line"].astype(int),
+                result["time"],
+                result.units[f"{name}_measured"],
+            )
+            for name in prepared.program.axes
+        },
+    }
+    meta = result.meta | {"program": about, "notes": [*result.meta.get("notes", []), *prepared.notes]}
+    return Result(columns, units, meta)
+
+
+def worst_lines(result: Result, column: np.ndarray, count: int = 5) -> list[tuple[int, float, float]]:
+    """The program lines with the largest values of a column: line, value and when it was, s."""
+    line = result["program_line"].astype(int)
+    found = []
+    for number in np.unique(line):
+        here = np.flatnonzero(line == number)
+        worst = here[np.argmax(column[here])]
+        found.append((int(number), float(column[worst]), float(result["time"][worst])))
+    return sorted(found, key=lambda entry: -entry[1])[:count]
+
+
+def _contour(result: Result, prepared: Prepared, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of each measured position to the path, and the program line that it is nearest to."""
+    path, axes = prepared.path, prepared.program.axes
+    line = result["program_line"].astype(int)
+    if not len(path):
+        return np.zeros(len(result)), line
+    points, wanted = np.zeros((len(result), 3)), np.zeros((len(result), 3))
+    for i, name in enumerate(_LINEAR):
+        if name in axes:
+            points[:, i], wanted[:, i] = result[f"{name}_measured"], result[f"{name}_reference"]
+        else:
+            points[:, i] = wanted[:, i] = path["start"][0, i]
+    row = np.clip(np.ceil(result["program_sample"]).astype(int), 0, len(prepared.segment) - 1)
+    blended = path["mode"] == BLEND
+    given = path["tolerance"][blended]
+    corner = float(np.where(np.isfinite(given), given, TOLERANCE).max(initial=0.0))
+    reach = np.linalg.norm(points - wanted, axis=1) + corner + 1e-3
+    on_path = state != State.HOME
+    error = np.zeros(len(result))
+    error[on_path], nearest = contour_error(points[on_path], path, prepared.segment[row][on_path], reach[on_path])
+    line = line.copy()
+    line[on_path] = path["line"][nearest]
+    return error, line
+
+
+def _times(result: Result, prepared: Prepared, state: np.ndarray) -> dict[str, Any]:
+    """Predicted and executed seconds, and what was waited for."""
+    # samples that were discarded belong to the state of the one after them
+    spent = np.diff(np.rint(result["time"] / prepared.T).astype(np.int64), prepend=-1)
+    waited = {name: int(spent[state == kind].sum()) for kind, name in WAITS.items()}
+    moving = int(spent.sum()) - sum(waited.values())
+    return {
+        "predicted_samples": prepared.program.samples,
+        "moving_samples": moving,
+        "predicted_s": prepared.seconds,
+        "executed_s": int(spent.sum()) * prepared.T,
+        "moving_s": moving * prepared.T,
+        **{name: samples * prepared.T for name, samples in waited.items()},
+        "completed": result.meta.get("ending") == "done",
+        "done_percent": 100.0 * min(float(result["program_sample"].max() + 1.0) / prepared.program.samples, 1.0),
+    }
+
+
+def _worst(values: np.ndarray, line: np.ndarray, time: np.ndarray, unit: str) -> dict[str, Any]:
+    at = int(np.argmax(values))
+    return {
+        "unit": unit,
+        "max": float(values[at]),
+        "line": int(line[at]),
+        "time_s": float(time[at]),
+        "rms": float(np.sqrt(np.mean(values**2))),
+        "mean": float(np.mean(values)),
+    }
