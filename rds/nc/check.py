@@ -17,6 +17,7 @@ from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_co
 from rds.nc.dialect import Dialect
 from rds.nc.interpreter import interpret
 from rds.nc.parameters import read_parameters
+from rds.nc.reading_on import later_faults
 from rds.nc.toolpath import PathBlock, toolpath
 from rds.nc.tools import Tool, read_tools
 from rds.nc.validate import Validation, Validator
@@ -77,6 +78,9 @@ def check_program(
     except _Faulty:
         for _ in blocks:  # the rest is looked at all the same
             pass
+        if validator.stopped is not None:
+            for fault in later_faults(validator.stopped, setup.options):
+                validator.report(fault)
         place.unlink(missing_ok=True)
         return validator.result(), None
     return validator.result(), place

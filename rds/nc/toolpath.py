@@ -73,12 +73,17 @@ def toolpath(
     call that nothing here carries out) goes to `report` as a ProgramError; if that returns, the path goes on.
     """
     converter = _Converter(report)
-    for item in items:
-        if isinstance(item, MotionBlock):
-            converter.take(item)
-        else:
-            converter.call(item)
-        yield from converter.ready()
+    try:
+        for item in items:
+            if isinstance(item, MotionBlock):
+                converter.take(item)
+            else:
+                converter.call(item)
+            yield from converter.ready()
+    except ProgramError:
+        converter.flush()
+        yield from converter.ready()  # what was right before the fault
+        raise
     converter.end()
     yield from converter.ready()
 
@@ -115,12 +120,16 @@ class _Converter:
         yield from self._done
         self._done.clear()
 
+    def flush(self) -> None:
+        self._convert()
+        self._hand_on()
+
     def end(self) -> None:
         """A program without M2 or M30 ends with its last line."""
         self._convert()
         if not self._ended:
             self._event("end", 0.0, self._last_line)
-        self._hand_on()
+        self.flush()
 
     def take(self, block: MotionBlock) -> None:
         self._in_file(block.file)

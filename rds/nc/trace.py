@@ -12,13 +12,14 @@ from rds.nc.toolpath import PathBlock
 
 RAPID, STRAIGHT, CURVED = 0, 1, 2
 STEP = 0.04  # rad of an arc from point to point
-MOST_POINTS = 400_000  # more are thinned out
+MOST_POINTS = 500_000  # more are thinned out
+_FINEST, _COARSEST = 1 / 20000, 1 / 400  # of the path's size, what they are thinned out to
 
 
 class Trace:
     """The points of a program: `points[kind]` n × 3 (X Y Z, mm, machine), nan rows between separate polylines.
 
-    `resolution` is what points were thinned out to, mm (0: none were): memory does not grow with the program's length.
+    `resolution` is what points were thinned out to, mm (0: none were): memory does not grow with the number of lines.
     """
 
     def __init__(self) -> None:
@@ -72,8 +73,8 @@ class Trace:
     def _thin_out(self) -> None:
         """Leave points away that are nearer to the one before than a fraction of the path, a coarser one each time."""
         span = float(np.max(self.high[:3] - self.low[:3])) or 1.0
-        while self._count > MOST_POINTS / 2 and self.resolution < span / 50:
-            self.resolution = max(2 * self.resolution, span / 20000)
+        while self._count > MOST_POINTS / 2 and self.resolution < span * _COARSEST / 2:
+            self.resolution = max(2 * self.resolution, span * _FINEST)
             for kind, kept in self._kept.items():
                 self._kept[kind] = [_thinned(np.concatenate(kept), self.resolution)] if kept else []
             self._count = sum(len(part) for kept in self._kept.values() for part in kept)

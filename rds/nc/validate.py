@@ -37,7 +37,7 @@ class Validation:
     """What became of a program: `faults` in the order of files and lines; `more` of them were counted only.
 
     `low` and `high` are how far the path reaches along the axes that move (machine coordinates, mm and degrees);
-    lengths are in mm.
+    lengths are in mm. `stopped`: the fault that ended the program; the lines after it were only read.
     """
 
     program: str
@@ -51,6 +51,7 @@ class Validation:
     high: Mapping[str, float] = field(default_factory=dict)
     tools: tuple[int, ...] = ()
     spindle: float = 0.0  # rev/min, the fastest
+    stopped: ProgramError | None = None
 
     @property
     def ok(self) -> bool:
@@ -80,6 +81,7 @@ class Validation:
             "reach": {axis: [self.low[axis], self.high[axis]] for axis in self.low},
             "tools": list(self.tools),
             "fastest_spindle_rev_min": self.spindle,
+            "stopped": self.stopped and {"file": self.stopped.file, "line": self.stopped.line},
         }
 
     def __str__(self) -> str:
@@ -96,6 +98,8 @@ class Validation:
         if self.more:
             lines.append(f"and {self.more} faults more")
         count = len(self.faults) + self.more
+        if self.stopped and self.stopped.line:
+            lines.append(f"{self.program}: not run from line {self.stopped.line} on: the words after it were only read")
         lines.append(f"{self.program}: {self.machine} can't run it: {count} fault{'s' * (count > 1)}")
         return "\n".join(lines)
 
@@ -123,6 +127,7 @@ class Validator:
         self._cutting = self._rapid = self._fastest = 0.0
         self._low, self._high = np.full(6, inf), np.full(6, -inf)
         self._used: dict[int, None] = {}
+        self.stopped: ProgramError | None = None  # the fault that ended the program
 
     @property
     def ok(self) -> bool:
@@ -141,9 +146,10 @@ class Validator:
                 self.look(block)
                 yield block
         except ProgramError as fault:
+            self.stopped = fault
             self.report(fault)
 
-    def report(self, fault: ProgramError, kind: str = "", excess: float = 0.0, letters: str = "") -> None:
+    def report(self, fault: ProgramError, kind: str = "", excess: float = 0.0, letters: str = "G2 G3 G1 F") -> None:
         """Keep a fault, if it is the worst of its kind on its line; `letters` of the word it is about."""
         key = (fault.file, fault.line, kind or fault.reason)
         self._files.setdefault(fault.file, len(self._files))
@@ -290,6 +296,7 @@ class Validator:
             high={AXES[axis]: float(self._high[axis]) for axis in moved},
             tools=tuple(self._used),
             spindle=self._fastest,
+            stopped=self.stopped,
         )
 
 
