@@ -14,6 +14,7 @@ from rds.nc.control import Control
 from rds.nc.dialect import Dialect
 from rds.nc.errors import ProgramError
 from rds.nc.expressions import Fault
+from rds.nc.fast_lane import FastLane
 from rds.nc.modes import execute
 from rds.nc.moves import move
 from rds.nc.names import known_names
@@ -79,6 +80,7 @@ class Interpreter:
         self.context = Context(options, table, Parameters(state, kept), state, self.out, stretches)
         self.control = Control(self.source, self.context.parameters, options)
         self.context.parameters.known = known_names(self.context, self.control, lambda: self.control.source.line)
+        self.lane = FastLane(self.context)
         self._percent = False
         self._first = True  # no block has been executed
         self._text = ""
@@ -96,8 +98,11 @@ class Interpreter:
         out.call("ON_RESET")
         try:
             self._open()
-            ended = False
+            ended, wait = False, self.lane.wait
             while not ended:
+                wait -= 1
+                if wait < 0:
+                    wait = self.lane.take(self.control)
                 raw = self.control.source.read()
                 if not raw:
                     self._file_ended()
@@ -175,7 +180,7 @@ class Interpreter:
             return self._other(text)
         digits, words = plain
         out = self.out
-        out.digits = len(digits)
+        out.digits, out.n = len(digits), 0
         if digits:
             if out.digits > 9:
                 line_number(text)
@@ -183,7 +188,7 @@ class Interpreter:
         if self.options.program_numbers and self._program_number(text):
             return False
         block = Block()
-        fill(block, words)
+        fill(block, words, text)
         return self._execute(block)
 
     def _other(self, text: str) -> bool:

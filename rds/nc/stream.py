@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _REST = (0.0,) * 3
 _ONLY = (0.0,) * 8
+FEW = 1024  # rows handed over that are worth no block of their own
 
 
 class Stream:
@@ -103,10 +104,17 @@ class Stream:
                     self.flush()
 
     def rows(self, rows: np.ndarray) -> None:
-        """A finished array of dtype MOTION from somewhere else, at most BLOCK_ROWS long."""
-        self.flush()
-        if len(rows):
-            self.items.append(MotionBlock(rows, self._file))
+        """A copy of rows of dtype MOTION from somewhere else, at most BLOCK_ROWS of them. Few are gathered, too."""
+        if len(rows) > FEW or len(rows) + len(self._kinds) > BLOCK_ROWS:
+            self.flush()
+        if len(rows) > FEW:
+            self.items.append(MotionBlock(rows.copy(), self._file))
+            return
+        self._kinds.frombytes(rows["kind"].tobytes())
+        self._digits.frombytes(rows["digits"].tobytes())
+        self._ns.frombytes(rows["n"].tobytes())
+        self._lines.frombytes(rows["line"].tobytes())
+        self._values.frombytes(rows["values"].tobytes())
 
     def flush(self) -> None:
         """What has been gathered becomes a block."""

@@ -66,23 +66,26 @@ def read_plain(text: str) -> tuple[str, list[tuple[str, str]]] | None:
     return match[1] or "", _WORD.findall(match[2])
 
 
-def fill(block: Block, words: list[tuple[str, str]]) -> None:
-    """Put plain words into a block. Raises Fault."""
+def fill(block: Block, words: list[tuple[str, str]], text: str) -> None:
+    """Put the plain words of a line into a block. Raises Fault."""
     found = block.words
-    for letter, digits in words:
-        if letter == "g":
-            block.add_g(float(digits))
-        elif letter in "xyzfijkabcr" and letter not in found:
-            value = float(digits)
-            if value < 0.0 and letter == "f":
-                block.add(letter, value)
-            found[letter] = value
-        elif letter == "m":
-            block.add_m(float(digits))
-        elif letter in _OTHERS:
-            block.add(letter, float(digits))
-        else:
-            raise Fault(no_such_letter(letter), letter)
+    letter = digits = ""
+    try:
+        for letter, digits in words:
+            if letter == "g":
+                block.add_g(float(digits))
+            elif letter in "xyzijkabcr" and letter not in found:
+                found[letter] = float(digits)
+            elif letter == "m":
+                block.add_m(float(digits))
+            elif letter in _OTHERS:
+                block.add(letter, float(digits))
+            else:
+                raise Fault(no_such_letter(letter))
+    except Fault as fault:
+        fault.at = [match.start() for match in _WORD.finditer(text) if match.groups() == (letter, digits)][-1]
+        fault.key = ""
+        raise
 
 
 def read_words(text: str, at: int, block: Block, parameters: Parameters) -> dict[str, int]:
@@ -118,7 +121,7 @@ def read_words(text: str, at: int, block: Block, parameters: Parameters) -> dict
                     block.add(letter, value)
                     places[letter] = start
             except Fault as fault:
-                fault.at = start
+                fault.at, fault.key = start, ""
                 raise
         else:
             raise Fault(no_such_letter(letter), at=start)
@@ -155,4 +158,4 @@ def place_of(key: str, text: str) -> int:
 def word_at(text: str, at: int) -> str:
     """The word, parameter or character that begins at `at`, as far as it is plain, in upper case."""
     match = _ANYTHING.match(text, at)
-    return match[0].upper() if match else ""
+    return match[0].encode("latin-1").upper().decode("latin-1") if match else ""  # ÿ stays ÿ
