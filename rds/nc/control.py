@@ -4,7 +4,7 @@ While `skipping` names a label, every block is passed over but the one with that
 belong to the subroutine that they stand in.
 
 Where LinuxCNC goes on in a strange way, this does not: a loop left by BREAK does not stop a later DO loop, a REPEAT
-left early counts anew, and a subroutine ends only with its own name.
+left early counts anew, a BREAK that is passed over does nothing, and a subroutine ends only with its own name.
 """
 
 from __future__ import annotations
@@ -315,6 +315,8 @@ class Control:
 
     def _break(self, word: Word) -> None:
         label = self._label(word, "while", "do")
+        if self.skipping:
+            return
         self._forget_rounds(label)
         self._skip_to(word.name)
         self._breaking = True

@@ -121,6 +121,7 @@ class Reader:
 
     def expression(self) -> float:
         """[ value operation value ... ] by precedence: **; * / MOD; + -; EQ NE GT GE LT LE; AND OR XOR."""
+        start = self.at
         self.expect("[", "a left bracket [ is missing; write the value as [...]")
         values = [self.value()]
         operations = [self._operation()]
@@ -132,9 +133,10 @@ class Reader:
                 try:
                     values[-1] = _BINARY[operations.pop(-2)](values[-1], right)
                 except Fault as fault:
-                    raise self.fault(fault.message) from None
+                    fault.at = start
+                    raise
         if not math.isfinite(values[0]):
-            raise self.fault(_NOT_FINITE)
+            raise Fault(_NOT_FINITE, at=start)
         return values[0]
 
     def _operation(self) -> str:
@@ -212,7 +214,7 @@ def whole(value: float) -> int:
     if value - below > 1 - WHOLE:
         return math.ceil(value)
     if value - below > WHOLE:
-        raise Fault(f"{value:g} must be a whole number")
+        raise Fault(f"{value:g} is not whole; write a whole number")
     return below
 
 

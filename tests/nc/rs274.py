@@ -56,7 +56,9 @@ def ours(program: bytes | Path, variables: dict[int, float] | None = None) -> tu
     source = program if isinstance(program, Path) else program.decode("utf-8", "surrogateescape")
     lines: list[str] = []
     try:
-        items = interpret(source, tools=table, parameters=variables, options=Dialect(inch_machine=True, max_jumps=20000))
+        items = interpret(
+            source, tools=table, parameters=variables, options=Dialect(inch_machine=True, max_jumps=20000)
+        )
         lines.extend(text(items))
     except ProgramError as error:
         return lines, str(error)
@@ -69,3 +71,19 @@ def calls(lines: list[str]) -> list[str]:
     while found and found[-1].endswith(END):
         found.pop()
     return found
+
+
+PROGRAMS = Path(__file__).parent / "programs"
+
+
+def kept() -> list[Path]:
+    """The programs whose canonical calls are kept beside them, as rs274 printed them."""
+    return sorted(path for path in PROGRAMS.glob("*.ngc") if path.stem != "twice")
+
+
+def keep() -> None:
+    """Write the expected files anew: `python -c "from tests.nc.rs274 import keep; keep()"`."""
+    for path in kept():
+        printed, complaint = rs274(path.read_bytes(), PROGRAMS)
+        assert not complaint, f"{path}: {complaint}"
+        path.with_suffix(".canon").write_text("\n".join(printed) + "\n")

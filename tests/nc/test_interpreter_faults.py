@@ -1,0 +1,162 @@
+"""What is wrong in a program is told with file, line, column, word, and what to do."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rds.nc import Dialect, ProgramError, interpret
+from tests.nc.random_programs import program
+
+
+def fault(text: str, **options: bool | int) -> ProgramError:
+    with pytest.raises(ProgramError) as caught:
+        list(interpret(text, name="part.ngc", options=Dialect(**options)))  # type: ignore[arg-type]
+    return caught.value
+
+
+# program, line, column, word, part of the message
+FAULTS = [
+    ("G21\nG81 X1 Y2 Z-3 R1\nM2", 2, 1, "G81", "canned cycles are outside"),
+    ("G0 X1 U2\nM2", 1, 7, "U2", "the axes are X Y Z A B C"),
+    ("G0 X1\n  g1 y2\nM2", 2, 3, "G1", "no feed rate is set; write F"),
+    ("X1\nM2", 1, 1, "X1", "write G0, G1, G2 or G3 before it"),
+    ("G0 X1 Y 2 X3\nM2", 1, 11, "X3", "two X words"),
+    ("G0 X1 G1 Y2 F3\nM2", 1, 7, "G1", "G0 and G1 on one line are both motion"),
+    ("M3 M5\nM2", 1, 4, "M5", "both spindle words"),
+    ("G0 X1.2.3\nM2", 1, 5, "1.2", "'1.2.3' is no number"),
+    ("G0 X\nM2", 1, 5, "", "a number is missing"),
+    ("G0 X[2 + ]\nM2", 1, 10, "]", "a number cannot begin with ']'"),
+    ("G0 X[1/0]\nM2", 1, 5, "[", "division by zero"),
+    ("G0 Y#<depth>\nM2", 1, 5, "#<DEPTH>", "has no value"),
+    ("#5400 = 3\nM2", 1, 1, "#5400", "can only be read"),
+    ("#<_x> = 3\nM2", 1, 1, "#<_X>", "can only be read"),
+    ("#0 = 3\nM2", 1, 1, "#0", "numbers go from 1 to 5601"),
+    ("#1 X5\nM2", 1, 4, "X5", "a parameter alone does nothing"),
+    ("G2 X10 I4 F10\nM2", 1, 8, "I4", "off its circle by 2.0000 (33.33 %), more than 0.0283 and 0.1 %"),
+    ("G2 X10 Y0 F10 R4\nM2", 1, 15, "R4", "at least half of the way to the end, 5.0000"),
+    ("F10 G2 X1 R1 I1\nM2", 1, 14, "I1", "either R or I J K"),
+    ("F10 G3 X1 Y1\nM2", 1, 5, "G3", "needs its centre (I and J in G17) or its radius R"),
+    ("G18 F1 G2 X1 J1\nM2", 1, 14, "J1", "no centre of an arc in the plane of G18"),
+    ("F10 G3 I1 P1.5\nM2", 1, 11, "P1.5", "a whole number of turns"),
+    ("G90.1 F1 G2 I5 X10\nM2", 1, 10, "G2", "J is missing; an absolute centre (G90.1) needs I and J"),
+    ("G93 G1 X1\nM2", 1, 5, "G1", "in inverse time (G93) every move by feed needs F"),
+    ("G95 F.1 G1 X1\nM2", 1, 9, "G1", "the spindle's speed is 0; write S"),
+    ("G4\nM2", 1, 1, "G4", "write the dwell in seconds"),
+    ("G92\nM2", 1, 1, "G92", "without an axis word"),
+    ("G10 L2 P10 X1\nM2", 1, 8, "P10", "is no coordinate system"),
+    ("G10 L1 P1 Z1\nM2", 1, 5, "L1", "edit the tool table's file"),
+    ("F1 G2 G53 X1 R2\nM2", 1, 7, "G53", "G53 needs G0 or G1"),
+    ("G28 G1 X1\nM2", 1, 5, "G1", "both use the axis words"),
+    ("G0 X1 P2\nM2", 1, 7, "P2", "nothing on the line uses P; it goes with G2, G3, G4, G10 or G64"),
+    ("G41 D3\nM2", 1, 5, "D3", "has no tool 3"),
+    ("G19 G41.1 D3\nM2", 1, 5, "G41.1", "planes of G17 and G18 only"),
+    ("T2\nM2", 1, 1, "T2", "it is empty; give one"),
+    ("M6\nM2", 1, 1, "M6", "write T and its number"),
+    ("G0 X1 (not closed\nM2", 1, 7, "(", "write ( ... )"),
+    ("G0 (π) X1 π\nM2", 1, 11, "π", "put it into a comment"),
+    ("(π) G0 Xβ\nM2", 1, 9, "β", "a number cannot begin with"),
+    ("G0 X1 N5\nM2", 1, 7, "N5", "a line number stands first"),
+    ("N G0\nM2", 1, 1, "N", "a line number is digits"),
+    ("(print,#1)\nM2", 1, 1, "(", "write a plain comment or (MSG, ...)"),
+    ("G0 X1\nG1.55\nM2", 2, 1, "G1.55", "at most one decimal"),
+    ("M98 P1\nM2", 1, 1, "M98", "write O<name> CALL"),
+    ("M106\nM2", 1, 1, "M106", "user-defined"),
+    ("T2.5\nM2", 1, 1, "T2.5", "is not whole"),
+    ("o1 if [1\nM2", 1, 9, "", "not closed; add ]"),
+    ("o1 endif\nM2", 1, 1, "O1", "has no O1 IF before it"),
+    ("o1 foo\nM2", 1, 1, "O1", "no control word"),
+    ("o1 call [1] X2\nM2", 1, 13, "X2", "only a comment can follow O1 CALL"),
+    ("G0\n  o<part> call\nM2", 2, 0, "O<part> CALL", "in a file part.ngc beside the program"),
+    ("o1 if [0]\nM2", 2, 0, "", "close it with"),
+    ("o1 sub\no2 sub\nM2", 2, 1, "O2", "a subroutine inside the subroutine '1'"),
+    ("G0 X1", 1, 0, "", "the program does not end; write M2, M30 or %"),
+    ("%\nG0 X1\n", 2, 0, "", "the program does not end; write % on its last line"),
+    ("", 1, 0, "", "the program is empty"),
+    ("G0 X" + 250 * "1", 1, 0, "", "longer than 252 characters"),
+    ("G0 X" + 60 * "[" + "1" + 60 * "]" + "\nM2", 1, 55, "[", "more than 50 deep"),
+]
+
+
+@pytest.mark.parametrize(("text", "line", "column", "word", "message"), FAULTS, ids=lambda value: repr(value)[:40])
+def test_a_fault_is_told_with_its_place_and_word(text: str, line: int, column: int, word: str, message: str) -> None:
+    error = fault(text)
+    assert (error.file, error.line, error.column, error.word) == ("part.ngc", line, column, word)
+    assert message in error.reason
+    assert str(error).startswith(
+        f"part.ngc:{line}" + (f":{column}" if column else "") + ": " + (f"{word}: " if word else "")
+    )
+
+
+def test_a_program_that_does_not_end_is_stopped() -> None:
+    error = fault("o1 while [1]\no1 endwhile\nM2", max_jumps=50)
+    assert "more than 50 calls and jumps back" in error.reason
+    assert error.line == 2
+
+
+def test_a_subroutine_that_calls_itself_without_end_is_stopped() -> None:
+    error = fault("o1 sub\no1 call\no1 endsub\no1 call\nM2")
+    assert "more than 9 subroutine calls inside one another" in error.reason
+    assert (error.line, error.word) == (2, "O1")
+
+
+def test_what_was_right_before_a_fault_is_handed_out() -> None:
+    found = []
+    with pytest.raises(ProgramError):
+        found.extend(interpret("G0 X1\nX2\nX3 Q1\nM2"))
+    calls = interpret("G0 X1\nX2\nX3 Q1\nM2")
+    rows = 0
+    with pytest.raises(ProgramError):
+        for item in calls:
+            rows += len(getattr(item, "rows", ()))
+    assert rows == 2
+
+
+def test_a_fault_crosses_processes() -> None:
+    error = fault("G0 X1 U2\nM2")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.line, again.column, again.word) == (str(error), 1, 7, "U2")
+
+
+FEW = settings(max_examples=300, suppress_health_check=list(HealthCheck))
+LIMITS = Dialect(max_jumps=200, gr=True, program_numbers=True)
+
+
+def ends_or_is_refused(text: str, options: Dialect = LIMITS) -> None:
+    try:
+        for _ in interpret(text, options=options):
+            pass
+    except ProgramError as error:
+        assert error.line >= 1
+        assert "; " in error.reason, error.reason  # what; what to do
+
+
+@FEW
+@given(st.text(max_size=300))
+def test_any_text_is_a_program_or_a_fault(text: str) -> None:
+    ends_or_is_refused(text)
+
+
+@FEW
+@given(st.text("GMXYZIJRFPNOo#<>[]()/%;.-+*=0123456789 \nabsincodwhileqrt", max_size=300))
+def test_any_signs_of_the_language_are_a_program_or_a_fault(text: str) -> None:
+    ends_or_is_refused(text, Dialect(max_jumps=200))
+
+
+@FEW
+@given(st.randoms(use_true_random=False))
+def test_damaged_programs_are_programs_or_faults(r) -> None:
+    text = bytearray(program(r))
+    for _ in range(r.randrange(1, 6)):
+        at = r.randrange(len(text))
+        way = r.randrange(3)
+        if way == 0:
+            text[at] = r.randrange(256)
+        elif way == 1:
+            del text[at : at + r.randrange(5)]
+        else:
+            text[at:at] = text[r.randrange(len(text)) :][: r.randrange(9)]
+    ends_or_is_refused(text.decode("utf-8", "surrogateescape"))
