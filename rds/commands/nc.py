@@ -189,7 +189,7 @@ def _save(figure: Any, path: Path) -> None:
 
     kind = path.suffix.lower().removeprefix(".")
     if kind not in PICTURES:
-        raise InputError(f"no picture can be written there; end the name with .{', .'.join(PICTURES)}", str(path))
+        raise InputError("what kind of picture is that? end its name with .png, .svg or .pdf", str(path))
     write_files({path: lambda stream: figure.savefig(stream, format=kind)})
 
 

@@ -66,10 +66,10 @@ def check_program(
     A program with faults leaves none, and one of before is removed. Raises InputError for files that cannot be read or
     written, and where the place of the compiled form is taken by a file that is none.
     """
+    header = describe(program, machine, setup)
     place = beside(program)
     if place.exists() and not is_ours(place):
         raise InputError("is where the compiled program would go, and is none; rename or move it", str(place))
-    header = describe(program, machine, setup)
     validator = Validator(machine, setup.tool_list(), str(program))
     items = followed(setup.interpret(program), program, progress)
     blocks = validator.watch(toolpath(items, report=validator.report))

@@ -33,9 +33,7 @@ _AGAIN = "compile it again with `rds nc check`"
 def beside(program: Path) -> Path:
     """Where the compiled form of a program is: part.dat for part.ngc. InputError for a program that is called so."""
     if program.suffix.lower() == ".dat":
-        raise InputError(
-            "a part program can't be called .dat: its compiled form gets that name; rename it", str(program)
-        )
+        raise InputError("the compiled form of a part program gets the name .dat; rename the program", str(program))
     return program.with_suffix(".dat")
 
 

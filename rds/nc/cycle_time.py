@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import ceil
@@ -73,18 +74,18 @@ def cycle_time(blocks: Iterable[PathBlock], machine: Machine, T: float | None = 
     T = machine.sample_period if T is None else T
     tools = _Tools()
     counts: dict[int, list[int]] = {}
-    dwells: list[tuple[int, int]] = []  # samples, from and up to
+    dwells: list[tuple[int, int, int]] = []  # samples, from and up to, and the tool
     samples = 0
     for block in plan(tools.watch(blocks), Limits.of(machine), T, start=np.zeros(6)):
         number = np.arange(block.first, block.first + len(block))
-        dwells += [
-            (at + 1, at + 1 + ceil(event.value / T - 1e-9)) for at, event in block.events if event.kind == "dwell"
-        ]
-        kind = np.where(_rapid(block), 1, 0)
-        for begin, end in dwells:
-            kind[(number >= begin) & (number < end)] = 2
+        for at, event in block.events:
+            if event.kind == "dwell":
+                dwells.append((at + 1, at + 1 + ceil(event.value / T - 1e-9), tools.of_dwells.popleft()))
+        kind, tool = np.where(_rapid(block), 1, 0), tools.at(block.segment)
+        for begin, end, waiting in dwells:
+            rows = (number >= begin) & (number < end)
+            kind[rows], tool[rows] = 2, waiting
         dwells = [dwell for dwell in dwells if dwell[1] > block.first + len(block)]
-        tool = tools.at(block.segment)
         for used in np.unique(tool).tolist():
             mine = counts.setdefault(used, [0, 0, 0])
             for what, count in enumerate(np.bincount(kind[tool == used], minlength=3).tolist()):
@@ -107,6 +108,7 @@ class _Tools:
         self._first = [0]
         self._tool = [0]
         self._segments = 0
+        self.of_dwells: deque[int] = deque()  # the tools that are in the spindle during the dwells to come
 
     def watch(self, blocks: Iterable[PathBlock]) -> Iterator[PathBlock]:
         for block in blocks:
@@ -114,6 +116,7 @@ class _Tools:
                 self._first.append(self._segments)
                 self._tool.append(block.tool)
             self._segments += len(block)
+            self.of_dwells.extend(block.tool for event in block.events if event.kind == "dwell")
             yield block
 
     def at(self, segments: np.ndarray) -> np.ndarray:

@@ -127,7 +127,7 @@ def test_all_faults_are_told_in_the_order_of_lines(tmp_path: Path) -> None:
         (5, "A5"),
         (6, "G2"),
         (8, "G81"),
-        (9, "X1"),
+        (9, "X2"),
     ]
     assert found.stopped is not None and found.stopped.line == 6
     assert "not run from line 6 on" in str(found) and "7 faults" in str(found)

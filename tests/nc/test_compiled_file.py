@@ -1,0 +1,141 @@
+"""The compiled form of a program: whole, of just this program, or not used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.machines import load_machine
+from rds.nc.check import Setup, check_program, compiled_if_current, sources
+from rds.nc.compiled_file import MAGIC, open_compiled
+from rds.nc.dialect import Dialect
+from rds.nc.toolpath import toolpath
+
+PROGRAM = """G21 G90
+T1 M6
+S500 M3 M8
+F120
+G0 X10
+G1 Y20
+G3 X10 Y20 Z-1 I-5 J0
+G4 P0.5
+O<drill> CALL [3]
+M2
+"""
+DRILL = "O<drill> SUB\nG1 Z#1\nO<drill> ENDSUB\n"
+MACHINE = load_machine("mini-cnc")
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    (tmp_path / "part.ngc").write_text(PROGRAM, encoding="utf-8")
+    (tmp_path / "drill.ngc").write_text(DRILL, encoding="utf-8")
+    (tmp_path / "tools.tbl").write_text("T1 P1 Z10\n", encoding="utf-8")
+    return tmp_path / "part.ngc"
+
+
+def setup(part: Path) -> Setup:
+    return Setup(tools=part.with_name("tools.tbl"))
+
+
+def compile_it(part: Path) -> Path:
+    result, compiled = check_program(part, MACHINE, setup(part))
+    assert compiled is not None, str(result)
+    return compiled
+
+
+def test_what_is_read_back_is_the_motion(part: Path) -> None:
+    compiled = compile_it(part)
+    assert compiled == part.with_suffix(".dat")
+    found = list(open_compiled(compiled).blocks())
+    made = list(toolpath(setup(part).interpret(part)))
+    assert len(found) == len(made) > 2
+    for one, other in zip(found, made, strict=True):
+        assert np.array_equal(one.segments, other.segments)
+        assert np.array_equal(one.feed_lines, other.feed_lines)
+        assert (one.events, one.file, one.tool) == (other.events, other.file, other.tool)
+    trailer = open_compiled(compiled).trailer
+    assert trailer["segments"] == sum(map(len, made)) and trailer["blocks"] == len(made)
+
+
+def test_the_same_program_makes_the_same_bytes(part: Path) -> None:
+    first = compile_it(part).read_bytes()
+    assert compile_it(part).read_bytes() == first
+    assert first.startswith(MAGIC)
+
+
+def test_an_invalid_program_leaves_none_and_takes_the_old_one_away(part: Path) -> None:
+    compiled = compile_it(part)
+    part.write_text(PROGRAM.replace("X10", "X100"), encoding="utf-8")
+    result, path = check_program(part, MACHINE, setup(part))
+    assert not result.ok and path is None
+    assert not compiled.exists()
+    assert sorted(path.name for path in part.parent.iterdir()) == ["drill.ngc", "part.ngc", "tools.tbl"]
+
+
+@pytest.mark.parametrize("what", ["program", "subroutine", "tools", "machine", "options"])
+def test_it_is_used_only_for_what_it_was_made_of(part: Path, tmp_path: Path, what: str) -> None:
+    compile_it(part)
+    machine, how = MACHINE, setup(part)
+    assert compiled_if_current(part, machine, how) is not None
+    if what == "machine":
+        other = tmp_path / "other.toml"
+        other.write_text(Path(MACHINE.path).read_text(encoding="utf-8") + "\n", encoding="utf-8")
+        machine = load_machine(str(other))
+    elif what == "options":
+        how = replace(how, options=Dialect(block_delete=True))
+    else:
+        name = {"program": "part.ngc", "subroutine": "drill.ngc", "tools": "tools.tbl"}[what]
+        path = part.with_name(name)
+        path.write_text(path.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    assert compiled_if_current(part, machine, how) is None
+
+
+def test_a_file_of_someone_else_is_neither_overwritten_nor_removed(part: Path) -> None:
+    data = part.with_suffix(".dat")
+    data.write_text("1 2 3\n", encoding="utf-8")
+    for text in (PROGRAM, PROGRAM + "G999"):
+        part.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=r"part\.dat.*rename or move it"):
+            check_program(part, MACHINE, setup(part))
+    assert data.read_text(encoding="utf-8") == "1 2 3\n"
+    assert compiled_if_current(part, MACHINE, setup(part)) is None
+
+
+def test_a_program_may_not_bear_the_name_of_the_compiled_form(part: Path) -> None:
+    program = part.rename(part.with_suffix(".DAT"))
+    with pytest.raises(InputError, match=r"rename the program"):
+        check_program(program, MACHINE, setup(part))
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@given(at=st.floats(0, 1), change=st.integers(1, 255), cut=st.booleans())
+def test_damage_is_noticed(part: Path, at: float, change: int, cut: bool) -> None:
+    compiled = part.with_suffix(".dat")
+    if not compiled.exists():
+        compile_it(part)
+        compiled.with_suffix(".good").write_bytes(compiled.read_bytes())
+    good = compiled.with_suffix(".good").read_bytes()
+    place = min(int(at * len(good)), len(good) - 1)
+    bad = good[:place] if cut else good[:place] + bytes([good[place] ^ change]) + good[place + 1 :]
+    compiled.write_bytes(bad)
+    with pytest.raises(InputError, match=r"compile it again"):
+        open_compiled(compiled)
+    assert compiled_if_current(part, MACHINE, setup(part)) is None
+    compiled.write_bytes(good)
+    assert compiled_if_current(part, MACHINE, setup(part)) is not None
+
+
+def test_sources_are_the_files_that_may_be_called(tmp_path: Path) -> None:
+    program = tmp_path / "part.ngc"
+    program.write_text("o <A> call\nN5O200CALL [1]\nO3 IF [1]\nM2\n", encoding="utf-8")
+    (tmp_path / "a.ngc").write_text("O<b> CALL", encoding="utf-8")
+    for name in ("b", "200", "3", "c"):
+        (tmp_path / f"{name}.ngc").write_text("", encoding="utf-8")
+    assert {path.name for path in sources(program)} == {"part.ngc", "a.ngc", "b.ngc", "200.ngc", "3.ngc"}
