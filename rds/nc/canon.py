@@ -9,14 +9,16 @@ Moves and feed rates come in blocks, as rows of a numpy array; the rare other ca
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 TRAVERSE, FEED, ARC, RATE = 0, 1, 2, 3
 BLOCK_ROWS = 65536  # at most, in a MotionBlock
+MANY = 1024  # rows that are worth writing by compiled code
 
 # values by kind: TRAVERSE and FEED: x, y, z, a, b, c of the end.
 # ARC: first end, second end, first centre, second centre (absolute, along the plane's axes: XY; ZX in G18; YZ in G19),
@@ -100,5 +102,30 @@ def texts(items: Iterable[MotionBlock | Call]) -> Iterator[tuple[str, str]]:
 
 def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
     """The lines that LinuxCNC's `rs274 -g` prints: running number, the program's line number (or N.....), the call."""
-    for number, (n, call) in enumerate(texts(items), start=1):
+    number = 1
+    for item in items:
+        if isinstance(item, MotionBlock) and len(item) >= MANY and (write := _compiled()) is not None:
+            first = 0
+            for count, lines in write(item.rows, number):
+                yield from lines or _numbered(_row_texts(item.rows[first : first + count]), number)
+                first += count
+                number += count
+        else:
+            lines = list(_numbered(texts((item,)), number))
+            yield from lines
+            number += len(lines)
+
+
+def _numbered(calls: Iterable[tuple[str, str]], first: int) -> Iterator[str]:
+    for number, (n, call) in enumerate(calls, start=first):
         yield f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}"
+
+
+@cache
+def _compiled() -> Callable[[np.ndarray, int], Iterator[tuple[int, list[str]]]] | None:
+    """What writes many rows at once; None without numba."""
+    try:
+        from rds.nc.fast_lane_text import written
+    except ImportError:
+        return None
+    return written

@@ -5,6 +5,7 @@ It gives the same items as the interpreter without it, bit for bit. Without numb
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,10 @@ if TYPE_CHECKING:
     from rds.nc.control import Control
     from rds.nc.source import Source
 
-OPENS_AFTER = 2000  # lines: in this time numba is loaded
+# Loading numba takes the time of some ten thousand lines in Python: it is done for programs that are certain to be
+# longer, and for others (of unknown length, or with loops) once they have turned out to be.
+LONG_PROGRAM = 1 << 20  # bytes
+OPENS_AFTER = 30_000  # lines
 ROWS = 16384  # at once
 FEW_LINES = 4  # less in one go are not worth the way
 LONGEST_PAUSE = 63  # lines until the next attempt
@@ -39,9 +43,14 @@ def kernel() -> Callable[..., tuple[int, int, int]] | None:
 class FastLane:
     """Of one run of a program. `take` may be called before any block is read, first after `wait` lines."""
 
-    def __init__(self, context: Context, opens_after: int = OPENS_AFTER):
+    def __init__(self, context: Context, source: Source):
         self._context = context
-        self.wait = NEVER if context.dialect.program_numbers else opens_after
+        if context.dialect.program_numbers:
+            self.wait = NEVER
+        elif "rds.nc.fast_lane_kernel" in sys.modules or source.size() >= LONG_PROGRAM:
+            self.wait = 0
+        else:
+            self.wait = OPENS_AFTER
         self._pause = 0
         self._rows: np.ndarray | None = None
         self._columns: list[np.ndarray] = []

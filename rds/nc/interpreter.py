@@ -80,7 +80,7 @@ class Interpreter:
         self.context = Context(options, table, Parameters(state, kept), state, self.out, stretches)
         self.control = Control(self.source, self.context.parameters, options)
         self.context.parameters.known = known_names(self.context, self.control, lambda: self.control.source.line)
-        self.lane = FastLane(self.context)
+        self.lane = FastLane(self.context, self.source)
         self._percent = False
         self._first = True  # no block has been executed
         self._text = ""

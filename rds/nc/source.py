@@ -53,6 +53,15 @@ class Source:
         self._semicolons = semicolons
         self._ended = False
 
+    def size(self) -> int:
+        """Bytes of the whole program; 0 when that is not known before it is read."""
+        if isinstance(self._stream, _Spool):
+            return 0
+        here = self._stream.tell()
+        end = self._stream.seek(0, os.SEEK_END)
+        self._stream.seek(here)
+        return end
+
     def fill(self) -> bool:
         """Read on until the buffer holds a whole line after `at` (or the program's end). False: nothing is left."""
         while not self._ended and self.buffer.find(b"\n", self.at) < 0:
