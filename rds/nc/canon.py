@@ -9,6 +9,7 @@ Moves and feed rates come in blocks, as rows of a numpy array; the rare other ca
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
@@ -19,6 +20,7 @@ import numpy as np
 TRAVERSE, FEED, ARC, RATE = 0, 1, 2, 3
 BLOCK_ROWS = 65536  # at most, in a MotionBlock
 MANY = 1024  # rows that are worth writing by compiled code
+LONG_TEXT = 200_000  # lines that Python writes in the time that numba takes to load
 
 # values by kind: TRAVERSE and FEED: x, y, z, a, b, c of the end.
 # ARC: first end, second end, first centre, second centre (absolute, along the plane's axes: XY; ZX in G18; YZ in G19),
@@ -104,7 +106,7 @@ def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
     """The lines that LinuxCNC's `rs274 -g` prints: running number, the program's line number (or N.....), the call."""
     number = 1
     for item in items:
-        if isinstance(item, MotionBlock) and len(item) >= MANY and (write := _compiled()) is not None:
+        if isinstance(item, MotionBlock) and len(item) >= MANY and (write := _writer(number)) is not None:
             first = 0
             for count, lines in write(item.rows, number):
                 yield from lines or _numbered(_row_texts(item.rows[first : first + count]), number)
@@ -121,9 +123,16 @@ def _numbered(calls: Iterable[tuple[str, str]], first: int) -> Iterator[str]:
         yield f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}"
 
 
+def _writer(number: int) -> Callable[[np.ndarray, int], Iterator[tuple[int, list[str]]]] | None:
+    """What writes many rows at once, when loading it is worth the time: it is loaded already, or the text is long."""
+    if number > LONG_TEXT or "rds.nc.fast_lane_kernel" in sys.modules:
+        return _compiled()
+    return None
+
+
 @cache
 def _compiled() -> Callable[[np.ndarray, int], Iterator[tuple[int, list[str]]]] | None:
-    """What writes many rows at once; None without numba."""
+    """None without numba."""
     try:
         from rds.nc.fast_lane_text import written
     except ImportError:

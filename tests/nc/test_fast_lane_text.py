@@ -60,6 +60,7 @@ def test_large_blocks_are_written_alike(monkeypatch: pytest.MonkeyPatch) -> None
     rows["values"] = rng.normal(0, 1000, (len(rows), 9))
     rows["values"][:, 4] = np.copysign(1, rows["values"][:, 4])
     rows["values"][::5000, 0] = 1e15  # by Python, in between
+    monkeypatch.setattr(canon, "LONG_TEXT", 0)
     items = [canon.Call("SELECT_PLANE", ("XY",)), canon.MotionBlock(rows), canon.Call("PROGRAM_END")]
     fast = list(canon.text(items))
     monkeypatch.setattr(canon, "_compiled", lambda: None)
