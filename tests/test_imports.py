@@ -23,9 +23,9 @@ ALLOWED: dict[str, set[str]] = {
     "signals": {"core"},
     "interface": {"core"},
     "machines": {"core"},
-    "motion": {"core", "machines"},
+    "motion": {"core", "machines", "results"},  # see ONLY
     "nc": {"core", "machines", "motion", "results"},  # see ONLY
-    "programs": {"core", "machines", "motion", "nc", "runtime", "modes", "experiment", "results"},
+    "programs": {"core", "machines", "motion", "nc", "runtime", "modes", "experiment", "results", "reports"},
     "paths": {"core", "results"},  # see ONLY
     "checks": {"core"},
     "bus": {"core", "machines", "models", "runtime", "results"},  # see ONLY
@@ -48,9 +48,10 @@ ONLY = {
     ("paths", "results"): {"rds.results.figure"},  # pictures
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     ("reports", "bus"): {"rds.bus.frames", "rds.bus.logs"},  # which frames are commands and answers; their logs
+    ("motion", "results"): {"rds.results.figure"},  # what all plots share
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record
 }
-LAZY = [("results", "runtime"), ("modes", "bus")]  # inside functions only
+LAZY = [("results", "runtime"), ("motion", "results"), ("modes", "bus")]  # inside functions only
 TOP = {"__main__", "cli", "commands", "console"}
 
 

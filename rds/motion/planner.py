@@ -224,7 +224,9 @@ class _Planner:
         segments = self.out.segments()
         low = max(int(segments[0]) - 2 - self.kept_first, 0)
         high = min(int(segments[1]) + 3 - self.kept_first, len(self.kept))
-        block = self.out.block(self.kept[low:high].copy(), self.kept_first + low)
+        block = self.out.block(
+            self.kept[low:high].copy(), self.kept_first + low, float(self.kept_at[low]) if low < len(self.kept) else 0.0
+        )
         oldest = self.stretch.oldest_segment
         unbuilt = self.kept_first + len(self.kept) - len(self.new)
         drop = min(max(self.rested, int(segments[1])), unbuilt if oldest is None else oldest, unbuilt) - 3

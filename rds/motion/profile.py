@@ -13,17 +13,33 @@ from rds.motion.compiling import kernel
 
 
 @kernel
-def fastest(edges, cap, push, speed):
-    """Phases from `speed` at edges[0] to rest at edges[-1]; `cap` and `push` are the limits between edges."""
+def speeds(edges, cap, push, first, last):
+    """Highest speeds at the edges, from `first` on, at most `last` at the end; `cap`, `push`: limits between edges."""
     n = len(cap)
     v = np.empty(n + 1)
-    v[0] = speed
+    v[0] = first
     for e in range(n):
         reached = sqrt(v[e] ** 2 + 2.0 * push[e] * (edges[e + 1] - edges[e]))
-        v[e + 1] = min(cap[e], reached) if e == n - 1 else min(cap[e], cap[e + 1], reached)
-    v[n] = 0.0
+        v[e + 1] = min(cap[e], last, reached) if e == n - 1 else min(cap[e], cap[e + 1], reached)
     for e in range(n - 1, 0, -1):
         v[e] = min(v[e], sqrt(v[e + 1] ** 2 + 2.0 * push[e] * (edges[e + 1] - edges[e])))
+    return v
+
+
+@kernel
+def settled(edges, cap, push, first, v):
+    """The last edge up to which the speeds v, that end at rest, are what they would be if they did not."""
+    free = speeds(edges, cap, push, first, np.inf)
+    e = 0
+    while e < len(v) - 1 and v[e + 1] == free[e + 1]:
+        e += 1
+    return edges[e]
+
+
+@kernel
+def phases_of(edges, cap, push, v):
+    """Phases through the speeds v at the edges, as fast as may be between them."""
+    n = len(cap)
     phases = np.empty((3 * n, 3))
     count = 0
     for e in range(n):
@@ -54,15 +70,14 @@ def fastest(edges, cap, push, speed):
 
 @kernel
 def hold_tops(phases, tau):
-    """The phases with each top of the speed held for τ at least, by lowering it: (phases, count up to the last top's
-    end).
+    """The phases with each top of the speed held for τ at least, by lowering it.
 
     Between speeding up and slowing down lie then τ seconds without acceleration. (Between slowing down and speeding up
     they do anyway, as each limit of the speed reaches far enough to either side.)
     """
     n = len(phases)
     out = np.empty((n + n, 3))
-    count = held = i = 0
+    count = i = 0
     while i < n:
         j = i
         while j < n and phases[j, 2] >= phases[j, 1]:
@@ -112,9 +127,21 @@ def hold_tops(phases, tau):
         if length > 0.0:
             out[count, 0], out[count, 1], out[count, 2] = length, level, level
             count += 1
-        held = count
         for m in range(right, k):
             out[count] = phases[m]
             count += 1
         i = k
-    return out[:count], held
+    return out[:count]
+
+
+@kernel
+def cut(phases, length):
+    """The phases up to `length` from their start."""
+    for i in range(len(phases)):
+        if phases[i, 0] >= length:
+            u, w = phases[i, 1], phases[i, 2]
+            out = phases[: i + 1].copy()
+            out[i, 0], out[i, 2] = length, sqrt(u * u + (w * w - u * u) * (length / phases[i, 0]))
+            return out
+        length -= phases[i, 0]
+    return phases

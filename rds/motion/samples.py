@@ -16,7 +16,7 @@ class SampleBlock:
     line: the program line of each sample; segment: which of the program's segments; distance: how far along the
     programmed path, mm (degrees where only rotary axes move). events: (sample, event), the sample at which the motion
     has come to rest for it, or passes it. path: the segments that the samples belong to with their neighbours, from
-    number path_first on.
+    number path_first on, and path_at, how far along the programmed path these begin.
     """
 
     first: int
@@ -29,6 +29,7 @@ class SampleBlock:
     distance: np.ndarray
     path: np.ndarray
     path_first: int
+    path_at: float
     events: list[tuple[int, Any]] = field(default_factory=list)
 
     def __len__(self) -> int:
@@ -56,7 +57,7 @@ class Rows:
         """First and last segment of the rows."""
         return int(self.parts[0][4][0]), int(self.parts[-1][4][-1])
 
-    def block(self, path: np.ndarray, path_first: int) -> SampleBlock:
+    def block(self, path: np.ndarray, path_first: int, path_at: float) -> SampleBlock:
         columns = [np.concatenate(column) for column in zip(*self.parts, strict=True)]
         first = self.total - self.rows
         now = [event for event in self.events if event[0] < self.total]
@@ -64,5 +65,5 @@ class Rows:
         self.parts, self.rows = [], 0
         position, velocity, acceleration, line, segment, distance = columns
         return SampleBlock(
-            first, self.T, position, velocity, acceleration, line, segment, distance, path, path_first, now
+            first, self.T, position, velocity, acceleration, line, segment, distance, path, path_first, path_at, now
         )

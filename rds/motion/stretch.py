@@ -1,7 +1,7 @@
 """The motion along pieces, from rest to rest: it looks ahead over a window of pieces, and hands out samples.
 
-It plans as if the motion ended with the window, and takes over the part of the profile that this end does not touch: up
-to the end of its last top. So memory is bounded. What is in a window does not depend on how many pieces come at a time.
+It plans as if the motion ended with the window, and takes over the part of the profile that this end does not touch. So
+memory is bounded. What is in a window does not depend on how many pieces come at a time.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ import numpy as np
 
 from rds.motion.limits import Limits
 from rds.motion.pieces import END, FIRST, LAST, LENGTH, REST, no_pieces
-from rds.motion.profile import fastest, hold_tops
+from rds.motion.profile import cut, hold_tops, phases_of, settled, speeds
 from rds.motion.sampling import LASTS, PLACE, SINCE, sample, timed
 from rds.motion.speed import envelope, joint_limits
 
 WINDOW = 1024  # pieces that are looked ahead over, at least
 LONGEST_WINDOW = 65536  # pieces: if these are too short a way to stop in, the motion stops after them
+PROGRESS = 0.2  # of a window, that must be settled; else a longer one is taken
 MOST_ROWS = 16384  # samples at a time
 
 # position, velocity, acceleration (m, 6), programmed distance (m), first and last segment of each sample's piece (m)
@@ -92,11 +93,13 @@ class Stretch:
             return False
         joints = joint_limits(f, at, limits.acceleration, limits.jerk, self._tau, self._T)
         edges, cap, push = envelope(f, at, joints, self._tau, self._place, end)
-        phases, held = hold_tops(fastest(edges, cap, push, self._speed), self._tau)
+        v = speeds(edges, cap, push, self._speed, 0.0)
+        phases = hold_tops(phases_of(edges, cap, push, v), self._tau)
         if not ends:
-            phases = phases[:held]
-            if not len(phases):
+            done = settled(edges, cap, push, self._speed, v) - self._place
+            if done < PROGRESS * (end - self._place):
                 return False
+            phases = cut(phases, done)
         rows = timed(phases, self._time, self._place)
         self._rows = np.concatenate((self._rows, rows))
         self._place = end if ends else self._place + float(phases[:, 0].sum())

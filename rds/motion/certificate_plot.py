@@ -1,0 +1,50 @@
+"""The certificate of a motion as a picture: how much of each limit is used, over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rds.motion.segments import AXES
+
+if TYPE_CHECKING:
+    from rds.motion.certificate import Certificate
+    from rds.results.figure import Picture
+
+
+def plot_certificate(certificate: Certificate, path: str | Path | None = None) -> Picture:
+    """Largest velocity, acceleration and jerk of each axis in % of its limit, and the deviation from the path, over
+    time.
+
+    Saved as PNG at `path` if given.
+    """
+    from rds.results.figure import CYCLE, GREY, VERMILLION, Picture, dress, legend
+
+    trace = certificate.trace()
+    drawn = Picture(7.6)
+    grid = drawn.subplots(4, 1, sharex=True)
+    time = trace[:, 0]
+    styles = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (8, 2)))
+    for row, kind in enumerate(("velocity", "acceleration", "jerk")):
+        for i, axis in enumerate(AXES):
+            if certificate.limits.velocity[i] > 0.0:
+                worst = certificate.worst.get((kind, axis))
+                label = f"{axis}, at most {100 * worst.share:.1f} % in line {worst.line}" if worst else axis
+                values = 100.0 * trace[:, 1 + 6 * row + i]
+                grid[row].step(
+                    time, values, where="post", color=CYCLE[i], linestyle=styles[i], linewidth=1.1, label=label
+                )
+        grid[row].axhline(100.0, color=GREY, linewidth=0.9)
+        grid[row].set_ylim(0.0, None)
+        dress(grid[row], f"{kind} [% of limit]", None)
+        legend(grid[row], 3)
+    worst = certificate.worst.get(("deviation", ""))
+    label = f"at most {worst.value:.4g} mm in line {worst.line}" if worst else "deviation"
+    grid[3].step(time, trace[:, 19], where="post", color=VERMILLION, linewidth=1.1, label=label)
+    grid[3].set_ylim(0.0, None)
+    dress(grid[3], "off the path [mm]")
+    legend(grid[3])
+    drawn.align_ylabels()
+    if path is not None:
+        drawn.savefig(path)
+    return drawn
