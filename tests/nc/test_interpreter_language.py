@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.nc import Dialect, ProgramError, interpret
+from rds.nc.blocks import G_GROUPS, M_GROUPS
 from rds.nc.canon import ARC, BLOCK_ROWS, FEED, RATE, TRAVERSE, Call, MotionBlock, text
 from rds.nc.interpreter import Interpreter
 from rds.nc.tools import Tool
@@ -269,3 +271,22 @@ def test_lengths_of_tools_and_parameters_are_in_the_machine_s_units() -> None:
     kept = {5221: 2.0, 5220: 1.0}
     origin = next(item for item in interpret("M2", parameters=kept) if isinstance(item, Call) and "G5X" in item.name)
     assert origin.args[:2] == (1, 2.0)
+
+
+def test_the_document_names_every_word() -> None:
+    document = (Path(__file__).parents[2] / "docs" / "part-program-language.md").read_text(encoding="utf-8")
+    table = document[document.index("## Words") : document.index("## Options")]
+    for code in G_GROUPS:
+        number = f"G{code / 10:g}"
+        assert number in table or (540 <= code <= 593 and "G54 to G59.3" in table), number
+    for code in M_GROUPS:
+        assert f"M{code}" in table, code
+    for option in fields(Dialect):
+        assert f"`{option.name}`" in document, option.name
+
+
+def test_the_document_s_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    document = (Path(__file__).parents[2] / "docs" / "part-program-language.md").read_text(encoding="utf-8")
+    example = document[document.index("```python") + 9 :]
+    exec(example[: example.index("```")], {})
+    assert "ARC_FEED(11.0000, 2.0000, 6.0000, 2.0000, -1, 0.0000" in capsys.readouterr().out
