@@ -212,7 +212,7 @@ class Compensation:
         around = first is not None and first.kind == ARC and not self._inside(first.turn)
         begin = along(corner, normal, self.radius)
         if angle < -STRAIGHT_ON or angle > math.pi + (-STRAIGHT_ON if around else STRAIGHT_ON):
-            self._queue.trim(self._crossing_straight(self._before_corner(), direction, begin))
+            self._queue.trim(self._crossing_straight(self._before_corner(), direction, begin), angle)
         elif angle <= STRAIGHT_ON:
             self._queue.finish(wide=True)
         else:
@@ -236,7 +236,7 @@ class Compensation:
         angle = self._turns_away((-outward[1], outward[0]) if turn > 0 else (outward[1], -outward[0]))
         offset = -self.radius if inside else self.radius
         if angle < -STRAIGHT_ON or angle > math.pi + (STRAIGHT_ON if inside else -STRAIGHT_ON):
-            self._queue.trim(self._crossing_arc(self._before_corner(), centre, radius + offset, turn))
+            self._queue.trim(self._crossing_arc(self._before_corner(), centre, radius + offset, turn), angle)
         elif angle <= STRAIGHT_ON:
             self._queue.finish(wide=True)
         else:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from math import atan2, dist, hypot, pi, sqrt
+from math import atan2, dist, hypot, inf, pi, sqrt
+
+from rds.nc.errors import ProgramError
 
 Point = tuple[float, float]
 
 
 def unit(start: Point, end: Point) -> Point:
-    """The direction from one point to another, of length 1."""
+    """The direction from one point to another, of length 1. Raises ProgramError where rounding has made them one."""
     u, v = end[0] - start[0], end[1] - start[1]
     length = hypot(u, v)
+    if not 0 < length < inf:
+        raise ProgramError(
+            f"the points {start[0]:g}, {start[1]:g} and {end[0]:g}, {end[1]:g} are too far out for the cutter's radius:"
+            " rounding swallows it; use smaller coordinates"
+        )
     return (u / length, v / length)
 
 

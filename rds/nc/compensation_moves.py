@@ -13,6 +13,7 @@ from rds.nc.errors import ProgramError
 XY, XZ = "XY", "XZ"
 CENTRE_TOLERANCE = 0.01  # program units; by so much the radii at both ends of a shortened arc may differ
 SWEEP_TOLERANCE = {"MM": 0.0254, "INCHES": 0.001}  # rad; by so much an arc may grow when its end is moved
+DEPTH = 0.0025  # of the radius; twice as deep as a corner may gouge that is taken as straight on
 # Calls that keep their place among the held moves; all others are made at once, as LinuxCNC does.
 IN_ORDER = frozenset(
     (
@@ -73,6 +74,7 @@ class HeldMoves:
         self.tool = start
         self.made = start
         self.begin: Point | None = None
+        self._sharp = 0.0  # where `begin` is a cut-off inside corner, the sine of its angle
         self.units = stretch.units
         self.radius = stretch.radius
         self.mark = (0, 0)  # digits and number of the word N of the block being executed
@@ -103,8 +105,11 @@ class HeldMoves:
         out, self.out = self.out, []
         return out
 
-    def trim(self, point: Point) -> None:
-        """All held moves end at `point` and are made: besides the first these are moves up and down in the corner."""
+    def trim(self, point: Point, angle: float) -> None:
+        """All held moves end at `point` and are made: besides the first these are moves up and down in the corner.
+
+        `angle`: by how much the path turns there, rad.
+        """
         self._check(point, wide=False)
         for item in self._held:
             if isinstance(item, Move):
@@ -112,12 +117,18 @@ class HeldMoves:
         self._flush()
         self.tool = self.made = point
         self.begin = point
+        self._sharp = abs(math.sin(angle)) if math.cos(angle) > 0 else 1.0
 
     def finish(self, wide: bool = False) -> None:
-        """The held moves are made as they are. `wide`: where LinuxCNC looks for no gouge, allow for flat corners."""
+        """The held moves are made as they are.
+
+        `wide`: LinuxCNC looks for no gouge here. Then lines are refused only when they run back into the side of a
+        sharp corner: in a contour of very short moves, rounded to a few decimals, flat corners push the cutter about.
+        """
         self._check(self.tool, wide)
         self._flush()
         self.begin = self.tool
+        self._sharp = 0.0
 
     def make(self, move: Move) -> None:
         """A move that is not held back."""
@@ -167,7 +178,8 @@ class HeldMoves:
                     raise _gouges(self.radius, move)
             elif self.begin is not None:
                 made = (point[0] - self.begin[0], point[1] - self.begin[1])
-                if move.direction[0] * made[0] + move.direction[1] * made[1] < 0:
+                forward = move.direction[0] * made[0] + move.direction[1] * made[1]
+                if -forward * self._sharp > DEPTH * self.radius if wide else forward < 0:
                     raise _gouges(self.radius, move)
 
     def _flush(self) -> None:

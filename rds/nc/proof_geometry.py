@@ -177,9 +177,15 @@ class Contour:
         distances = self.distance(curve.at(fractions), near)
         if np.ptp(distances) < _CONSTANT:
             return fractions, distances
-        for index, sign in ((int(distances.argmax()), 1.0), (int(distances.argmin()), -1.0)):
-            low, high = fractions[max(index - 1, 0)], fractions[min(index + 1, len(fractions) - 1)]
-            found.add(self._golden(curve, near, float(low), float(high), sign))
+        for sign in (1.0, -1.0):
+            index = int((sign * distances).argmax())
+            if sign < 0 and distances[index] >= 0:
+                continue
+            before, after = max(index - 1, 0), min(index + 1, len(fractions) - 1)
+            others = [abs(distances[other] - distances[index]) for other in (before, after) if other != index]
+            if min(others) > _CONSTANT:
+                low, high = float(fractions[before]), float(fractions[after])
+                found.add(self._golden(curve, near, low, high, sign))
         fractions = np.array(sorted(found))
         return fractions, self.distance(curve.at(fractions), near)
 

@@ -56,7 +56,11 @@ def _title(proof: Proof, stretch: StretchProof) -> str:
     first, last = stretch.lines
     side = "left" if stretch.stretch.side > 0 else "right"
     gouges = stretch.gouges()
-    verdict = f"{len(gouges)} gouges" if len(gouges) > 1 else "a gouge" if gouges else "no gouge"
+    verdict = "no gouge"
+    if gouges:
+        deepest = -min(part.least for part in gouges)
+        where = f"{len(gouges)} moves" if len(gouges) > 1 else "one move"
+        verdict = f"gouges in {where}, {_length(deepest)} deep at most"
     name = f"{proof.name}, lines" if proof.name else "Lines"
     return (
         f"{name} {first} to {last}: cutter of radius {stretch.radius:g} mm, {side} of the contour.  Edge to contour:"

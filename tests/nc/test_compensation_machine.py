@@ -35,7 +35,7 @@ STRICTER = ("only backward", "stopped at this inside corner", "too short for the
 
 
 @needs_rs274
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cases())
 def test_every_stretch_is_made_or_refused_as_linuxcnc_does(case: Case) -> None:
     printed, complaint = rs274(program(case))
@@ -145,6 +145,7 @@ FAULTS: list[tuple[str, Case]] = [
         "does not fit into the inside corner after line 5",
         Case("XY", LEFT, 3.0, (-20.0, 0, 0), (*straight((0, 0), (10, 0)), Round((4, -3, 0), (7, -1.5), 1))),
     ),
+    ("rounding swallows it", Case("XY", LEFT, 1.0, (-1e20, 0, 0), straight((0, 1e20), (1e20, 1e20), (1e20, 0)))),
     (
         "stopped at this inside corner",
         Case("XY", LEFT, 1.0, (-20.0, 0, 0), (*straight((0, 0)), STOP, *straight((0, 9)))),
@@ -158,6 +159,31 @@ def test_what_the_cutter_cannot_do_is_refused_with_a_remedy(words: str, case: Ca
     with pytest.raises(ProgramError, match=words) as caught:
         made(case)
     assert ";" in str(caught.value)
+
+
+def test_a_contour_of_tiny_moves_rounded_to_three_decimals_is_followed() -> None:
+    """Inside a circle of 20 mm, in moves of 0.03 mm whose directions rounding changes by more than a degree."""
+    angles = [0.0015 * k for k in range(2000)]
+    points = [(round(20 * math.cos(a), 3), round(20 * math.sin(a), 3)) for a in angles]
+    rows = made(Case("XY", LEFT, 3.0, (10.0, -5.0, 0.0), (*straight((20, -3), *points), OFF)))
+    radii = [math.hypot(*values[:2]) for _, values in rows[10:]]
+    assert max(radii) < 17.01
+    assert min(radii) > 16.99
+
+
+def test_a_short_move_before_one_straight_on_is_refused_though_linuxcnc_gouges_with_it() -> None:
+    case = Case("XY", LEFT, 5.0, (-40.0, 0.0, 0.0), straight((0, 0), (30, 0), (30, 4), (30, 30), (0, 30)))
+    with pytest.raises(ProgramError, match="straight move of line 6 is too short"):
+        made(case)
+
+
+@needs_rs274
+def test_linuxcnc_gouges_with_a_short_move_before_one_straight_on() -> None:
+    case = Case("XY", LEFT, 5.0, (-40.0, 0.0, 0.0), straight((0, 0), (30, 0), (30, 4), (30, 30), (0, 30)))
+    printed, complaint = rs274(program(case))
+    assert not complaint
+    ends = [values[:2] for _, values in moves_of(printed)]
+    assert (25.0, 4.0) in ends  # 4 mm above the first line, where 5 is the radius
 
 
 @given(st.floats(1, 50), st.floats(-49, 49), st.floats(0, 6))

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 
 from rds.nc import Dialect, ProgramError, interpret
 from rds.nc.canon import text
-from rds.nc.proof import proof
+from rds.nc.proof import Proof, proof
 from rds.nc.proof_pieces import CONTOUR, ENTRY, EXIT
 
 from .compensation_cases import Case, cases, needs_rs274, program, rs274
@@ -52,7 +52,7 @@ STRICTER = ("only backward", "stopped at this inside corner", "too short for the
 
 
 @needs_rs274
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cases())
 def test_random_programs_give_the_same_calls_or_are_refused(case: Case) -> None:
     source = program(case)
@@ -153,3 +153,16 @@ def test_every_stretch_of_a_program_is_measured_apart() -> None:
 def test_a_proof_across_a_change_of_units_is_refused() -> None:
     with pytest.raises(ProgramError, match="one length unit"):
         proof(HERE / "inches.ngc", tools=TOOLS, options=INCHES)
+
+
+def test_the_documented_proof_runs_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    document = (HERE.parents[2] / "docs" / "cutter-compensation.md").read_text(encoding="utf-8")
+    code = document.split("```python file=prove.py run\n")[1].split("```")[0]
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(code, "prove.py", "exec"), names)
+    found = names["found"]
+    assert isinstance(found, Proof)
+    assert found.max_deviation < 1e-6
+    assert found.gouges() == []
+    assert (tmp_path / "proof.png").stat().st_size > 10_000
