@@ -16,9 +16,11 @@ Tools = Annotated[Path | None, typer.Option(help="Tool table, as LinuxCNC keeps 
 Parameters = Annotated[Path | None, typer.Option(help="Parameter file, as LinuxCNC keeps it (offsets, #parameters).")]
 With = Annotated[
     list[str] | None,
-    typer.Option("--with", metavar="OPTION", help="An option of the dialect: block-delete, gr or program-numbers."),
+    typer.Option(
+        "--with", metavar="OPTION", help="An option of the dialect: block-delete, gr, program-numbers or inch-machine."
+    ),
 ]
-DIALECT = ("block-delete", "gr", "program-numbers")
+DIALECT = ("block-delete", "gr", "program-numbers", "inch-machine")
 
 
 def setup(tools: Path | None, parameters: Path | None, options: list[str] | None) -> Setup:
