@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -17,6 +18,10 @@ POSITION = 5420  # X Y Z A B C
 G28_HOME, G30_HOME = 5161, 5181
 G92_APPLIED, G92 = 5210, 5211
 SYSTEM = 5220  # which coordinate system is selected
+_SETTING = re.compile(  # what int() and float() take and LinuxCNC does not, like 1_000, is no number here either
+    r"\s*([-+]?[0-9]+)\s+([-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?|inf|nan))", re.ASCII | re.IGNORECASE
+)
+_DIGITS_MOST = 18  # of a number; more would be out of range all the same
 SYSTEMS = 5200  # + 20 * system + 1...: origin X Y Z A B C U V W, rotation
 
 
@@ -107,17 +112,16 @@ def read_parameters(path: Path) -> dict[int, float]:
     values: dict[int, float] = {}
     last = 0
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = path.read_bytes().decode("utf-8", "replace").split("\n")  # as editors count them
     except OSError as error:
         raise ProgramError(
             f"the parameter file cannot be read ({error.strerror}); check its path", file=str(path)
         ) from None
     for line, text in enumerate(lines, start=1):
-        words = text.split()
-        try:
-            number, value = int(words[0]), float(words[1])
-        except (ValueError, IndexError):
+        match = _SETTING.match(text)
+        if match is None:
             continue
+        number, value = int(match[1][:_DIGITS_MOST]), float(match[2])
         if not 1 <= number < COUNT:
             raise ProgramError(
                 f"there is no parameter {number}; numbers go from 1 to {COUNT - 1}", file=str(path), line=line
@@ -128,7 +132,7 @@ def read_parameters(path: Path) -> dict[int, float]:
             )
         if value - value != 0.0:
             raise ProgramError(
-                f"{words[1]} is no finite number; correct the value of parameter {number}", file=str(path), line=line
+                f"{match[2]} is no finite number; correct the value of parameter {number}", file=str(path), line=line
             )
         values[number] = value
         last = number
