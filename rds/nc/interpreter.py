@@ -194,7 +194,7 @@ class Interpreter:
     def _other(self, text: str) -> bool:
         """A block with more than plain words: %, comments, parameters, expressions, O words; or one passed over."""
         control, out = self.control, self.out
-        if text == "%" and (self._percent or control.skipping):
+        if text == "%" and self._percent:
             return self._percent_sign()
         out.digits, out.n, at = line_number(text)
         first = text[at : at + 1]

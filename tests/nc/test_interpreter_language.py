@@ -236,6 +236,16 @@ def test_a_fault_in_a_subroutine_s_file_is_told_there(tmp_path: Path) -> None:
     assert (caught.value.file, caught.value.line, caught.value.column) == (str(tmp_path / "sub.ngc"), 2, 4)
 
 
+def test_percent_signs_of_a_subroutine_s_file_and_of_what_is_passed_over_say_nothing(tmp_path: Path) -> None:
+    (tmp_path / "sub.ngc").write_text("%\no<sub> sub\nG0 X1\no<sub> endsub\n%\n")
+    main = tmp_path / "main.ngc"
+    for frame in ("{}\nM2\n", "%\n{}\n%\n"):
+        main.write_text(frame.format("o<sub> call\nG0 X2"))
+        blocks = [item for item in interpret(main) if isinstance(item, MotionBlock)]
+        assert [row["values"][0] for block in blocks for row in block.rows][:2] == [1.0, 2.0]
+    assert x_of("o1 if [0]\n%\no1 endif\nG0 X3") == 3.0
+
+
 def test_files_elsewhere_are_no_subroutines(tmp_path: Path) -> None:
     (tmp_path / "secret.ngc").write_text("o<secret> sub\no<secret> endsub\n")
     (tmp_path / "here").mkdir()
