@@ -228,17 +228,19 @@ def outline(
     holes: Annotated[str, typer.Option(help="refuse, fill (outer outline alone) or cut (each hole too).")] = "refuse",
     level: Annotated[float, typer.Option(help="Darkness, 0 to 1, from which on a pixel belongs to the shape.")] = 0.5,
     invert: Annotated[bool, typer.Option("--invert", help="The shape is light on dark.")] = False,
+    specks: Annotated[int, typer.Option(min=0, help="Leave out islands and holes of at most so many pixels.")] = 0,
 ) -> Made:
     """The outline of the shape in a drawing, counter-clockwise and closed."""
     from rds.paths.drawing import read_drawing
     from rds.paths.outlines import outline as make
 
     options: dict[str, Any] = {"method": trace, "holes": holes, "level": level, "invert": invert, "arcs": arcs}
-    options |= {"tolerance": tolerance, "at": _numbers(at, "--at"), "depth": depth, "passes": passes}
+    options |= {"specks": specks, "tolerance": tolerance, "at": _numbers(at, "--at"), "depth": depth, "passes": passes}
     traced = make(read_drawing(file), pixel, feed / 60, name=str(file), **options)
     rows, columns = traced.darkness.shape
     said = f"outline of {file.name}, {columns} x {rows} pixels of {pixel:g} mm"
     more = {"deviation_mm": traced.deviation, "tolerance_mm": tolerance, "outlines": len(traced.rings)}
+    more["specks_left_out"] = traced.specks
     return Made(traced.segments, said, more, traced, file)
 
 
@@ -259,11 +261,13 @@ def _tell(found: dict[str, Any]) -> None:
         f"{found['file']}: {found['lines']} lines, {found['arcs']} arcs{pieces}, {shape}; "
         f"{found['length_mm']:.2f} mm, {found['cutting_time_s']:.1f} s at the feed rate; {extent} mm"
     )
-    if "deviation_mm" in found:
+    if found.get("deviation_mm") or found.get("tolerance_mm"):
         limit = found["tolerance_mm"]
         allowed = f" (tolerance {limit:g} mm)" if limit else ""
         typer.echo(f"deviation: {found['deviation_mm']:.4f} mm at most{allowed}")
     if found.get("repeated_points_left_out"):
         typer.echo(f"{found['repeated_points_left_out']} points that repeat the one before are left out")
+    if found.get("specks_left_out"):
+        typer.echo(f"{found['specks_left_out']} islands and holes of specks are left out")
     if found["picture"]:
         typer.echo(f"picture: {found['picture']}")

@@ -91,7 +91,9 @@ def read_image(path: Path) -> np.ndarray:
         except (InputError, MemoryError):
             raise
         except image_module.DecompressionBombError as error:
-            raise InputError(f"is too large to trace ({error}); scale it down", str(path)) from error
+            raise InputError(
+                f"has far more than the {MOST_CELLS} pixels that are traced; scale it down", str(path)
+            ) from error
         except image_module.UnidentifiedImageError as error:
             raise InputError(f"is no image that can be read ({', '.join(sorted(_FORMATS))})", str(path)) from error
         except (FileNotFoundError, PermissionError, IsADirectoryError) as error:

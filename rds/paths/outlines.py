@@ -18,7 +18,7 @@ from rds.paths.deviation import hausdorff
 from rds.paths.measure import signed_area, trace
 from rds.paths.needs import needed
 from rds.paths.numbers import COORDINATE, FEED_RATE, NOT_NEGATIVE, POSITIVE, number, point
-from rds.paths.region import Holes, single_region
+from rds.paths.region import Holes, single_region, without_specks
 from rds.paths.smoothing import are_simple, smoothed, without_idle_points
 
 Trace = Literal["contour", "blob"]
@@ -26,6 +26,7 @@ TRACES: tuple[Trace, ...] = ("contour", "blob")
 LEVEL = Option("darkness from 0 to 1 where the shape begins", more_than=0.0)
 MOST_PASSES = 1000
 _ARC_SHARE = 0.25  # of the tolerance, for fitting arcs to the smoothed outline
+_BLUR_BEFORE_ARCS = 0.95  # of the rest; arcs are fitted to points that are dense
 _CHORD_ERROR = 1e-5  # mm: of the chords that stand for arcs while their deviation is measured
 
 
@@ -41,6 +42,7 @@ class Outline:
     darkness: np.ndarray  # the drawing, shape (rows, columns)
     pixel: float
     at: tuple[float, float]  # lower left corner of the drawing
+    specks: int = 0  # islands and holes that were left out
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -59,6 +61,7 @@ def outline(
     holes: Holes = "refuse",
     level: float = 0.5,
     invert: bool = False,
+    specks: int = 0,
     tolerance: float = 0.0,
     arcs: bool = False,
     at: Sequence[float] = (0.0, 0.0),
@@ -76,7 +79,8 @@ def outline(
     squares, scikit-image's `find_contours`); "blob" goes from centre to centre of the cells on the boundary, as
     three-axis-mill does. With a `tolerance` (mm) the outline is smoothed and may be that far from the traced one; with
     `arcs` it is cut in arcs as well as lines. `holes`: "refuse", "fill" (the outer outline alone) or "cut" (clockwise,
-    before the outer one; not for a blob). The depth is reached in `passes` equal steps, each closed before the next.
+    before the outer one; not for a blob). Islands and holes of at most `specks` cells are left out first.
+    The depth is reached in `passes` equal steps, each closed before the next.
 
     InputError names the place of what cannot be followed: see `region.single_region`.
     """
@@ -99,12 +103,14 @@ def outline(
     threshold = LEVEL.check(level, "level", name)
     cells = darkness >= threshold
     if not cells.any() or cells.all():
+        found = "nowhere as dark as" if not cells.any() else "nowhere lighter than"
         raise InputError(
-            f"{'nothing' if cells.all() else 'all'} is lighter than level {threshold:g} (darkness {darkness.min():.2g} "
-            f"to {darkness.max():.2g}): there is no outline to trace; choose another level, or invert",
+            f"is {found} level {threshold:g} (its darkness goes from {darkness.min():.2g} to {darkness.max():.2g}): "
+            "there is no outline to trace; choose another level, or invert",
             name,
         )
-    region = single_region(cells, holes, name)
+    clean, left_out = without_specks(cells, specks, name)
+    region = single_region(clean, holes, name)
 
     pixels = [boundary_cells(region)] if method == "blob" else _contours(darkness, region, threshold, name)
     rows = darkness.shape[0]
@@ -114,7 +120,7 @@ def outline(
     levels = [0.0 - bottom * (k + 1) / passes for k in range(passes)]
     # holes first: once the outer outline is cut, the part may come loose
     segments = [s for ring in [*flat[1:], flat[0]] for s in _in_passes(ring, levels)]
-    return Outline(segments, cut, traced, deviation, allowed, darkness, size, (x, y))
+    return Outline(segments, cut, traced, deviation, allowed, darkness, size, (x, y), left_out)
 
 
 def _darkness(drawing: np.ndarray, invert: bool, name: str) -> np.ndarray:
@@ -132,7 +138,8 @@ def _darkness(drawing: np.ndarray, invert: bool, name: str) -> np.ndarray:
 
 def _contours(darkness: np.ndarray, region: np.ndarray, level: float, name: str) -> list[np.ndarray]:
     """Rings of (row, column) where the darkness crosses the level, the longest first."""
-    field = np.where(region & (darkness < level), 1.0, darkness)  # what was filled counts as black
+    # what was filled counts as black, what was left out as white
+    field = np.where(region & (darkness < level), 1.0, np.where(~region & (darkness >= level), 0.0, darkness))
     # no pixel is exactly at the level that is followed, so that the line is nowhere degenerate
     used = level if not np.any(field == level) else (level + float(field[field < level].max())) / 2
     rings = needed("skimage.measure").find_contours(field, used, fully_connected="low")
@@ -163,7 +170,7 @@ def _shaped(
         return rings, deviation, [_lines(ring, feed) for ring in rings]
     share = _ARC_SHARE
     for _ in range(6):
-        rounded, _ = smoothed(traced, (1 - share) * tolerance, simplify=False)
+        rounded, _ = smoothed(traced, (1 - share) * tolerance, blur=_BLUR_BEFORE_ARCS)
         flat = [fit(np.column_stack([r, np.zeros(len(r))]), share * tolerance, feed)[0] for r in rounded]
         rings = [trace(ring, _CHORD_ERROR)[:, :2] for ring in flat]
         deviation = hausdorff(traced, rings) + _CHORD_ERROR

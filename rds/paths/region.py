@@ -35,6 +35,26 @@ def single_region(cells: np.ndarray, holes: Holes = "refuse", name: str = "drawi
     return filled
 
 
+def without_specks(cells: np.ndarray, largest: int, name: str = "drawing") -> tuple[np.ndarray, int]:
+    """The cells without islands, and holes, of at most `largest` cells: what dust and JPEG leave; and their number.
+
+    InputError where `largest` is no whole number from 0.
+    """
+    if not isinstance(largest, int) or largest < 0:
+        raise InputError(f"specks = {largest!r} must be a whole number of pixels, 0 for none", name)
+    if largest == 0:
+        return cells, 0
+    cleaned, removed = cells, 0
+    for of_shape, structure in ((True, _ALL_EIGHT), (False, None)):
+        labels, _ = _label(cleaned == of_shape, structure)
+        sizes = np.bincount(labels.ravel())
+        small = sizes <= largest
+        small[0] = False
+        cleaned = np.where(small[labels], not of_shape, cleaned)
+        removed += int(small.sum())
+    return cleaned, removed
+
+
 def _check_border(cells: np.ndarray, name: str) -> None:
     if not cells.any():
         raise InputError("has nothing filled: there is no outline to trace", name)
@@ -62,7 +82,7 @@ def _without_holes(cells: np.ndarray, holes: Holes, name: str) -> np.ndarray:
     count = _label(inside)[1]
     raise InputError(
         f"has {_count(count, 'hole')}, the first {_place(inside)}; fill them (a drawn outline counts as the shape "
-        "within it) or cut them too: holes = fill or cut",
+        "within it) or cut them too (holes: fill or cut)",
         name,
     )
 
@@ -75,7 +95,8 @@ def _check_islands(cells: np.ndarray, name: str) -> None:
     shown = ", ".join(f"{_count(int(sizes[k]), 'pixel')} {_place(labels == k + 1)}" for k in range(min(count, 3)))
     more = ", ..." if count > 3 else ""
     raise InputError(
-        f"has {count} islands ({shown}{more}); one outline has one: join them, or trace each from a drawing of its own",
+        f"has {count} islands ({shown}{more}); one outline has one: join them, trace each "
+        "from a drawing of its own, or leave out small ones as specks",
         name,
     )
 

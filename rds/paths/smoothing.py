@@ -10,24 +10,26 @@ from rds.core.errors import InputError
 from rds.paths.deviation import hausdorff
 from rds.paths.needs import needed
 
-_SHARE = 0.65  # of the tolerance for rounding; the rest is for leaving out points
+BLUR = 0.65  # of the tolerance; the rest is for leaving out points
 _SMALLER = 0.85
 _POINTS_PER_TOLERANCE = 4.0
 _MOST_POINTS = 400_000
 
 
-def smoothed(rings: Sequence[np.ndarray], tolerance: float, *, simplify: bool = True) -> tuple[list[np.ndarray], float]:
+def smoothed(rings: Sequence[np.ndarray], tolerance: float, blur: float = BLUR) -> tuple[list[np.ndarray], float]:
     """Rings (closed, shape (n, 2), first point repeated, mm) smoothed, and their measured Hausdorff distance to these.
 
-    Each ring is sampled evenly and blurred along its length by a Gaussian as wide as the tolerance allows; then,
-    with `simplify`, points are left out (Douglas and Peucker). What comes out is measured against the traced rings, and
-    blurred less until it keeps within the tolerance and no ring crosses itself or another. InputError where even that
-    does not help.
+    Each ring is sampled evenly and blurred along its length by a Gaussian as wide as `blur` of the tolerance allows;
+    with the rest points are left out (Douglas and Peucker). What comes out is measured against the traced rings, and
+    made less smooth until it keeps within the tolerance and no ring crosses itself or another. InputError where even
+    that does not help.
     """
-    share = _SHARE if simplify else 1.0
+    share = 1.0
     for _ in range(30):
-        rounded = [_blurred(ring, share * tolerance, tolerance) for ring in rings]
-        found = [_simplified(ring, (1 - _SHARE) * share * tolerance) for ring in rounded] if simplify else rounded
+        found = [
+            _simplified(_blurred(ring, blur * share * tolerance, tolerance), (1 - blur) * share * tolerance)
+            for ring in rings
+        ]
         if are_simple(found):
             deviation = hausdorff(rings, found)
             if deviation <= tolerance:
@@ -46,16 +48,18 @@ def are_simple(rings: Sequence[np.ndarray]) -> bool:
 
 def _blurred(ring: np.ndarray, most: float, tolerance: float) -> np.ndarray:
     """The ring under the widest Gaussian that moves no sample by more than `most` (found by halving)."""
-    from scipy.ndimage import gaussian_filter1d
-
     samples = _evenly(ring, tolerance / _POINTS_PER_TOLERANCE)
-    low, high = 0.0, len(samples) / 8
+    count = len(samples)
+    # a Gaussian of σ samples around the closed ring: its spectrum times exp(-(2πfσ)²/2)
+    spectrum = np.fft.rfft(samples, axis=0)
+    exponent = -2 * (np.pi * np.fft.rfftfreq(count)) ** 2
+    low, high = 0.0, count / 8
     best = samples
     for _ in range(24):
         width = (low + high) / 2
         if width < 0.3:  # samples: no blur to speak of
             break
-        moved = gaussian_filter1d(samples, width, axis=0, mode="wrap")
+        moved = np.fft.irfft(spectrum * np.exp(exponent * width**2)[:, None], n=count, axis=0)
         if np.linalg.norm(moved - samples, axis=1).max() <= most:
             low, best = width, moved
         else:
