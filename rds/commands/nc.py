@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.commands import nc_make
+from rds.commands import nc_make, nc_run
 from rds.commands.common import Json, print_json, progress_bars, refusals
 from rds.commands.nc_options import MachineName, Parameters, Program, Tools, With, setup
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
 app.add_typer(nc_make.app, name="make")
+for _command in nc_run.COMMANDS:
+    app.command()(_command)
 
 PICTURES = ("png", "svg", "pdf")
 

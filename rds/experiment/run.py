@@ -118,6 +118,11 @@ class Run:
         """The names of the columns of `read`."""
         return self._live.columns
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of the columns."""
+        return self._live.units
+
     def read(self, first: int = 0) -> tuple[int, Any]:
         """The rows from number `first` on (array, rows × columns), and the number of the first that is still there.
 
@@ -145,7 +150,7 @@ class Run:
                 if progress and self._live.attached.is_set():
                     progress(*self.progress)
             except KeyboardInterrupt:
-                if self._live.was_stopped:
+                if self._live.was_cut:
                     raise
                 self._live.stop(hard=True)
         if self._error is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from math import hypot
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ class Status:
     line: int
     state: State
     rate: float
+    feed: float  # mm/min along the path, as wanted
     share: float  # of the planned samples that are done
     measured: dict[str, float]
     reference: dict[str, float]
@@ -75,6 +77,7 @@ class ProgramRun(Run):
             line=int(of["program_line"]),
             state=State(int(of["program_state"])),
             rate=of["program_override"],
+            feed=60.0 * hypot(*(of[f"{name}_reference_velocity"] for name in program.axes if name in "XYZ")),
             share=min((of["program_sample"] + 1.0) / program.samples, 1.0),
             measured={name: of[f"{name}_measured"] for name in self.plan.names},
             reference={name: of[f"{name}_reference"] for name in self.plan.names},

@@ -69,10 +69,13 @@ class Heed:
             while self._waits() and not self.desk.news():
                 sleep(_LOOK)
         planned = self._planned
-        while self._next < len(planned) and planned[self._next][0] <= k:
-            self._apply(k, *planned[self._next][1:])
-            self._next += 1
         desk = self.desk
+        while self._next < len(planned) and planned[self._next][0] <= k:
+            _, name, value = planned[self._next]
+            self._next += 1
+            self._apply(k, name, value)
+            if desk is not None:
+                desk.show(name, value)
         if desk is not None and desk.news():
             values = self.values
             for name, value in zip(self._names, desk.take(), strict=False):

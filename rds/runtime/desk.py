@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
+from rds.runtime.words import read_word, write_float, write_word
 
 _MAGIC = b"RDSDESK1"
 _VERSION, _NOTED, _SIZE, _TEXT = 8, 16, 24, 32
-_U64 = struct.Struct("<Q")
 _NOTE = struct.Struct("<4d")  # sample, channel, old, new
 NOTES = 4096  # changes kept until the recorder has copied them, every 0.05 s
 
@@ -83,7 +83,7 @@ class Desk:
         self._names = list(self.channels)
         self._memory = memory
         self._values = struct.Struct(f"<{len(self._names)}d")
-        self._first_value = _TEXT + _text_size(_U64.unpack_from(memory, _SIZE)[0])
+        self._first_value = _TEXT + _text_size(read_word(memory, _SIZE))
         self._first_note = self._first_value + self._values.size
         self._seen = bytes(8)
         self._own = threading.Lock()
@@ -102,7 +102,7 @@ class Desk:
             with open(path, "wb") as file:
                 file.truncate(size)
             memory = _map(path)
-        _U64.pack_into(memory, _SIZE, len(text))
+        write_word(memory, _SIZE, len(text))
         memory[_TEXT : _TEXT + len(text)] = text
         values.pack_into(memory, first, *(channel.value for channel in channels))
         memory[: len(_MAGIC)] = _MAGIC
@@ -114,7 +114,7 @@ class Desk:
         memory = _map(path)
         if memory[: len(_MAGIC)] != _MAGIC:
             raise InputError("not a run's live values", str(path))
-        size = _U64.unpack_from(memory, _SIZE)[0]
+        size = read_word(memory, _SIZE)
         return cls(memory, [Channel(**entry) for entry in json.loads(memory[_TEXT : _TEXT + size])], Path(path))
 
     # --- the host's side ------------------------------------------------------------------------------------------
@@ -133,7 +133,7 @@ class Desk:
             self._verify(dict(self.values()) | checked)
         with self._writing():
             for name, value in checked.items():
-                struct.pack_into("<d", self._memory, self._first_value + 8 * self._names.index(name), value)
+                write_float(self._memory, self._first_value + 8 * self._names.index(name), value)
 
     def verify_with(self, verify: Any) -> None:
         """Let `verify(values of all channels)` have its say before values are set; it raises InputError."""
@@ -159,12 +159,12 @@ class Desk:
     def _writing(self) -> Iterator[None]:
         with self._own, _locked(self.path):
             # An odd number that a killed writer left behind is taken over.
-            odd = _U64.unpack_from(self._memory, _VERSION)[0] | 1
-            _U64.pack_into(self._memory, _VERSION, odd)
+            odd = read_word(self._memory, _VERSION) | 1
+            write_word(self._memory, _VERSION, odd)
             try:
                 yield
             finally:
-                _U64.pack_into(self._memory, _VERSION, odd + 1)
+                write_word(self._memory, _VERSION, odd + 1)
 
     # --- the loop's side ------------------------------------------------------------------------------------------
 
@@ -183,22 +183,26 @@ class Desk:
         self._seen = before
         return values
 
+    def show(self, name: str, value: float) -> None:
+        """Let everybody see a value that the loop has changed by itself; it is no news."""
+        write_float(self._memory, self._first_value + 8 * self._names.index(name), value)
+
     def note(self, note: Note) -> None:
         """The loop has taken a change."""
-        count = _U64.unpack_from(self._memory, _NOTED)[0]
+        count = read_word(self._memory, _NOTED)
         place = self._first_note + count % NOTES * _NOTE.size
         _NOTE.pack_into(self._memory, place, note.sample, self._names.index(note.name), note.old, note.new)
-        _U64.pack_into(self._memory, _NOTED, count + 1)
+        write_word(self._memory, _NOTED, count + 1)
 
     def notes(self, first: int = 0) -> tuple[int, list[Note]]:
         """The notes from number `first` on, and the number of the first one that is still there."""
-        count = _U64.unpack_from(self._memory, _NOTED)[0]
+        count = read_word(self._memory, _NOTED)
         first = max(first, count - NOTES, 0)
         found = []
         for i in range(first, count):
             sample, index, old, new = _NOTE.unpack_from(self._memory, self._first_note + i % NOTES * _NOTE.size)
             found.append(Note(int(sample), self._names[int(index)], old, new))
-        lost = max(_U64.unpack_from(self._memory, _NOTED)[0] - NOTES - first, 0)  # overwritten while being copied
+        lost = max(read_word(self._memory, _NOTED) - NOTES - first, 0)  # overwritten while being copied
         return first + lost, found[lost:]
 
     def close(self) -> None:

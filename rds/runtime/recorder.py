@@ -19,8 +19,9 @@ from typing import Any
 
 from rds.core.types import Ending
 from rds.runtime.changes import FILE as CHANGES
-from rds.runtime.changes import as_text, read_changes, timed
+from rds.runtime.changes import STOP, as_text, read_changes, timed
 from rds.runtime.desk import Desk
+from rds.runtime.program import HOLD
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
 from rds.runtime.ring import Ring
 
@@ -56,6 +57,11 @@ class Recorder:
         self._drain_changes()
         return self._next
 
+    def host_is_gone(self) -> None:
+        """A part program is not carried on without an operator: it comes to rest on its path, and ends."""
+        if HOLD in self._desk:
+            self._desk.set(STOP, 1.0)
+
     def _drain_changes(self) -> None:
         """After the rows: a record that begins has removed what an earlier run left."""
         path = self.directory / CHANGES
@@ -80,9 +86,13 @@ class Recorder:
 def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) -> str | None:
     """Record until the target ends; if it hangs, kill it and return what happened."""
     hang_after = max(HANG_AFTER, 20 * period)
+    host = os.getppid()
     seen, since = (-1, -1), time.monotonic()
     while target.poll() is None:
         time.sleep(DRAIN_EVERY)
+        if host and os.getppid() != host:
+            recorder.host_is_gone()
+            host = 0
         now = (recorder.drain(), recorder.ring.heartbeat)
         if now != seen:
             seen, since = now, time.monotonic()
@@ -145,7 +155,8 @@ def main(arguments: list[str]) -> int:
             stderr=output,
         )
         # where a user in trouble finds them, and the host if the recorder is killed
-        (directory / PROCESSES).write_text(json.dumps({"recorder": os.getpid(), "target": target.pid}))
+        processes = {"recorder": os.getpid(), "target": target.pid, "desk": str(ring.desk_path)}
+        (directory / PROCESSES).write_text(json.dumps(processes))
         hung = watch(target, recorder, ring.about["sample_period"])
     recorder.close()
     finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.runtime.words import read_word, write_word
 
 _MAGIC = b"RDSRING1"
 _HEADER = 16384  # bytes before the first row: counters, then the description as JSON
 _HEAD, _STOP, _HEARTBEAT, _TEXT_SIZE, _TEXT = 8, 16, 24, 32, 64
-_U64 = struct.Struct("<Q")
 
 
 class Ring:
@@ -44,7 +44,7 @@ class Ring:
             file.truncate(size)
         memory = _map(path)
         memory[_TEXT : _TEXT + len(text)] = text
-        _U64.pack_into(memory, _TEXT_SIZE, len(text))
+        write_word(memory, _TEXT_SIZE, len(text))
         memory[: len(_MAGIC)] = _MAGIC
         return cls(path, memory, description)
 
@@ -54,20 +54,20 @@ class Ring:
         memory = _map(path)
         if memory[: len(_MAGIC)] != _MAGIC:
             raise InputError("not a run's shared memory", str(path))
-        size = _U64.unpack_from(memory, _TEXT_SIZE)[0]
+        size = read_word(memory, _TEXT_SIZE)
         return cls(path, memory, json.loads(memory[_TEXT : _TEXT + size]))
 
     @property
     def head(self) -> int:
         """Rows written so far."""
-        return int(_U64.unpack_from(self._memory, _HEAD)[0])
+        return read_word(self._memory, _HEAD)
 
     def append(self, row: list[float]) -> None:
         """Write one row; overwrites the oldest when the ring is full."""
         head = self._head
         self._row.pack_into(self._memory, _HEADER + head % self.capacity * self._row.size, *row)
         self._head = head + 1
-        _U64.pack_into(self._memory, _HEAD, head + 1)
+        write_word(self._memory, _HEAD, head + 1)
 
     def read(self, first: int) -> tuple[int, bytes]:
         """The rows from number `first` on, as bytes, and the number of the first one that is still there."""
@@ -75,7 +75,7 @@ class Ring:
         first = max(first, head - self.capacity, 0)
         size = self._row.size
         start, end = first % self.capacity, head % self.capacity
-        if first == head:
+        if first >= head:
             return first, b""
         memory = self._memory
         if start < end:
@@ -103,11 +103,11 @@ class Ring:
     @property
     def heartbeat(self) -> int:
         """A count that the target raises while it is getting ready."""
-        return int(_U64.unpack_from(self._memory, _HEARTBEAT)[0])
+        return read_word(self._memory, _HEARTBEAT)
 
     def beat(self, count: int) -> None:
         """Say that the target has come to step `count` of getting ready."""
-        _U64.pack_into(self._memory, _HEARTBEAT, count)
+        write_word(self._memory, _HEARTBEAT, count)
 
     def close(self) -> None:
         """Unmap; the file stays."""

@@ -20,6 +20,7 @@ import rds
 from rds.core.types import Ending
 from rds.runtime.changes import Heed, as_text, plan_changes, read_changes, stop_channel, timed
 from rds.runtime.desk import NOTES, Channel, Desk, Note
+from rds.runtime.ring import Ring
 
 Maker = Callable[..., rds.Experiment]
 
@@ -347,3 +348,41 @@ def test_changes_of_a_run_that_was_killed_are_kept(experiment: Maker, alone: Pat
     for path in alone.glob("run/result.*"):
         path.unlink()
     assert rds.open_result(alone / "run").meta["changes"] == result.meta["changes"]
+
+
+# --- words that processes share -----------------------------------------------------------------------------------
+
+APPEND = """
+import sys
+from rds.runtime.ring import Ring
+ring = Ring.open(sys.argv[1])
+while not ring.stop_asked():
+    ring.append([0.0])
+"""
+
+
+def test_a_count_is_never_seen_half_written(tmp_path: Path) -> None:
+    """Another process appends as fast as it can; `struct.pack_into` would show zero for a moment several times."""
+    ring = Ring.create(tmp_path / "a.ring", ["a"], 1000)
+    writer = subprocess.Popen([sys.executable, "-c", APPEND, str(ring.path)])
+    try:
+        while not ring.head:
+            time.sleep(0.01)
+        heads = [ring.head for _ in range(2_000_000)]
+    finally:
+        ring.ask_to_stop()
+        writer.wait(30)
+    assert (np.diff(heads) >= 0).all()
+    assert heads[-1] > heads[0]
+
+
+def test_a_planned_change_is_not_undone_by_a_desk_that_did_not_know_of_it() -> None:
+    desk = Desk.create(None, [GAIN, OVERRIDE])
+    heed = Heed([GAIN, OVERRIDE], dict.fromkeys(("X.Pgain", "override"), lambda value: None), [(0, "override", 0.5)])
+    heed.desk = desk
+    heed(0)
+    assert desk["override"] == 0.5
+    desk.set("X.Pgain", 3.0)
+    heed(1)
+    assert heed.values == {"X.Pgain": 3.0, "override": 0.5}
+    assert [note.name for note in heed.taken] == ["override", "X.Pgain"]

@@ -1,0 +1,135 @@
+"""Pictures of a program's run: the measured path with its contour error, and the errors along the program."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rds.programs.judge import worst_lines
+from rds.programs.prepare import Prepared
+from rds.results import Result
+from rds.results.figure import BLACK, CYCLE, GREY, ORANGE, VERMILLION, Picture, dress, legend
+from rds.runtime.execution import State
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_POINTS = 6000  # of a curve in a picture
+_VIEWS = (("XY", "X", "Y"), ("ZX", "X", "Z"), ("YZ", "Y", "Z"))
+_NAMED = 3  # of the worst lines
+
+
+def path(result: Result, prepared: Prepared) -> Picture:
+    """The measured path from up to three sides, its colour the contour error; the worst lines are named."""
+    axes = prepared.program.axes
+    views = [view for view in _VIEWS if view[1] in axes and view[2] in axes]
+    error = result["contour_error"] * 1e3
+    at = _thinned(error)
+    picture = Picture(4.2 if len(views) == 1 else 7.6)
+    places = picture.subplots(-(-len(views) // 2), min(len(views), 2) or 1, squeeze=False).ravel()
+    drawn: Any = None
+    for place, (title, across, up) in zip(places, views, strict=False):
+        x, y = result[f"{across}_measured"], result[f"{up}_measured"]
+        wanted = prepared.program.position[:: max(1, len(prepared.program.position) // _POINTS)]
+        place.plot(wanted[:, axes.index(across)], wanted[:, axes.index(up)], color=GREY, linewidth=0.8, zorder=1)
+        drawn = place.scatter(x[at], y[at], c=error[at], s=5.0, cmap="viridis", linewidths=0, zorder=2)
+        for i, (line, _, when) in enumerate(worst_lines(result, error, _NAMED)):
+            k = int(np.searchsorted(result["time"], when))
+            place.plot(x[k], y[k], marker="o", markersize=9, markerfacecolor="none", color=VERMILLION, zorder=3)
+            place.annotate(
+                f"line {line}",
+                (x[k], y[k]),
+                xytext=(8, 8 + 11 * i),
+                textcoords="offset points",
+                fontsize="small",
+                color=BLACK,
+            )
+        dress(place, f"{up} [mm]", f"{across} [mm]")
+        place.set_aspect("equal", adjustable="datalim")
+        place.set_title(title, loc="left", fontsize="medium")
+    for place in places[len(views) :]:
+        place.set_axis_off()
+    if drawn is not None:
+        picture.colorbar(drawn, ax=list(places), label="contour error [µm]", shrink=0.8)
+    return picture
+
+
+def along(result: Result, prepared: Prepared) -> Picture:
+    """Contour error, following errors and feed over time, with the program's lines above."""
+    from rds.programs.report import feed
+
+    time = result["time"]
+    picture = Picture(8.4)
+    top, middle, bottom = picture.subplots(3, 1, sharex=True)
+    edges = _edges(len(time))
+    top.plot(time[edges], _largest(result["contour_error"] * 1e3, edges), color=BLACK, linewidth=1.1)
+    dress(top, "contour error [µm]", None)
+    for i, name in enumerate(prepared.program.axes):
+        unit = result.units[f"{name}_measured"]
+        scale, unit = (1e3, "µm") if unit == "mm" else (1.0, unit)
+        off = np.abs(result[f"{name}_reference"] - result[f"{name}_measured"]) * scale
+        style = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))[i % 4]
+        values = _largest(off, edges)
+        middle.plot(time[edges], values, color=CYCLE[i % 6], linestyle=style, linewidth=1.1, label=f"{name} [{unit}]")
+    dress(middle, "following error", None)
+    legend(middle)
+    bottom.plot(time[edges], feed(result, prepared.program.axes)[edges], color=CYCLE[0], linewidth=1.1)
+    dress(bottom, "feed [mm/min]")
+    _mark_waits(bottom, result)
+    _mark_lines(top, result)
+    return picture
+
+
+def _mark_waits(axes: Axes, result: Result) -> None:
+    """Grey where the program waits or is held, orange on the way home."""
+    state = result["program_state"].astype(int)
+    starts = np.flatnonzero(np.diff(state, prepend=-1))
+    ends = [*starts[1:], len(state) - 1]
+    named: set[str] = set()
+    for start, end in list(zip(starts, ends, strict=True))[:500]:
+        if state[start] != State.RUNS:
+            homes = state[start] == State.HOME
+            label = "moves home" if homes else "waits, dwells or is held"
+            axes.axvspan(
+                *result["time"][[start, end]],
+                color=ORANGE if homes else GREY,
+                alpha=0.25,
+                linewidth=0,
+                label=None if label in named else label,
+            )
+            named.add(label)
+    legend(axes)
+
+
+def _mark_lines(axes: Axes, result: Result) -> None:
+    """Program lines on top, as many as can be read."""
+    line, time = result["program_line"].astype(int), result["time"]
+    starts = np.flatnonzero(np.diff(line, prepend=line[0] - 1))
+    shown: list[int] = []
+    least = (time[-1] - time[0]) / 24
+    for k in starts:
+        if not shown or time[k] - time[shown[-1]] >= least:
+            shown.append(int(k))
+    above = axes.secondary_xaxis("top")
+    above.set_xticks([time[k] for k in shown], [str(line[k]) for k in shown], fontsize="x-small")
+    above.set_xlabel("program line", fontsize="small")
+
+
+def _edges(count: int) -> np.ndarray:
+    """Where the parts of a long curve begin of which the largest value is drawn."""
+    return np.arange(0, count, max(1, count // _POINTS))
+
+
+def _largest(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    largest: np.ndarray = np.maximum.reduceat(values, edges)
+    return largest
+
+
+def _thinned(error: np.ndarray) -> np.ndarray:
+    """Samples to draw, among them the worst; the worst last, on top."""
+    chosen = _edges(len(error))
+    worst = np.argsort(error)[-50:]
+    both = np.union1d(chosen, worst)
+    ordered: np.ndarray = both[np.argsort(error[both])]
+    return ordered

@@ -1,0 +1,146 @@
+"""The report on a program's run: cycle time, where along the program axes and contour are worst, with pictures."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rds.experiment.report import save_with_report
+from rds.programs.judge import WAITS, worst_lines
+from rds.programs.prepare import Prepared
+from rds.reports.content import Report, Table
+from rds.reports.write import write
+from rds.results import Result
+
+KIND = "program"
+_WORST = 5  # lines in a table
+_TEXT = 60  # characters of a program line
+_CHANGES = 200  # in a table
+_WAITED = {
+    "held_s": "held",
+    "stops_s": "M0 and M1",
+    "tool_changes_s": "tool changes",
+    "spindle_s": "waiting for the spindle's speed",
+    "homing_s": "moving home",
+}
+
+
+def save_run(result: Result, prepared: Prepared, folder: Path) -> dict[str, Path]:
+    """Save the result, its pictures and reports in `folder`; each file's path by its kind."""
+    files = save_with_report(result, folder, f"{prepared.file.name}, {result.mode}")
+    written = write(program_report(result, prepared), folder)
+    return files | {KIND: written[0]} | {path.stem: path for path in written[1:] if path.suffix == ".png"}
+
+
+def program_report(result: Result, prepared: Prepared) -> Report:
+    """What was measured of a program's run, in tables, pictures and sentences."""
+    from rds.programs.pictures import along, path
+
+    about = result.meta["program"]
+    text = _program_lines(prepared.file)
+    return Report(
+        kind=KIND,
+        title=f"{prepared.file.name} on {result.meta.get('machine')}, {result.mode}",
+        sources=[str(prepared.file)],
+        settings={
+            "mode": result.mode,
+            "sample period": f"{prepared.T:g} s",
+            "ending": result.meta.get("ending"),
+            "why": result.meta.get("ending_reason") or None,
+            "timing": result.verdict,
+        },
+        tables=[
+            _times(about),
+            *([_contour(result, text)] if about["contour_error"] else []),
+            _following(about, text),
+            *([_changes(result)] if result.meta.get("changes") else []),
+        ],
+        figures={"path": partial(path, result, prepared), "along the program": partial(along, result, prepared)},
+        findings=[*findings(about), *map(str, result.meta.get("notes", ()))],
+    )
+
+
+def findings(about: dict[str, Any]) -> list[str]:
+    """What a reader wants to know first, as sentences."""
+    said = []
+    if about["contour_error"]:
+        worst = about["contour_error"]
+        said.append(
+            f"The measured position is at most {worst['max']:.4f} mm off the programmed path, in line {worst['line']} "
+            f"(t = {worst['time_s']:.3f} s); RMS {worst['rms']:.4f} mm."
+        )
+    axis, worst = max(about["following_error"].items(), key=lambda entry: entry[1]["max"], default=(None, None))
+    if worst is not None:
+        said.append(f"{axis} lags most: {worst['max']:.4f} {worst['unit']} in line {worst['line']}.")
+    predicted, moving = about["predicted_s"], about["moving_s"]
+    if not about["completed"]:
+        said.append(f"The run ended after {about['done_percent']:.1f} % of the program.")
+    elif about["predicted_samples"] == about["moving_samples"]:
+        said.append(f"It moved for {moving:.3f} s, as predicted to the sample.")
+    else:
+        said.append(f"It moved for {moving:.3f} s instead of {predicted:.3f} s: the override was not 100 % throughout.")
+    return said
+
+
+def _times(about: dict[str, Any]) -> Table:
+    rows = [["predicted", about["predicted_s"]], ["moving and dwelling", about["moving_s"]]]
+    rows += [[_WAITED[name], about[name]] for name in WAITS.values() if about[name]]
+    rows.append(["in all", about["executed_s"]])
+    return Table("Cycle time", ["", "time [s]"], rows, digits={"time [s]": 3})
+
+
+def _contour(result: Result, text: list[str]) -> Table:
+    rows = [
+        [line, value, when, _line(text, line)]
+        for line, value, when in worst_lines(result, result["contour_error"], _WORST)
+    ]
+    return Table(
+        "Where the contour error is largest",
+        ["line", "contour error [mm]", "at [s]", "program"],
+        rows,
+        "The distance of the measured position to the programmed path, corners uncut. X, Y and Z count.",
+        {"contour error [mm]": 4, "at [s]": 3},
+    )
+
+
+def _following(about: dict[str, Any], text: list[str]) -> Table:
+    rows = [
+        [name, worst["max"], worst["unit"], worst["line"], worst["time_s"], worst["rms"], _line(text, worst["line"])]
+        for name, worst in about["following_error"].items()
+    ]
+    return Table(
+        "Where each axis lags most",
+        ["axis", "largest error", "unit", "line", "at [s]", "RMS error", "program"],
+        rows,
+        "Reference minus measured position.",
+        {"largest error": 4, "at [s]": 3, "RMS error": 4},
+    )
+
+
+def _changes(result: Result) -> Table:
+    changes = result.meta["changes"]
+    note = f"The first {_CHANGES} of {len(changes)}." if len(changes) > _CHANGES else ""
+    return Table("Changed while it ran", ["at [s]", "what", "from", "to"], changes[:_CHANGES], note, {"at [s]": 3})
+
+
+def _program_lines(file: Path) -> list[str]:
+    try:
+        return file.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:  # it was there when it was read
+        return []
+
+
+def _line(text: list[str], number: int) -> str:
+    if not 1 <= number <= len(text):
+        return ""
+    line = text[number - 1].strip()
+    return line if len(line) <= _TEXT else f"{line[: _TEXT - 1]}…"
+
+
+def feed(result: Result, axes: tuple[str, ...]) -> np.ndarray:
+    """Speed along the path, mm/min, of the reference in X, Y and Z."""
+    speeds = [result[f"{name}_reference_velocity"] for name in axes if name in "XYZ"]
+    return 60.0 * np.sqrt(sum(speed**2 for speed in speeds)) if speeds else np.zeros(len(result))

@@ -1,0 +1,26 @@
+"""The desk of a run that goes on, found by the folder that it is recorded in."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rds.core.errors import InputError
+from rds.runtime.desk import Desk
+from rds.runtime.record import PROCESSES
+
+
+@contextmanager
+def desk_of(directory: str | Path) -> Iterator[Desk]:
+    """The live values of the run in `directory`, for whoever is not its host. InputError if no run goes on there."""
+    try:
+        path = json.loads((Path(directory) / PROCESSES).read_text())["desk"]
+        desk = Desk.open(path)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError("no run goes on there; give the folder of one that does", str(directory)) from error
+    try:
+        yield desk
+    finally:
+        desk.close()
