@@ -1,6 +1,6 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
-python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [--json]
+python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [--json]
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from benchmarks import bus, cia402, imports, machine, realtime, simulation, timed_bus
+from benchmarks import bus, cia402, imports, machine, nc, realtime, simulation, timed_bus
 from benchmarks.figures import TITLES, Figure
 from rds.console import show_table
 
@@ -24,6 +24,7 @@ SUBJECTS = {
     "bus": "The built-in bus beside python-can's virtual",
     "timed-bus": "Four modules on the bus with bit timing: 1 Mbit/s, 1 kHz",
     "cia402": "CiA 402 drives at 1 Mbit/s: our cyclic loop beside the canopen library's",
+    "nc": "Part programs: 200,000 lines and arcs, beside rs274 -g",
 }
 
 
@@ -58,7 +59,11 @@ def main() -> int:
     parser.add_argument("subjects", nargs="*", metavar="SUBJECT", help=f"{', '.join(SUBJECTS)}; all by default")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout, nothing else")
     parser.add_argument("--seconds", type=float, default=30.0, help="of each real-time run (default 30)")
-    parser.add_argument("--peer-python", default=sys.executable, help="an interpreter that has bdsim, control and rds")
+    parser.add_argument(
+        "--peer-python",
+        default=sys.executable,
+        help="an interpreter that has the peers (bdsim, control and rds; gcodeparser, pygcode)",
+    )
     parser.add_argument("--quiet-load", type=float, default=0.5, help="load average to wait for (default 0.5)")
     parser.add_argument("--patience", type=float, default=60.0, help="s to wait for it before each (default 60)")
     options = parser.parse_args()
@@ -71,6 +76,7 @@ def main() -> int:
         "bus": run_bus,
         "timed-bus": run_timed_bus,
         "cia402": run_cia402,
+        "nc": lambda: nc.run(peer_python=options.peer_python),
     }
     report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}
     for name in options.subjects or SUBJECTS:

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from benchmarks import c_program, cyclictest
+from benchmarks import c_program, cyclictest, nc_peers
 from rds.runtime.environment import surroundings
 
 PACKAGES = ("rds", "numpy", "numba", "llvmlite", "scipy", "control", "bdsim", "python-can", "canopen")
@@ -28,6 +28,8 @@ def versions() -> dict[str, str]:
         found["C"] = c_program.version()
     with contextlib.suppress(OSError):
         found["cyclictest"] = cyclictest.version()
+    if (linuxcnc := nc_peers.rs274_version()) is not None:
+        found["rs274 (linuxcnc-uspace)"] = linuxcnc
     return found
 
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 # Loading numba takes the time of some ten thousand lines in Python: it is done for programs that are certain to be
 # longer, and for others (of unknown length, or with loops) once they have turned out to be.
-LONG_PROGRAM = 1 << 20  # bytes
-OPENS_AFTER = 30_000  # lines
+LONG_PROGRAM = 1 << 21  # bytes
+OPENS_AFTER = 50_000  # lines
 ROWS = 16384  # at once
 FEW_LINES = 4  # less in one go are not worth the way
 LONGEST_PAUSE = 63  # lines until the next attempt
