@@ -8,25 +8,43 @@ at most α R / 4: one BLU for α = 4/R, R in BLU.
 
 from __future__ import annotations
 
+from cmath import phase, rect
 from collections.abc import Iterator, Mapping
-from math import atan2, ceil, cos, floor, pi, sin, sqrt
+from math import asin, atan2, ceil, copysign, cos, floor, inf, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 
 from rds.core.types import Segment
 from rds.interpolators import reference_word
-from rds.interpolators.reference_word import Method, Turn
+from rds.interpolators.division import Method, Turn
 
 OPTIONS = reference_word.OPTIONS
+_WIDEST = 1.9  # from 2 on, the corners are on no ellipse
+_NEWTON = 3  # corrections of the step angle; each leaves a small part of the error
 
 
 def _alpha(turn: Turn, n: int) -> float:
-    return 2.0 * sin(0.5 * turn.sweep / n)
+    """The step angle with which `n` steps go to the direction of the end: near the mean one, 2 sin(sweep / 2 n)."""
+    mean = alpha = 2.0 * sin(0.5 * turn.sweep / n)
+    for _ in range(_NEWTON):
+        alpha -= phase(_after(turn.arm, alpha, n) / (turn.arm * rect(1.0, turn.sweep))) / n
+        alpha = copysign(min(max(abs(alpha), 0.7 * abs(mean)), 1.3 * abs(mean)), mean)  # few steps: no farther
+    return alpha
+
+
+def _after(arm: complex, alpha: float, n: int) -> complex:
+    """The corner after `n` steps M of the recursion: Mⁿ = (sin nδ M - sin (n-1)δ) / sin δ, where 2 cos δ = 2 - α²."""
+    delta = 2.0 * asin(0.5 * alpha)
+    x = arm.real - alpha * arm.imag
+    once = complex(x, arm.imag + alpha * x)
+    return (sin(n * delta) * once - sin((n - 1) * delta) * arm) / sin(delta)
 
 
 def _deviation(turn: Turn, n: int) -> float:
     alpha, R = _alpha(turn, n), turn.radius
+    if abs(alpha) > _WIDEST:
+        return inf
     first = atan2(turn.arm.imag, turn.arm.real)
     low, high = sorted((first, first + turn.sweep))
     # sin 2θ is largest at 45° + k 180°, smallest at 135° + k 180°
@@ -34,7 +52,7 @@ def _deviation(turn: Turn, n: int) -> float:
     turning = [pi / 4 + k * pi / 2 for k in quarters]
     kept = 1.0 - 0.5 * alpha * sin(2.0 * first)
     radii = [R * sqrt(kept / (1.0 - 0.5 * alpha * sin(2.0 * angle))) for angle in (low, high, *turning)]
-    inside = R - min(radii) + R * (1.0 - cos(0.75 * turn.sweep / n))  # the last chord may be half a step longer
+    inside = R - min(radii) + R * (1.0 - cos(0.5 * (1.0 + abs(alpha)) * turn.sweep / n))  # steps differ a little
     return max(max(radii) - R, inside)
 
 

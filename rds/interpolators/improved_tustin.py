@@ -18,7 +18,7 @@ import numpy as np
 
 from rds.core.types import Segment
 from rds.interpolators import reference_word
-from rds.interpolators.reference_word import Method, Turn, rotated
+from rds.interpolators.division import Method, Turn, rotated
 from rds.interpolators.tustin import factor
 
 OPTIONS = reference_word.OPTIONS
@@ -58,7 +58,12 @@ def _corners(turn: Turn, n: int) -> Iterator[complex]:
     yield from rotated(Turn(first, turn.sweep), factor(2.0 * psi), n - 2)
 
 
-METHOD = Method("improved-tustin", lambda R: 4.0 / sqrt(R), _deviation, _corners, _least)
+def _widest(turn: Turn, n: int) -> float:
+    phi, psi = _angles(_share(turn, n))
+    return {1: 2.0 * phi, 2: phi + psi}.get(n, 2.0 * psi)
+
+
+METHOD = Method("improved-tustin", lambda R: 4.0 / sqrt(R), _deviation, _corners, _widest, _least)
 
 
 def interpolate(segment: Segment, T: float, params: Mapping[str, Any]) -> Iterator[tuple[np.ndarray, ...]]:

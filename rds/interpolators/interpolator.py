@@ -18,7 +18,8 @@ from rds.core.options import read_options
 from rds.core.signature import form
 from rds.core.types import ArcSegment, Segment, Source
 from rds.interpolators import LIBRARY
-from rds.interpolators.reference_word import Method, Steps, steps
+from rds.interpolators.division import Method, check_steps
+from rds.interpolators.reference_word import Steps, steps
 
 Rows = Iterator[tuple[np.ndarray, ...]]
 _ROWS_PER_ROW, _SPARE_ROWS = 10, 5000  # a slow start and stop are still allowed
@@ -63,11 +64,11 @@ class Interpolator:
                 raise self._broken(f"has yielded {most} rows of a segment of {length(segment):g} mm, and no end")
         return np.array(rows) if rows else np.empty((0, 3, axes))
 
-    def steps(self, segment: Segment) -> Steps | None:
+    def steps(self, segment: Segment, T: float) -> Steps | None:
         """How a reference word method takes an arc; None for other methods and for lines."""
         if self.word is None or not isinstance(segment, ArcSegment):
             return None
-        return steps(segment, self.params, self.word)
+        return steps(segment, self.params, self.word, T)
 
     def _errors(self, segment: Segment) -> Callable[[Rows], Rows]:
         return (lambda rows: rows) if self.source.path is None else partial(self._blamed, segment)
@@ -105,6 +106,8 @@ def from_library(name: str, options: Mapping[str, Any]) -> Interpolator:
     """The library's interpolator called `name`, with its options checked."""
     module = LIBRARY.module(name)
     params = getattr(module, "DEFAULTS", {}) | read_options(options, module.OPTIONS, f"interpolator {name!r}")
+    if "steps" in params:
+        check_steps(params["steps"], f"interpolator {name!r}")
     return Interpolator(
         name,
         module.interpolate,

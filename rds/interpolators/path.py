@@ -80,7 +80,7 @@ def interpolate(
         segment=last,
         path_error=path_distances(segments, position, first, last),
         chord_error=np.concatenate([[0.0], middles]),
-        steps=tuple(each.steps(segment) for each, segment in zip(chosen, segments, strict=True)),
+        steps=tuple(each.steps(segment, T) for each, segment in zip(chosen, segments, strict=True)),
         blu=blu,
         theory=theory,
         pulses=None if blu is None else pulses(theory, blu),

@@ -13,7 +13,7 @@ import numpy as np
 
 from rds.core.types import Segment
 from rds.interpolators import reference_word
-from rds.interpolators.reference_word import Method, Turn, grown, rotated
+from rds.interpolators.division import Method, Turn, grown, rotated
 
 OPTIONS = reference_word.OPTIONS
 
