@@ -109,11 +109,14 @@ def canon(
     with_: With = None,
     json: Json = False,
 ) -> None:
-    """Print the canonical calls of a program, in the form of LinuxCNC's `rs274 -g`: as they are read."""
+    """Print the canonical calls of a program, in the form of LinuxCNC's `rs274 -g`: as they are read.
+
+    The move after G40 may be as short as LinuxCNC lets it be; `rds nc check` calls a move that gouges a fault.
+    """
     with refusals():
         from rds.nc.canon import text, texts
 
-        items = setup(tools, parameters, with_).interpret(file)
+        items = setup(tools, parameters, [*(with_ or ()), "any-exit"]).interpret(file)
         if json:
             calls = (json_text.dumps({"n": n, "call": call}) for n, call in texts(items))
             _print_when_whole(_json_lines(file, calls))

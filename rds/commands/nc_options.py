@@ -17,10 +17,12 @@ Parameters = Annotated[Path | None, typer.Option(help="Parameter file, as LinuxC
 With = Annotated[
     list[str] | None,
     typer.Option(
-        "--with", metavar="OPTION", help="An option of the dialect: block-delete, gr, program-numbers or inch-machine."
+        "--with",
+        metavar="OPTION",
+        help="An option of the dialect: block-delete, gr, program-numbers, inch-machine or any-exit.",
     ),
 ]
-DIALECT = ("block-delete", "gr", "program-numbers", "inch-machine")
+DIALECT = ("block-delete", "gr", "program-numbers", "inch-machine", "any-exit")
 
 
 def setup(tools: Path | None, parameters: Path | None, options: list[str] | None) -> Setup:

@@ -133,13 +133,13 @@ class Compensation:
         self._over = True
         return items
 
-    def leave(self, rapid: bool, start: Point, end: Triple, line: int = 0) -> None:
+    def leave(self, rapid: bool, start: Point, end: Triple, line: int = 0, any_exit: bool = False) -> None:
         """Check the first motion after G40, straight from the programmed point `start` to `end`, both in the units and
-        offsets of now. The interpreter refuses an arc, as LinuxCNC does.
+        offsets of now. With `any_exit` it may be short. The interpreter refuses an arc, as LinuxCNC does.
         """
         goal = end[:2]
         length = math.dist(start, goal)
-        if length <= self.radius:
+        if length <= self.radius and not any_exit:
             raise ProgramError(
                 f"the exit move is {length:.4f} long in the {self.plane} plane, not longer than the cutter's radius"
                 f" {self.radius:.4f}, and would take the cutter's centre back to the contour; after G40 leave it"

@@ -130,7 +130,7 @@ def _leave(m: Context, rapid: bool, end: list[float]) -> None:
         start = m.state.position()
         first, second, third = AXES_OF[PLANES.index(compensation.plane)]
         goal = end[first], end[second], end[third]
-        compensation.leave(rapid, (start[first], start[second]), goal, m.out.line)
+        compensation.leave(rapid, (start[first], start[second]), goal, m.out.line, m.dialect.any_exit)
 
 
 def _length(start: list[float], end: list[float]) -> float:

@@ -166,3 +166,11 @@ def test_the_documented_proof_runs_as_it_is(tmp_path: Path, monkeypatch: pytest.
     assert found.max_deviation < 1e-6
     assert found.gouges() == []
     assert (tmp_path / "proof.png").stat().st_size > 10_000
+
+
+def test_a_short_exit_passes_where_it_is_allowed() -> None:
+    short = ON + "X30\nG40\nG0 Z10\nM2\n"
+    with pytest.raises(ProgramError, match="exit move"):
+        list(interpret(short, tools=TOOLS, options=Dialect()))
+    lines = list(text(interpret(short, tools=TOOLS, options=Dialect(any_exit=True))))
+    assert any("STRAIGHT_TRAVERSE(30.0000, 0.0000, 10.0000" in line for line in lines), lines
