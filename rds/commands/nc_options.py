@@ -19,7 +19,7 @@ With = Annotated[
     typer.Option(
         "--with",
         metavar="OPTION",
-        help="An option of the dialect: block-delete, gr, program-numbers, inch-machine or any-exit.",
+        help="Of the dialect: block-delete, gr, program-numbers, inch-machine or any-exit.",
     ),
 ]
 DIALECT = ("block-delete", "gr", "program-numbers", "inch-machine", "any-exit")

@@ -14,8 +14,8 @@ class Dialect:
     program_numbers: the first block may be a program number `P001` and `;` ends a block, as in oacs-thesis, section 7.3
         (then there are no comments behind `;`).
     inch_machine: lengths in the tool table and the parameter file are in inches (as they are for `rs274 -g`), not mm.
-    any_exit: the first move after G40 may be as short as it likes, as in LinuxCNC, where it may take the cutter onto the
-        contour; without it such a move is a fault.
+    any_exit: the first move after G40 may be as short as it likes, as in LinuxCNC, where it may take the cutter onto
+        the contour; without it such a move is a fault.
     max_jumps: after so many calls and jumps back the program is taken for one that does not end (ProgramError).
     max_depth: subroutine calls inside one another (9 in LinuxCNC).
     """
