@@ -125,10 +125,10 @@ class _Reader:
             raise self.fault(piece[far[0]][0], f"a coordinate beyond {FARTHEST:g} mm; is the unit {self.unit!r} right?")
 
     def _header(self, line: int, body: str) -> None:
-        for match in _headings(body.replace('"', "").replace("'", "")):
-            if match is None:
-                raise self.fault(line, f"{body!r} is no point and no header; write x, y and perhaps z, with their unit")
-            name, unit = match
+        found = list(_headings(body.replace('"', "").replace("'", "")))
+        if None in found or not any(match[0] in ("x", "y") for match in found if match):
+            raise self.fault(line, f"{body!r} is no point and no header; write x, y and perhaps z, with their unit")
+        for name, unit in filter(None, found):
             if name not in ("x", "y", "z"):
                 raise self.fault(line, f"column {name!r} is none of x, y, z; leave it out of the file")
             if name in self.columns:
@@ -144,11 +144,11 @@ class _Reader:
         fields = [word.strip() for word in body.split(separator)]
         if not self.columns:
             if len(fields) not in (2, 3):
-                raise self.fault(line, f"{len(fields)} numbers in {body!r}; a point has 2 (x, y) or 3 (x, y, z)")
+                raise self.fault(line, f"{_numbers(fields)} in {body!r}; a point has 2 (x, y) or 3 (x, y, z)")
             self.columns = list("xyz"[: len(fields)])
         if len(fields) != len(self.columns):
             names = ", ".join(self.columns)
-            raise self.fault(line, f"{len(fields)} numbers in {body!r} instead of {len(self.columns)} ({names})")
+            raise self.fault(line, f"{_numbers(fields)} in {body!r} instead of {len(self.columns)} ({names})")
         row = []
         for name, word in zip(self.columns, fields, strict=True):
             if not _NUMBER.fullmatch(word):
@@ -170,6 +170,10 @@ class _Reader:
         if unit not in UNITS:
             raise self.fault(line, f"unit {unit!r} is not known; known units: {', '.join(UNITS)}")
         return UNITS[unit]
+
+
+def _numbers(fields: Sequence[str]) -> str:
+    return f"{len(fields)} number{'s' if len(fields) != 1 else ''}"
 
 
 def _headings(text: str) -> Iterator[tuple[str, str | None] | None]:

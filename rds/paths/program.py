@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from math import hypot, inf, pi
+from math import dist, hypot, inf, pi
 
 from rds.core.errors import InputError
 from rds.core.geometry import sweep
@@ -16,6 +16,7 @@ from rds.paths.numbers import FARTHEST, FEED_RATE, number
 # An arc's end may be off its circle by either of these (LinuxCNC, interp_internal.hh and "G2, G3 Arc Move").
 ARC_TOLERANCE = 2 * 0.01 * 2**0.5  # mm
 ARC_RELATIVE_TOLERANCE = 0.001  # of the radius; an end off by 100 ARC_TOLERANCE is refused whatever the radius
+LEAST_RADIUS = 0.0013  # mm; LinuxCNC refuses arcs of less than 0.00005 inch
 DECIMALS = 4
 _COMMENT = 200  # characters; LinuxCNC's lines end at 255
 _ACTIVE = re.compile(r"(msg|debug|print|log|py|abort|probe)", re.IGNORECASE)  # comments that LinuxCNC acts on
@@ -39,7 +40,8 @@ def part_program(
     It sets G17 G21 G40 G90 G91.1 G94; F in mm/min, absolute coordinates in mm with so many `decimals`, arcs in the
     centre format. With `safe_height` (z in mm, above the path) the tool goes to each piece of the path in rapid moves
     at that height, and back to it at the end; without it the tool feeds straight from where it stands to the start, as
-    three-axis-mill's does from its origin. `spindle` (rev/min) turns it clockwise; `blend` (mm) writes G64 P.
+    three-axis-mill's does from its origin. Arcs with a radius of less than 1.3 µm become straight. `spindle` (rev/min)
+    turns it clockwise; `blend` (mm) writes G64 P.
 
     InputError for a path with gaps and no safe height, a safe height not above the path, an arc that is off its circle
     by more than LinuxCNC's tolerances (as given, or because of too few decimals), and numbers that make no sense.
@@ -136,10 +138,10 @@ class _Writer:
         self.at = end
 
     def _offset(self, arc: ArcSegment, end: tuple[float, ...]) -> tuple[float, float] | None:
-        """I and J; None where the arc is so small that, rounded, it is a line or would turn the long way round."""
+        """I and J; None where the arc has to be a line: too small for LinuxCNC, or rounded to go the long way round."""
         i, j = (round(arc.centre[k] - self.at[k], self.decimals) for k in (0, 1))
         centre = (self.at[0] + i, self.at[1] + j, self.at[2])
-        if i == j == 0.0 or end[:2] == centre[:2]:
+        if min(hypot(i, j), dist(end[:2], centre[:2])) < LEAST_RADIUS:
             return None
         printed = ArcSegment(self.at, end, centre, arc.feed_rate, arc.clockwise)
         if abs(sweep(printed) - sweep(arc)) > pi:
