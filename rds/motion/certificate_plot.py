@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rds.motion.segments import AXES
 
 if TYPE_CHECKING:
     from rds.motion.certificate import Certificate
-    from rds.results.figure import Picture
 
 
-def plot_certificate(certificate: Certificate, path: str | Path | None = None) -> Picture:
+def plot_certificate(certificate: Certificate, path: str | Path | None = None) -> Any:
     """Largest velocity, acceleration and jerk of each axis in % of its limit, and the deviation from the path, over
     time.
 
@@ -39,10 +38,10 @@ def plot_certificate(certificate: Certificate, path: str | Path | None = None) -
         dress(grid[row], f"{kind} [% of limit]", None)
         legend(grid[row], 3)
     worst = certificate.worst.get(("deviation", ""))
-    label = f"at most {worst.value:.4g} mm in line {worst.line}" if worst else "deviation"
-    grid[3].step(time, trace[:, 19], where="post", color=VERMILLION, linewidth=1.1, label=label)
-    grid[3].set_ylim(0.0, None)
-    dress(grid[3], "off the path [mm]")
+    label = f"at most {1000.0 * worst.value:.3g} µm in line {worst.line}" if worst else "deviation"
+    grid[3].step(time, 1000.0 * trace[:, 19], where="post", color=VERMILLION, linewidth=1.1, label=label)
+    grid[3].set_ylim(0.0, max(1.05e3 * trace[:, 19].max(initial=0.0), 0.001))
+    dress(grid[3], "off the path [µm]")
     legend(grid[3])
     drawn.align_ylabels()
     if path is not None:

@@ -106,7 +106,7 @@ class _Planner:
         refuse(~np.isfinite(np.hstack(numbers)).all(axis=1), "a position of this move is not finite; mend the program")
         feed = ~segments["rapid"] & (segments["length"] > 0.0)
         refuse(feed & ~(segments["rate"] > 0.0), "this move has the rate 0; program a feed rate (F) above 0")
-        moved = (start != end) | False
+        moved = start != end
         arcs = segments["plane"] != LINE
         for plane, axes in ((0, (0, 1)), (1, (2, 0)), (2, (1, 2))):
             moved[np.ix_(segments["plane"] == plane, axes)] = True

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rds.motion.compiling import kernel
+from rds.runtime.retimed import SPARE
 
 MOST = 2.0  # override
 
@@ -44,9 +45,9 @@ def caps(velocity: np.ndarray, acceleration: np.ndarray, limits: np.ndarray, T: 
     cap = np.full(len(velocity), MOST)
     jerk = np.abs(np.diff(acceleration, axis=0, append=acceleration[-1:])) / T
     for values, most, power in ((velocity, limits[0], 1.0), (acceleration, limits[1], 2.0), (jerk, limits[2], 3.0)):
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             cap = np.minimum(cap, ((most / np.abs(values)) ** (1.0 / power)).min(axis=1))
     cap = np.minimum(cap, np.minimum(np.append(cap[1:], MOST), np.insert(cap[:-1], 0, MOST)))  # between samples too
     cap = np.maximum(cap, 1.0)
-    _backwards(cap, velocity, acceleration, limits[1], T, fastest)
+    _backwards(cap, velocity, acceleration, SPARE * limits[1], T, fastest)
     return cap

@@ -17,6 +17,7 @@ from rds.runtime.program import Program
 
 FASTEST = 10.0  # 1/s, change of the rate: 100 % of override in 0.1 s at the earliest
 SMOOTH = 200.0  # 1/s², change of that
+SPARE = 0.97  # of the acceleration that is used: the rest is for what changes between samples
 
 
 class Retimed:
@@ -28,7 +29,7 @@ class Retimed:
         tables = (program.position, program.velocity, program.acceleration, program.caps)
         views: list[Any] = [np.ascontiguousarray(table, dtype=float).reshape(-1).data for table in tables]
         self._p, self._v, self._a, self._caps = views
-        self._push = [float(limit) for limit in program.limits[1]]
+        self._push = [SPARE * float(limit) for limit in program.limits[1]]
         self._n = len(program.axes)
         self.place, self.rate, self._change = 0.0, 1.0, 0.0
         self.position: list[float] = self._p[: self._n].tolist()
@@ -40,7 +41,7 @@ class Retimed:
         before = self.rate
         self.rate = rate = self._next_rate(wanted)
         self._change = (rate - before) / self._T
-        self.place = min(self.place + rate, until)
+        self.place = min(self.place + 0.5 * (before + rate), until)
         self._evaluate(rate, self._change)
 
     def _next_rate(self, wanted: float) -> float:
@@ -64,6 +65,8 @@ class Retimed:
         new = rate + change * T
         if (off >= 0.0 and new >= wanted) or (off <= 0.0 and new <= wanted):
             return wanted
+        if new > 1.0:
+            new = min(new, self._cap(min(place + new, last)))
         return max(new, 0.0)
 
     def _cap(self, place: float) -> float:
@@ -72,17 +75,21 @@ class Retimed:
         return here if i == place else here + (self._caps[i + 1] - here) * (place - i)
 
     def _room(self, i: int, rate: float) -> tuple[float, float]:
-        """How fast the rate may fall and rise near the sample `i`, 1/s."""
+        """How fast the rate may fall and rise from the sample `i` on, 1/s.
+
+        Second differences of what is sent see the plan up to two samples further on.
+        """
         low, high = -FASTEST, FASTEST
         square = rate * rate
-        start = i * self._n
-        for axis, limit in enumerate(self._push):
-            v, a = self._v[start + axis], square * self._a[start + axis]
-            if v < 0.0:
-                v, a = -v, -a
-            if v > 0.0:
-                high = min(high, max(limit - a, 0.0) / v)
-                low = max(low, -max(limit + a, 0.0) / v)
+        n = self._n
+        for start in range(i * n, min(i + 3, len(self._caps)) * n, n):
+            for axis, limit in enumerate(self._push, start):
+                v, a = self._v[axis], square * self._a[axis]
+                if v < 0.0:
+                    v, a = -v, -a
+                if v > 0.0:
+                    high = min(high, max(limit - a, 0.0) / v)
+                    low = max(low, -max(limit + a, 0.0) / v)
         return low, high
 
     def _evaluate(self, rate: float, change: float) -> None:

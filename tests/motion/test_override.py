@@ -1,0 +1,89 @@
+"""Planned samples followed at another rate, as override and hold do: on the path, within the limits of each axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from rds.motion.deviation import allowed, deviation
+from rds.motion.segments import BLEND
+from rds.programs.caps import caps
+from rds.runtime.program import Program
+from rds.runtime.retimed import FASTEST, Retimed
+
+from .chains import MACHINES, chains, planned, polygon
+
+T = 1e-3
+LIMITS = MACHINES[0]
+
+
+def followed(segments: np.ndarray, wanted: list[float], every: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, how far off the path they are beyond its tolerance, and the rates, at overrides that change."""
+    motion, _, _ = planned(segments, LIMITS, T)
+    table = np.stack((LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk))[:, :4]
+    rows = {name: getattr(motion, name)[:, :4].copy() for name in ("position", "velocity", "acceleration")}
+    cap = caps(rows["velocity"], rows["acceleration"], table, T, FASTEST)
+    program = Program(
+        ("X", "Y", "Z", "A"), None, **rows, line=motion.line, caps=cap, happenings=(), home=(), limits=table
+    )
+    follower = Retimed(program, T)
+    last = len(motion) - 1
+    positions, places, rates = [follower.position], [0.0], [1.0]
+    k = 0
+    while follower.place < last:
+        follower.advance(wanted[k // every % len(wanted)] if k < 40 * every else 1.0, last)
+        positions.append(follower.position)
+        places.append(follower.place)
+        rates.append(follower.rate)
+        k += 1
+    full = np.zeros((len(positions), 6))
+    full[:, :4] = positions
+    at = np.minimum(np.array(places).astype(int), last)
+    own = motion.segment[at]
+    starts = np.concatenate(([0.0], np.cumsum(segments["length"])))
+    share = np.clip((motion.distance[at] - starts[own]) / np.maximum(segments["length"][own], 1e-12), 0.0, 1.0)
+    off = deviation(full, segments, own, share) - allowed(segments, 0.05)[own]
+    return full, off, np.array(rates)
+
+
+def shares(position: np.ndarray) -> tuple[float, float]:
+    """Largest velocity and acceleration of any axis, as a share of its limit."""
+    padded = np.pad(position[:, :4], ((2, 2), (0, 0)), mode="edge")
+    speed = np.abs(np.diff(padded, axis=0)).max(axis=0) / T / LIMITS.velocity[:4]
+    push = np.abs(np.diff(padded, 2, axis=0)).max(axis=0) / T**2 / LIMITS.acceleration[:4]
+    return float(speed.max()), float(push.max())
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    segments=chains(most=6, low=-1.0),
+    wanted=st.lists(st.sampled_from((0.0, 0.1, 0.5, 1.0, 1.5, 2.0)), min_size=1, max_size=6),
+    every=st.sampled_from((17, 100, 333)),
+)
+def test_no_override_leaves_the_path_or_overloads_an_axis(
+    segments: np.ndarray, wanted: list[float], every: int
+) -> None:
+    assume(len(segments) and segments["length"].sum() < 50.0 and (segments["rate"] > 1.0).all())
+    position, off, rates = followed(segments, wanted, every)
+    assert off.max() < 1e-6  # mm
+    assert (position[-1] == segments["end"][-1]).all()
+    assert rates.min() >= 0.0 and rates.max() <= 2.0
+    speed, push = shares(position)
+    assert speed <= 1.001 and push <= 1.002
+
+
+def test_at_100_percent_the_samples_are_the_planned_ones() -> None:
+    segments = polygon([(0, 0), (5, 0), (5, 5)], 10.0, mode=BLEND)
+    motion, _, _ = planned(segments, LIMITS, T)
+    position, _, _ = followed(segments, [1.0], 10)
+    assert (position == motion.position).all()
+
+
+def test_200_percent_is_reached_where_the_axes_have_it_to_spare() -> None:
+    segments = polygon([(0, 0), (40, 0), (40, 30)], 5.0, mode=BLEND)
+    _, _, rates = followed(segments, [2.0], 10)
+    assert rates.max() == 2.0
+    half, _, _ = followed(segments, [0.5], 800)
+    normal, _, _ = followed(segments, [1.0], 800)
+    assert len(half) > 1.9 * len(normal)

@@ -1,0 +1,262 @@
+"""Every planned sample keeps the limits of each axis and the path; and what the modes promise, as numbers."""
+
+from __future__ import annotations
+
+from math import ceil, hypot, inf, pi
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.motion import Limits, plan, predicted_time
+from rds.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT, arc, chain, line, point_at
+
+from .chains import MACHINES, Event, PathBlock, chains, planned, polygon
+
+T = 1e-3
+SQUARE = [(0, 0), (10, 0), (10, 10), (0, 10), (0, 0)]
+
+
+def periods(segments: np.ndarray, limits: Limits) -> float:
+    """A sample period at which this chain does not take too many samples to test."""
+    rate = np.where(segments["rapid"], inf, segments["rate"])
+    slowest = np.minimum(rate, 0.3 * limits.velocity[limits.present].min())
+    return 1e-3 if (segments["length"] / slowest).sum() < 30.0 else 1e-2
+
+
+@settings(max_examples=150, deadline=None)
+@given(segments=chains(), limits=st.sampled_from(MACHINES))
+def test_every_sample_keeps_every_limit(segments: np.ndarray, limits: Limits) -> None:
+    if not len(segments):
+        return
+    motion, certificate, _ = planned(segments, limits, periods(segments, limits))
+    assert certificate.ok, "\n".join(map(str, certificate.violations[:5]))
+    assert (motion.position[0] == segments["start"][0]).all()
+    assert (motion.position[-1] == segments["end"][-1]).all()
+    assert not motion.velocity[-1].any()
+    assert (np.diff(motion.segment) >= 0).all() and (np.diff(motion.distance) > -1e-9).all()
+    assert motion.distance[-1] == pytest.approx(segments["length"].sum(), rel=1e-9, abs=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(segments=chains(modes=(EXACT_PATH, EXACT_STOP)))
+def test_an_exact_path_is_kept_by_each_sample(segments: np.ndarray) -> None:
+    if len(segments):
+        _, certificate, _ = planned(segments, T=1e-2)
+        assert certificate.worst["deviation", ""].value < 1e-6  # mm
+
+
+@settings(max_examples=25, deadline=None)
+@given(segments=chains(most=40, low=-2.0, modes=(BLEND,)), parts=st.integers(1, 20))
+def test_it_does_not_matter_how_the_path_is_portioned_out(segments: np.ndarray, parts: int) -> None:
+    if not len(segments):
+        return
+    whole, _, _ = planned(segments, T=1e-2)
+    portions, _, _ = planned([segments[k : k + parts] for k in range(0, len(segments), parts)], T=1e-2)
+    for name in ("position", "velocity", "acceleration", "line", "distance"):
+        assert (getattr(whole, name) == getattr(portions, name)).all()
+
+
+def wave(count: int, step: float, **words: float) -> np.ndarray:
+    """A dense polyline of `count` lines, along a sine of 4 mm."""
+    x = step * np.arange(count + 1)
+    points = np.column_stack((x, 4.0 * np.sin(x / 5.0), *np.zeros((4, count + 1))))
+    path = np.zeros(count, SEGMENT)
+    path["start"], path["end"], path["plane"] = points[:-1], points[1:], -1
+    path["length"] = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    path["rate"], path["tolerance"], path["line"] = 10.0, 0.02, np.arange(count) + 1
+    path["mode"] = BLEND
+    for name, value in words.items():
+        path[name] = value
+    return path
+
+
+def test_a_long_path_is_planned_in_windows_portion_by_portion() -> None:
+    """8000 lines without a stop: windows of 1024 pieces, whose ends must not show."""
+    path = wave(8000, 0.02)
+    whole, certificate, _ = planned(path)
+    portions, _, _ = planned([path[k : k + 700] for k in range(0, len(path), 700)])
+    assert (whole.position == portions.position).all()
+    assert certificate.ok
+    speed = np.linalg.norm(whole.velocity, axis=1)
+    middle = speed[500:-500]
+    assert middle.min() > 4.0  # it neither stops nor crawls
+
+
+def test_dense_polylines_do_not_crawl() -> None:
+    for step, least in ((0.5, 9.0), (0.1, 8.5), (0.02, 5.0)):
+        path = wave(int(60 / step), step)
+        motion, certificate, _ = planned(path)
+        assert certificate.ok
+        assert path["length"].sum() / (len(motion) * T) > least  # mm/s on average, of 10
+
+
+def test_lines_that_are_nearly_one_are_taken_as_one_with_q() -> None:
+    dense = wave(6000, 0.01)
+    joined = wave(6000, 0.01, collinear=0.01)
+    slow, _, _ = planned(dense)
+    fast, certificate, _ = planned(joined)
+    assert certificate.ok  # within P + Q
+    assert certificate.worst["deviation", ""].value > 0.001
+    assert len(fast) < 0.8 * len(slow)
+
+
+def test_a_straight_move_takes_the_time_of_the_seven_phases() -> None:
+    """d/v + v/a + a/j, to the margin kept for rounding and one sample."""
+    motion, _, _ = planned(line((0, 0, 0), (40, 0, 0), 100.0))
+    v, a, j = (0.999 * value for value in (13.0, 200.0, 1e4))
+    assert len(motion) - 1 == ceil((40 / v + v / a + a / j) / T)
+
+
+def test_rapids_go_at_the_speed_of_the_slowest_axis_along_a_straight_line() -> None:
+    motion, certificate, _ = planned(line((0, 0, 0), (10, 20, 30), inf, rapid=True))
+    assert certificate.worst["velocity", "Z"].share == pytest.approx(0.999, abs=1e-9)
+    assert np.abs(motion.position[:, :2] - motion.position[:, 2:3] * [1 / 3, 2 / 3]).max() < 1e-12
+
+
+def test_exact_stop_rests_on_every_corner() -> None:
+    motion, _, _ = planned(polygon(SQUARE, 10.0, mode=EXACT_STOP))
+    for corner in SQUARE:
+        at = (motion.position[:, :2] == corner).all(axis=1)
+        assert at.any() and not motion.velocity[at].any()
+
+
+def test_exact_path_slows_down_for_a_turn_and_passes_a_small_one() -> None:
+    def slowest(degrees: float) -> float:
+        turn = np.radians(degrees)
+        end = (10 + 10 * np.cos(turn), 10 * np.sin(turn))
+        motion, certificate, _ = planned(polygon([(0, 0), (10, 0), end], 10.0))
+        assert certificate.ok
+        speed = np.linalg.norm(motion.velocity, axis=1)
+        middle = np.searchsorted(motion.distance, 10.0)
+        return float(speed[middle - 5 : middle + 5].min())
+
+    assert slowest(90) < 1e-3
+    assert slowest(0.1) == pytest.approx(0.3 * 0.999 * 1e4 * T**2 / np.radians(0.1), rel=0.02)  # turn share of the jerk
+    assert slowest(0.01) == pytest.approx(10.0, rel=1e-6)
+
+
+def test_curvature_that_jumps_is_passed_as_fast_as_the_jerk_allows() -> None:
+    """From a line into an arc of 2 mm: v² / R jumps, which third differences see as 3/4 v² / (R T)."""
+    path = chain(line((0, 0), (10, 0), 13.0), arc((10, 0), (10, 4), (10, 2), 13.0))
+    motion, certificate, _ = planned(path)
+    assert certificate.ok
+    middle = np.searchsorted(motion.distance, 10.0)
+    expected = np.sqrt(0.3 * 0.999 * 1e4 * T / (0.75 / 2.0))
+    assert np.linalg.norm(motion.velocity[middle]) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.1, 0.5])
+def test_blending_uses_its_tolerance_and_keeps_it(tolerance: float) -> None:
+    motion, certificate, _ = planned(polygon(SQUARE, 10.0, mode=BLEND, tolerance=tolerance))
+    assert certificate.ok
+    away = certificate.worst["deviation", ""].value
+    assert 0.6 * tolerance < away <= tolerance
+    assert np.linalg.norm(motion.velocity, axis=1)[200:-200].min() > 1.0  # no stop at a corner
+
+
+def test_a_wider_tolerance_is_faster_and_none_given_means_the_default() -> None:
+    times = [len(planned(polygon(SQUARE, 13.0, mode=BLEND, tolerance=t))[0]) for t in (0.01, 0.05, 0.2, inf)]
+    assert times[0] > times[1] > times[2]
+    assert times[3] == times[1]
+    assert times[1] < len(planned(polygon(SQUARE, 13.0, mode=EXACT_PATH))[0])
+
+
+def test_where_the_path_turns_back_it_is_stopped_at_even_when_blending() -> None:
+    motion, certificate, _ = planned(polygon([(0, 0), (5, 0), (0, 0.1)], 10.0, mode=BLEND, tolerance=0.5))
+    assert certificate.ok and motion.position[:, 0].max() == 5.0
+
+
+def test_the_speed_along_the_path_is_the_programmed_rate() -> None:
+    path = chain(line((0, 0), (20, 0), 5.0, mode=BLEND), arc((20, 0), (20, 20), (20, 10), 3.0, mode=BLEND))
+    motion, _, _ = planned(path)
+    speed = np.linalg.norm(motion.velocity[:, :3], axis=1)
+    assert speed.max() == pytest.approx(5.0, rel=1e-9)
+    assert np.median(speed[motion.segment == 1]) == pytest.approx(3.0, rel=1e-9)
+
+
+def test_rotary_moves_go_by_degrees() -> None:
+    motion, certificate, _ = planned(line((0, 0, 0, 0), (0, 0, 0, 90), 20.0))
+    assert certificate.ok and motion.velocity[:, 3].max() == pytest.approx(20.0)
+    assert motion.distance[-1] == 90.0
+    with_x, _, _ = planned(line((0, 0, 0, 0), (10, 0, 0, 90), 5.0))
+    assert with_x.velocity[:, 3].max() == pytest.approx(0.999 * 30.0)  # A cannot follow 45°/s
+    assert with_x.velocity[:, 0].max() == pytest.approx(0.999 * 30.0 / 9.0)
+
+
+def test_many_short_ways_and_none_at_all() -> None:
+    """Ways of 0.1 nm add up, and end exactly."""
+    points = [(1e-7 * k, 0.0) for k in range(2001)]
+    motion, certificate, _ = planned(polygon([*points, (1.0, 0.0)], 10.0))
+    assert certificate.ok and (motion.position[-1, :2] == [1.0, 0.0]).all()
+    still, _, _ = planned(line((1, 1), (1, 1), 10.0))
+    assert (still.position[:, :2] == 1.0).all()
+    assert list(plan([np.empty(0, SEGMENT)], MACHINES[0], T)) == []
+
+
+def test_the_motion_rests_for_dwells_and_stops() -> None:
+    path = polygon([(0, 0), (10, 0), (20, 0), (30, 0)], 10.0, mode=BLEND)
+    kinds = (
+        Event(-1, "spindle", 500.0),
+        Event(0, "dwell", 0.25),
+        Event(0, "coolant"),
+        Event(1, "stop"),
+        Event(2, "end"),
+    )
+    motion, certificate, happened = planned([PathBlock(path, list(kinds))])
+    assert certificate.ok
+    assert [event.kind for _, event in happened] == ["spindle", "dwell", "coolant", "stop", "end"]
+    at = {event.kind: sample for sample, event in happened}
+    assert at["spindle"] == 0 and at["end"] == len(motion) - 1
+    assert (motion.position[at["dwell"] : at["dwell"] + 251, 0] == 10.0).all()
+    assert motion.position[at["dwell"] + 255, 0] > 10.0
+    assert motion.position[at["stop"], 0] == 20.0 and not motion.velocity[at["stop"]].any()
+
+
+def test_an_event_that_comes_after_its_block_still_stops_the_motion() -> None:
+    path = polygon([(0, 0), (10, 0), (20, 0)], 10.0, mode=BLEND)
+    blocks = [PathBlock(path[:1], []), PathBlock(path[1:], [Event(-1, "dwell", 0.1)])]
+    together = [PathBlock(path, [Event(0, "dwell", 0.1)])]
+    assert (planned(blocks)[0].position == planned(together)[0].position).all()
+
+
+def test_a_passing_event_is_where_it_is_passed() -> None:
+    path = polygon([(0, 0), (10, 0), (20, 0)], 10.0, mode=BLEND)
+    motion, _, ((sample, event),) = planned([PathBlock(path, [Event(0, "coolant")])])
+    assert event.kind == "coolant" and motion.velocity[sample, 0] == pytest.approx(10.0)
+    assert motion.position[sample - 1, 0] < 10.0 <= motion.position[sample, 0]
+
+
+def test_the_predicted_time_is_that_of_the_samples() -> None:
+    blocks = list(plan([polygon(SQUARE, 10.0)], MACHINES[0], T))
+    assert predicted_time(blocks) == sum(map(len, blocks)) * T
+
+
+def test_helices_and_arcs_follow_their_programmed_path() -> None:
+    helix = arc((5, 0, 0), (5, 0, 6), (0, 0, 0), 8.0, turns=2)
+    assert helix["length"][0] == pytest.approx(hypot(2 * pi * 5 * 3, 6))
+    motion, certificate, _ = planned(helix)
+    assert certificate.ok
+    expected = np.array([point_at(helix[0], d) for d in motion.distance])
+    assert np.abs(motion.position - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        (lambda: line((0, 0), (1, 0), 0.0, program_line=7), "line 7: this move has the rate 0"),
+        (lambda: line((0,) * 6, (0, 0, 0, 0, 1), 1.0, program_line=8), "line 8: this move wants axis B"),
+        (lambda: line((0, 0), (np.nan, 0), 1.0, program_line=9), "line 9: a position of this move is not finite"),
+        (
+            lambda: chain(line((0, 0), (1, 0), 1.0), line((1.1, 0), (2, 0), 1.0, program_line=5)),
+            "line 5: this move does not start where",
+        ),
+    ],
+)
+def test_segments_that_cannot_be_are_refused_by_line(path: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        list(plan([path()], MACHINES[0], T))  # type: ignore[operator]
+    with pytest.raises(InputError, match="sample period"):
+        list(plan([], MACHINES[0], 0.0))

@@ -1,0 +1,171 @@
+"""The profiles of three-axis-mill as numbers, and jerk-limited moves beside ruckig's."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import ceil, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.motion.blended import ACCEL, CRUISE, DECEL, blended
+from rds.motion.point_to_point import point_to_point
+from rds.motion.segments import line
+from rds.motion.trapezoid import trapezoid
+
+from .chains import MACHINES, planned
+
+T = 1e-2
+# The strokes of the character for the sun: a box with a bar across, in a unit square, drawn without lifting.
+SUN = [(0, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 1), (1, 1), (0, 1), (0, 0)]
+
+
+@given(distance=st.floats(-500, 500), feed=st.floats(1, 200), accel=st.floats(10, 5000))
+def test_profile_keeps_its_limits(distance: float, feed: float, accel: float) -> None:
+    profile = trapezoid(distance, feed, accel, T=1e-3)
+    assert abs(profile.velocity).max() <= feed * (1 + 1e-9)
+    assert abs(profile.acceleration).max() <= accel
+    padded = np.pad(profile.position, (2, 2), mode="edge")
+    assert abs(np.diff(padded, 2)).max() <= accel * 1e-6 * (1 + 1e-6) + 1e-12
+    assert profile.position[-1] == distance and profile.velocity[-1] == 0.0
+    top = min(feed, sqrt(accel * abs(distance)))
+    expected = abs(distance) / top + top / accel if distance else 0.0
+    assert profile.duration == pytest.approx(expected)
+    assert len(profile.time) == ceil(profile.duration / 1e-3 - 1e-9) + 1
+
+
+def test_figure_9_is_a_trapezoid() -> None:
+    """10 mm at 5 mm/s with 10 mm/s²: 0.5 s up, 1.5 s level, 0.5 s down."""
+    profile = trapezoid(10.0, 5.0, 10.0, T)
+    assert profile.duration == pytest.approx(2.5)
+    at = {t: profile.velocity[round(t / T)] for t in (0.25, 0.5, 1.0, 2.0, 2.25, 2.5)}
+    assert list(at.values()) == pytest.approx([2.5, 5.0, 5.0, 5.0, 2.5, 0.0])
+    with pytest.raises(InputError, match=r"feed = 0.0 must be more than 0 \(mm/s\)"):
+        trapezoid(1.0, 0.0, 1.0, T)
+
+
+def test_figure_10_velocity_is_held_until_the_target_is_reached() -> None:
+    """One axis of a path whose direction changes: X goes 3, 4, 3 mm/s, with the change after each corner."""
+    points = [(0, 0), (6, 8), (14, 14), (20, 22)]  # X takes 0.6, 0.8, 0.6 of the way, Y 0.8, 0.6, 0.8
+    motion = blended(points, 5.0, T)
+    assert motion.held.tolist() == [True, True, False]
+    before = motion.targets - 1
+    for velocities, expected in zip(motion.velocity.T, ([3, 4, 3], [4, 3, 4]), strict=True):
+        assert velocities[before[:2]] == pytest.approx(expected[:2], rel=0.1)  # held up to the corner
+        assert velocities[motion.targets[:2]] == pytest.approx(velocities[before[:2]])  # the change begins there
+    assert motion.position[motion.targets] == pytest.approx(np.array(points[1:]))
+    assert motion.speed[motion.targets[0] - 50 : motion.targets[1]].min() > 4.8  # mm/s, of 5
+    assert motion.stage[before].tolist() == [CRUISE, CRUISE, DECEL]
+
+
+def test_figure_11_without_blending_each_move_is_accel_cruise_decel() -> None:
+    motion = blended([(0, 0), (10, 0), (20, 10)], 5.0, T, blend=False)
+    assert not motion.held.any()
+    for move in (0, 1):
+        stages = motion.stage[motion.move == move]
+        assert [a for a, b in pairwise([*stages.tolist(), None]) if a != b] == [ACCEL, CRUISE, DECEL]
+    assert motion.speed[motion.targets] == pytest.approx([0.0, 0.0])
+
+
+def test_figure_19_a_polygon_keeps_its_speed_at_corners_where_no_axis_turns_back() -> None:
+    octagon = [(10 * np.cos(a), 10 * np.sin(a)) for a in np.pi / 8 + np.pi / 4 * np.arange(9)]
+    motion = blended(octagon, 2.0, T)
+    # the first side goes up to the left; sides along an axis stop the other, and turn it back after them
+    for k, (way, after) in enumerate(pairwise(np.diff(octagon, axis=0))):
+        if (way * after < -1e-9).any():
+            assert not motion.held[k]
+    speeds = motion.speed[motion.targets]
+    assert (speeds[motion.held] > 1.5).all() and speeds[~motion.held] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_figures_20_to_23_a_circle_stops_only_where_an_axis_turns_back() -> None:
+    """Chords of 10°: X is a cosine, and the speed is the feed but at the four ends of the axes."""
+    angle = np.radians(np.arange(37) * 10.0)
+    motion = blended(np.column_stack((10 * np.cos(angle), 10 * np.sin(angle))), 1.0, T)
+    assert np.flatnonzero(~motion.held).tolist() == [8, 17, 26, 35]  # the last chords before 90°, 180°, 270°, 360°
+    radius = np.linalg.norm(motion.position, axis=1)
+    assert radius.min() > 9.95 and radius.max() < 10.02
+    assert np.median(motion.speed) == pytest.approx(1.0, rel=0.03) and motion.speed.max() <= 1.0 + 1e-9
+
+
+def test_figures_24_to_28_the_sun_stops_at_its_corners_and_passes_where_strokes_meet() -> None:
+    motion = blended(10.0 * np.array(SUN), 5.0, T)
+    assert motion.held.tolist() == [False, True, False, False, False, False, False, False]
+    assert motion.speed[motion.targets[1]] == pytest.approx(5.0)  # where the bar ends on the side
+    assert motion.speed.max() == pytest.approx(5.0)
+    assert motion.position[motion.targets] == pytest.approx(10.0 * np.array(SUN[1:]))
+
+
+points = st.lists(
+    st.tuples(*(st.floats(-50, 50).map(lambda x: round(x, 2)),) * 3), min_size=2, max_size=12, unique=True
+)
+
+
+@given(points=points, feed=st.floats(0.5, 20.0), share=st.floats(0.05, 0.5), blend=st.booleans())
+def test_blended_motion_meets_every_target_and_never_turns_back_within_a_move(
+    points: list[tuple[float, ...]], feed: float, share: float, blend: bool
+) -> None:
+    motion = blended(points, feed, T, share=share, blend=blend)
+    assert np.abs(motion.position[motion.targets] - np.array(points[1:])).max() < 1e-9
+    assert np.abs(np.diff(motion.position, axis=0) / T - motion.velocity[:-1]).max() <= (
+        0.5 * T * np.abs(motion.acceleration).max() + 1e-6
+    )
+    ways = np.diff(np.array(points), axis=0)
+    wanted = np.abs(ways[motion.move]) / np.linalg.norm(ways[motion.move], axis=1)[:, None] * feed
+    before = np.abs(motion.velocity[np.maximum(motion.targets[np.maximum(motion.move - 1, 0)], 0)])
+    assert (np.abs(motion.velocity) <= np.maximum(wanted, before) * (1 + 1e-9) + 1e-9).all()
+    assert (motion.velocity * ways[motion.move] >= -1e-9).all()
+    for k, (way, after) in enumerate(pairwise(ways)):
+        if motion.held[k]:
+            assert blend and (way * after >= 0.0).all()
+        else:
+            assert not motion.velocity[motion.targets[k]].any() or k == len(ways) - 1
+
+
+def test_blended_motion_refuses_what_cannot_be() -> None:
+    for words, message in (
+        ({"points": [(0, 0), (0, 0)]}, "at least two that differ"),
+        ({"feed": 0.0}, "feed = 0.0"),
+        ({"share": 0.6}, "share = 0.6"),
+        ({"points": [(0, np.nan), (1, 1)]}, "finite"),
+    ):
+        given_words = {"points": [(0, 0), (1, 1)], "feed": 1.0, "T": T} | words
+        with pytest.raises(InputError, match=message):
+            blended(**given_words)  # type: ignore[arg-type]
+
+
+ends = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-20, 20))
+
+
+@settings(max_examples=60, deadline=None)
+@given(end=ends)
+def test_our_moves_take_as_long_as_the_fastest_there_are(end: tuple[float, ...]) -> None:
+    """ruckig's moves are the fastest within the same limits: ours take at most a few ms and 1 % more, never less."""
+    pytest.importorskip("ruckig")
+    if max(map(abs, end)) < 1e-3:
+        return
+    limits = MACHINES[0]
+    three = (limits.velocity[:3], limits.acceleration[:3], limits.jerk[:3])
+    best = point_to_point((0, 0, 0), end, *three, T=1e-3)
+    assert (best.position[-1] == end).all()
+    motion, certificate, _ = planned(line((0, 0, 0), end, np.inf, rapid=True))
+    assert certificate.ok
+    ours = (len(motion) - 1) * 1e-3
+    assert best.duration - 1e-9 <= ours
+    if max(map(abs, end)) > 3.0:  # long enough for full acceleration
+        assert ours <= 1.01 * best.duration + 2e-3
+    else:
+        assert ours <= 1.35 * best.duration + 2e-3
+
+
+def test_point_to_point_refuses_what_cannot_be() -> None:
+    pytest.importorskip("ruckig")
+    with pytest.raises(InputError, match=r"jerk = \(0,\) must each be more than 0"):
+        point_to_point((0,), (1,), (1,), (1,), (0,), T=1e-3)
+    with pytest.raises(InputError, match="2 finite numbers"):
+        point_to_point((0, 0), (1,), (1, 1), (1, 1), (1, 1), T=1e-3)
+    moving = point_to_point((0,), (5,), (10,), (100,), (1e4,), T=1e-3, start_velocity=[5.0])
+    assert moving.velocity[0, 0] == 5.0 and moving.position[-1, 0] == 5.0
