@@ -89,11 +89,12 @@ def hold_tops(phases, tau):
         level = phases[left, 2] if left >= i else phases[right, 1]
         length, cut_left, cut_right = 0.0, 0.0, 0.0  # of the top, and of the phases beside it that it takes a part of
         while True:
-            if left >= i and phases[left, 1] >= level:
+            flat = 1e-12 * level * level  # a phase that changes the speed by rounding only has no slope to go down
+            if left >= i and (phases[left, 1] >= level or phases[left, 2] ** 2 - phases[left, 1] ** 2 <= flat):
                 length += phases[left, 0]
                 left -= 1
                 continue
-            if right < k and phases[right, 2] >= level:
+            if right < k and (phases[right, 2] >= level or phases[right, 1] ** 2 - phases[right, 2] ** 2 <= flat):
                 length += phases[right, 0]
                 right += 1
                 continue
