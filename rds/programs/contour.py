@@ -14,7 +14,8 @@ from rds.motion.segments import LINE, in_plane
 
 _CHUNK = 16384  # samples at a time
 _MOST = 512  # segments to either side
-_STEPS = 12  # of Newton's method, at most
+_STEPS = 40  # of Newton's method, at most
+_GRID = 65  # places along a helix that are looked at first
 _ARC_LENGTH = pi  # path between a point and its nearest neighbour, over twice the distance: half a circle at most
 
 
@@ -99,14 +100,18 @@ def _to_arcs(points: np.ndarray, segments: np.ndarray, plane: int) -> np.ndarray
     climbed = np.divide(point[:, 2] - start[:, 2], rise, out=np.zeros_like(rise), where=rise != 0.0)
     turn, whole = 2.0 * pi, np.abs(sweep)
     lap = np.where(rise != 0.0, np.round((np.clip(climbed, 0.0, 1.0) * whole - angle) / turn), 0.0)
-    for more in (-1.0, 0.0, 1.0):
-        share = np.clip((angle + (lap + more) * turn) / whole, 0.0, 1.0)
+    starts = [np.clip((angle + (lap + more) * turn) / whole, 0.0, 1.0) for more in (-1.0, 0.0, 1.0)]
+    if rise.any():  # a helix has nearest places in several turns, which its axis does not tell apart
+        grid = np.linspace(0.0, 1.0, _GRID)
+        far = np.array([np.linalg.norm(place(np.full(len(points), share))[0], axis=1) for share in grid])
+        starts += [grid[order] for order in np.argsort(far, axis=0)[:2]]
+    for share in starts:
         for _ in range(_STEPS):
             away, slope, bend = place(share)
             gradient = np.einsum("ij,ij->i", away, slope)
             square = np.einsum("ij,ij->i", slope, slope)
             curvature = square + np.einsum("ij,ij->i", away, bend)
-            step = gradient / np.where(curvature > 0.1 * square, curvature, square)
+            step = gradient / np.where(curvature > 0.02 * square, curvature, square)
             moved = np.clip(share - step, 0.0, 1.0)
             if np.abs(moved - share).max(initial=0.0) < 1e-15:
                 break

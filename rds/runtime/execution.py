@@ -46,6 +46,9 @@ class Follower(Protocol):
     def advance(self, wanted: float, until: int) -> None:
         """One sample period, at a rate that goes towards `wanted`; not beyond the sample `until`, a place of rest."""
 
+    def settle(self, wanted: float) -> None:
+        """Take the rate `wanted` at once, where the path rests."""
+
 
 class Execution:
     """A program that has begun.
@@ -75,7 +78,7 @@ class Execution:
         self._steady = 0
         self._resumed = 0.0  # the value of resume when a stop began
         self._last = -1  # sample of the run; -1: the program begins
-        self._line = int(program.line[0]) if len(program.line) else 0
+        self._line = self._shown_line = int(program.line[0])
         self._speed = 0.0
         self._position = [float(value) for value in program.position[0]]
         self._legs: list[tuple[list[float], list[float], float]] = []
@@ -99,13 +102,14 @@ class Execution:
         if self._last < 0:
             self._last = 0  # and it does so with its first row
             self._rest()
+            self._follower.settle(self._wanted())
             self._happen()
         for _ in range(k - self._last):
             self._step(positions)
         self._last = k
         shown = self._shown
         rate = self._follower.rate if shown is State.RUNS else self._leg_rate if shown is State.HOME else 0.0
-        row += (self._line, self._follower.place, rate, shown)
+        row += (self._shown_line, self._follower.place, rate, shown)
 
     def over(self) -> tuple[Ending, str] | None:
         """How the run ends before its next sample, and why, if it does."""
@@ -125,6 +129,7 @@ class Execution:
         if self.ending is not None:
             return
         before = self.state
+        self._shown_line = self._line
         self._STEPS[before](self, positions)
         # what this sample was spent on; the state may be the next one's already
         self._shown = self.state if before <= State.HELD and self.state <= State.HELD else before
@@ -137,7 +142,7 @@ class Execution:
         follower, until, wanted = self._follower, self._until(), self._wanted()
         follower.advance(wanted, until)
         self._put(follower.position, follower.velocity, follower.acceleration)
-        self._line = int(self._program.line[-int(-follower.place // 1)])
+        self._line = self._shown_line = int(self._program.line[-int(-follower.place // 1)])
         is_there = follower.place >= until
         is_still = is_there or follower.rate == 0.0
         if is_still and self._values[STOP]:
@@ -241,6 +246,7 @@ class Execution:
     def _go_on(self) -> None:
         """The rest of what is due here; then the path again."""
         self.state = State.RUNS
+        self._follower.settle(self._wanted())
         self._happen()
 
     # --- home -----------------------------------------------------------------------------------------------------

@@ -44,6 +44,10 @@ class Retimed:
         self.place = min(self.place + 0.5 * (before + rate), until)
         self._evaluate(rate, self._change)
 
+    def settle(self, wanted: float) -> None:
+        """Take the rate `wanted` at once: for a place where the path rests."""
+        self.rate, self._change = min(wanted, self._cap(self.place)), 0.0
+
     def _next_rate(self, wanted: float) -> float:
         place, rate, T = self.place, self.rate, self._T
         i = int(place)

@@ -1,0 +1,27 @@
+"""A small part that has everything: spindle, lines, an arc, a stop, a dwell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+PART = """\
+(a small part)
+G21 G90 G61
+S2000 M3
+G1 Z-0.5 F600
+G1 X2 F900
+G2 X4 Y-2 I0 J-2
+M0
+G4 P0.05
+G1 Y-0.5
+M2
+"""
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    file = tmp_path / "part.ngc"
+    file.write_text(PART)
+    return file

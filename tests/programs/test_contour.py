@@ -1,0 +1,94 @@
+"""The contour error against dense sampling of the path, for lines, arcs and helices in all planes."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rds.motion.segments import XY, YZ, ZX, arc, chain, in_plane, line, point_at
+from rds.programs.contour import contour_error
+
+DENSE = 1500
+
+number = st.floats(-20.0, 20.0)
+point = st.tuples(number, number, number)
+
+
+@st.composite
+def arcs(draw: st.DrawFn) -> np.ndarray:
+    """An arc, a full circle or a helix of up to two and a half turns."""
+    plane = draw(st.sampled_from([XY, ZX, YZ]))
+    first, second, normal = in_plane(plane)
+    centre, radius = np.array(draw(point)), draw(st.floats(0.5, 15.0))
+    from_, sweep = draw(st.floats(-pi, pi)), draw(st.floats(0.05, 2.0 * pi))
+    rise, turns = draw(st.sampled_from([0.0, 3.0, -8.0])), draw(st.sampled_from([0, 0, 1]))
+    start, end = centre.copy(), centre.copy()
+    for place, angle in ((start, from_), (end, from_ + sweep)):
+        place[[first, second]] += radius * np.array([np.cos(angle), np.sin(angle)])
+    end[normal] += rise
+    return arc(start, end, centre, 10.0, clockwise=draw(st.booleans()), turns=turns if rise else 0, plane=plane)
+
+
+def brute(points: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, float]:
+    """Distance to the nearest of many points of the path, and how far it may be too large."""
+    dense = np.array([point_at(row, d)[:3] for row in path for d in np.linspace(0.0, row["length"], DENSE)])
+    distance = np.array([np.linalg.norm(dense - p, axis=1).min() for p in points])
+    return distance, float(path["length"].max()) / DENSE
+
+
+@settings(max_examples=40)
+@given(segment=arcs(), offs=st.lists(st.tuples(st.floats(0.0, 1.0), point), min_size=1, max_size=4))
+def test_the_distance_to_an_arc_is_the_least(
+    segment: np.ndarray, offs: list[tuple[float, tuple[float, float, float]]]
+) -> None:
+    """Of points that are off by up to half of its radius: an axis does not lag by more."""
+    arm = segment["start"][0, :3] - segment["centre"][0]
+    radius = np.linalg.norm(arm[list(in_plane(int(segment["plane"][0]))[:2])])
+    p = np.array(
+        [point_at(segment[0], share * segment["length"][0])[:3] + np.array(off) / 40.0 * radius for share, off in offs]
+    )
+    found, nearest = contour_error(p, segment, np.zeros(len(p), int), np.full(len(p), 100.0))
+    dense, step = brute(p, segment)
+    assert (nearest == 0).all()
+    assert (found <= dense + 1e-9).all()
+    assert (found >= dense - step).all()
+
+
+@settings(max_examples=25)
+@given(corners=st.lists(point, min_size=3, max_size=6, unique=True), points=st.lists(point, min_size=1, max_size=4))
+def test_the_distance_to_lines_is_the_least(
+    corners: list[tuple[float, float, float]], points: list[tuple[float, float, float]]
+) -> None:
+    path = chain(*(line(a, b, 10.0) for a, b in pairwise(corners)))
+    p = np.array(points)
+    found, nearest = contour_error(p, path, np.zeros(len(p), int), np.full(len(p), 1000.0))
+    dense, step = brute(p, path)
+    assert (found <= dense + 1e-9).all()
+    assert (found >= dense - step).all()
+    for k, segment in enumerate(nearest):
+        alone, _ = contour_error(p[k : k + 1], path[segment : segment + 1], np.zeros(1, int), np.full(1, 1.0))
+        assert alone[0] == found[k]
+
+
+@settings(max_examples=40)
+@given(segment=arcs(), share=st.floats(0.0, 1.0))
+def test_a_point_of_the_path_is_not_off_it(segment: np.ndarray, share: float) -> None:
+    p = point_at(segment[0], share * segment["length"][0])[None, :3]
+    found, _ = contour_error(p, segment, np.zeros(1, int), np.full(1, 1.0))
+    assert found[0] < 1e-9
+
+
+def test_only_the_path_near_the_motion_counts() -> None:
+    """A second pass beside the first, 0.1 mm away: each measured point belongs to its own pass."""
+    there, back = line((0, 0, 0), (50, 0, 0), 10.0), line((50, 0.1, 0), (0, 0.1, 0), 10.0)
+    corners = [(50, 0, 0), (60, 0, 0), (60, 0.1, 0), (50, 0.1, 0)]
+    path = chain(there, *(line(a, b, 10.0) for a, b in pairwise(corners)), back)
+    p = np.array([[20.0, 0.09, 0.0]])
+    for segment, expected in ((0, 0.09), (4, 0.01)):
+        found, nearest = contour_error(p, path, np.array([segment]), np.array([0.1]))
+        assert nearest[0] == segment
+        assert abs(found[0] - expected) < 1e-12

@@ -1,0 +1,238 @@
+"""A program carried out: as planned when nobody interferes, on its path within the limits when somebody does."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.core.types import Ending
+from rds.machines import load_machine
+from rds.motion.segments import BLEND, SEGMENT, arc, chain, line
+from rds.nc.toolpath import Event, PathBlock
+from rds.programs.contour import contour_error
+from rds.programs.prepare import Prepared, planned
+from rds.runtime.changes import Heed, plan_changes, stop_channel
+from rds.runtime.execution import Execution, State
+from rds.runtime.laws import LiveReference
+from rds.runtime.program import program_channels
+from rds.runtime.retimed import Retimed
+
+T = 0.001
+MACHINE = load_machine("mini-cnc")
+STOP = stop_channel()
+
+
+class Ran(NamedTuple):
+    """What a program asked of the axes: positions (n × 3), velocities, accelerations, and its own four columns."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    line: np.ndarray
+    place: np.ndarray
+    rate: np.ndarray
+    state: np.ndarray
+    speed: np.ndarray
+    ending: Ending
+    reason: str
+
+
+def prepared(path: np.ndarray, *events: Event) -> Prepared:
+    block = PathBlock(path, [*events, Event(len(path) - 1, "end", 0.0, 99)])
+    return planned([block], MACHINE, T, Path("made.ngc"))
+
+
+def execute(program: Prepared, changes: Any = (), speed: Any = lambda k, wanted: wanted) -> Ran:
+    """The references of a program, sample by sample; `speed(sample, wanted)` is the spindle's measured one."""
+    channels = program_channels()
+    references = [LiveReference() for _ in range(4)]
+    execution = Execution(
+        program.program, T, Retimed(program.program, T), references, 3, 1.0, lambda names: heed.expects(names)
+    )
+    by_name = {channel.name: channel for channel in (*channels, STOP)}
+    heed = Heed([*channels, STOP], execution.actions(), plan_changes(changes, by_name, T), execution.over)
+    rows, parts = [], []
+    k = 0
+    while (ending := heed(k)) is None:
+        row: list[float] = []
+        wanted = references[3].position.value
+        execution.law(k, [0.0, 0.0, 0.0, speed(k, wanted)], row, [])
+        rows.append([*row, references[3].position.value])
+        parts.append([[r.position.value, r.velocity.value, r.acceleration.value] for r in references[:3]])
+        k += 1
+        assert k < 200_000
+    p = np.array(parts)
+    columns = np.array(rows).T
+    return Ran(p[:, :, 0], p[:, :, 1], p[:, :, 2], *columns, ending, heed.reason)
+
+
+PATH = chain(
+    line((0, 0, 0), (6, 0, 0), 10.0, program_line=1),
+    arc((6, 0, 0), (6, 4, 0), (6, 2), 8.0, program_line=2),
+    line((6, 4, 0), (0, 4, -2), 12.0, program_line=3),
+    line((0, 4, -2), (1, 1, -2), 5.0, program_line=4),
+)
+WHOLE = prepared(PATH)
+
+
+def check_motion(ran: Ran, path: np.ndarray = PATH) -> None:
+    """Within the limits, by differences of the samples, and on the path."""
+    velocity, acceleration, _ = WHOLE.program.limits
+    moved = np.diff(ran.position, axis=0) / T
+    assert (np.abs(moved).max(axis=0, initial=0.0) <= velocity * 1.001).all()
+    assert (np.abs(np.diff(moved, axis=0)).max(axis=0, initial=0.0) / T <= acceleration * 1.01).all()
+    row = np.clip(np.ceil(ran.place).astype(int), 0, len(WHOLE.segment) - 1)
+    on_path = ran.state != State.HOME
+    off, _ = contour_error(ran.position[on_path], path, WHOLE.segment[row][on_path], np.full(on_path.sum(), 0.05))
+    assert off.max() < 1e-6
+    # and what the laws are told of velocity is that of the positions
+    between = 0.5 * (ran.velocity[1:] + ran.velocity[:-1])
+    assert np.abs(moved - between)[ran.state[1:] != State.HOME].max(initial=0.0) < 0.05
+
+
+def test_without_anybody_s_doing_it_is_the_plan() -> None:
+    ran = execute(WHOLE)
+    program = WHOLE.program
+    assert (ran.position == program.position).all()
+    assert (ran.velocity == program.velocity).all()
+    assert (ran.acceleration == program.acceleration).all()
+    assert (ran.line == program.line).all()
+    assert (ran.place == np.arange(program.samples)).all()
+    assert (ran.ending, ran.reason) == (Ending.DONE, "")
+
+
+@settings(max_examples=25)
+@given(
+    overrides=st.lists(st.tuples(st.floats(0.0, 4.0), st.floats(0.05, 2.0)), max_size=6),
+    holds=st.lists(st.tuples(st.floats(0.0, 4.0), st.floats(0.01, 0.5)), max_size=3),
+)
+def test_override_and_hold_keep_to_path_and_limits(
+    overrides: list[tuple[float, float]], holds: list[tuple[float, float]]
+) -> None:
+    changes = [(at, "override", share) for at, share in overrides]
+    changes += [change for at, long in holds for change in ((at, "hold", 1), (at + long, "hold", 0))]
+    ran = execute(WHOLE, [*changes, (30.0, "hold", 0)])
+    check_motion(ran)
+    assert ran.ending is Ending.DONE
+    assert (ran.position[-1] == WHOLE.program.position[-1]).all()
+    assert (np.diff(ran.place) >= 0.0).all()
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 2.0])
+def test_the_feed_follows_the_override(share: float) -> None:
+    long = prepared(line((0, 0, 0), (30, 0, 0), 4.0, program_line=1))
+    ran = execute(long, [(0.0, "override", share)])
+    assert ran.velocity[:, 0].max() == pytest.approx(4.0 * share, rel=1e-3)
+    assert len(ran.position) == pytest.approx(long.program.samples / share, rel=0.08)
+
+
+def test_rapids_are_not_made_faster_than_the_axes() -> None:
+    rapid = prepared(line((0, 0, 0), (30, 0, 0), 0.0, rapid=True, program_line=1))
+    ran = execute(rapid, [(0.0, "override", 2.0)])
+    assert ran.velocity[:, 0].max() <= rapid.program.limits[0, 0] * 1.0001
+
+
+@given(at=st.floats(0.0, 2.4))
+@settings(max_examples=20)
+def test_a_stop_comes_to_rest_on_the_path(at: float) -> None:
+    ran = execute(WHOLE, [(at, "stop", 1)])
+    check_motion(ran)
+    assert ran.ending is Ending.STOPPED
+    assert ran.reason == f"stopped in line {int(ran.line[-1])}"
+    assert np.abs(ran.velocity[-1]).max() == 0.0
+    assert len(ran.position) * T < at + 1.0
+
+
+@given(at=st.floats(0.0, 2.4))
+@settings(max_examples=20)
+def test_the_way_home_is_up_then_straight_within_the_limits(at: float) -> None:
+    ran = execute(WHOLE, [(at, "home", 1)])
+    check_motion(ran)
+    assert (ran.position[-1] == 0.0).all()
+    assert (np.abs(ran.acceleration).max(axis=0) <= WHOLE.program.limits[1] * 1.0001).all()
+    assert ran.reason.startswith("went home from line ")
+    way = ran.position[ran.state == State.HOME]
+    low = way[:, 2] < -1e-9
+    assert (way[low][:, :2] == way[:1, :2]).all()  # X and Y stand while Z is down
+    jerk = np.abs(np.diff(way, 3, axis=0)).max(axis=0, initial=0.0) / T**3
+    assert (jerk <= WHOLE.program.limits[2] * 1.01).all()
+
+
+def test_a_hold_that_nobody_can_end_ends_the_run() -> None:
+    ran = execute(WHOLE, [(0.5, "hold", 1)])
+    assert ran.ending is Ending.STOPPED
+    assert "held in line 1, and nobody is there to let it go on" in ran.reason
+
+
+def test_stops_wait_for_whoever_is_to_come_and_for_nobody_else() -> None:
+    events = (Event(0, "stop", 0.0, 7), Event(1, "stop", 1.0, 8), Event(2, "tool", 3.0, 9))
+    program = prepared(PATH, *events)
+    alone = execute(program)
+    assert len(alone.position) == program.program.samples + 3  # one sample each, and on
+    first = program.program.happenings[0].sample * T
+    changes = [(first + 0.5, "resume", 1), (first + 20.0, "optional_stop", 0), (first + 30.0, "resume", 2)]
+    waited = execute(program, changes)
+    assert (waited.state == State.STOP).sum() == pytest.approx(30.0 / T, rel=0.2)
+    assert waited.line[waited.state == State.STOP][0] == 7
+    assert (np.diff(waited.position[waited.state == State.STOP], axis=0) != 0.0).any(axis=1).sum() == 1
+    skipped = execute(program, [(0.0, "optional_stop", 0)])
+    assert len(skipped.position) == program.program.samples + 2
+
+
+def test_a_dwell_lasts_as_long_whatever_the_override() -> None:
+    program = prepared(PATH, Event(1, "dwell", 0.25, 5))
+    assert len(execute(program).position) == program.program.samples
+    for share in (0.5, 2.0):
+        ran = execute(program, [(0.0, "override", share)])
+        assert (ran.state == State.DWELL).sum() == 250
+
+
+def test_cutting_begins_when_the_spindle_turns_as_fast_as_it_should() -> None:
+    program = prepared(PATH, Event(-1, "spindle", 2000.0, 5))
+    ran = execute(program, speed=lambda k, wanted: min(10.0 * k, wanted))
+    waits = ran.state == State.SPINDLE
+    assert waits.sum() == pytest.approx(196 + 9, abs=2)  # 2 % below 2000, ten samples of it
+    assert len(ran.position) == program.program.samples + waits.sum()
+    assert (ran.position[: waits.sum()] == 0.0).all()
+    assert (ran.speed[2:] == 2000.0).all()
+
+
+def test_a_spindle_that_never_gets_there_is_told() -> None:
+    program = prepared(PATH, Event(-1, "spindle", -2000.0, 5))
+    ran = execute(program, speed=lambda k, wanted: 0.5 * wanted)
+    assert ran.ending is Ending.STOPPED
+    assert "the spindle turns at -1000 rev/min 10 s after line 5 asked for -2000" in ran.reason
+    assert (ran.position == 0.0).all()
+
+
+def test_discarded_samples_are_not_lost_time() -> None:
+    """A machine does not wait: where the loop was late, the path goes on."""
+    program = WHOLE.program
+    references = [LiveReference() for _ in range(4)]
+    execution = Execution(program, T, Retimed(program, T), references, 3, 1.0, lambda names: False)
+    for k in (0, 1, 2, 50, 51, 300):
+        row: list[float] = []
+        execution.law(k, [0.0] * 4, row, [])
+        assert row[1] == k
+        assert [r.position.value for r in references[:3]] == program.position[k].tolist()
+
+
+def test_blends_are_followed_too() -> None:
+    corners = [(0, 0, 0), (5, 0, 0), (5, 5, 0), (0, 5, 0)]
+    square = chain(*(line(a, b, 10.0, mode=BLEND, tolerance=0.1, program_line=1) for a, b in pairwise(corners)))
+    ran = execute(prepared(square), [(0.2, "override", 1.7), (0.4, "hold", 1), (0.9, "hold", 0)])
+    acceleration = np.abs(np.diff(ran.position, 2, axis=0)).max(axis=0) / T**2
+    assert (acceleration[:2] <= WHOLE.program.limits[1, :2] * 1.01).all()
+    assert (ran.position[-1] == (0.0, 5.0, 0.0)).all()
+
+
+def test_nothing_to_run_is_refused() -> None:
+    with pytest.raises(InputError, match="nothing in it moves or waits"):
+        planned([PathBlock(np.zeros(0, SEGMENT))], MACHINE, T, Path("empty.ngc"))
