@@ -253,12 +253,16 @@ def _numbers(text: str, option: str) -> list[float]:
         raise InputError(f"{option} {text!r} is not numbers with commas between them, as in 10,-2.5") from error
 
 
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' if number != 1 else ''}"
+
+
 def _tell(found: dict[str, Any]) -> None:
     extent = ", ".join(f"{axis} {low:.4g} to {high:.4g}" for axis, (low, high) in found["extent_mm"].items())
     shape = "closed" if found["closed"] else "open"
     pieces = "" if found["pieces"] == 1 else f" in {found['pieces']} pieces"
     typer.echo(
-        f"{found['file']}: {found['lines']} lines, {found['arcs']} arcs{pieces}, {shape}; "
+        f"{found['file']}: {_count(found['lines'], 'line')}, {_count(found['arcs'], 'arc')}{pieces}, {shape}; "
         f"{found['length_mm']:.2f} mm, {found['cutting_time_s']:.1f} s at the feed rate; {extent} mm"
     )
     if found.get("deviation_mm") or found.get("tolerance_mm"):
@@ -266,8 +270,9 @@ def _tell(found: dict[str, Any]) -> None:
         allowed = f" (tolerance {limit:g} mm)" if limit else ""
         typer.echo(f"deviation: {found['deviation_mm']:.4f} mm at most{allowed}")
     if found.get("repeated_points_left_out"):
-        typer.echo(f"{found['repeated_points_left_out']} points that repeat the one before are left out")
+        points = _count(found["repeated_points_left_out"], "point")
+        typer.echo(f"left out, as they repeat the one before: {points}")
     if found.get("specks_left_out"):
-        typer.echo(f"{found['specks_left_out']} islands and holes of specks are left out")
+        typer.echo(f"left out, as islands or holes of few pixels: {_count(found['specks_left_out'], 'speck')}")
     if found["picture"]:
         typer.echo(f"picture: {found['picture']}")

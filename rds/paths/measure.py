@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from math import acos, atan2, ceil, dist, pi
 
 import numpy as np
@@ -102,8 +101,3 @@ def summary(segments: Sequence[Segment]) -> dict[str, object]:
         "end_mm": list(segments[-1].end),
         "extent_mm": {axis: list(bounds) for axis, bounds in zip(names, extent(segments), strict=True)},
     }
-
-
-def travel_between(found: Sequence[Sequence[Segment]]) -> float:
-    """The ways from the end of each piece to the start of the next, mm."""
-    return sum(dist(before[-1].end, after[0].start) for before, after in pairwise(found))

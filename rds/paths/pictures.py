@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rds.results.figure import Picture
 
 _ARROWS = 12  # along the whole path
-_CHORDS_PER_SIZE = 2000.0  # arcs are drawn in chords that are off by this part of the picture
+_CHORDS_PER_SIZE = 20000.0  # arcs are drawn in chords that are off by this part of the picture
 
 
 def picture(segments: Sequence[Segment], title: str = "", *, drawing: Outline | None = None) -> Picture:

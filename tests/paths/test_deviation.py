@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from rds.paths.deviation import ACCURACY, hausdorff
 
-points = st.lists(st.tuples(st.floats(-10, 10), st.floats(-10, 10)), min_size=2, max_size=12, unique=True)
+coordinates = st.floats(-10, 10).map(lambda value: round(value, 6))  # mm
+points = st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=12, unique=True)
 
 
 def test_it_is_exact_where_the_corners_alone_are_not() -> None:
