@@ -9,6 +9,7 @@ the corner at most.
 from __future__ import annotations
 
 from math import fabs, inf, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -144,7 +145,7 @@ def _close(out, ints, count, f, u, first, last, front, distance, work):
     """Emit a piece, less what a blend took of its start, that ends at rest."""
     taken = distance + front * f[RATIO]
     trim(f, u[KIND], u[AXIS_1], u[AXIS_2], front, 0.0, work[6, :6], work[7, :6], work[8, :6])
-    return _emit(out, ints, count, f, u, first, last, 1, taken, work)
+    return _emit(out, ints, count, f, u, first, last, np.int64(1), taken, work)
 
 
 @kernel
@@ -164,9 +165,10 @@ def build(
     work = np.zeros((11, FLOATS))
     blend = np.zeros(INTS, np.int64)
     blend[KIND] = BLENDED
-    count, done, i = 0, 0, 0
+    zero: Any = np.int64(0)  # not the literal, for each of which numba would compile what is called with it
+    count = done = i = zero
     front, distance = state[0], state[1]
-    held, old, held_first, held_last = False, 0, 0, 0
+    held, old, held_first, held_last = False, 0, zero, zero
     here = point.copy()
     begin = point.copy()  # where the held piece begins
     while i < n:
@@ -238,12 +240,12 @@ def build(
             if size - front - half > 1e-12:
                 taken = distance + front * ratio
                 trim(g, w[KIND], w[AXIS_1], w[AXIS_2], front, half, work[6, :6], work[7, :6], work[8, :6])
-                count = _emit(out, ints, count, g, w, held_first, held_last, stops, taken, work)
+                count = _emit(out, ints, count, g, w, held_first, held_last, np.int64(stops), taken, work)
             if half > 0.0:
                 b = work[0]
                 b[RATIO], b[FEED] = 0.5 * (ratio + f[RATIO]), min(feed, f[FEED])
                 taken = distance + (size - half) * ratio
-                count = _emit(out, ints, count, b, blend, held_first, last, 0, taken, work)
+                count = _emit(out, ints, count, b, blend, held_first, last, zero, taken, work)
             front = half
             distance += size * ratio
         done, held, held_first, held_last, old = first, True, first, last, new
