@@ -19,7 +19,7 @@ from rds.core.types import Segment
 from rds.interpolators import reference_word
 from rds.interpolators.division import Method, Turn
 
-OPTIONS = reference_word.OPTIONS
+OPTIONS, DEFAULTS = reference_word.OPTIONS, reference_word.DEFAULTS
 _WIDEST = 1.9  # from 2 on, the corners are on no ellipse
 _NEWTON = 3  # corrections of the step angle; each leaves a small part of the error
 

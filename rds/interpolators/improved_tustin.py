@@ -21,7 +21,7 @@ from rds.interpolators import reference_word
 from rds.interpolators.division import Method, Turn, rotated
 from rds.interpolators.tustin import factor
 
-OPTIONS = reference_word.OPTIONS
+OPTIONS, DEFAULTS = reference_word.OPTIONS, reference_word.DEFAULTS
 
 
 def _angles(share: float) -> tuple[float, float]:

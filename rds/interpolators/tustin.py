@@ -15,7 +15,7 @@ from rds.core.types import Segment
 from rds.interpolators import reference_word
 from rds.interpolators.division import Method, Turn, grown, rotated
 
-OPTIONS = reference_word.OPTIONS
+OPTIONS, DEFAULTS = reference_word.OPTIONS, reference_word.DEFAULTS
 
 
 def factor(angle: float) -> complex:
