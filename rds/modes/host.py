@@ -65,8 +65,9 @@ def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = Non
     """
     if load_mode(plan.mode).real_time:
         assert directory is not None
-        with machine_behind(plan) as reached:
-            return _in_target(reached, directory, progress, live or Live())
+        # The folder first: two runs for one folder are told so before a machine is started.
+        with _folder(directory) as lock, machine_behind(plan) as reached:
+            return _in_target(reached, directory, lock, progress, live or Live())
     return _here(plan, progress, live)
 
 
@@ -98,22 +99,20 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     return Rows(columns, units, values, ending, heed.reason, {}, changes=tuple(timed(heed.taken, plan.T)))
 
 
-def _in_target(plan: Plan, directory: Path, progress: Progress | None, live: Live) -> Rows:
-    """A real-time run, in a target process that a recorder starts."""
+def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None, live: Live) -> Rows:
+    """A real-time run, in a target process that a recorder starts; `lock` holds the folder."""
     columns, units = plan.columns(load_mode(plan.mode).followed)
     columns[1:1] = TIMING_COLUMNS
     units |= dict.fromkeys(TIMING_COLUMNS, "ns")
-    data = _dumped(plan)
-    with _folder(directory) as lock:
-        write_whole(directory / PLAN, data)
-        has_rows = _recorded(plan, directory, columns, units, lock, progress, live)
-        report = read_ending(directory, ENDING if has_rows else UNSTARTED)
-        ending, reason = Ending(report["ending"]), report.get("reason", "")
-        if has_rows:
-            values, changes = read_raw(directory)[1], tuple(read_changes(directory))
-            return Rows(columns, units, values, ending, reason, report, changes=changes)
-        (directory / UNSTARTED).unlink()
-        return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
+    write_whole(directory / PLAN, _dumped(plan))
+    has_rows = _recorded(plan, directory, columns, units, lock, progress, live)
+    report = read_ending(directory, ENDING if has_rows else UNSTARTED)
+    ending, reason = Ending(report["ending"]), report.get("reason", "")
+    if has_rows:
+        values, changes = read_raw(directory)[1], tuple(read_changes(directory))
+        return Rows(columns, units, values, ending, reason, report, changes=changes)
+    (directory / UNSTARTED).unlink()
+    return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
 
 
 def _recorded(

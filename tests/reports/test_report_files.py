@@ -181,7 +181,8 @@ def test_a_log_that_is_none(ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"bad.{ending}"
     path.write_text("this is not a log\nat all\n")
     with pytest.raises(
-        InputError, match=r"bad\.\w+:.*(this is no BLF file|is no line of|can't be read as|has no data frames)"
+        InputError,
+        match=r"bad\.\w+:.*(is no BLF file|no line of the file|is no line of|can't be read as|has no data frames)",
     ):
         make_report("response", [path])
 
