@@ -21,6 +21,31 @@ settings.load_profile("judge" if os.environ.get("CI") else "search")
 
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
+# The folders whose tests start no loop, hub or machine: they may run side by side. All others run one by one.
+TOGETHER = {
+    *("checks", "controllers", "core", "experiment", "interface", "interpolators", "models", "motion", "nc", "paths"),
+    *("reports", "results", "signals"),
+}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--part` chooses the tests that may run beside each other, or those that may not."""
+    parser.addoption("--part", choices=("together", "alone"), help="tests that may run beside others, or the rest")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the tests of the other part."""
+    part, here = config.getoption("--part"), Path(__file__).parent
+    if part is None:
+        return
+
+    def is_chosen(item: pytest.Item) -> bool:
+        together = item.path.relative_to(here).parts[0] in TOGETHER and "realtime" not in item.keywords
+        return together == (part == "together")
+
+    config.hook.pytest_deselected(items=[item for item in items if not is_chosen(item)])
+    items[:] = [item for item in items if is_chosen(item)]
+
 
 @pytest.fixture
 def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
