@@ -13,6 +13,7 @@ from rds.nc.errors import ProgramError
 
 CHUNK = 1 << 18  # bytes read at once
 LONGEST = 252  # characters of a line, as in LinuxCNC
+_WINDOW = LONGEST + 4  # a block with `;` and a line break, and one character more
 
 
 class Place(NamedTuple):
@@ -76,14 +77,14 @@ class Source:
 
     def read(self) -> bytes:
         """The next block, with the line break that ends it; b"" at the end."""
-        end = self.buffer.find(b"\n", self.at) + 1
-        if not end:
-            if not self.fill():
-                return b""
-            end = self.buffer.find(b"\n", self.at) + 1 or len(self.buffer)
-        raw = self.buffer[self.at : end]
-        if self._semicolons and (cut := _block_end(raw)):
-            raw = raw[:cut]
+        raw = self._short_block() if self._semicolons else b""
+        if not raw:
+            end = self.buffer.find(b"\n", self.at) + 1
+            if not end:
+                if not self.fill():
+                    return b""
+                end = self.buffer.find(b"\n", self.at) + 1 or len(self.buffer)
+            raw = self.buffer[self.at : end]
         self.place = place = self._next
         self.line, self.column = place.line, place.column
         self.at += len(raw)
@@ -92,6 +93,14 @@ class Source:
         else:
             self._next = Place(place.offset + len(raw), place.line, place.column + len(raw))
         return raw
+
+    def _short_block(self) -> bytes:
+        """The next block up to its `;` when it is not too long: of a long line only so much is looked at."""
+        if self.buffer.find(b"\n", self.at, self.at + _WINDOW) < 0 and len(self.buffer) - self.at < _WINDOW:
+            self.fill()
+        line, end, _ = self.buffer[self.at : self.at + _WINDOW].partition(b"\n")
+        line += end
+        return line[: _block_end(line)]
 
     def skip(self, size: int, lines: int) -> None:
         """`size` bytes of the buffer, which are `lines` whole lines, have been taken by someone else."""

@@ -26,7 +26,7 @@ DIALECTS = (
     Dialect(max_jumps=100),
     Dialect(block_delete=True, gr=True, max_jumps=100),
     Dialect(program_numbers=True, max_jumps=100),
-    Dialect(inch_machine=True, max_jumps=100),
+    Dialect(inch_machine=True, any_exit=True, max_jumps=100),
 )
 
 
