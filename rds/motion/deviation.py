@@ -29,8 +29,8 @@ def deviation(position: np.ndarray, path: np.ndarray, segment: np.ndarray, share
 
 
 def allowed(path: np.ndarray, tolerance: float) -> np.ndarray:
-    """mm or degrees by which the motion may leave each segment: P (or `tolerance`) and Q of G64; else nothing."""
-    cut = np.where(np.isfinite(path["tolerance"]), path["tolerance"], tolerance) + path["collinear"]
+    """mm or degrees by which the motion may leave each segment: the larger of P (or `tolerance`) and Q of G64, or 0."""
+    cut = np.maximum(np.where(np.isfinite(path["tolerance"]), path["tolerance"], tolerance), path["collinear"])
     return np.where(path["mode"] == BLEND, cut, 0.0)
 
 

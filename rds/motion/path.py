@@ -3,7 +3,8 @@
 A corner between two segments in mode BLEND becomes a quintic polynomial that leaves the one and reaches the other with
 their position, tangent and curvature, at most the tolerance away from them: for two lines that meet at unit tangents
 t₀ and t₁ and a blend from −d to d its derivative goes over from t₀ to t₁ as 3x² − 2x³, and it is 3/16 d |t₁ − t₀| from
-the corner at most.
+the corner at most. Lines are joined within Q of G64 as far as that leaves half of P, and corners get what joining left
+over: so the motion is off the path by P at most, or by Q where that is more.
 """
 
 from __future__ import annotations
@@ -55,27 +56,26 @@ def gap(a, b):
 
 
 @kernel
-def _in_line(begin, ends, first, last, within, nearest):
-    """Whether the ends first to last−1 are in order along the line from `begin` to ends[last], and near it."""
+def _off_line(begin, ends, first, last, nearest):
+    """How far the ends first to last−1 are from the line from `begin` to ends[last]; inf if not in order along it."""
     total = 0.0
     for i in range(6):
         total += (ends[last, i] - begin[i]) ** 2
     if total == 0.0:
-        return False
-    before = 0.0
+        return inf
+    before, off = 0.0, 0.0
     for k in range(first, last):
         along = 0.0
         for i in range(6):
             along += (ends[k, i] - begin[i]) * (ends[last, i] - begin[i])
         along /= total
         if along < before or along > 1.0:
-            return False
+            return inf
         before = along
         for i in range(6):
             nearest[i] = begin[i] + along * (ends[last, i] - begin[i])
-        if gap(ends[k], nearest) > within:
-            return False
-    return True
+        off = max(off, gap(ends[k], nearest))
+    return off
 
 
 @kernel
@@ -168,7 +168,7 @@ def build(
     zero: Any = np.int64(0)  # not the literal, for each of which numba would compile what is called with it
     count = done = i = zero
     front, distance = state[0], state[1]
-    held, old, held_first, held_last = False, 0, zero, zero
+    held, old, held_first, held_last, held_room = False, 0, zero, zero, 0.0
     here = point.copy()
     begin = point.copy()  # where the held piece begins
     while i < n:
@@ -176,18 +176,22 @@ def build(
         # what belongs together: a tiny way with what follows, lines that are one
         while i + 1 < n and not rest[i] and gap(here, end[i]) < TINY and plane[i] == LINE:
             i += 1
-        last = i
+        last, off = i, 0.0
         if plane[last] == LINE and mode[last] == BLEND and collinear[last] > 0.0 and rate[last] < inf:
+            most = max(tolerance[last], collinear[last])
+            within = min(collinear[last], most - 0.5 * tolerance[last])  # half is left for the corners
             joinable = True
             while joinable and last + 1 < n and last + 1 - first < MOST_JOINED and not rest[last]:
                 k = last + 1
                 joinable = plane[k] == LINE and mode[k] == BLEND and rate[k] == rate[last]
                 joinable = joinable and collinear[k] == collinear[last] and tolerance[k] == tolerance[last]
-                joinable = joinable and _in_line(here, end, first, k, collinear[last], work[1])
+                away = _off_line(here, end, first, k, work[1]) if joinable else inf
+                joinable = joinable and away <= within
                 if joinable:
-                    last = k
+                    last, off = k, away
             if joinable and last + 1 == n and not final and not rest[last] and n - first < MOST_JOINED:
                 break  # it may go on
+        room = min(tolerance[last], max(tolerance[last], collinear[last]) - off)
         programmed = 0.0
         for k in range(first, last + 1):
             programmed += length[k]
@@ -229,9 +233,9 @@ def build(
                     size_0 += d0[k] ** 2
                     size_1 += d1[k] ** 2
                 stops = cosine < SHARP * sqrt(size_0 * size_1)
-                within = min(tolerance[held_last], tolerance[last])
-                if not stops and within > 0.0:
-                    half = _blend_half(g, w, f, u, within, work)
+                left = min(held_room, room)
+                if not stops and left > 0.0:
+                    half = _blend_half(g, w, f, u, left, work)
             if not stops and half == 0.0:
                 evaluate(g, w[KIND], w[AXIS_1], w[AXIS_2], g[LENGTH], p0, d0, dd)
                 evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], 0.0, p1, d1, dd)
@@ -248,7 +252,7 @@ def build(
                 count = _emit(out, ints, count, b, blend, held_first, last, zero, taken, work)
             front = half
             distance += size * ratio
-        done, held, held_first, held_last, old = first, True, first, last, new
+        done, held, held_first, held_last, held_room, old = first, True, first, last, room, new
         begin[:] = here
         here[:] = end[last]
         i = last + 1

@@ -98,9 +98,26 @@ def test_lines_that_are_nearly_one_are_taken_as_one_with_q() -> None:
     joined = wave(6000, 0.01, collinear=0.01)
     slow, _, _ = planned(dense)
     fast, certificate, _ = planned(joined)
-    assert certificate.ok  # within P + Q
+    assert certificate.ok  # within P
     assert certificate.worst["deviation", ""].value > 0.001
     assert len(fast) < 0.8 * len(slow)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_joining_and_blending_together_stay_within_p(seed: int) -> None:
+    """G64 P without Q: lines are joined within the same tolerance, but the two don't add up."""
+    chance = np.random.default_rng(seed)
+    lengths = 0.5 * 10.0 ** chance.uniform(-1.0, 1.0, 100)
+    turns = np.cumsum(chance.choice([0.05, 0.3, 1.0], 100) * chance.normal(size=100))
+    points = np.cumsum(lengths[:, None] * np.column_stack((np.cos(turns), np.sin(turns))), axis=0)
+    path = polygon(points, 10.0, mode=BLEND, tolerance=0.5, collinear=0.5)
+    motion, certificate, _ = planned(path)
+    assert certificate.ok
+    a, way = path["start"][:, :2], (path["end"] - path["start"])[:, :2]
+    p = motion.position[:, None, :2]
+    share = np.clip(((p - a) * way).sum(axis=2) / (way**2).sum(axis=1), 0.0, 1.0)
+    off = np.linalg.norm(p - a - share[..., None] * way, axis=2).min(axis=1)
+    assert 0.1 < off.max() <= 0.5 + 1e-6
 
 
 def test_a_straight_move_takes_the_time_of_the_seven_phases() -> None:
