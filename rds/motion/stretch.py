@@ -42,6 +42,7 @@ class Stretch:
 
     def _begin(self) -> None:
         self._place, self._speed, self._time = 0.0, 0.0, 0.0  # where the profile is known to
+        self._passed = 0  # pieces before this place
         self._next = 1  # sample of the stretch
         self._window = WINDOW
         self._rows = np.empty((0, 5))
@@ -60,9 +61,8 @@ class Stretch:
         pieces).
         """
         while True:
-            at = np.concatenate(([0.0], np.cumsum(self._f[:, LENGTH])))
-            current = max(int(np.searchsorted(at, self._place, side="right")) - 1, 0)
-            last = current + self._window
+            last = self._passed + self._window
+            at = np.concatenate(([0.0], np.cumsum(self._f[:last, LENGTH])))
             rests = np.flatnonzero(self._u[:last, REST])
             if len(rests):
                 count, ends = int(rests[0]) + 1, True
@@ -138,7 +138,8 @@ class Stretch:
         self._time -= whole * self._T
         self._next -= whole
         needed = float(self._rows[0, PLACE]) - 2.0 * self._reach
-        gone = int(np.searchsorted(at, needed, side="right")) - 1
+        gone = max(int(np.searchsorted(at, needed, side="right")) - 1, 0)
+        self._passed = max(int(np.searchsorted(at, self._place, side="right")) - 1 - gone, 0)
         if gone > 0:
             self._f, self._u = self._f[gone:], self._u[gone:]
             self._rows[:, PLACE] -= at[gone]
