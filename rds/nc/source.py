@@ -134,7 +134,7 @@ class Source:
 
 
 def _block_end(raw: bytes) -> int:
-    """Bytes up to and with the first `;` outside of a comment; 0 when there is none."""
+    """Bytes up to and with the first `;` outside of a comment, and a line break right after; 0 when there is none."""
     comment = False
     for index, byte in enumerate(raw):
         if comment:
@@ -143,7 +143,7 @@ def _block_end(raw: bytes) -> int:
             comment = True
         elif byte == 59:
             rest = raw[index + 1 :]
-            return len(raw) if rest.isspace() else index + 1
+            return len(raw) if rest.isspace() and rest.endswith(b"\n") else index + 1
     return 0
 
 

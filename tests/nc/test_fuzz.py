@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from .fuzz_targets import TARGETS
+from rds.nc import Dialect
+
+from .fuzz_targets import TARGETS, same
 
 pytest.importorskip("numba", reason="without numba (extra fast) there is no second way of reading to compare with")
 
@@ -18,6 +20,11 @@ CASES = sorted((Path(__file__).parent / "fuzz_cases").iterdir())
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_what_was_found_before(case: Path) -> None:
     TARGETS[case.name.partition("-")[0]](case.read_bytes())
+
+
+def test_blanks_between_blocks_count_to_no_block() -> None:
+    program = b"G0 X1" + b" " * 100 + b";" + b" " * 240 + b"X2;" + b" " * 9 + b"\nM2;\n"
+    assert same(program, Dialect(program_numbers=True))["fault"] is None
 
 
 # Pieces of the language, in any order and number.
