@@ -27,7 +27,7 @@ def interpolate(
     line: Annotated[
         str | None, typer.Option(help="Straight moves over points, mm: 0,0:30,40 or 0,0,0:10,0,5:20,0,0.")
     ] = None,
-    arc: Annotated[str | None, typer.Option(help="An arc START:END:CENTRE, mm: 10,0:0,10:0,0.")] = None,
+    arc: Annotated[str | None, typer.Option(help="An arc by start, end and centre, mm: 10,0:0,10:0,0.")] = None,
     clockwise: Annotated[bool, typer.Option("--clockwise", help="With --arc: the other way round.")] = False,
     plane: Annotated[str | None, typer.Option(help="With --arc of three axes: XY (default), ZX or YZ.")] = None,
     feed: Annotated[

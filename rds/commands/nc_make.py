@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
@@ -22,7 +23,15 @@ app = typer.Typer(
     help="Make a part program of a line, a quadrilateral, an arc, a spiral cone, points or a drawing.",
 )
 
-Feed = Annotated[float, typer.Option("--feed", "-f", help="Feed rate along the path, mm/min.")]
+
+def _feed(value: float) -> float:
+    """Refused here and not by the makers, which take and name mm/s."""
+    if not 0 < value < math.inf:
+        raise typer.BadParameter(f"{value:g} must be a number above 0, in mm/min")
+    return value
+
+
+Feed = Annotated[float, typer.Option("--feed", "-f", callback=_feed, help="Feed rate along the path, mm/min.")]
 Centre = Annotated[str, typer.Option(help="Centre x,y in mm.")]
 Depth = Annotated[float, typer.Option(help="Depth below z = 0, mm.")]
 

@@ -45,7 +45,8 @@ def centre_offsets(words: dict[str, float], state: State, key: str) -> tuple[flo
         raise Fault(f"an arc needs its centre ({names} in {plane}) or its radius R; add them", key)
     if third in words:
         raise Fault(
-            f"{third.upper()} is no centre of an arc in the plane of {plane}; use {names} or G17, G18, G19", third
+            f"{third.upper()} is no centre of an arc in the plane of {plane}; use {names}, or another plane before",
+            third,
         )
     if state.arc_absolute:
         for letter in (first, second):

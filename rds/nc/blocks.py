@@ -202,7 +202,7 @@ def check(block: Block, state: State) -> None:
         if not used and letter == "p" and not g and not block.m and len(words) == 1:
             raise Fault(
                 "P alone, a program number of oacs-thesis, is an option of the dialect; switch it on"
-                " (program_numbers) or leave it away",
+                " (`--with program-numbers`) or leave it away",
                 letter,
             )
         if not used:

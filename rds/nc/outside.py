@@ -40,7 +40,8 @@ _LETTERS = {
     "^": "polar coordinates are outside this dialect; write X and Y, for example X[10*COS[30]]",
     "$": "there is one spindle; leave $ away",
     "n": "a line number stands first on its line; move it there",
-    "o": "an O word stands first on its line, after N; write a line of its own",
+    "o": "an O word stands first on its line, after N; write a line of its own, or the digit 0 if that is meant",
+    ",": "no word begins with ','; write a decimal point, 10.5, and blanks between words",
     "%": "% stands alone on the first and the last line; remove it here",
     "/": "/ stands first on its line; remove it here",
     ")": "a comment is closed that was not opened; add ( or remove )",
@@ -51,7 +52,8 @@ _LETTERS = {
 }
 
 GR_IS_OFF = (
-    "GR, the subroutine call of dcs-thesis, is an option of the dialect; switch it on (gr) or write O<name> CALL"
+    "GR, the subroutine call of dcs-thesis, is an option of the dialect; switch it on (`--with gr`)"
+    " or write O<name> CALL"
 )
 
 

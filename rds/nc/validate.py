@@ -91,8 +91,8 @@ class Validation:
                 for axis in self.low
             )
             return (
-                f"{self.program}: {self.machine} can run it: {self.segments} moves, {self.cutting:.6g} mm at feed, "
-                f"{self.rapid:.6g} mm rapid; {reach or 'nothing moves'}"
+                f"{self.program}: {self.machine} can run it: {self.segments} move{'s' * (self.segments != 1)}, "
+                f"{self.cutting:.6g} mm at feed, {self.rapid:.6g} mm rapid; {reach or 'nothing moves'}"
             )
         lines = [str(fault) for fault in self.faults]
         if self.more:
