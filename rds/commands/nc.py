@@ -221,7 +221,7 @@ def time(
             found = cycle_time(motion(file, of, what, bar("plan")), of, sample_period)
     if json:
         print_json({"program": str(file), "machine": of.name, **found.to_json()})
-        return
+        raise typer.Exit(0 if found.certificate.ok else 1)
     from rds.console import show_table
 
     shares = [(str(tool) if tool else "none", share) for tool, share in found.by_tool.items()]
@@ -230,6 +230,8 @@ def time(
     rows = [[tool, *(f"{value:.3f}" for value in share.seconds)] for tool, share in shares]
     title = f"{file}: {_clock(found.total)} on {of.name}, {found.samples} samples of {found.T:g} s"
     show_table(title, ["tool", "cutting [s]", "rapid [s]", "dwell [s]", "total [s]"], rows)
+    typer.echo(found.certificate.sentence())
+    raise typer.Exit(0 if found.certificate.ok else 1)
 
 
 def _clock(seconds: float) -> str:

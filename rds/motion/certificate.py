@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.errors import RdsError
 from rds.motion.deviation import allowed, deviation
 from rds.motion.limits import Limits
 from rds.motion.planner import TOLERANCE
@@ -18,6 +19,7 @@ KINDS = ("velocity", "acceleration", "jerk")
 EXCESS = 1e-6  # by which a limit may be exceeded, relative
 ROUNDING = 4.0 * np.finfo(float).eps  # of a position, relative: what differences of samples can see of it is allowed
 OFF_PATH = 1e-6  # mm or degrees: what is shorter is not told apart on the path
+NAMED = 5  # violations in an error
 LISTED = 100  # violations that are kept; all are counted
 BINS = 2048  # of the trace
 
@@ -76,6 +78,14 @@ class Certificate:
     def ok(self) -> bool:
         """Whether every sample keeps every limit."""
         return self.count == 0
+
+    def require(self, name: str) -> None:
+        """RdsError with the first violations, by line of the program `name`, unless every limit is kept."""
+        if self.ok:
+            return
+        first = [f"{name}: {violation}" for violation in self.violations[:NAMED]]
+        more = [f"{name}: and {self.count - NAMED} more"] if self.count > NAMED else []
+        raise RdsError("\n".join([f"{name}: the planned motion breaks its limits, and is not run", *first, *more]))
 
     @property
     def time(self) -> float:
@@ -195,6 +205,19 @@ class Certificate:
             "violations": [vars(violation).copy() for violation in self.violations],
             "violation_count": self.count,
         }
+
+    def sentence(self) -> str:
+        """The certificate for people: verdict, and how close the motion comes to its limits."""
+        if not self.ok:
+            return f"The planned motion breaks its limits in {self.count} places; first: {self.violations[0]}."
+        shares = [(worst.share, kind, axis, worst.line) for (kind, axis), worst in self.worst.items() if axis]
+        share, kind, axis, line = max(shares, default=(0.0, "velocity", "none", 0))
+        away = self.worst.get(("deviation", ""), Worst())
+        return (
+            f"Certificate: all {self.samples} planned samples keep the velocity, acceleration and jerk of every axis "
+            f"(at most {100.0 * share:.1f} %: {kind} of {axis} in line {line}) and the tolerance of the path "
+            f"(at most {away.value:.4f} mm off, in line {away.line})."
+        )
 
     def plot(self, path: Any = None) -> Any:
         """The matplotlib figure of the shares of the limits over time; saved at `path` if given."""

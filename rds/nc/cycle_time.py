@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.machines import Machine
+from rds.motion.certificate import Certificate, certified
 from rds.motion.limits import Limits
 from rds.motion.planner import plan
 from rds.motion.samples import SampleBlock
@@ -42,12 +43,13 @@ class Share:
 class CycleTime:
     """The predicted time of a program: `samples` of `T` s, which are those that are run; stops (M0, M1) end at once.
 
-    by_tool: the shares of each tool, in the order of use (0: before the first one).
+    by_tool: the shares of each tool, in the order of use (0: before the first one). certificate: of all samples.
     """
 
     samples: int
     T: float
     by_tool: dict[int, Share]
+    certificate: Certificate
 
     @property
     def total(self) -> float:
@@ -63,7 +65,13 @@ class CycleTime:
     def to_json(self) -> dict[str, Any]:
         """As plain dicts and numbers, times in s."""
         tools = {str(tool): share.to_json() for tool, share in self.by_tool.items()}
-        return {"samples": self.samples, "sample_period_s": self.T, **self.whole.to_json(), "by_tool": tools}
+        return {
+            "samples": self.samples,
+            "sample_period_s": self.T,
+            **self.whole.to_json(),
+            "by_tool": tools,
+            "certificate": self.certificate.to_dict(),
+        }
 
 
 def cycle_time(blocks: Iterable[PathBlock], machine: Machine, T: float | None = None) -> CycleTime:
@@ -76,7 +84,9 @@ def cycle_time(blocks: Iterable[PathBlock], machine: Machine, T: float | None = 
     counts: dict[int, list[int]] = {}
     dwells: list[tuple[int, int, int]] = []  # samples, from and up to, and the tool
     samples = 0
-    for block in plan(tools.watch(blocks), Limits.of(machine), T, start=np.zeros(6)):
+    limits = Limits.of(machine)
+    certificate = Certificate(limits)
+    for block in certified(plan(tools.watch(blocks), limits, T, start=np.zeros(6)), certificate):
         number = np.arange(block.first, block.first + len(block))
         for at, event in block.events:
             if event.kind == "dwell":
@@ -91,7 +101,9 @@ def cycle_time(blocks: Iterable[PathBlock], machine: Machine, T: float | None = 
             for what, count in enumerate(np.bincount(kind[tool == used], minlength=3).tolist()):
                 mine[what] += count
         samples += len(block)
-    return CycleTime(samples, T, {tool: Share(*(count * T for count in mine)) for tool, mine in counts.items()})
+    return CycleTime(
+        samples, T, {tool: Share(*(count * T for count in mine)) for tool, mine in counts.items()}, certificate
+    )
 
 
 def _rapid(block: SampleBlock) -> np.ndarray:

@@ -33,6 +33,7 @@ def judged(result: Result, prepared: Prepared) -> Result:
     about = {
         "file": prepared.file.name,
         **_times(result, prepared, state),
+        "certificate": prepared.certificate.to_dict() if prepared.certificate else None,
         "contour_error": _worst(error, line, result["time"], "mm") if len(prepared.path) else None,
         "following_error": {
             name: _worst(

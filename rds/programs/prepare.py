@@ -11,6 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.machines import Machine
+from rds.motion.certificate import Certificate, certified
 from rds.motion.limits import Limits
 from rds.motion.planner import PASSING, plan
 from rds.motion.samples import SampleBlock
@@ -41,6 +42,7 @@ class Prepared:
     segment: np.ndarray
     T: float
     notes: tuple[str, ...] = ()
+    certificate: Certificate | None = None  # of the planned samples
 
     @property
     def seconds(self) -> float:
@@ -68,11 +70,12 @@ def prepare(
 
 
 def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path) -> Prepared:
-    """The motion of blocks that the machine can run; see `prepare`."""
+    """The motion of blocks that the machine can run; see `prepare`. RdsError if a sample breaks a limit."""
     limits = Limits.of(machine)
     path: list[np.ndarray] = []
     rows = _Rows([AXES.index(name) for name in machine.axes if name in AXES])
-    for block in plan(_kept(blocks, path), limits, T):
+    certificate = Certificate(limits)
+    for block in certified(plan(_kept(blocks, path), limits, T), certificate):
         rows.add(block)
         if rows.count > MOST_SAMPLES:
             raise InputError(
@@ -81,6 +84,7 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
             )
     if not rows.count:
         raise InputError("nothing in it moves or waits: there is nothing to run", str(file))
+    certificate.require(str(file))
     position, velocity, acceleration, line, segment = rows.columns()
     axes = tuple(AXES[i] for i in rows.axes)
     spindle = next((axis.name for axis in machine.axes.values() if axis.unit == SPINDLE_UNIT), None)
@@ -107,7 +111,7 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
         [f"{machine.name} has no coolant to switch: M7, M8 and M9 do nothing ({_lines(coolant)})"] if coolant else []
     )
     whole = np.concatenate(path) if path else np.zeros(0, SEGMENT)
-    return Prepared(file, program, whole, segment, T, tuple(notes))
+    return Prepared(file, program, whole, segment, T, tuple(notes), certificate)
 
 
 class _Rows:

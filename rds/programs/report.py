@@ -58,8 +58,12 @@ def program_report(result: Result, prepared: Prepared) -> Report:
             _following(about, text),
             *([_changes(result)] if result.meta.get("changes") else []),
         ],
-        figures={"path": partial(path, result, prepared), "along the program": partial(along, result, prepared)},
-        findings=[*findings(about), *map(str, result.meta.get("notes", ()))],
+        figures={
+            "path": partial(path, result, prepared),
+            "along the program": partial(along, result, prepared),
+            **({"certificate": prepared.certificate.plot} if prepared.certificate else {}),
+        },
+        findings=[*findings(about), *_certified(prepared), *map(str, result.meta.get("notes", ()))],
     )
 
 
@@ -83,6 +87,10 @@ def findings(about: dict[str, Any]) -> list[str]:
     else:
         said.append(f"It moved for {moving:.3f} s instead of {predicted:.3f} s: the override was not 100 % throughout.")
     return said
+
+
+def _certified(prepared: Prepared) -> list[str]:
+    return [prepared.certificate.sentence()] if prepared.certificate else []
 
 
 def _times(about: dict[str, Any]) -> Table:

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.core.errors import InputError
+from rds.core.errors import InputError, RdsError
 from rds.motion import Limits, plan, predicted_time
+from rds.motion.certificate import Certificate, certified
 from rds.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT, arc, chain, line, point_at
 
 from .chains import MACHINES, Event, PathBlock, chains, planned, polygon
@@ -91,6 +92,20 @@ def test_dense_polylines_do_not_crawl() -> None:
         motion, certificate, _ = planned(path)
         assert certificate.ok
         assert path["length"].sum() / (len(motion) * T) > least  # mm/s on average, of 10
+
+
+def test_a_motion_that_breaks_its_limits_is_refused_by_line() -> None:
+    motion, certificate, _ = planned(polygon(SQUARE, 10.0))
+    certificate.require("part.ngc")
+    assert f"all {len(motion)} planned samples keep" in certificate.sentence()
+    slower = Certificate(Limits.from_axes({"X": (13, 200, 1e4), "Y": (9, 200, 1e4)}))
+    for _block in certified([motion], slower):
+        pass
+    assert slower.sentence().startswith(
+        f"The planned motion breaks its limits in {slower.count} places; first: line 2:"
+    )
+    with pytest.raises(RdsError, match=r"part.ngc: line 2: velocity of Y is .* at most 9 is allowed"):
+        slower.require("part.ngc")
 
 
 def test_lines_that_are_nearly_one_are_taken_as_one_with_q() -> None:

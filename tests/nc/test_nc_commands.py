@@ -155,6 +155,8 @@ def test_time_is_that_of_the_planner(folder: Path) -> None:
     assert found["samples"] == round(planned / 0.001)
     assert found["cutting_s"] + found["rapid_s"] + found["dwell_s"] == pytest.approx(planned)
     assert found["dwell_s"] == pytest.approx(0.25)
+    certificate = found["certificate"]
+    assert certificate["ok"] and certificate["samples"] == found["samples"]
     tools = found["by_tool"]
     assert set(tools) == {"1", "2"} and tools["1"]["dwell_s"] == 0.0
     assert tools["2"]["cutting_s"] == pytest.approx(3 / (300 / 60), rel=0.5)  # 3 mm at 5 mm/s, and the ramps

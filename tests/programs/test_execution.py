@@ -236,3 +236,11 @@ def test_blends_are_followed_too() -> None:
 def test_nothing_to_run_is_refused() -> None:
     with pytest.raises(InputError, match="nothing in it moves or waits"):
         planned([PathBlock(np.zeros(0, SEGMENT))], MACHINE, T, Path("empty.ngc"))
+
+
+def test_the_certificate_of_the_planned_samples_goes_with_them() -> None:
+    corner = chain(line((0, 0, 0), (5, 0, 0), 10.0, program_line=1), line((5, 0, 0), (5, 5, 0), 10.0, program_line=2))
+    found = prepared(corner)
+    assert found.certificate is not None and found.certificate.ok
+    assert found.certificate.samples == found.program.samples
+    assert found.certificate.worst["velocity", "Y"].line == 2
