@@ -119,8 +119,8 @@ class Execution:
         """Whether nothing will happen until somebody at the desk does something."""
         if self._values[STOP] or self._values[HOME] or self.ending is not None:
             return False
-        if self.state in (State.STOP, State.TOOL):
-            return self._values[RESUME] == self._resumed
+        if self.state in (State.STOP, State.TOOL):  # one sample of it is taken first, for others to see
+            return self._shown is self.state and self._values[RESUME] == self._resumed
         return self.state is State.HELD and self._wanted() == 0.0
 
     # --- one sample -----------------------------------------------------------------------------------------------

@@ -1,0 +1,288 @@
+"""Part programs run: the same in simulation and emulation, with somebody at the desk, in every mode."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rds
+from rds.programs.prepare import prepare
+from rds.programs.report import findings, program_report, save_run
+from rds.programs.run import PartProgram, ProgramRun
+from rds.runtime.execution import State
+
+PERIOD = 0.002  # s: with room for a busy computer
+STOP_LINE = 7
+
+
+def wait_for(condition: Callable[[], Any], timeout: float = 60.0) -> Any:
+    deadline = time.monotonic() + timeout
+    while not (found := condition()):
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.01)
+    return found
+
+
+def reaches(run: ProgramRun, state: State) -> None:
+    """Wait until the run is in a state."""
+    wait_for(lambda: run.done or ((status := run.status()) is not None and status.state is state))
+    assert not run.done, run.wait().meta
+
+
+def same(a: rds.Result, b: rds.Result) -> bool:
+    """Whether all columns of a are those of b, bit for bit."""
+    return len(a) == len(b) and all((a[name] == b[name]).all() for name in a.columns)
+
+
+# --- simulations --------------------------------------------------------------------------------------------------
+
+
+def test_the_same_program_gives_the_same_samples(part: Path) -> None:
+    assert same(PartProgram(part).run(), PartProgram(part).run())
+
+
+def test_the_predicted_time_is_the_executed_one(part: Path) -> None:
+    program = PartProgram(part)
+    about = program.run().meta["program"]
+    assert about["completed"]
+    assert about["moving_samples"] == about["predicted_samples"] == program.prepared.program.samples
+    assert about["executed_s"] == pytest.approx(about["predicted_s"] + about["spindle_s"] + about["stops_s"])
+    slower = program.run(changes=[(0.0, "override", 0.5)]).meta["program"]
+    assert slower["moving_samples"] > 1.5 * about["moving_samples"]
+    assert "the override was not 100 % throughout" in " ".join(findings(slower))
+
+
+def test_all_axes_and_the_spindle_run_under_their_controllers(part: Path, tmp_path: Path) -> None:
+    result = PartProgram(part).run()
+    assert result.axes == ["X", "Y", "Z", "spindle"]
+    names = {name: law["name"] for name, law in result.meta["controller"].items()}
+    assert names == {"X": "tracking", "Y": "tracking", "Z": "tracking", "spindle": "pid"}
+    assert result["spindle_reference"].max() == 2000.0
+    cuts = result["program_sample"] > 0.0
+    assert np.abs(result["spindle_measured"][cuts] - 2000.0).max() <= 0.02 * 2000.0
+    (tmp_path / "laws.toml").write_text(
+        '[controller]\nname = "p"\n[axis.Y.controller]\nname = "pid"\n'
+        '[axis.spindle.controller]\nname = "p"\nPgain = 0.1\n'
+    )
+    mixed = PartProgram(part, experiment=tmp_path / "laws.toml").run()
+    names = {name: law["name"] for name, law in mixed.meta["controller"].items()}
+    assert names == {"X": "p", "Y": "pid", "Z": "p", "spindle": "p"}
+
+
+def test_the_contour_error_is_the_distance_to_the_path(part: Path) -> None:
+    """Line 5 runs along X at Y = 0, Z = −0.5; line 6 is the circle of radius 2 about (2, −2)."""
+    result = PartProgram(part).run()
+    x, y, z = (result[f"{name}_measured"] for name in "XYZ")
+    straight = np.flatnonzero((result["program_line"] == 5) & (x > 0.2) & (x < 1.9))
+    expected = np.hypot(y, z + 0.5)[straight]
+    assert result["contour_error"][straight] == pytest.approx(expected, abs=1e-12)
+    curved = np.flatnonzero((result["program_line"] == 6) & (x > 2.2) & (x < 3.8))
+    expected = np.hypot(np.hypot(x - 2.0, y + 2.0) - 2.0, z + 0.5)[curved]
+    assert result["contour_error"][curved] == pytest.approx(expected, abs=1e-12)
+    worst = result.meta["program"]["contour_error"]
+    assert worst["max"] == result["contour_error"].max()
+    assert 4 <= worst["line"] <= 9
+    following = result.meta["program"]["following_error"]["X"]
+    assert following["max"] == np.abs(result["X_reference"] - x).max()
+
+
+@pytest.mark.parametrize(
+    ("program", "said"),
+    [
+        ("G1 X500 F600\nM2\n", r"p\.ngc:1:.*X"),
+        ("G1 X5 A3 F600\nM2\n", r"p\.ngc:1:.*A"),
+        ("G1 X5\nM2\n", r"p\.ngc:1:.*feed"),
+    ],
+)
+def test_what_cannot_run_is_refused(program: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "p.ngc").write_text(program)
+    with pytest.raises(rds.InputError, match=said):
+        PartProgram(tmp_path / "p.ngc")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ('[reference]\nkind = "sinusoid"\n', "the part program says what the axes do: remove reference"),
+        ('axis = "X"\n', "names an axis; the part program drives all of them"),
+        ('[axis.Y.reference]\nkind = "sinusoid"\n', "the part program says what the axes do: remove reference"),
+        ('[axis.A.controller]\nname = "p"\n', "the program drives X, Y, Z, spindle, and no axis 'A'"),
+        ('mode = "system-test"\n', "mode system-test has no controllers"),
+        ("duration = 3.0\n", "remove duration"),
+    ],
+)
+def test_words_that_do_not_go_with_a_program_are_refused(part: Path, tmp_path: Path, words: str, said: str) -> None:
+    (tmp_path / "e.toml").write_text(words)
+    with pytest.raises(rds.InputError, match=said):
+        PartProgram(part, experiment=tmp_path / "e.toml")
+
+
+def test_a_current_compiled_program_is_used(part: Path) -> None:
+    machine = rds.load_machine("mini-cnc")
+    first = prepare(part, machine)
+    stamp = part.with_suffix(".dat").stat().st_mtime_ns
+    again = prepare(part, machine)
+    assert part.with_suffix(".dat").stat().st_mtime_ns == stamp
+    assert (again.program.position == first.program.position).all()
+
+
+def test_a_machine_without_coolant_says_so(part: Path) -> None:
+    part.write_text(part.read_text().replace("M3", "M3\nM8"))
+    assert "mini-cnc has no coolant to switch" in PartProgram(part).run().meta["notes"][0]
+
+
+def test_the_report_says_where_it_is_worst(part: Path, tmp_path: Path) -> None:
+    program = PartProgram(part)
+    result = program.run(changes=[(0.5, "hold", 1), (0.7, "hold", 0)])
+    files = save_run(result, program.prepared, tmp_path / "out")
+    page = files["program"].read_text()
+    worst = result.meta["program"]["contour_error"]
+    assert f"{worst['max']:.4f} mm off the programmed path, in line {worst['line']}" in page
+    assert part.read_text().splitlines()[worst["line"] - 1] in page
+    assert "data:image/png;base64" in page
+    saved = rds.open_result(tmp_path / "out")
+    assert same(saved, result)
+    assert saved.meta["program"] == result.meta["program"]
+    report = program_report(result, program.prepared)
+    times = dict(map(tuple, report.table("Cycle time").rows))
+    assert times["held"] == result.meta["program"]["held_s"] > 0.05
+    assert report.table("Changed while it ran").rows[0] == [0.5, "hold", 0.0, 1.0]
+
+
+def test_a_simulation_with_somebody_at_its_desk_waits_for_him(part: Path) -> None:
+    run = PartProgram(part).start()
+    reaches(run, State.STOP)
+    time.sleep(0.1)
+    taken = run.progress[0]
+    time.sleep(0.1)
+    assert run.progress[0] == taken  # time stands still, and no memory fills
+    run.resume()
+    result = run.wait()
+    assert result.meta["ending"] == "done"
+    assert same(result, PartProgram(part).run(changes=result.meta["changes"]))
+
+
+# --- real time ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.realtime
+def test_an_operated_emulation_is_repeated_by_a_simulation(part: Path, alone: Path) -> None:
+    program = PartProgram(part, sample_period=PERIOD)
+    run = program.start("emulation", out=alone / "run")
+    wait_for(lambda: run.progress[0] > 300)
+    run.hold()
+    reaches(run, State.HELD)
+    held = run.status()
+    assert held is not None and held.feed == 0.0
+    run.override(1.6)
+    run.resume()
+    reaches(run, State.STOP)
+    stopped = run.status()
+    assert stopped is not None and stopped.line == STOP_LINE
+    run.desk.set("X.g1", 1500.0)
+    run.resume()
+    emulated = run.wait()
+    assert emulated.meta["ending"] == "done"
+    assert {name for _, name, _, _ in emulated.meta["changes"]} == {"hold", "resume", "override", "X.g1"}
+    simulated = PartProgram(part, sample_period=PERIOD).run(changes=emulated.meta["changes"])
+    assert same(simulated, emulated)
+
+
+@pytest.mark.realtime
+def test_an_implementation_is_held_and_stopped_on_its_path(part: Path, alone: Path) -> None:
+    run = PartProgram(part, sample_period=PERIOD).start("implementation", out=alone / "run")
+    wait_for(lambda: run.progress[0] > 300)
+    run.hold()
+    reaches(run, State.HELD)
+    run.resume()
+    wait_for(lambda: (status := run.status()) is not None and status.state is State.RUNS)
+    run.stop()
+    result = run.wait()
+    assert result.meta["ending"] == "stopped"
+    assert result.meta["ending_reason"].startswith("stopped in line ")
+    assert not result.meta["program"]["completed"]
+    assert result["contour_error"].max() < 0.3
+    moved = np.abs(np.diff([result[f"{name}_reference"] for name in "XYZ"], axis=1)).max(axis=0)
+    assert moved[-1] < 1e-3
+    assert "X_simulated" in result
+    assert np.abs(result["X_simulated"] - result["X_measured"]).max() < 0.5
+
+
+@pytest.mark.realtime
+def test_an_implementation_goes_home(part: Path, alone: Path) -> None:
+    run = PartProgram(part, sample_period=PERIOD).start("implementation", out=alone / "run")
+    reaches(run, State.STOP)
+    run.home()
+    result = run.wait()
+    assert result.meta["ending_reason"] == f"went home from line {STOP_LINE}"
+    for name in "XYZ":
+        assert result[f"{name}_reference"][-1] == 0.0
+        assert abs(result[f"{name}_measured"][-1]) < 0.1
+    assert result["spindle_reference"][-1] == 0.0
+
+
+OPERATOR = """
+import sys, time
+from rds.programs.run import PartProgram
+run = PartProgram(sys.argv[1], sample_period=0.002).start("implementation", out=sys.argv[2])
+run.ready()
+while run.progress[0] < 300:
+    time.sleep(0.01)
+print("cuts", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.realtime
+def test_a_program_whose_operator_is_killed_comes_to_rest_on_its_path(part: Path, alone: Path) -> None:
+    part.write_text(part.read_text().replace("G1 X2 F600", "G1 X2 F60"))
+    host = subprocess.Popen([sys.executable, "-c", OPERATOR, str(part), "run"], stdout=subprocess.PIPE, text=True)
+    assert host.stdout is not None
+    assert host.stdout.readline() == "cuts\n"
+    host.kill()
+    host.wait()
+    host.stdout.close()
+    wait_for(lambda: (alone / "run" / "ending.json").is_file())
+    left = json.loads((alone / "run" / "ending.json").read_text())
+    assert left["ending"] == "stopped"
+    assert left["reason"].startswith("stopped in line ")
+    record = rds.open_result(alone / "run")
+    moved = [np.abs(np.diff(record[f"{name}_reference"][-3:])).max() for name in "XYZ"]
+    assert max(moved) < 1e-4
+    assert record.meta["changes"][-1][1] == "stop"
+
+
+@pytest.mark.realtime
+def test_a_program_is_operated_from_another_terminal(part: Path, alone: Path) -> None:
+    command = [sys.executable, "-m", "rds.cli", "nc"]
+    host = subprocess.Popen(
+        [*command, "run", str(part), "--mode", "emulation", "--out", "run", "--json"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+    )
+    assert host.stderr is not None
+    said = host.stderr.readline()
+    assert said == f"rds: line {STOP_LINE}: stops; `rds nc operate run --resume` goes on\n"
+    shown = subprocess.run([*command, "operate", "run", "--json"], capture_output=True, text=True, check=True)
+    assert json.loads(shown.stdout)["override"] == 1.0
+    subprocess.run([*command, "operate", "run", "--override", "150", "--resume"], check=True, stdout=subprocess.DEVNULL)
+    out, errors = host.communicate(timeout=120)
+    found = json.loads(out)
+    assert found["ending"] == "done", errors
+    assert found["program"]["completed"]
+    assert [change[1:] for change in found["changes"]] == [["override", 1.0, 1.5], ["resume", 0.0, 1.0]]
+    gone = subprocess.run([*command, "operate", "run", "--hold"], capture_output=True, text=True)
+    assert gone.returncode == 2
+    assert "no run goes on there" in gone.stderr

@@ -1,0 +1,123 @@
+"""`rds nc run` and its document: the commands shown work, every key is named, keys of a terminal do what is said."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import select
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from documents import blocks
+from typer.testing import CliRunner
+
+from rds.cli import app
+from rds.commands.keys import Keys
+from rds.programs.judge import WAITS
+from rds.runtime.execution import State
+from rds.runtime.program import COLUMNS, program_channels
+
+DOCUMENT = "docs/part-programs.md"
+TEXT = (Path(__file__).parents[2] / DOCUMENT).read_text(encoding="utf-8").partition("## Running")[2]
+COMMANDS = [
+    shlex.split(line)[1:] for block in blocks(DOCUMENT) if block.language == "sh" for line in block.text.splitlines()
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_the_commands_of_the_document_work(command: list[str], part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(part.parent)
+    (part.parent / "tools.tbl").write_text("T1 P1 Z12.0 D3.0\n")
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    folder = Path("fast") if "--out" in command else next(Path("runs").iterdir())
+    assert {"program.html", "report.html", "result.csv", "program-path.png"} <= {path.name for path in folder.iterdir()}
+    if "--json" not in command:
+        assert "off the programmed path, in line" in done.stdout
+        return
+    found = json.loads(done.stdout)
+    assert found["program"]["completed"]
+    assert set(found["program"]) - {"file"} <= set(re.findall(r"`(\w+)`", TEXT))
+    assert found["files"]["program"] == str(folder / "program.html")
+
+
+def test_every_column_state_and_live_value_is_named() -> None:
+    named = set(re.findall(r"`(\w+)`", TEXT))
+    assert {*COLUMNS, "contour_error", *WAITS.values()} <= named
+    assert {channel.name for channel in program_channels()} | {"stop"} <= named
+    numbers = re.search(r"`program_state` \| (.*) \|", TEXT)
+    assert numbers
+    assert [int(n) for n in re.findall(r"(?:^|, )(\d)", numbers[1])] == [
+        state for state in State if state != State.OVER
+    ]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--mode", "system-test"], "mode system-test has no controllers"),
+        (["--override", "250"], "less than or equal to 200"),
+        (["--controller", "nonsense"], "nonsense"),
+        (["--controller", "nothing.toml"], "cannot be read"),
+        (["--machine", "nowhere"], "there is no machine 'nowhere'"),
+        (["--tools", "nothing.tbl"], "nothing.tbl"),
+    ],
+)
+def test_refusals(options: list[str], said: str, part: Path) -> None:
+    done = CliRunner().invoke(app, ["nc", "run", str(part), "--out", str(part.parent / "out"), *options])
+    assert done.exit_code == 2
+    assert said in done.output
+    assert not (part.parent / "out").exists()
+
+
+def test_keys_come_one_by_one() -> None:
+    ours, theirs = os.openpty()
+    try:
+        keys = Keys(theirs)
+        assert keys.pressed(0.0) == ""
+        os.write(ours, b" +\n")
+        assert keys.pressed(5.0) == " +\n"
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+@pytest.mark.realtime
+def test_a_terminal_operates_the_run(part: Path, alone: Path) -> None:
+    """In a real terminal: faster, hold, on, and home from the stop."""
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "rds.cli", "nc", "run", str(part), "--mode", "emulation", "--out", "run"]
+    host = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, close_fds=True)
+    os.close(theirs)
+    screen = b""
+
+    def shows(word: str) -> None:
+        nonlocal screen
+        deadline = time.monotonic() + 90.0
+        while word.encode() not in screen:
+            assert time.monotonic() < deadline, screen[-2000:]
+            if select.select([ours], [], [], 0.1)[0]:
+                screen += os.read(ours, 65536)
+        screen = b""
+
+    try:
+        shows(" runs")
+        os.write(ours, b"+ ")
+        shows(" held")
+        os.write(ours, b" ")
+        shows(" stops")
+        os.write(ours, b"h")
+        shows("went home from line 7")
+    finally:
+        host.kill()
+        host.wait()
+        os.close(ours)
+    changes = [line.split(",")[1:] for line in (alone / "run" / "changes.csv").read_text().splitlines()[1:]]
+    assert changes[:2] == [["override", "1.0", "1.1"], ["hold", "0.0", "1.0"]]
+    assert changes[-1] == ["home", "0.0", "1.0"]
