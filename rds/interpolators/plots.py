@@ -10,6 +10,7 @@ from rds.interpolators.reference_word import Steps
 from rds.interpolators.result import Interpolation
 from rds.results.figure import BLUE, CYCLE, GREY, VERMILLION, Picture, dress, legend
 
+_ROUNDING = 1e-6  # mm: a smaller error is rounding, and is drawn as the zero that it is
 _STYLES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
 
 
@@ -72,7 +73,7 @@ def errors(done: Interpolation) -> Picture:
     if worst is not None:
         axes.axhline(scale * worst.blu, color=GREY, linewidth=1.0, linestyle=(0, (1, 1.5)), label="one BLU")
     dress(axes, f"distance from path [{unit}]")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, max(axes.get_ylim()[1], scale * _ROUNDING))
     legend(axes)
     return picture
 
