@@ -12,8 +12,6 @@ from rds.nc import Dialect
 
 from .fuzz_targets import TARGETS, same
 
-pytest.importorskip("numba", reason="without numba (extra fast) there is no second way of reading to compare with")
-
 CASES = sorted((Path(__file__).parent / "fuzz_cases").iterdir())
 
 
