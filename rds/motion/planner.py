@@ -14,6 +14,7 @@ from rds.motion.samples import Rows, SampleBlock
 from rds.motion.segments import AXES, LINE, SEGMENT
 
 TOLERANCE = 0.05  # mm (degrees), of G64 without P; chosen
+LONGEST_RAMP = 1000.0  # s, acceleration over jerk of an axis, over which the motion is averaged
 MARGIN = 1e-3  # relative, kept off the limits for rounding
 PASSING = ("coolant",)  # kinds of events for which the motion does not come to rest
 ENOUGH = 2048  # segments, or samples, that are gathered before they are handed on
@@ -68,6 +69,11 @@ class _Planner:
         self.within = Limits(limits.velocity * share, limits.acceleration * share, limits.jerk * share)
         axes = limits.present
         self.tau = float((limits.acceleration[axes] / limits.jerk[axes]).max()) if axes.any() else T
+        if self.tau > LONGEST_RAMP:
+            raise InputError(
+                f"an axis needs {self.tau:.3g} s to reach its acceleration at its jerk, more than {LONGEST_RAMP:g}; "
+                "raise the jerk of [axis.NAME.limits], or lower the acceleration"
+            )
         self.stretch = Stretch(self.within, self.tau, T)
         self.state = np.array([0.0, 0.0, float(limits.velocity.max())])
         self.point = None if start is None else np.array(start, dtype=float)

@@ -47,10 +47,10 @@ def phases_of(edges, cap, push, v):
         v0, v1 = v[e], v[e + 1]
         top = min(c, sqrt(0.5 * (v0 * v0 + v1 * v1) + a * length))
         up, down = (top * top - v0 * v0) / (2.0 * a), (top * top - v1 * v1) / (2.0 * a)
-        if up < 1e-9 * length:
+        if up < 1e-9 * length and v0 > 0.0:  # at a very slow feed even a ramp from rest is so short
             up, top = 0.0, v0
             down = (top * top - v1 * v1) / (2.0 * a)
-        if down < 1e-9 * length:
+        if down < 1e-9 * length and v1 > 0.0:
             down, top = 0.0, v1
             up = length if top < c and v0 < v1 else min(up, length)
         if up == 0.0 and top < c and v1 < v0:

@@ -17,8 +17,9 @@ def timed(phases, time, place):
     rows = np.empty((len(phases), 5))
     for i in range(len(phases)):
         length, u, w = phases[i, 0], phases[i, 1], phases[i, 2]
-        lasts = 2.0 * length / (u + w)
-        rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4] = time, lasts, place, u, (w - u) / lasts
+        lasts = 2.0 * length / (u + w) if length > 0.0 else 0.0
+        rate = (w - u) / lasts if lasts > 0.0 else 0.0  # so slow that its ramps are shorter than rounding
+        rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4] = time, lasts, place, u, rate
         time += lasts
         place += length
     return rows

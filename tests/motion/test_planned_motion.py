@@ -108,6 +108,18 @@ def test_a_motion_that_breaks_its_limits_is_refused_by_line() -> None:
         slower.require("part.ngc")
 
 
+@pytest.mark.parametrize("rate", [1e-5, 1e-7])
+def test_feeds_whose_ramps_are_shorter_than_rounding_are_planned(rate: float) -> None:
+    motion, certificate, _ = planned(line((0, 0, 0), (1e-2, 0, 0), rate), T=1e-5 / rate)
+    assert certificate.ok
+    assert len(motion) == pytest.approx(1000, abs=25)
+
+
+def test_a_jerk_that_never_gets_anywhere_is_refused() -> None:
+    with pytest.raises(InputError, match="raise the jerk"):
+        planned(line((0, 0, 0), (1, 0, 0), 1.0), Limits.from_axes({"X": (13, 200, 1e-9)}))
+
+
 def test_lines_that_are_nearly_one_are_taken_as_one_with_q() -> None:
     dense = wave(6000, 0.01)
     joined = wave(6000, 0.01, collinear=0.01)
