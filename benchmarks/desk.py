@@ -1,0 +1,75 @@
+"""What live values and a part program cost the loop, per sample, besides the laws of the axes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter_ns
+
+from benchmarks.figures import Figure
+from rds.machines import load_machine
+from rds.motion.segments import arc, chain, line
+from rds.nc.toolpath import Event, PathBlock
+from rds.programs.prepare import planned
+from rds.runtime.changes import Heed, stop_channel
+from rds.runtime.desk import Channel, Desk
+from rds.runtime.execution import Execution
+from rds.runtime.laws import LiveReference
+from rds.runtime.retimed import Retimed
+
+CHANNELS = 40
+ROUNDS = 7
+SAMPLES = 20_000
+LIMIT = 2.0  # µs
+
+
+def run() -> list[Figure]:
+    """Figures in µs per sample: the desk when nothing and when something changes, and a program on three axes."""
+    return [
+        Figure(f"a look at a desk of {CHANNELS} live values", "µs", tuple(_look() for _ in range(ROUNDS)), LIMIT),
+        Figure("a sample that takes a change", "µs", tuple(_change() for _ in range(ROUNDS))),
+        Figure("a program's references of three axes", "µs", tuple(_program(1.0) for _ in range(ROUNDS))),
+        Figure("the same at an override of 70 %", "µs", tuple(_program(0.7) for _ in range(ROUNDS))),
+    ]
+
+
+def _heed() -> tuple[Heed, Desk]:
+    channels = [Channel(f"value{i}", 0.0, "") for i in range(CHANNELS)]
+    heed = Heed([*channels, stop_channel()], {channel.name: lambda value: None for channel in channels})
+    heed.desk = Desk.create(None, [*channels, stop_channel()])
+    return heed, heed.desk
+
+
+def _look() -> float:
+    heed, _ = _heed()
+    started = perf_counter_ns()
+    for k in range(SAMPLES):
+        heed(k)
+    return (perf_counter_ns() - started) / SAMPLES / 1e3
+
+
+def _change() -> float:
+    heed, desk = _heed()
+    total = 0
+    for k in range(2000):
+        desk.set("value7", k + 1.0)
+        started = perf_counter_ns()
+        heed(k)
+        total += perf_counter_ns() - started
+    return total / 2000 / 1e3
+
+
+def _program(override: float) -> float:
+    path = chain(line((0, 0, 0), (20, 5, -3), 10.0), arc((20, 5, -3), (20, 25, -3), (20, 15), 10.0))
+    block = PathBlock(path, [Event(1, "end", 0.0, 1)])
+    T = 1e-3
+    program = planned([block], load_machine("mini-cnc"), T, Path("benchmark.ngc")).program
+    references = [LiveReference() for _ in range(3)]
+    execution = Execution(program, T, Retimed(program, T), references, None, 0.0, lambda names: True)
+    execution.actions()["override"](override)
+    row: list[float] = []
+    started = perf_counter_ns()
+    k = 0
+    while execution.over() is None:
+        execution.law(k, (), row, [])
+        k += 1
+    return (perf_counter_ns() - started) / k / 1e3
