@@ -76,9 +76,13 @@ def findings(about: dict[str, Any]) -> list[str]:
             f"The measured position is at most {worst['max']:.4f} mm off the programmed path, in line {worst['line']} "
             f"(t = {worst['time_s']:.3f} s); RMS {worst['rms']:.4f} mm."
         )
-    axis, worst = max(about["following_error"].items(), key=lambda entry: entry[1]["max"], default=(None, None))
-    if worst is not None:
-        said.append(f"{axis} lags most: {worst['max']:.4f} {worst['unit']} in line {worst['line']}.")
+    following = about["following_error"]
+    for unit in dict.fromkeys(worst["unit"] for worst in following.values()):
+        axis, worst = max(
+            ((axis, worst) for axis, worst in following.items() if worst["unit"] == unit), key=lambda of: of[1]["max"]
+        )
+        if worst["max"] > 0.0:
+            said.append(f"{axis} lags most: {worst['max']:.4f} {unit} in line {worst['line']}.")
     predicted, moving = about["predicted_s"], about["moving_s"]
     if not about["completed"]:
         said.append(f"The run ended after {about['done_percent']:.1f} % of the program.")
