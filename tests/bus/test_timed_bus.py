@@ -353,7 +353,8 @@ def test_a_fault_during_a_run_ends_as_documented(tmp_path: Path, fault: str, end
     assert result.meta["ending"] == ending, result.meta.get("ending_reason")
     assert reason in (result.meta.get("ending_reason") or "")
     if ending == "machine lost":
-        assert 0.3 - 2 * PERIOD <= result.table["time"].iloc[-1] <= 0.3 + 13 * PERIOD
+        # The schedule's clock starts with the bus, a moment before the loop's: how long, a busy computer decides.
+        assert 0.15 <= result.table["time"].iloc[-1] <= 0.3 + 13 * PERIOD
 
 
 @pytest.mark.realtime
