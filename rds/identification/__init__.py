@@ -1,0 +1,1 @@
+"""Logged data in; parameters, validation and verdicts out."""

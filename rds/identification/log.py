@@ -1,0 +1,86 @@
+"""A log: what was recorded of one axis, as arrays with units, and what is to be known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+
+from rds.core.errors import InputError
+
+QUANTITIES = ("command", "position", "velocity", "current", "reference")  # that a column can be, beside time
+
+
+class Gravity(StrEnum):
+    """How much a finding matters to who believes in an estimate."""
+
+    NOTE = "note"
+    WARNING = "warning"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a log that its reader must know: `what` is a sentence with numbers and units."""
+
+    kind: str  # gap, duplicate, jitter, saturation, quantization, excitation, sign, clock, closed-loop, ...
+    what: str
+    gravity: Gravity = Gravity.NOTE
+    sample: int | None = None  # the first sample concerned
+
+
+@dataclass(frozen=True)
+class Log:
+    """One axis over time. All arrays are float64, one-dimensional, of one length, and finite.
+
+    The command is held from its sample to the next (zero-order hold). `sample_period` is the mean step; the times
+    themselves are used where they are not exactly regular. A spindle's position is its speed, rev/min.
+
+    InputError for arrays of different lengths, that are not finite, or a time that does not increase.
+    """
+
+    name: str
+    time: np.ndarray  # s
+    command: np.ndarray  # V (or what `units` says)
+    position: np.ndarray  # mm
+    extra: Mapping[str, np.ndarray] = field(default_factory=dict)  # velocity, current, reference, where logged
+    units: Mapping[str, str] = field(default_factory=dict)  # of each quantity
+    resolution: float | None = None  # mm, one step of the encoder: stated, or found in the data
+    voltage_range: tuple[float, float] | None = None  # V, of the converter, where known
+    closed_loop: bool | None = None  # None: not known
+    force_gain: float | None = None  # N/V (gtau): the force that the command makes
+    source: str = ""  # the file that it was read from
+    sha256: str = ""  # of that file
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        arrays = {"time": self.time, "command": self.command, "position": self.position, **self.extra}
+        for key, values in arrays.items():
+            if values.ndim != 1 or len(values) != len(self.time):
+                raise InputError(f"{key} has shape {values.shape}; time has {len(self.time)} samples", self.name)
+            if not np.isfinite(values).all():
+                row = int(np.flatnonzero(~np.isfinite(values))[0])
+                raise InputError(f"{key} holds {values[row]} at sample {row}; remove or repair it", self.name)
+        if len(self.time) < 2 or not (np.diff(self.time) > 0.0).all():
+            raise InputError("a log needs two samples or more, at times that increase", self.name)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def sample_period(self) -> float:
+        """The mean step of the time, s."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    def part(self, first: int, end: int) -> Log:
+        """The samples from `first` to before `end`; its times stay what they are."""
+        chosen = slice(first, end)
+        return replace(
+            self,
+            time=self.time[chosen],
+            command=self.command[chosen],
+            position=self.position[chosen],
+            extra={key: values[chosen] for key, values in self.extra.items()},
+        )
