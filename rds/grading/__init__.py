@@ -1,0 +1,1 @@
+"""Batch grading: assignments, a sandbox for submissions, criteria, batches, feedback and gradebooks."""

@@ -1,0 +1,78 @@
+"""What grading says of one submission. Plain data: journals, pages and gradebooks are made from it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Status(StrEnum):
+    """What happened to a submission."""
+
+    OK = "ok"  # it was graded; its score may be low
+    MISSING = "missing"  # nothing was handed in
+    REFUSED = "refused"  # it was not opened: a device, a link, an archive that is too large, ...
+    FAILED_TO_LOAD = "failed to load"  # its code could not be loaded, or defines no interface
+    BROKE_CONTRACT = "broke the contract"  # it answered what no controller may: NaN, text, too late a sample, ...
+    TIMED_OUT = "timed out"  # more CPU or wall time than the assignment allows
+    KILLED = "killed"  # it ended its process, or went over a limit of memory, processes or output
+    GRADER_ERROR = "grader error"  # our fault: to be graded again, never a zero
+
+
+class Band(StrEnum):
+    """Where a value lies in a criterion's bands."""
+
+    FULL = "full"
+    PARTIAL = "partial"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class CriterionScore:
+    """One criterion's answer. `value` is None where nothing could be measured; `sentence` says what it means."""
+
+    name: str
+    title: str
+    score: float
+    max_score: float
+    value: float | None
+    unit: str
+    band: Band
+    sentence: str
+    visible: bool = True  # whether the student may see the value and the bands before grades are out
+    case: str = ""  # the case that decided it
+
+
+@dataclass(frozen=True)
+class Grade:
+    """One row of a batch. Scores are after the late penalty; `before_penalty` is what the criteria add up to."""
+
+    student: str  # an identifier as it was handed in; may hold any printable text
+    status: Status
+    reason: str  # a sentence; empty where the status is ok
+    score: float
+    max_score: float
+    before_penalty: float
+    criteria: tuple[CriterionScore, ...]
+    sha256: str = ""  # of the file that was graded
+    seed: int = 0  # of this student's plants
+    late_days: float = 0.0
+    notes: tuple[str, ...] = ()  # such as what it printed, capped
+    details: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # per case: file of the run's columns, figures of the budget
+
+    def to_json(self) -> dict[str, Any]:
+        """In JSON's own types, whole: `from_json` gives the same grade back."""
+        from dataclasses import asdict
+
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Grade:
+        """The grade that `to_json` was made from."""
+        criteria = tuple(CriterionScore(**{**each, "band": Band(each["band"])}) for each in data["criteria"])
+        whole = {**data, "status": Status(data["status"]), "criteria": criteria, "notes": tuple(data["notes"])}
+        return cls(**whole)
