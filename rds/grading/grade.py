@@ -62,7 +62,7 @@ class Grade:
     notes: tuple[str, ...] = ()  # such as what it printed, capped
     details: Mapping[str, Any] = field(
         default_factory=dict
-    )  # per case: file of the run's columns, figures of the budget
+    )  # per case: its columns' file, budget figures
 
     def to_json(self) -> dict[str, Any]:
         """In JSON's own types, whole: `from_json` gives the same grade back."""
