@@ -16,8 +16,8 @@ from rds.bus import frames
 from rds.checks import check_file
 from rds.controllers import controller_module, controller_names
 from rds.core.types import Ending, Verdict
+from rds.core.words import Words
 from rds.experiment.resolve import resolve
-from rds.experiment.words import Words
 from rds.machines import load_machine
 from rds.models import model_module, model_names
 from rds.models.machine_axis import MachineParameters

@@ -11,10 +11,10 @@ from typing import Any
 
 from rds.core.errors import ContractError, MachineError, RdsError
 from rds.core.types import Ending
+from rds.core.words import Words
 from rds.experiment.outcome import outcome
 from rds.experiment.resolve import resolve
 from rds.experiment.run import Run
-from rds.experiment.words import Words
 from rds.modes import load_mode
 from rds.modes.host import Progress, Rows, run_plan
 from rds.modes.live import Live

@@ -13,7 +13,7 @@ from rds.core.errors import InputError
 from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, from_function, from_namespace, load_student
 from rds.core.types import Controller, Model
-from rds.experiment.words import Words
+from rds.core.words import Words
 from rds.machines import Axis
 from rds.models import library_model, model_names
 from rds.models.student import student_model

@@ -15,8 +15,8 @@ from rds.bus.dialects import DEFAULT, dialect_names
 from rds.bus.fault_file import read_faults
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
+from rds.core.words import Words
 from rds.experiment.parts import Setting, make_controller, make_drive, make_model
-from rds.experiment.words import Words
 from rds.machines import Axis, Machine, load_machine
 from rds.modes import load_mode, mode_names
 from rds.modes.machine import BUILTIN

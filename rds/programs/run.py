@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.words import Words
 from rds.experiment import Experiment
 from rds.experiment.resolve import PERIODS, resolve
 from rds.experiment.run import Run
-from rds.experiment.words import Words
 from rds.machines import Machine, load_machine
 from rds.modes.host import Progress
 from rds.modes.live import Live

@@ -26,8 +26,8 @@ from hypothesis.strategies import (
 
 import rds
 from rds.core.errors import InputError, RdsError
+from rds.core.words import Words
 from rds.experiment.resolve import resolve
-from rds.experiment.words import Words
 from rds.runtime.plan import Plan
 
 GOOD = """\

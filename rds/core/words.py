@@ -172,7 +172,7 @@ def _line_of(text: str, table: str, key: str | None) -> int | None:
     """
     current, header_line = "", None
     for number, line in enumerate(text.splitlines(), 1):
-        header = re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line)
+        header = re.match(r"\s*\[{1,2}\s*([^\[\]]+?)\s*\]", line)
         if header:
             current = ".".join(part.strip().strip("\"'") for part in header[1].split("."))
             if current == table:
