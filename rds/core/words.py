@@ -35,6 +35,11 @@ class Words:
         """The same file with another top table: errors still tell the file's places."""
         return Words(table, self._text, self.path)
 
+    @property
+    def source(self) -> str:
+        """The text of the whole file."""
+        return self._text
+
     @classmethod
     def read(cls, path: str | Path) -> Words:
         """The top table of a TOML file; InputError if it cannot be read or is not TOML."""
@@ -142,6 +147,13 @@ class Words:
         if not isinstance(value, dict):
             raise self.fault(key, f"must be a table, as in `[{key}]`")
         return self.table_of(key, value)
+
+    def tables(self, key: str) -> list[Words]:
+        """The tables of a list such as `[[logs]]`; none where there is no such list."""
+        values = self.any(key, [])
+        if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
+            raise self.fault(key, f"must be tables, each under `[[{key}]]`")
+        return [self.table_of(key, value) for value in values]
 
     def table_of(self, key: str, table: dict[str, Any]) -> Words:
         """A table that stands for the value of `key`."""

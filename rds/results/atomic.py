@@ -42,6 +42,16 @@ def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
         _sync_directory(directory)
 
 
+def write_whole(path: Path, data: bytes) -> Path:
+    """Write one file so that it appears complete or not at all; see `write_files`. Returns its path."""
+
+    def write(stream: BinaryIO) -> None:
+        stream.write(data)
+
+    write_files({path: write})
+    return path
+
+
 def _sync_directory(directory: Path) -> None:
     if os.name != "posix":
         return  # Windows does not open directories; its rename is durable enough for a result
