@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from math import inf
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from rds.core.options import Option
+
+if TYPE_CHECKING:
+    from rds.identification.log import Log
 
 
 class Response(Protocol):
@@ -32,7 +36,21 @@ class Structure:
     states: int
     respond: Response
     options: tuple[str, ...] = ()
-    # outputs and their derivatives by parameter and initial state: (samples,), (samples, parameters + states)
+    # outputs and their derivatives by parameter and initial state: (samples,), (samples, parameters + states);
+    # called as `respond` is; without it, a fit takes finite differences
     sensitivities: Callable[..., tuple[np.ndarray, np.ndarray]] | None = None
     # the `[model]` table or machine parameters that say the same to a run; None where no library model does
     as_model: Callable[[Mapping[str, float]], dict[str, Any]] | None = None
+    at_most: Mapping[str, float] = field(default_factory=dict)  # upper bounds of parameters, where there are any
+    state_names: tuple[str, ...] = ("position", "velocity")
+    state_bounds: tuple[tuple[float, float], ...] = ()  # of each initial state; none where empty
+    # values to begin a fit with, best first, and an initial state for each log; InputError where the data hold none
+    start: Callable[[Sequence[Log]], list[tuple[dict[str, float], list[tuple[float, ...]]]]] | None = None
+    output_unit: str = "mm"
+    # parameters that only make sense held at a value unless another is held, with the sentence that says so
+    held: Callable[[frozenset[str]], Mapping[str, tuple[float, str]]] | None = None
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """The lowest and the highest value that the parameter may take."""
+        option = self.parameters[name]
+        return max(option.at_least, option.more_than), self.at_most.get(name, inf)
