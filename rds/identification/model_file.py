@@ -48,9 +48,7 @@ class ModelFile:
     parameters: Mapping[str, Parameter]
     covariance: np.ndarray
     method: str = ""
-    logs: tuple[
-        Mapping[str, Any], ...
-    ] = ()  # {name, source, sha256, first, end, command, velocity, free_run, ahead, ...}
+    logs: tuple[Mapping[str, Any], ...] = ()  # as in the file: name, source, sha256, first, end, command, ...
     warnings: tuple[str, ...] = ()
     untold: tuple[str, ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -240,9 +238,9 @@ def _read_covariance(words: Words, names: tuple[str, ...]) -> np.ndarray:
 
 def _read_log(table: Words) -> dict[str, Any]:
     log: dict[str, Any] = {key: value for key in _LOG_TEXTS if (value := table.text(key)) is not None}
-    log |= {
-        key: value for key in ("first", "end") if (value := table.whole(key, None, "sample", 0, 10**12)) is not None
-    }
+    for key in ("first", "end"):
+        if (sample := table.whole(key, None, "sample", 0, 10**12)) is not None:
+            log[key] = sample
     for key, count in (("command", 2), ("velocity", 2), ("initial_state", None)):
         if key in table:
             log[key] = _numbers(table, key, count)
@@ -261,7 +259,8 @@ def _read_log(table: Words) -> dict[str, Any]:
 
 
 def _read_errors(table: Words) -> Errors:
-    errors = Errors(*(_real(table, key) for key in _ERRORS), unit=table.text("unit", "") or "")
+    fit_percent, rmse, maximum = (_real(table, key) for key in _ERRORS)
+    errors = Errors(fit_percent, rmse, maximum, table.text("unit", "") or "")
     table.done()
     return errors
 
