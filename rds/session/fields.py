@@ -1,0 +1,136 @@
+"""Fields: what a user may set, with unit, range and the sentence that refuses a wrong value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from typing import Any
+
+from rds.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Field:
+    """One thing to set. `name` is its key in files and code, `label` what stands beside it, `tooltip` what it means."""
+
+    name: str
+    label: str
+    tooltip: str
+    default: Any = None
+
+    def check(self, value: Any) -> Any:
+        """The value as it will be used; InputError with what it must be instead."""
+        return value
+
+
+@dataclass(frozen=True)
+class Number(Field):
+    """A number in `unit`, from `low` to `high`, and more than `above`. Text is read as a person writes it."""
+
+    unit: str = ""
+    low: float = -inf
+    high: float = inf
+    above: float = -inf
+    whole: bool = False
+    optional: bool = False  # empty text stands for None: the program's own choice
+
+    def check(self, value: Any) -> float | int | None:
+        """The number; text may have a decimal comma, blanks around it, and the unit behind it."""
+        if self.optional and (value is None or (isinstance(value, str) and not value.strip())):
+            return None
+        number = self._number(value)
+        if not (isfinite(number) and self.low <= number <= self.high and number > self.above):
+            raise InputError(f"{self.label} must be {self.range}, not {value}")
+        if self.whole:
+            if number != int(number):
+                raise InputError(f"{self.label} must be a whole number{self._unit}, not {value}")
+            return int(number)
+        return number
+
+    @property
+    def range(self) -> str:
+        """The range in words, with the unit."""
+        low = max(self.low, self.above)
+        if isfinite(low) and isfinite(self.high):
+            return f"from {low:g} to {self.high:g}{self._unit}" if low == self.low else self._more_than_to()
+        if isfinite(low):
+            return f"{'at least' if low == self.low else 'more than'} {low:g}{self._unit}"
+        if isfinite(self.high):
+            return f"at most {self.high:g}{self._unit}"
+        return f"a number{' in' + self._unit if self.unit else ''}"
+
+    def _more_than_to(self) -> str:
+        return f"more than {self.above:g} and at most {self.high:g}{self._unit}"
+
+    @property
+    def _unit(self) -> str:
+        return f" {self.unit}" if self.unit else ""
+
+    def _number(self, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise InputError(f"{self.label} must be a number{self._unit}, not {value!r:.60}")
+        text = value.strip().removesuffix(self.unit).strip() if isinstance(value, str) else value
+        if isinstance(text, str) and text.count(",") == 1 and "." not in text:
+            text = text.replace(",", ".")
+        try:
+            return float(text)
+        except (ValueError, OverflowError):
+            raise InputError(f"{self.label} must be a number{self._unit}, not {value!r:.60}") from None
+
+
+@dataclass(frozen=True)
+class Choice(Field):
+    """One of `options`, each a key with the words that stand for it."""
+
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    def check(self, value: Any) -> str:
+        """The key; InputError with the list of those there are."""
+        if not isinstance(value, str) or value not in self.options:
+            raise InputError(f"{self.label} must be one of {', '.join(self.options)}, not {value!r:.60}")
+        return value
+
+
+@dataclass(frozen=True)
+class Flag(Field):
+    """Yes or no."""
+
+    def check(self, value: Any) -> bool:
+        """True or false."""
+        if not isinstance(value, bool):
+            raise InputError(f"{self.label} must be true or false, not {value!r:.60}")
+        return value
+
+
+@dataclass(frozen=True)
+class Text(Field):
+    """Text of at most `longest` characters; `refuse(text)` may raise InputError."""
+
+    placeholder: str = ""
+    longest: int = 4096
+    refuse: Callable[[str], None] | None = None
+
+    def check(self, value: Any) -> str:
+        """The text."""
+        if not isinstance(value, str) or len(value) > self.longest:
+            raise InputError(f"{self.label} must be text of at most {self.longest} characters")
+        if self.refuse is not None and value:
+            self.refuse(value)
+        return value
+
+
+@dataclass(frozen=True)
+class Several(Field):
+    """Some of `options`, in their order."""
+
+    options: Mapping[str, str] = field(default_factory=dict)
+    least: int = 1
+
+    def check(self, value: Any) -> list[str]:
+        """The keys; InputError for one that is not there, or too few."""
+        if not isinstance(value, Sequence) or isinstance(value, str) or any(key not in self.options for key in value):
+            raise InputError(f"{self.label} must be some of {', '.join(self.options)}, not {value!r:.60}")
+        if len(set(value)) < self.least:
+            raise InputError(f"{self.label} needs {self.least} or more of {', '.join(self.options)}")
+        return [key for key in self.options if key in value]

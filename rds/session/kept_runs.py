@@ -1,0 +1,102 @@
+"""The runs that lie in a folder: those with results, those that go on, and those that were cut short."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rds.core.errors import InputError
+from rds.runtime.desk_of_run import desk_of
+from rds.runtime.record import ENDING, NAME, PROCESSES
+
+if TYPE_CHECKING:
+    from rds.results import Result
+
+
+class State(StrEnum):
+    """What has become of a run."""
+
+    WHOLE = "whole"  # its results are saved
+    GOES_ON = "goes on"  # its loop is running now, whoever started it
+    CUT_SHORT = "cut short"  # its host ended before it could save results: the record can be opened
+
+
+@dataclass(frozen=True)
+class KeptRun:
+    """One folder with a run in it."""
+
+    folder: Path
+    state: State
+    when: float  # s since 1970, of its latest file
+
+    @property
+    def name(self) -> str:
+        """What the folder is called."""
+        return self.folder.name
+
+    def open(self) -> Result:
+        """Its result; of a run that was cut short, what was recorded. InputError if it cannot be read."""
+        from rds.results import open_result
+
+        return open_result(self.folder)
+
+    def stop(self) -> None:
+        """Ask a run that goes on for a safe end; one that is over stays as it is."""
+        with contextlib.suppress(InputError), desk_of(self.folder) as desk:
+            desk.set("stop", 1.0)
+
+
+def kept_runs(folder: Path) -> list[KeptRun]:
+    """The runs in the folders of `folder`, the latest first."""
+    found = []
+    for each in _folders(folder):
+        state = state_of(each)
+        if state is not None:
+            found.append(KeptRun(each, state, _when(each)))
+    return sorted(found, key=lambda run: run.when, reverse=True)
+
+
+def state_of(folder: Path) -> State | None:
+    """What lies in one folder; None: no run."""
+    if _goes_on(folder):
+        return State.GOES_ON
+    if any((folder / f"result.{kind}").is_file() for kind in ("csv", "parquet", "mat")):
+        return State.WHOLE
+    return State.CUT_SHORT if (folder / NAME).is_file() else None
+
+
+def ending(folder: Path) -> dict[str, Any]:
+    """How a run ended, as far as it could still say."""
+    try:
+        said = json.loads((folder / ENDING).read_text())
+    except (OSError, ValueError):
+        return {}
+    return said if isinstance(said, dict) else {}
+
+
+def _goes_on(folder: Path) -> bool:
+    if not (folder / PROCESSES).is_file():
+        return False
+    try:
+        with desk_of(folder):
+            return True
+    except InputError:
+        return False
+
+
+def _folders(folder: Path) -> list[Path]:
+    try:
+        return [each for each in folder.iterdir() if each.is_dir() and not each.is_symlink()]
+    except OSError:
+        return []
+
+
+def _when(folder: Path) -> float:
+    times = [0.0]
+    with contextlib.suppress(OSError):
+        times += [each.stat().st_mtime for each in folder.iterdir() if each.is_file()]
+    return max(times)

@@ -1,0 +1,185 @@
+"""One sitting: the folder of a student's files, what was chosen in each panel, the work that goes on, the machine."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rds.core.errors import InputError
+from rds.results.atomic import write_whole
+from rds.session.choices import Choices
+from rds.session.claim import Claim
+from rds.session.fields import Field
+from rds.session.kept_runs import KeptRun, State, kept_runs
+from rds.session.task import Task
+
+KEPT = "session.json"  # the choices of all panels
+RUNS = "runs"
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Message:
+    """Something that happened, for the line that everybody sees: `kind` is note, warning or error."""
+
+    when: float  # s since 1970
+    kind: str
+    text: str
+
+
+class Session:
+    """What all panels share. Nothing here waits for anything; long work is a `Task`, a run has a handle of its own.
+
+    `folder` holds the student's files, `runs/` and what was chosen (`session.json`). A second session on the same
+    folder, of another page, shares the files and finds the machine in use while this one runs something.
+    """
+
+    def __init__(self, folder: str | Path = ".", machine: str = "mini-cnc", bus: Mapping[str, Any] | None = None):
+        """`bus` holds the arguments of can.Bus, as in the `[bus]` table of an experiment; none: the built-in bus."""
+        self.folder = Path(folder).resolve()
+        self.machine = machine
+        self.bus = dict(bus or {})
+        self.messages: list[Message] = []
+        self.tasks: list[Task[Any]] = []
+        self.machine_user: Any = None  # what holds the machine now: something with stop()
+        self._choices: dict[str, Choices] = {}
+        self._watchers: list[Callable[[Message], None]] = []
+        self._lock = threading.Lock()
+        self._claim: Claim | None = None
+        self._kept = self._read_kept()
+
+    # choices
+
+    def choices(self, panel: str, fields: Iterable[Field]) -> Choices:
+        """The choices of a panel: those that were kept in this folder, else the defaults. Changes are kept."""
+        if panel not in self._choices:
+            made = Choices(fields)
+            for sentence in made.load(self._kept.get(panel, {})):
+                self.say(f"{panel}: {sentence}; the default was taken", "warning")
+            made.watch(lambda name: self.keep())
+            self._choices[panel] = made
+        return self._choices[panel]
+
+    def keep(self) -> None:
+        """Write all choices to the folder; a folder that cannot be written to is said once, and nothing else breaks."""
+        self._kept |= {panel: choices.values() for panel, choices in self._choices.items()}
+        try:
+            write_whole(self.folder / KEPT, json.dumps(self._kept, indent=1, default=str).encode())
+        except InputError as error:
+            if not any(message.text.startswith("choices are not kept") for message in self.messages):
+                self.say(f"choices are not kept: {error}", "warning")
+
+    def _read_kept(self) -> dict[str, dict[str, Any]]:
+        path = self.folder / KEPT
+        try:
+            kept = json.loads(path.read_text())
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError) as error:
+            self.say(f"{path} cannot be read ({error}); panels begin with their defaults", "warning")
+            return {}
+        if not isinstance(kept, dict):
+            return {}
+        return {panel: values for panel, values in kept.items() if isinstance(values, dict)}
+
+    # messages
+
+    def say(self, text: str, kind: str = "note") -> None:
+        """A message for whoever is at the page."""
+        message = Message(time.time(), kind, text)
+        self.messages.append(message)
+        del self.messages[:-200]
+        for watcher in tuple(self._watchers):
+            watcher(message)
+
+    def watch(self, watcher: Callable[[Message], None]) -> Callable[[], None]:
+        """Call `watcher(message)` for each new message, in whichever thread says it; the answer ends that."""
+        self._watchers.append(watcher)
+        return lambda: self._watchers.remove(watcher)
+
+    # work
+
+    def work(self, title: str, work: Callable[[Task[T]], T], on_stop: Callable[[], None] | None = None) -> Task[T]:
+        """Begin long work; see Task."""
+        task = Task(title, work, on_stop)
+        with self._lock:
+            self.tasks = [each for each in self.tasks if not each.done] + [task]
+        return task.start()
+
+    # the machine
+
+    def take_machine(self, what: str, user: Any) -> None:
+        """The machine is used for `what` from now on; InputError that says by whom it is in use already.
+
+        `user.stop()` ends that use; `give_machine_back(user)` is due at its end.
+        """
+        with self._lock:
+            if self.machine_user is not None:
+                raise InputError("the machine is in use on this page; stop that first")
+            self._claim = Claim(self.folder, what)
+            self.machine_user = user
+
+    def give_machine_back(self, user: Any) -> None:
+        """The use is over; whoever is not the user changes nothing."""
+        with self._lock:
+            if self.machine_user is user:
+                self.machine_user = None
+                if self._claim is not None:
+                    self._claim.release()
+                self._claim = None
+
+    def emergency_stop(self) -> str:
+        """Zero volts for all modules of this session's machine, now; a sentence that says who acknowledged.
+
+        Ends the run that goes on here or in another page of this folder. Raises MachineError where the bus fails:
+        then cut the power.
+        """
+        user = self.machine_user
+        try:
+            stopped = self._stop_modules()
+        finally:
+            if user is not None:
+                with contextlib.suppress(Exception):
+                    user.stop()
+            for run in self.runs():
+                if run.state is State.GOES_ON:
+                    run.stop()
+        if stopped:
+            text = f"emergency stop: {len(stopped)} modules are at zero volts and stay so until they are released"
+        else:
+            text = "emergency stop sent; no module is on the bus, so nothing moves"
+        self.say(text, "warning")
+        return text
+
+    def release_emergency_stop(self) -> str:
+        """Let the modules be used again; a sentence. MachineError where a button is still pressed."""
+        from rds.bus.estop import reset_everything
+
+        with self._open_bus() as bus:
+            free = reset_everything(bus)
+        text = f"{len(free)} modules are free again" if free else "no module is on the bus"
+        self.say(text)
+        return text
+
+    def _stop_modules(self) -> list[int]:
+        from rds.bus.estop import stop_everything
+
+        with self._open_bus() as bus:
+            return stop_everything(bus)
+
+    def _open_bus(self) -> Any:
+        from rds.bus.link import open_bus
+
+        return open_bus(self.bus.get("interface", "rds"), self.bus.get("channel", self.machine))
+
+    # runs
+
+    def runs(self) -> list[KeptRun]:
+        """The runs kept in this folder, the latest first."""
+        return kept_runs(self.folder / RUNS)
