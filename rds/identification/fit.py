@@ -24,7 +24,7 @@ METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Es
 
 
 def fit(
-    logs: Sequence[Log], structure: Structure, method: str = "simulation", options: Mapping[str, Any] | None = None
+    logs: Sequence[Log], structure: Structure, method: str | None = None, options: Mapping[str, Any] | None = None
 ) -> Estimate:
     """The parameters of `structure` that explain the logs, all fitted together, by the method's own `options`.
 
@@ -32,5 +32,7 @@ def fit(
     """
     if not logs:
         raise InputError("there is no log to fit; name at least one")
-    estimated: Estimate = METHODS.module(method).estimate(list(logs), structure, dict(options or {}))
+    estimated: Estimate = METHODS.module(method or structure.default_method).estimate(
+        list(logs), structure, dict(options or {})
+    )
     return estimated

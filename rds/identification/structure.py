@@ -49,6 +49,10 @@ class Structure:
     output_unit: str = "mm"
     # parameters that only make sense held at a value unless another is held, with the sentence that says so
     held: Callable[[frozenset[str]], Mapping[str, tuple[float, str]]] | None = None
+    # parameters that the logs state and no fit can tell (a force per volt), held at these values, with 0 std error
+    given: Callable[[Sequence[Log]], Mapping[str, float]] | None = None
+    default_method: str = "simulation"  # the method where the user names none
+    no_effect: Mapping[str, str] = field(default_factory=dict)  # what it means that a parameter changes nothing
 
     def bounds(self, name: str) -> tuple[float, float]:
         """The lowest and the highest value that the parameter may take."""
