@@ -36,6 +36,7 @@ from rds.motion.pieces import (
     make_blend,
     make_circular,
     make_straight,
+    quickening,
     trim,
 )
 
@@ -208,6 +209,7 @@ def build(
             continue
         new = 1 - old
         f, u = rows[new], kinds[new]
+        drift = 0.0
         if plane[last] == LINE:
             u[KIND] = STRAIGHT
             make_straight(f, here, end[last], programmed)
@@ -218,8 +220,8 @@ def build(
                 u[AXIS_1], u[AXIS_2] = 2, 0
             elif plane[last] == 2:
                 u[AXIS_1], u[AXIS_2] = 1, 2
-            make_circular(f, here, end[last], centre[last], sweep[last], u[AXIS_1], u[AXIS_2], programmed)
-        f[FEED] = rate[last] / f[RATIO] if f[RATIO] > 0.0 else rate[last]
+            drift = make_circular(f, here, end[last], centre[last], sweep[last], u[AXIS_1], u[AXIS_2], programmed)
+        f[FEED] = rate[last] * programmed / (f[RATIO] * (programmed + drift)) if f[RATIO] > 0.0 else rate[last]
         if held:
             g, w = rows[old], kinds[old]
             stops, half = mode[held_last] == EXACT_STOP, 0.0
@@ -247,7 +249,7 @@ def build(
                 count = _emit(out, ints, count, g, w, held_first, held_last, np.int64(stops), taken, work)
             if half > 0.0:
                 b = work[0]
-                b[RATIO], b[FEED] = 0.5 * (ratio + f[RATIO]), min(feed, f[FEED])
+                b[RATIO], b[FEED] = 0.5 * (ratio + f[RATIO]), min(feed, f[FEED]) / quickening(b)
                 taken = distance + (size - half) * ratio
                 count = _emit(out, ints, count, b, blend, held_first, last, zero, taken, work)
             front = half

@@ -80,7 +80,10 @@ def make_straight(f, start, end, programmed):
 
 @kernel
 def make_circular(f, start, end, centre, sweep, axis_1, axis_2, programmed):
-    """An arc or helix into the row f. An end that is a little off the circle is met by a drift along the whole arc."""
+    """An arc or helix into the row f. An end that is a little off the circle is met by a drift along the whole arc.
+
+    Returns how long that drift is, mm.
+    """
     x, y = start[axis_1] - centre[axis_1], start[axis_2] - centre[axis_2]
     half = sin(0.5 * sweep)
     s, lost = sin(sweep), 2.0 * half * half
@@ -99,6 +102,7 @@ def make_circular(f, start, end, centre, sweep, axis_1, axis_2, programmed):
         f[END + i] = end[i]
     f[SHAPE + 6 + axis_1], f[SHAPE + 6 + axis_2] = off_1 / total, off_2 / total
     f[SHAPE + 12], f[SHAPE + 13], f[SHAPE + 14] = x, y, sweep / total
+    return sqrt(off_1**2 + off_2**2)
 
 
 @kernel
@@ -193,6 +197,39 @@ def _bound_polynomial(f, i, h):
     a1, a2, a3 = 2 * c2 * h, 3 * c3 * h**2, 4 * c4 * h**3
     slope = max(slope, fabs(c1 + a1 / 4), fabs(c1 + a1 / 2 + a2 / 6), fabs(c1 + 3 * a1 / 4 + a2 / 2 + a3 / 4))
     f[SLOPE + i] = slope
+
+
+@kernel
+def quickening(f):
+    """How many times faster than at its ends a blend is passed at most, at a steady dq/dt; 1 or more.
+
+    For X, Y, Z and for A, B, C, by the hull of the Bézier points of dp/dq, which are taken of its two halves.
+    """
+    h, worst = f[LENGTH], 1.0
+    left, right, row = np.empty((3, 5)), np.empty((3, 5)), np.empty(5)
+    for first in (0, 3):
+        ends = most = 0.0
+        for i in range(3):
+            c = SHAPE + first + i
+            a0, a1, a2 = f[c + 6], 2.0 * f[c + 12] * h, 3.0 * f[c + 18] * h**2
+            a3, a4 = 4.0 * f[c + 24] * h**3, 5.0 * f[c + 30] * h**4
+            row[0], row[1], row[2] = a0, a0 + a1 / 4.0, a0 + a1 / 2.0 + a2 / 6.0
+            row[3], row[4] = a0 + 0.75 * a1 + a2 / 2.0 + a3 / 4.0, a0 + a1 + a2 + a3 + a4
+            for k in range(5):  # de Casteljau
+                left[i, k], right[i, 4 - k] = row[0], row[4 - k]
+                for m in range(4 - k):
+                    row[m] = 0.5 * (row[m] + row[m + 1])
+        for k in range(5):
+            one = left[0, k] ** 2 + left[1, k] ** 2 + left[2, k] ** 2
+            other = right[0, k] ** 2 + right[1, k] ** 2 + right[2, k] ** 2
+            most = max(most, one, other)
+            if k == 0:
+                ends = one
+            if k == 4:
+                ends = max(ends, other)
+        if ends > 0.0:
+            worst = max(worst, sqrt(most / ends))
+    return worst
 
 
 def no_pieces() -> tuple[np.ndarray, np.ndarray]:

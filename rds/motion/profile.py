@@ -5,7 +5,7 @@ A phase is a row (length, speed at its start, speed at its end).
 
 from __future__ import annotations
 
-from math import sqrt
+from math import fabs, sqrt
 
 import numpy as np
 
@@ -73,47 +73,50 @@ def hold_tops(phases, tau):
     """The phases with each top of the speed held for τ at least, by lowering it.
 
     Between speeding up and slowing down lie then τ seconds without acceleration. (Between slowing down and speeding up
-    they do anyway, as each limit of the speed reaches far enough to either side.)
+    they do anyway, as each limit of the speed reaches far enough to either side.) A top that is lowered to the valley
+    beside it lasts as long as both: so what is left of it stands in `out`, whose end is taken back where need be.
     """
     n = len(phases)
     out = np.empty((n + n, 3))
     count = i = 0
     while i < n:
-        j = i
-        while j < n and phases[j, 2] >= phases[j, 1]:
-            j += 1
-        k = j  # slowing down from here
+        while i < n and phases[i, 2] >= phases[i, 1]:
+            out[count] = phases[i]
+            count += 1
+            i += 1
+        k = i  # slowing down from here
         while k < n and phases[k, 2] <= phases[k, 1]:
             k += 1
-        left, right = j - 1, j  # the next phases to be lowered, outwards
-        level = phases[left, 2] if left >= i else phases[right, 1]
-        length, cut_left, cut_right = 0.0, 0.0, 0.0  # of the top, and of the phases beside it that it takes a part of
+        right = i  # the next phase to be lowered on this side; on the other it is the last of `out`
+        level = out[count - 1, 2] if count > 0 else phases[right, 1]
+        length = 0.0
         while True:
             flat = 1e-12 * level * level  # a phase that changes the speed by rounding only has no slope to go down
-            if left >= i and (phases[left, 1] >= level or phases[left, 2] ** 2 - phases[left, 1] ** 2 <= flat):
-                length += phases[left, 0]
-                left -= 1
+            if count > 0 and fabs(out[count - 1, 2] ** 2 - out[count - 1, 1] ** 2) <= flat:
+                count -= 1
+                length += out[count, 0]
                 continue
             if right < k and (phases[right, 2] >= level or phases[right, 1] ** 2 - phases[right, 2] ** 2 <= flat):
                 length += phases[right, 0]
                 right += 1
                 continue
-            if length >= level * tau or left < i or right >= k:
+            last = count - 1
+            if length >= level * tau or last < 0 or right >= k or out[last, 2] < out[last, 1]:
                 break
-            u, w = phases[left, 1], phases[right, 2]
-            gain_left = phases[left, 0] / (phases[left, 2] ** 2 - u * u)
+            u, w = out[last, 1], phases[right, 2]
+            gain_left = out[last, 0] / (out[last, 2] ** 2 - u * u)
             gain_right = phases[right, 0] / (phases[right, 1] ** 2 - w * w)
             gain = gain_left + gain_right
             lower = (sqrt(tau * tau + 4.0 * gain * (length + gain * level * level)) - tau) / (2.0 * gain)
             below = max(lower, u, w)
-            cut = level * level - below * below
-            cut_left, cut_right = gain_left * cut, gain_right * cut
+            cut_off = level * level - below * below
+            cut_left, cut_right = gain_left * cut_off, gain_right * cut_off
             length += cut_left + cut_right
             if below == u:
-                left -= 1
+                count -= 1
             else:
-                phases[left, 0] -= cut_left
-                phases[left, 2] = below
+                out[last, 0] -= cut_left
+                out[last, 2] = below
             if below == w:
                 right += 1
             else:
@@ -122,9 +125,6 @@ def hold_tops(phases, tau):
             level = below
             if lower >= u and lower >= w:
                 break
-        for m in range(i, left + 1):
-            out[count] = phases[m]
-            count += 1
         if length > 0.0:
             out[count, 0], out[count, 1], out[count, 2] = length, level, level
             count += 1

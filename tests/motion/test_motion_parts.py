@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
@@ -96,6 +96,7 @@ def test_the_senses_of_arcs() -> None:
     ),
     tau=st.sampled_from((0.01, 0.1)),
 )
+@example(table=[(0.3125, 4.0, 25.0), (0.125, 3.875, 1.0), (1.5, 4.0, 6.0)], tau=0.1)  # two tops lowered to one level
 def test_profiles_keep_their_envelope_and_hold_their_tops(table: list[tuple[float, ...]], tau: float) -> None:
     length, cap, push = np.array(table).T
     edges = np.concatenate(([0.0], np.cumsum(length)))

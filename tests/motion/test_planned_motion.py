@@ -221,6 +221,44 @@ def test_the_speed_along_the_path_is_the_programmed_rate() -> None:
     assert np.median(speed[motion.segment == 1]) == pytest.approx(3.0, rel=1e-9)
 
 
+@settings(max_examples=60, deadline=None)
+@given(segments=chains(modes=(BLEND,), low=-3.0))
+def test_blends_are_no_faster_than_the_faster_of_the_moves_that_they_blend(segments: np.ndarray) -> None:
+    """In mm/s; a chain with rapids has no programmed rate to compare with."""
+    if not len(segments) or segments["rapid"].any():
+        return
+    motion, _, _ = planned(segments, MACHINES[2], periods(segments, MACHINES[2]))
+    linear = (segments["start"] != segments["end"])[:, :3].any(axis=1) | (segments["plane"] >= 0)
+    rate = np.where(linear, segments["rate"], 0.0)
+    near = np.clip(motion.segment[:, None] + [-1, 0, 1], 0, len(rate) - 1)
+    speed = np.linalg.norm(motion.velocity[:, :3], axis=1)
+    assert (speed <= rate[near].max(axis=1) * (1.0 + 1e-9)).all()
+
+
+def test_a_blend_of_an_arc_would_be_faster_than_its_ends_and_is_not() -> None:
+    """At the corner of a line and an arc the quintic's derivative by q is more than 1."""
+    path = chain(
+        line((0, 0), (4, 0), 5.0, mode=BLEND, tolerance=0.5),
+        arc((4, 0), (4, 2), (4, 1), 5.0, mode=BLEND, tolerance=0.5),
+    )
+    motion, _, _ = planned(path, MACHINES[2])
+    assert 4.999 < np.linalg.norm(motion.velocity[:, :3], axis=1).max() <= 5.0 * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("off", [0.0007, 0.0283, -0.0283])
+def test_an_arc_that_ends_off_its_circle_drifts_there_at_most_at_the_programmed_rate(off: float) -> None:
+    """The circle of the start's radius, plus a share of the difference that grows with the angle: mm, mm/s."""
+    path = arc((10, 0), (0, 10 + off), (0, 0), 5.0)
+    motion, certificate, _ = planned(path)
+    assert certificate.ok and certificate.worst["deviation", ""].value < 1e-9
+    share = motion.distance / path["length"][0]
+    circle = 10.0 * np.column_stack((np.cos(share * pi / 2), np.sin(share * pi / 2)))
+    assert np.abs(motion.position[:, :2] - circle - share[:, None] * [0.0, off]).max() < 1e-9
+    spiral = 10.0 + off * share  # LinuxCNC's: the radius grows with the angle
+    assert np.abs(np.hypot(*motion.position[:, :2].T) - spiral).max() < 0.3 * abs(off)
+    assert np.linalg.norm(motion.velocity, axis=1).max() <= 5.0 * (1.0 + 1e-12)
+
+
 def test_rotary_moves_go_by_degrees() -> None:
     motion, certificate, _ = planned(line((0, 0, 0, 0), (0, 0, 0, 90), 20.0))
     assert certificate.ok and motion.velocity[:, 3].max() == pytest.approx(20.0)
