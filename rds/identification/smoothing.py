@@ -1,0 +1,54 @@
+"""What the data themselves say of noise and velocity, before there is a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rds.identification.log import Log
+
+_LONGEST = 0.05  # of a log: the widest difference that a velocity is taken over
+_SLOW = 0.03  # of the highest speed: slower is taken for rest
+_NOISY = 0.05  # of the highest speed: what noise a velocity may have
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Noise and velocity of a log's position. `velocity` (N) is centred at the samples, mm/s; noise is in mm."""
+
+    noise: float  # standard deviation of the position's noise, quantization included
+    velocity: np.ndarray
+    threshold: float  # mm/s, below which the axis may as well be at rest
+    moves: bool  # whether the position changes by more than noise and quantization do
+
+
+def motion_of(log: Log) -> Motion:
+    """Differences of the position over as few samples as noise permits."""
+    y, t = log.position, log.time
+    step = log.resolution or 0.0
+    noise = max(_noise(y), step / np.sqrt(12.0))
+    moves = bool(np.ptp(y) > max(2.5 * step, 8.0 * noise))
+    half, longest = 1, max(1, int(_LONGEST * len(y) / 2))
+    while True:
+        velocity = _difference(t, y, half)
+        fastest = float(np.abs(velocity).max())
+        uncertain = noise * np.sqrt(2.0) / (2 * half * log.sample_period)
+        if uncertain <= _NOISY * fastest or 2 * half > longest:
+            return Motion(noise, velocity, max(2.0 * uncertain, _SLOW * fastest), moves)
+        half *= 2
+
+
+def _noise(y: np.ndarray) -> float:
+    """From third differences, in which a smooth motion leaves next to nothing; the median leaves out jolts."""
+    if len(y) < 8:
+        return 0.0
+    third = np.diff(y, 3)  # 1, 3, 3, 1: the variance is 20 times the noise's
+    robust = 1.4826 * float(np.median(np.abs(third)))
+    return (robust or float(np.sqrt(np.mean(third**2)))) / np.sqrt(20.0)
+
+
+def _difference(t: np.ndarray, y: np.ndarray, half: int) -> np.ndarray:
+    index = np.arange(len(y))
+    before, after = np.maximum(index - half, 0), np.minimum(index + half, len(y) - 1)
+    return (y[after] - y[before]) / (t[after] - t[before])

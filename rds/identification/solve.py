@@ -1,0 +1,97 @@
+"""Least squares by scipy over a problem, and free runs with an initial state that is estimated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.identification.log import Log
+from rds.identification.problem import Problem
+from rds.identification.structure import Structure
+
+_EVALUATIONS = 100
+# A step that lowers the sum of squares by less than this share of one residual's variance moves no number by more than
+# a hundredth of its standard error.
+_NEGLIGIBLE = 1e-4
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where least squares ended. `triangle` is R (n + 1, n + 1) of [J r] there."""
+
+    point: np.ndarray
+    triangle: np.ndarray
+    evaluations: int
+    converged: bool
+    at_bound: np.ndarray  # -1, 0 or 1 for each free number
+
+    @property
+    def squares(self) -> float:
+        """The sum of squared residuals."""
+        return float(self.triangle[:, -1] @ self.triangle[:, -1])
+
+
+def least_squares(problem: Problem, start: np.ndarray, evaluations: int = _EVALUATIONS) -> Solution:
+    """The point with the least squared residuals near `start`. InputError if the free run there is not finite."""
+    from scipy.optimize import least_squares as minimize
+
+    low, high = problem.bounds()
+    start = np.clip(start, low, high)
+    last: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def triangle(point: np.ndarray) -> np.ndarray:
+        if not last or not np.array_equal(last[0][0], point):
+            last[:] = [(point.copy(), problem.triangle(point))]
+        return last[0][1]
+
+    if not np.isfinite(triangle(start)).all():
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in problem.values(start).items())
+        raise InputError(
+            f"structure {problem.structure.name}: its free run leaves the finite numbers at {values}; give it better "
+            "values to start from, or check its derivatives"
+        )
+    if not problem.size:
+        return Solution(start, triangle(start), 1, True, np.zeros(0))
+    samples = sum(len(log) for log in problem.logs)
+    found = minimize(
+        lambda point: triangle(point)[:, -1],
+        start,
+        jac=lambda point: -triangle(point)[:, :-1],
+        bounds=(low, high),
+        x_scale="jac",
+        ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
+        xtol=1e-9,
+        gtol=1e-12,
+        max_nfev=evaluations,
+    )
+    return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
+
+
+def initial_state(structure: Structure, values: Mapping[str, float], log: Log) -> tuple[float, ...]:
+    """The initial state with which the free run of a known model fits the log best, its parameters left alone."""
+    problem = Problem([log], structure, {name: values[name] for name in structure.parameters})
+    solved = least_squares(problem, problem.point({}, [first_state(structure, log)]))
+    return problem.state(solved.point, 0)
+
+
+def free_run(
+    structure: Structure, values: Mapping[str, float], log: Log, x0: Sequence[float] | None = None
+) -> np.ndarray:
+    """The output (N) that the model gives to the log's commands, from `x0` or the state estimated from the log."""
+    state = initial_state(structure, values, log) if x0 is None else x0
+    return structure.respond(log.time, log.command, state, values)
+
+
+def first_state(structure: Structure, log: Log) -> tuple[float, ...]:
+    """A state to begin with: the first measurement, its smoothed velocity, and 0 for what else there is."""
+    from rds.identification.smoothing import motion_of
+
+    first = float(log.position[0])
+    if structure.states < 2 or structure.state_names[1] != "velocity":
+        return (first, *([0.0] * (structure.states - 1)))[: structure.states]
+    motion = motion_of(log)
+    speed = float(motion.velocity[0])
+    return (first, speed if abs(speed) > motion.threshold else 0.0, *([0.0] * (structure.states - 2)))
