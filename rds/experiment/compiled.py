@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.types import Ending
-from rds.models.linear_axis import coefficients, respond
+from rds.models.linear_axis import LinearAxisMotion, coefficients, respond
 from rds.modes.host import Rows
 from rds.runtime.plan import AxisPlan, Plan
 
@@ -32,7 +32,7 @@ def obstacle(plan: Plan) -> str | None:
         return f"{plan.mode} runs in real time; only simulations can be compiled"
     for axis in plan.axes:
         name = axis.axis.name
-        if axis.model.source.name != "linear-axis" or axis.model.motion is None:
+        if axis.model.motion is not LinearAxisMotion:
             return f"axis {name}: only the library's linear-axis model can be compiled"
         if axis.controller is not None and _law(axis) is None:
             return f"axis {name}: only the library's controllers can be compiled"

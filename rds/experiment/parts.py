@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from rds.core.types import Controller, Model
 from rds.core.words import Words
 from rds.machines import Axis
 from rds.models import library_model, model_names
+from rds.models.machine_model import MachineAxisMotion, linear_part
 from rds.models.student import student_model
 from rds.signals import Signal, make_signal, signal_kinds, user
 
@@ -53,9 +54,21 @@ def make_model(words: Words, setting: Setting) -> Model:
         table.done()
         with _named(table):
             return student_model(student, params, substeps or SUBSTEPS)
+    if "file" in table:
+        return _fitted_model(table, setting)
     name, options = _name_and_options(table, "model", model_names())
     with _named(table):
         return library_model(name, **((default if name == default.pop("name", None) else {}) | options))
+
+
+def _fitted_model(table: Words, setting: Setting) -> Model:
+    """The model of a model file, as `rds fit` writes it."""
+    from rds.identification.model_file import read_model
+    from rds.identification.run_model import run_model
+
+    path = setting.path(str(table.text("file")))
+    table.done()
+    return run_model(read_model(path), unit=setting.axis.unit)
 
 
 def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
@@ -78,7 +91,10 @@ def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
         with _named(table):
             return student.controller(coupled=is_coupled, params=params)
     name, options = _name_and_options(table, "controller", controller_names())
-    design = model.params if {"tau", "K"} <= set(model.params) else setting.axis.model
+    if model.motion is MachineAxisMotion:
+        design: Mapping[str, Any] = linear_part(model.params)
+    else:
+        design = model.params if {"tau", "K"} <= set(model.params) else setting.axis.model
     with _named(table):
         return library_controller(name, design, setting.T, setting.limit, unit=setting.axis.unit, **options)
 
@@ -114,7 +130,7 @@ def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, 
     if isinstance(given, StudentFile):
         return nameless, given
     if isinstance(given, str):
-        given = {"file" if given.endswith(".py") else "name": given}
+        given = {"file" if given.endswith((".py", ".toml")) else "name": given}
     elif isinstance(given, dict) and any(callable(given.get(name)) for name in _FUNCTIONS):
         with _named(nameless):
             return _functions(words, key, given), from_namespace(given)
@@ -132,6 +148,10 @@ def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, 
     if not path.is_file():
         kind = f"{path} is a folder" if path.is_dir() else f"there is no such file as {path}"
         raise table.fault("file", f"will not do: {kind}; a name counts from the experiment's folder")
+    if path.suffix == ".toml":
+        if key != "model":
+            raise table.fault("file", f"is no {key}: a .toml file is a model; name the {key}'s .py file")
+        return table, None
     return table, load_student(path)
 
 

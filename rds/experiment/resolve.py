@@ -310,4 +310,4 @@ def _check_coupling(axes: list[AxisPlan], words: Words) -> None:
 
 def _import_path(axes: list[AxisPlan]) -> tuple[str, ...]:
     paths = [part.source.path for plan in axes for part in (plan.controller, plan.model) if part is not None]
-    return tuple(dict.fromkeys(str(Path(path).parent) for path in paths if path))
+    return tuple(dict.fromkeys(str(Path(path).parent) for path in paths if path and path.endswith(".py")))

@@ -13,6 +13,7 @@ LIBRARY = Registry(
     {
         "linear-axis": "rds.models.linear_axis",
         "spindle": "rds.models.spindle",
+        "machine-axis": "rds.models.machine_model",
     },
 )
 

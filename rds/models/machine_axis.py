@@ -6,14 +6,14 @@ Motor and carriage, with the velocity v in mm/s (rev/min for a spindle), the vol
     F(v) = F± (1 + s exp(-(v/v_s)²)) + b v,      F+ for v > 0, F- (negative) for v < 0
 
 F± is Coulomb friction per direction, s the Stribeck part, b the viscous part. At rest the axis sticks while
-F-(1+s) <= K u <= F+(1+s). Between motor and encoder is a dead zone of play (backlash), and a voltage acts a stated
-delay after its command arrived.
+F-(1+s) <= K u <= F+(1+s). The amplifier may add an offset to its voltage, and have a dead zone. Between motor and
+encoder is a dead zone of play (backlash), and a voltage acts a stated delay after its command arrived.
 
 Time is real time, not samples: `advance` goes to any instant. Between two commands the voltage is constant; then the
-time is cut into equal substeps of at most `SUBSTEP`. The Stribeck friction level is frozen over each, at the speed
-predicted for its middle, which leaves a linear equation with a closed form; the instant at which the velocity crosses
-zero is exact, and from there the axis sticks or starts the other way. Without Stribeck friction the closed form holds
-however long the time, and no substeps are taken.
+time is cut into equal substeps (`machine_motion.SUBSTEP`). The Stribeck friction level is frozen over each, at the
+speed predicted for its middle, which leaves a linear equation with a closed form; the instant at which the velocity
+crosses zero is exact, and from there the axis sticks or starts the other way. Without Stribeck friction the closed
+form holds however long the time, and no substeps are taken.
 """
 
 from __future__ import annotations
@@ -21,13 +21,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from math import ceil, exp, expm1, inf, isfinite, log1p
+from math import isfinite
 
 from rds.core.errors import InputError
-
-# 1/40 of the shortest time constant here (10 ms). Against substeps of 1 µs the position differs by less than 1e-6 mm
-# (a thousandth of an encoder count) over several reversals; a module's four substeps per ms cost 4 µs.
-SUBSTEP = 0.25e-3  # s
+from rds.models.machine_motion import moved, pull_of
 
 
 @dataclass(frozen=True)
@@ -43,16 +40,30 @@ class MachineParameters:
     stribeck_velocity: float = 1.0  # mm/s
     backlash: float = 0.0  # mm, whole width of the play
     delay: float = 0.0  # s, from the command to the amplifier's output
+    offset: float = 0.0  # V, of the amplifier: added to the command
+    dead_zone: float = 0.0  # V, half width: what is smaller is no voltage, what is larger is so much less
 
     def __post_init__(self) -> None:
         for name in ("tau", "K", "stribeck_velocity"):
             if not getattr(self, name) > 0:
                 raise InputError(f"machine parameter {name} = {getattr(self, name)!r} must be more than 0")
-        for name in ("friction_plus", "viscous", "stribeck", "backlash", "delay"):
+        for name in ("friction_plus", "viscous", "stribeck", "backlash", "delay", "dead_zone"):
             if not getattr(self, name) >= 0:
                 raise InputError(f"machine parameter {name} = {getattr(self, name)!r} must be 0 or more")
         if not self.friction_minus <= 0:
             raise InputError(f"machine parameter friction_minus = {self.friction_minus!r} must be 0 or less")
+
+    def motion(self) -> tuple[float, ...]:
+        """What `machine_motion.moved` needs after its first five arguments."""
+        return (
+            self.tau,
+            1.0 + self.viscous,
+            self.friction_plus,
+            self.friction_minus,
+            self.stribeck,
+            self.stribeck_velocity,
+            0.5 * self.backlash,
+        )
 
     @classmethod
     def from_table(cls, table: Mapping[str, float], where: str | None = None) -> MachineParameters:
@@ -83,10 +94,11 @@ class MachineAxis:
         self.velocity = 0.0  # mm/s
         self.position = 0.0  # mm, of the motor
         self._carriage = 0.0  # mm, behind the play
-        self._rate = (1.0 + parameters.viscous) / parameters.tau  # 1/s
+        self._constants = parameters.motion()
         self._speed_output = speed_output
         self._now = start
         self._voltage = 0.0
+        self._pull = 0.0  # mm/s: without a command there is no voltage, and no amplifier's offset
         self._commands: deque[tuple[float, float]] = deque()  # (instant from which it acts, V)
 
     @property
@@ -107,15 +119,17 @@ class MachineAxis:
         """Zero volts from the instant `at` on, without delay; commands that wait are dropped."""
         self.advance(at)
         self._commands.clear()
-        self._voltage = 0.0
+        self._voltage = self._pull = 0.0
 
     def advance(self, until: float) -> float:
         """Move on to the instant `until` and return the output there; earlier instants change nothing."""
+        p = self.parameters
         while self._commands and self._commands[0][0] <= until:
             instant, voltage = self._commands.popleft()
             self._move(instant - self._now)
             self._now = max(self._now, instant)
             self._voltage = voltage
+            self._pull = pull_of(voltage, p.K, p.offset, p.dead_zone)
         self._move(until - self._now)
         self._now = max(self._now, until)
         return self.output()
@@ -126,51 +140,6 @@ class MachineAxis:
 
     def _move(self, time: float) -> None:
         """Constant voltage for `time` s."""
-        if time <= 0:
-            return
-        p = self.parameters
-        pull = p.K * self._voltage
-        steps = max(ceil(time / SUBSTEP - 1e-9), 1) if p.stribeck else 1
-        step = time / steps
-        for _ in range(steps):
-            if self.velocity == 0.0 and self._sticks(pull):
-                return  # and stays so as long as the voltage does
-            self._substep(pull, step)
-
-    def _sticks(self, pull: float) -> bool:
-        p = self.parameters
-        breakaway = 1.0 + p.stribeck
-        return p.friction_minus * breakaway <= pull <= p.friction_plus * breakaway
-
-    def _substep(self, pull: float, time: float) -> None:
-        """The closed form over a time in which the friction level is frozen, in parts if the axis comes to rest."""
-        rate = self._rate
-        while time > 0.0:
-            v = self.velocity
-            if v == 0.0 and self._sticks(pull):
-                return
-            p = self.parameters
-            friction = p.friction_plus if v > 0.0 or (v == 0.0 and pull > 0.0) else p.friction_minus
-            final = self._final(pull, friction, v)
-            if p.stribeck:
-                middle = final + (v - final) * exp(-0.5 * rate * time)
-                final = self._final(pull, friction, middle if middle * v >= 0.0 else 0.0)
-            # the velocity is zero where (v - final) exp(-rate t) = -final
-            crossing = log1p(-v / final) / rate if final * v < 0.0 else inf
-            part = min(time, crossing)
-            passed = -expm1(-rate * part)
-            self._shift(final * part + (v - final) * passed / rate)
-            self.velocity = 0.0 if crossing <= time else v + (final - v) * passed
-            time -= part
-
-    def _final(self, pull: float, friction: float, v: float) -> float:
-        """The velocity that the axis would end at if the friction stayed as it is at velocity v."""
-        p = self.parameters
-        level = friction * (1.0 + p.stribeck * exp(-((v / p.stribeck_velocity) ** 2))) if p.stribeck else friction
-        return (pull - level) / (1.0 + p.viscous)
-
-    def _shift(self, distance: float) -> None:
-        """Move the motor one way, and the carriage with it once the play is used up."""
-        self.position += distance
-        half = 0.5 * self.parameters.backlash
-        self._carriage = min(max(self._carriage, self.position - half), self.position + half)
+        self.position, self.velocity, self._carriage = moved(
+            self.position, self.velocity, self._carriage, self._pull, time, *self._constants
+        )

@@ -47,6 +47,6 @@ def test_bad_parameters_are_refused(params, fault):
 
 
 def test_unknown_model_lists_the_known_ones():
-    with pytest.raises(InputError, match="no model 'lathe'; known models: linear-axis, spindle"):
+    with pytest.raises(InputError, match="no model 'lathe'; known models: linear-axis, spindle, machine-axis"):
         library_model("lathe")
-    assert model_names() == ["linear-axis", "spindle"]
+    assert model_names() == ["linear-axis", "spindle", "machine-axis"]

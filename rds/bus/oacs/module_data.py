@@ -18,7 +18,7 @@ from rds.models.machine_axis import MachineParameters
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 _KINDS = {"translational": Kind.TRANSLATIONAL, "rotary": Kind.ROTARY, "tool": Kind.TOOL}
-_MODELS = ("linear-axis", "spindle")  # whose parameters are those of a machine's axis
+_MODELS = ("linear-axis", "spindle", "machine-axis")  # whose parameters are those of a machine's axis
 _ROUNDING = 1e-4  # of a resolution that is written with few digits
 
 

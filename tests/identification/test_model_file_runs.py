@@ -1,0 +1,119 @@
+"""Model files in experiments: every mode takes them, and they move as the library's models with the same numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from model_files import UNITS, X, write_made
+
+import rds
+from rds.core.errors import InputError
+from rds.identification.model_file import read_model
+from rds.identification.run_model import run_model
+
+FULL = X | {"stribeck": 0.1, "stribeck_velocity": 0.8, "delay": 0.0017, "backlash": 0.003, "dead_zone": 0.1}
+OPTIONS = ("stribeck", "dead-zone", "delay", "backlash")
+TRACKED: dict[str, Any] = {
+    "axis": "X",
+    "duration": 0.4,
+    "reference": rds.sinusoid(2.0, 2.0),
+    "controller": {"name": "tracking", "gains": [1600.0, -36.6]},
+}
+
+
+def measured(model: Any, **more: Any) -> np.ndarray:
+    return rds.Experiment(model=model, **(TRACKED | more)).run()["X_measured"]
+
+
+def test_a_plain_axis_is_the_linear_axis_compiled_or_not(tmp_path: Path) -> None:
+    file = str(write_made(tmp_path / "x.toml", X))
+    wanted = measured({"name": "linear-axis", **X})
+    assert np.array_equal(measured(file), wanted)
+    result = rds.Experiment(model=file, compiled=True, **TRACKED).run()
+    assert result.meta["notes"] == [] and np.array_equal(result["X_measured"], wanted)
+    source = result.meta["model"]["X"]
+    assert source["sha256"] == read_model(file).sha256 and source["path"] == file
+
+
+def test_an_axis_with_options_is_the_machine_s_own(tmp_path: Path) -> None:
+    file = str(write_made(tmp_path / "x.toml", FULL, OPTIONS))
+    assert np.array_equal(measured(file), measured({"name": "machine-axis", **FULL}))
+
+
+def test_the_controller_is_designed_for_the_fitted_axis(tmp_path: Path) -> None:
+    file = str(write_made(tmp_path / "x.toml", X | {"tau": 0.02, "K": 3.0}))
+    plan = rds.Experiment(model=file, **(TRACKED | {"controller": "pid"})).plan()
+    controller = plan.axes[0].controller
+    assert controller is not None and controller.params["FF1"] == 1.0 / 3.0
+
+
+def test_a_friction_the_same_both_ways_with_an_offset(tmp_path: Path) -> None:
+    values = {"tau": 0.01, "K": 2.0, "friction": 0.4, "offset": 0.05}
+    model = run_model(read_model(write_made(tmp_path / "x.toml", values, ("offset",))))
+    assert model.params["friction_plus"] == pytest.approx(0.3)
+    assert model.params["friction_minus"] == pytest.approx(-0.5)
+    model = run_model(read_model(write_made(tmp_path / "y.toml", values | {"offset": 0.5}, ("offset",))))
+    assert (model.params["offset"], model.params["friction_minus"]) == (0.5, -0.4)  # it creeps: no plain axis does
+
+
+STUDENT = """\
+params = {"tau": 0.01, "K": 1.0}
+def derivatives(t, x, u, params):
+    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]
+"""
+
+
+def test_a_student_s_structure_runs_with_what_was_fitted(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.write_text(STUDENT)
+    values = {"tau": 0.012, "K": 1.9}
+    file = write_made(tmp_path / "x.toml", values, structure=str(own))
+    assert np.array_equal(measured(str(file)), measured({"file": str(own), "params": values}))
+    own.write_text(STUDENT + "# changed\n")
+    with pytest.raises(InputError, match=r"own\.py has changed since it was fitted"):
+        measured(str(file))
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(("values", "options"), [(X, ()), (FULL, OPTIONS)], ids=["plain", "full"])
+def test_emulation_is_the_simulation_bit_for_bit(alone: Path, values: dict[str, float], options: Any) -> None:
+    write_made(alone / "x.toml", values, options)
+    experiment = rds.Experiment(model="x.toml", **TRACKED)
+    simulated, emulated = experiment.run(), experiment.run("emulation")
+    for column in ("X_measured", "X_command", "X_voltage"):
+        taken = emulated["time"]
+        assert np.array_equal(emulated[column], simulated[column][np.rint(taken / 0.001).astype(int)])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("[parameters.K]", "[parameters.Q]"), "must be that of"),
+        (('unit = "s"', 'unit = "ms"'), "parameters.tau.unit = 'ms' must be 's'"),
+        (('structure = "axis"', 'structure = "lathe"'), "no structure 'lathe'"),
+        (("options = []", 'options = ["delay"]'), "parameter delay, which is missing"),
+        (("value = 0.009943\n", "value = -0.009943\n"), "low"),
+    ],
+)
+def test_what_is_not_the_structure_s_is_refused(tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    file = write_made(tmp_path / "x.toml", X)
+    file.write_text(file.read_text().replace(*change, 1))
+    with pytest.raises(InputError) as caught:
+        measured(str(file))
+    assert said in str(caught.value) and "x.toml" in str(caught.value)
+
+
+def test_models_are_for_their_kind_of_axis_and_their_key(tmp_path: Path) -> None:
+    file = str(write_made(tmp_path / "x.toml", X))
+    with pytest.raises(InputError, match="measured in rev/min"):
+        measured(file, axis="spindle", controller="p")
+    with pytest.raises(InputError, match="is no controller"):
+        measured(None, controller=file)
+    with pytest.raises(InputError, match="unknown key 'tau'"):
+        measured({"file": file, "tau": 1.0})
+    spindle = write_made(tmp_path / "s.toml", {"tau": 0.08, "K": 1000.0}, structure="spindle", units=UNITS)
+    with pytest.raises(InputError, match=r"measured in mm|spindle"):
+        measured(str(spindle))
