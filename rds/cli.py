@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rds.commands import analyse, bus, estop, fault, interpolate, modules, nc, reports
+from rds.commands.app import app as app_page
 from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
 from rds.commands.guard import guarded
 
@@ -33,6 +34,7 @@ bus.app.command()(fault.nodes)
 app.command()(modules.scan)
 app.command()(estop.estop)
 app.command()(reports.report)
+app.command("app")(app_page)
 app.command()(interpolate.interpolate)
 
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]

@@ -1,0 +1,24 @@
+"""The page with all panels, as a command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rds.commands.common import refusals
+
+
+def app(
+    folder: Annotated[Path, typer.Argument(help="The folder with your files; runs are kept in its runs/.")] = Path("."),
+    machine: Annotated[str, typer.Option(help="A machine's name, or its TOML file.")] = "mini-cnc",
+    panel: Annotated[str, typer.Option(help="The panel to begin with.")] = "menu",
+    port: Annotated[int | None, typer.Option(min=1, max=65535, help="Port; by default the first free one.")] = None,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+) -> None:
+    """Open the panels as a web page of this machine, until Ctrl-C."""
+    with refusals():
+        from rds.panels.app.serve import serve
+
+        serve(folder, machine, panel, port, browser)

@@ -1,0 +1,53 @@
+"""Serving the page: Voilà with a template that asks no other machine for anything, and a kernel that is ready."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.machines import load_machine
+from rds.panels import PANELS
+from rds.panels.app.page import FOLDER, MACHINE, PANEL
+
+_HERE = Path(__file__).parent
+
+
+def serve(folder: Path, machine: str, panel: str, port: int | None, browser: bool, address: str = "127.0.0.1") -> None:
+    """Serve until Ctrl-C. InputError for a folder, machine or panel that is not there, or where Voilà is missing.
+
+    Only who has the address with its token gets in: a kernel runs whatever its page asks for.
+    """
+    try:
+        from voila.app import Voila
+    except ImportError as error:
+        raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error
+    if not folder.is_dir():
+        raise InputError("is no folder; give the one with your files, or make it first", str(folder))
+    load_machine(machine)
+    PANELS.module(panel)
+    paths = [str(_HERE / "share" / "jupyter"), os.environ.get("JUPYTER_PATH", "")]
+    os.environ |= {
+        "JUPYTER_PATH": os.pathsep.join(filter(None, paths)),
+        FOLDER: str(folder.resolve()),
+        MACHINE: machine,
+        PANEL: panel,
+    }
+    Voila.launch_instance(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, address)])
+
+
+def _options(port: int | None, browser: bool, address: str) -> list[str]:
+    settings: dict[str, Any] = {
+        "Voila.ip": address,
+        "Voila.auto_token": True,
+        "Voila.open_browser": browser,
+        "VoilaConfiguration.template": "rds",
+        "VoilaConfiguration.preheat_kernel": True,  # the first page opens on a kernel that has loaded everything
+        "VoilaConfiguration.default_pool_size": 1,
+        "VoilaConfiguration.show_tracebacks": True,
+        "VoilaConfiguration.file_allowlist": [],
+    }
+    if port is not None:
+        settings |= {"Voila.port": port, "Voila.port_retries": 0}
+    return [f"--{name}={value}" for name, value in settings.items()]

@@ -1,0 +1,32 @@
+"""One line that says what happened: a note, a warning or an error, told by a sign and not by colour alone."""
+
+from __future__ import annotations
+
+from html import escape
+
+import ipywidgets as widgets
+
+_SIGNS = {"note": "ℹ", "good": "✔", "warning": "⚠", "error": "✖"}
+
+
+class Notice(widgets.HTML):
+    """Empty until something is said."""
+
+    def __init__(self) -> None:
+        super().__init__("")
+        self.add_class("rds-notice")
+
+    def say(self, text: str, kind: str = "note") -> None:
+        """Show `text`; kind is note, good, warning or error. Empty text shows nothing."""
+        if not text:
+            self.value = ""
+            return
+        role = "alert" if kind == "error" else "status"
+        lines = escape(text).replace("\n", "<br>")
+        self.value = (
+            f'<div class="rds-notice-{kind}" role="{role}"><b aria-hidden="true">{_SIGNS[kind]}</b> {lines}</div>'
+        )
+
+    def clear(self) -> None:
+        """Nothing to say."""
+        self.value = ""

@@ -1,0 +1,54 @@
+"""Ten times a second: what a page shows of work that goes on is brought up to date in the kernel's own loop."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+PERIOD = 0.1  # s
+
+
+class Ticker:
+    """Calls what was added every PERIOD s while a loop of asyncio runs; `tick()` does it once, for tests.
+
+    In the kernel's own thread, so that what it changes is never changed by a handler at the same time.
+    """
+
+    def __init__(self) -> None:
+        self._calls: list[Callable[[], None]] = []
+        self._task: asyncio.Task[None] | None = None
+
+    def add(self, call: Callable[[], None]) -> Callable[[], None]:
+        """Call it from now on; the answer ends that."""
+        self._calls.append(call)
+        self._begin()
+
+        def remove() -> None:
+            if call in self._calls:
+                self._calls.remove(call)
+
+        return remove
+
+    def tick(self) -> None:
+        """Once, now. A call that fails is not made again; its error goes to the log."""
+        for call in tuple(self._calls):
+            try:
+                call()
+            except Exception:
+                logging.getLogger(__name__).exception("a panel could not be brought up to date")
+                if call in self._calls:
+                    self._calls.remove(call)
+
+    def _begin(self) -> None:
+        if self._task is not None and not self._task.done():
+            return
+        try:
+            self._task = asyncio.get_running_loop().create_task(self._run())
+        except RuntimeError:  # no loop: a test, which ticks itself
+            self._task = None
+
+    async def _run(self) -> None:
+        while self._calls:
+            self.tick()
+            await asyncio.sleep(PERIOD)

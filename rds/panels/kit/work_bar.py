@@ -1,0 +1,92 @@
+"""Progress of long work, with the time that it will still take and a stop button."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import ipywidgets as widgets
+
+from rds.panels.kit.ticker import Ticker
+
+
+class Work(Protocol):
+    """What can be watched: a Task of the session, or what wraps a run."""
+
+    @property
+    def share(self) -> float | None:
+        """0 to 1, or None where nobody knows."""
+        ...
+
+    @property
+    def seconds_left(self) -> float | None:
+        """s."""
+        ...
+
+    @property
+    def done(self) -> bool:
+        """Whether it is over."""
+        ...
+
+    note: str
+
+    def stop(self) -> None:
+        """Ask it to end."""
+        ...
+
+
+class WorkBar(widgets.HBox):
+    """Hidden until `follow(work, ended)`; when the work is over it calls `ended()` once, and hides again."""
+
+    def __init__(self, ticker: Ticker):
+        self._bar = widgets.FloatProgress(0.0, 0.0, 1.0)
+        self._bar.add_class("rds-progress")
+        self._text = widgets.Label("")
+        self.stop_button = widgets.Button(
+            description="Stop", icon="", button_style="warning", tooltip="End it; what was recorded is kept"
+        )
+        self.stop_button.on_click(lambda _: self._stop())
+        super().__init__([self._bar, self._text, self.stop_button])
+        self.add_class("rds-work")
+        self.layout.display = "none"
+        self._ticker = ticker
+        self._work: Any = None
+        self._ended: Callable[[], None] | None = None
+        self._end: Callable[[], None] | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether it follows something that is not over."""
+        return self._work is not None
+
+    def follow(self, work: Work, ended: Callable[[], None]) -> None:
+        """Show the progress of `work` until it is over."""
+        self._work, self._ended = work, ended
+        self.layout.display = ""
+        self.stop_button.disabled = False
+        self._look()
+        if self._work is not None:
+            self._end = self._ticker.add(self._look)
+
+    def _stop(self) -> None:
+        if self._work is not None:
+            self.stop_button.disabled = True
+            self._text.value = "stopping"
+            self._work.stop()
+
+    def _look(self) -> None:
+        work = self._work
+        if work is None:
+            return
+        share, left = work.share, work.seconds_left
+        self._bar.value = share or 0.0
+        if not self.stop_button.disabled:
+            parts = [work.note, "" if share is None else f"{share:.0%}", "" if left is None else f"{left:.0f} s left"]
+            self._text.value = ", ".join(filter(None, parts)) or "working"
+        if work.done:
+            ended, self._work = self._ended, None
+            self.layout.display = "none"
+            if self._end is not None:
+                self._end()
+            if ended is not None:
+                ended()

@@ -1,0 +1,32 @@
+"""The main menu: what there is to do, and the shortest way to a first tracked sine."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.panels import PANELS
+
+NAME = "menu"
+TITLE = "Main menu"
+SUMMARY = "What there is to do"
+HELP = "panels"
+
+
+def build(shell: Any) -> widgets.Widget:
+    """A card for each panel."""
+    cards = [_card(shell, name) for name in PANELS.names() if name != NAME]
+    grid = widgets.Box(cards)
+    grid.add_class("rds-cards")
+    return widgets.VBox([grid])
+
+
+def _card(shell: Any, name: str) -> widgets.VBox:
+    module = PANELS.module(name)
+    button = widgets.Button(description=module.TITLE, button_style="primary", tooltip=module.SUMMARY)
+    button.on_click(lambda _: shell.open(name))
+    card = widgets.VBox([button, widgets.HTML(f"<p>{escape(module.SUMMARY)}</p>")])
+    card.add_class("rds-card")
+    return card

@@ -1,0 +1,139 @@
+"""The page around the panels: title, emergency stop, navigation, help, light and dark."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from html import escape
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.core.errors import RdsError
+from rds.panels import PANELS
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.ticker import Ticker
+from rds.session.session import Message, Session
+
+_STYLE = Path(__file__).parent / "static" / "style.css"
+
+
+@cache
+def _style() -> str:
+    return f"<style>{_STYLE.read_text(encoding='utf-8')}</style>"
+
+
+class Shell:
+    """One page. Panels are built when they are opened first, and stay as they were left.
+
+    A panel's `build(shell)` uses `shell.session`, `shell.ticker`, `shell.say`, and `shell.open(name)` to go elsewhere.
+    """
+
+    def __init__(self, session: Session, panel: str = "menu"):
+        self.session = session
+        self.ticker = Ticker()
+        self.panels: dict[str, Any] = {}
+        self.here = ""
+        self.on_help: Callable[[str], None] | None = None  # called with the help page of the panel one is in
+        self._notice = Notice()
+        self._heard: list[Message] = []
+        self._title = widgets.HTML()
+        self._title.add_class("rds-title")
+        self._title.layout.flex = "1 1 0"
+        self._buttons = {name: self._button(name) for name in PANELS.names()}
+        nav = widgets.VBox(list(self._buttons.values()))
+        nav.add_class("rds-nav")
+        self._place = widgets.VBox([])
+        self._place.add_class("rds-panel")
+        body = widgets.HBox([nav, self._place])
+        body.add_class("rds-body")
+        self.widget = widgets.VBox([widgets.HTML(_style()), self._head(), self._notice, body])
+        self.widget.add_class("rds-app")
+        session.watch(self._heard.append)  # from any thread; shown at the next tick
+        self.ticker.add(self._show_messages)
+        self._offer_runs()
+        self.open(panel)
+
+    def open(self, name: str) -> None:
+        """Go to the panel called `name`; InputError if there is none."""
+        module = PANELS.module(name)
+        if name not in self.panels:
+            self.panels[name] = self._built(module)
+        self.here = name
+        for other, button in self._buttons.items():
+            (button.add_class if other == name else button.remove_class)("rds-here")
+        about = f"{escape(self.session.machine)} · files in {escape(str(self.session.folder))}"
+        self._title.value = f"<h1>{escape(module.TITLE)}</h1><p>{about}</p>"
+        self._place.children = [self.panels[name]]
+
+    def say(self, text: str, kind: str = "note") -> None:
+        """A line over the panel; kind is note, good, warning or error."""
+        self._notice.say(text, kind)
+
+    def emergency_stop(self) -> None:
+        """What the red button does."""
+        try:
+            self.say(self.session.emergency_stop(), "warning")
+        except RdsError as error:
+            self.say(str(error), "error")
+
+    def _built(self, module: ModuleType) -> Any:
+        try:
+            return module.build(self)
+        except RdsError as error:
+            notice = Notice()
+            notice.say(str(error), "error")
+            return notice
+
+    def _button(self, name: str) -> widgets.Button:
+        module = PANELS.module(name)
+        button = widgets.Button(description=module.TITLE, tooltip=module.SUMMARY)
+        button.on_click(lambda _: self.open(name))
+        return button
+
+    def _head(self) -> widgets.HBox:
+        stop = widgets.Button(
+            description="EMERGENCY STOP", tooltip="Zero volts on every module of the bus, now, whatever runs"
+        )
+        stop.add_class("rds-stop")
+        stop.on_click(lambda _: self.emergency_stop())
+        release = widgets.Button(description="Release", tooltip="Let the modules be used again after an emergency stop")
+        release.on_click(lambda _: self._release())
+        guide = widgets.Button(description="Help", tooltip="The page of the documentation on this panel")
+        guide.on_click(lambda _: self._help())
+        theme = widgets.ToggleButton(description="Dark", tooltip="Dark or light colours", value=False)
+        theme.observe(lambda change: self._darken(change["new"]), "value")
+        theme.layout.width = "auto"
+        head = widgets.HBox([self._title, guide, theme, release, stop])
+        head.add_class("rds-head")
+        return head
+
+    def _release(self) -> None:
+        try:
+            self.say(self.session.release_emergency_stop(), "good")
+        except RdsError as error:
+            self.say(str(error), "error")
+
+    def _darken(self, dark: bool) -> None:
+        (self.widget.add_class if dark else self.widget.remove_class)("rds-dark")
+
+    def _help(self) -> None:
+        if self.on_help is not None:
+            self.on_help(PANELS.module(self.here).HELP)
+
+    def _show_messages(self) -> None:
+        heard, self._heard[:] = list(self._heard), []
+        for message in heard:
+            self.say(message.text, message.kind)
+
+    def _offer_runs(self) -> None:
+        """What was going on when the page was last left."""
+        from rds.session.kept_runs import State
+
+        states = [run.state for run in self.session.runs()]
+        if State.GOES_ON in states:
+            self.say("a run goes on: its results will be among the earlier runs; Emergency stop ends it", "warning")
+        elif State.CUT_SHORT in states[:1]:
+            self.say("the last run was cut short; what it recorded can be opened among the earlier runs", "warning")

@@ -1,0 +1,128 @@
+// A live strip chart over uPlot (which stands above this in the same module, as `uPlot`).
+// The kernel sends rows of float64: time, then one value per trace. The page keeps them all, so that pausing,
+// slow motion and scrubbing back cost the kernel nothing.
+
+const STEP_MS = 100;
+
+function render({ model, el }) {
+  const style = document.createElement("style");
+  style.textContent = model.get("_style");
+  const box = document.createElement("div");
+  box.className = "rds-strip";
+  const bar = document.createElement("div");
+  bar.className = "rds-strip-bar";
+  el.append(style, box, bar);
+
+  let columns = [];
+  let end = 0; // s, the right edge that is shown
+  let follows = true; // the right edge is the newest sample
+  let speed = 1; // of the replay; 1 with `follows` is live
+  let plot = null;
+  let dirty = false;
+
+  const pause = button("Pause", "Hold the picture; recording goes on");
+  const slow = button("Slow motion", "Replay at a quarter of the speed from here");
+  const live = button("Live", "Show the newest samples again");
+  const scrub = document.createElement("input");
+  Object.assign(scrub, { type: "range", min: 0, max: 1000, value: 1000, title: "Scrub back through what was recorded" });
+  scrub.setAttribute("aria-label", "time shown");
+  const clock = document.createElement("span");
+  clock.className = "rds-strip-clock";
+  bar.append(pause, slow, live, scrub, clock);
+
+  pause.onclick = () => { follows = false; speed = 0; dirty = true; };
+  slow.onclick = () => { if (follows) end = Math.max(first(), end - model.get("window")); follows = false; speed = 0.25; };
+  live.onclick = () => { follows = true; speed = 1; dirty = true; };
+  scrub.oninput = () => {
+    follows = false; speed = 0;
+    end = first() + (last() - first()) * scrub.value / 1000;
+    dirty = true;
+  };
+
+  function button(text, tip) {
+    const made = document.createElement("button");
+    made.textContent = text; made.title = tip; made.type = "button";
+    return made;
+  }
+  const first = () => (columns.length && columns[0].length ? columns[0][0] : 0);
+  const last = () => (columns.length && columns[0].length ? columns[0][columns[0].length - 1] : 0);
+  const ink = (name, fallback) => getComputedStyle(el).getPropertyValue(name).trim() || fallback;
+
+  function build() {
+    if (plot) plot.destroy();
+    const traces = model.get("traces");
+    if (columns.length !== traces.length + 1) columns = [[], ...traces.map(() => [])];
+    const text = ink("--rds-text", "#222"), grid = { stroke: ink("--rds-grid", "#ddd"), width: 1 };
+    const units = [...new Set(traces.map((trace) => trace.unit))];
+    const scales = { x: { time: false, range: () => [end - model.get("window"), end] } };
+    units.forEach((unit) => { scales[unit] = { auto: true }; });
+    const axes = [{ stroke: text, grid, label: "time [s]", labelSize: 20, size: 34 }];
+    units.forEach((unit, i) => axes.push({
+      scale: unit, stroke: text, grid: i ? { show: false } : grid, side: i ? 1 : 3, size: 58, labelSize: 18,
+      label: traces.filter((trace) => trace.unit === unit).map((trace) => trace.name).join(", ") + ` [${unit}]`,
+    }));
+    const series = [{ label: "time [s]", value: (u, v) => (v == null ? "–" : v.toFixed(3)) }];
+    traces.forEach((trace) => series.push({
+      label: `${trace.name} [${trace.unit}]`, stroke: trace.color, width: trace.width || 1.6, dash: trace.dash || [],
+      scale: trace.unit, points: { show: false }, value: (u, v) => (v == null ? "–" : v.toPrecision(5)),
+    }));
+    plot = new uPlot({ width: Math.max(box.clientWidth, 320), height: model.get("height"), scales, axes, series,
+      cursor: { drag: { x: false, y: false } }, legend: { live: true } }, shown(), box);
+  }
+
+  // only what is in the window is handed to the chart
+  function shown() {
+    const time = columns[0] || [], from = lower(time, end - model.get("window")), to = lower(time, end + 1e-9);
+    return columns.map((column) => column.slice(Math.max(from - 1, 0), to + 1));
+  }
+  function lower(values, wanted) {
+    let low = 0, high = values.length;
+    while (low < high) { const middle = (low + high) >> 1; if (values[middle] < wanted) low = middle + 1; else high = middle; }
+    return low;
+  }
+
+  function draw() {
+    if (!plot) return;
+    plot.setData(shown());
+    if (last() > first()) scrub.value = 1000 * (end - first()) / (last() - first());
+    const state = follows ? "live" : speed ? `${speed}×` : "paused";
+    clock.textContent = `${end.toFixed(2)} s, ${state}`;
+    el.dataset.samples = columns.length ? columns[0].length : 0;
+    el.dataset.state = state;
+  }
+
+  const timer = setInterval(() => {
+    if (!follows && speed) { end = Math.min(end + speed * STEP_MS / 1000, last()); dirty = true; }
+    if (dirty && el.isConnected && box.clientWidth) {
+      dirty = false;
+      if (plot && Math.abs(plot.width - box.clientWidth) > 4) plot.setSize({ width: box.clientWidth, height: model.get("height") });
+      draw();
+    }
+  }, STEP_MS);
+
+  function receive(message, buffers) {
+    if (message.kind === "clear") { columns = [[], ...model.get("traces").map(() => [])]; follows = true; speed = 1; end = 0; }
+    if (message.kind === "rows") {
+      const view = buffers[0], width = message.width;
+      const values = new Float64Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength));
+      if (columns.length !== width) columns = Array.from({ length: width }, () => []);
+      for (let i = 0; i < values.length; i += width)
+        for (let j = 0; j < width; j++) columns[j].push(values[i + j]);
+      if (follows) end = last();
+    }
+    dirty = true;
+  }
+
+  const rebuild = () => { build(); dirty = true; };
+  model.on("msg:custom", receive);
+  model.on("change:traces", rebuild);
+  model.on("change:window", () => { dirty = true; });
+  const themed = new MutationObserver(rebuild);
+  themed.observe(document.body, { attributes: true, attributeFilter: ["class", "data-jp-theme-light"] });
+  const app = document.querySelector(".rds-app");
+  if (app) themed.observe(app, { attributes: true, attributeFilter: ["class"] });
+  requestAnimationFrame(() => { build(); model.send({ kind: "all" }); });
+  return () => { clearInterval(timer); themed.disconnect(); model.off("msg:custom", receive); if (plot) plot.destroy(); };
+}
+
+export default { render };

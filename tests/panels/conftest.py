@@ -1,0 +1,120 @@
+"""A real browser on a real page of `rds app`; skipped, with how to get it, where there is no Chromium."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+HOW = "no Chromium here: install it (Debian: apt-get install chromium) to run the tests in a browser"
+PATIENCE = 60_000  # ms, on a busy computer
+ARTIFACTS = Path(os.environ.get("RDS_SCREENSHOTS", Path(tempfile.gettempdir()) / "rds-screenshots"))
+
+
+class App(NamedTuple):
+    """A running `rds app`."""
+
+    url: str
+    folder: Path
+    process: subprocess.Popen[str]
+
+
+@pytest.fixture(scope="session")
+def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., App]]:
+    """Start `rds app` on a folder; ended with the tests."""
+    if CHROMIUM is None:
+        pytest.skip(HOW)
+    pytest.importorskip("voila", reason="Voilà is not installed: pip install 'rds[lab]'")
+    runtime = tempfile.mkdtemp(prefix="rds", dir="/tmp")  # short, because a socket's path is
+    started: list[App] = []
+
+    def start(folder: Path | None = None, *options: str) -> App:
+        folder = folder or tmp_path_factory.mktemp("student")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rds", "app", str(folder), "--no-browser", *options],
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env=os.environ | {"XDG_RUNTIME_DIR": runtime},
+        )
+        assert process.stderr is not None
+        said = []
+        for line in process.stderr:
+            said.append(line)
+            found = re.search(r"http://127\.0\.0\.1\S+token=\S+", line)
+            if found:
+                app = App(found.group(0), folder, process)
+                started.append(app)
+                return app
+        raise AssertionError("rds app did not start:\n" + "".join(said))
+
+    yield start
+    for app in started:
+        if app.process.poll() is None:
+            os.killpg(app.process.pid, signal.SIGTERM)
+            app.process.wait(20)
+        if app.process.stderr is not None:
+            app.process.stderr.close()
+    shutil.rmtree(runtime, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def app(start_app: Callable[..., App]) -> App:
+    """One `rds app` for all tests that can share its folder."""
+    return start_app()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Chromium without a window."""
+    if CHROMIUM is None:
+        pytest.skip(HOW)
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install 'rds[dev]'")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def open_page(browser: Any, app: App, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
+    """Open a page, at a panel by its title; fails the test if anything asked another host for anything.
+
+    A screenshot of each page is kept at the end of the test, in $RDS_SCREENSHOTS or a temporary folder.
+    """
+    pages: list[Any] = []
+    abroad: list[str] = []
+
+    def asked(message: Any) -> None:
+        if not re.match(r"(https?|wss?)://(127\.0\.0\.1|localhost)[:/]|data:|blob:|about:", message.url):
+            abroad.append(message.url)
+
+    def show(panel: str | None = None, on: App | None = None, width: int = 1280, height: int = 800) -> Any:
+        page = browser.new_page(viewport={"width": width, "height": height})
+        page.set_default_timeout(PATIENCE)
+        page.on("request", asked)
+        page.goto((on or app).url)
+        page.wait_for_selector(".rds-app .rds-nav button")
+        if panel is not None:
+            page.click(f'.rds-nav button:text-is("{panel}")')
+            page.wait_for_selector(f'.rds-title h1:text-is("{panel}")')
+        pages.append(page)
+        return page
+
+    yield show
+    ARTIFACTS.mkdir(parents=True, exist_ok=True)
+    name = re.sub(r"\W+", "-", request.node.name).strip("-")
+    for number, page in enumerate(pages):
+        page.screenshot(path=ARTIFACTS / f"{name}-{number}.png")
+        page.close()
+    assert not abroad, f"the page asked other hosts: {abroad}"
