@@ -1,0 +1,121 @@
+"""From the numbers of a method to an `Estimate`: intervals, the free run and predictions with them, and what to doubt.
+
+Methods that do not fit the free run itself still have it computed: it is how a model will be used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.identification.estimate import Errors, Estimate, Parameter
+from rds.identification.initial_state import estimate_start
+from rds.identification.kstep import ahead, errors_of
+from rds.identification.log import Gravity, Log
+from rds.identification.structure import Structure
+
+_START = 1000  # samples from which a log's initial state is estimated
+_UNTOLD = 0.5  # standard error over value from which a parameter that cannot be zero is not told
+
+
+def made_estimate(
+    structure: Structure,
+    method: str,
+    logs: Sequence[Log],
+    values: Mapping[str, float],
+    covariance: np.ndarray,
+    freedom: float,
+    *,
+    untold: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+    relative_error_percent: float | None = None,
+    details: Mapping[str, Any] | None = None,
+) -> Estimate:
+    """The estimate with `values` in the structure's order; `covariance` is of those, `freedom` for Student's t.
+
+    Parameters that the structure says are given have no error. InputError for values outside the structure's bounds.
+    """
+    values = {name: float(values[name]) for name in structure.parameters}
+    given = set(structure.given(logs)) if structure.given else set()
+    width = t_quantile(freedom)
+    errors = np.sqrt(np.diag(covariance))
+    parameters = {}
+    notes = list(untold)
+    for (name, value), error in zip(values.items(), errors.tolist(), strict=True):
+        _check_bounds(structure, name, value, method)
+        reach = 0.0 if name in given else width * error
+        parameters[name] = Parameter(value, error, value - reach, value + reach, structure.units[name])
+        known = any(name in sentence for sentence in notes)
+        if not known and structure.bounds(name)[0] == 0.0 and np.isfinite(error) and error > _UNTOLD * abs(value):
+            unit = structure.units[name]
+            notes.append(
+                f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is hardly told by these data"
+            )
+    states, free_run, predictions, said = {}, {}, {}, list(warnings)
+    for log in logs:
+        states[log.name], free_run[log.name], predictions[log.name] = _runs(structure, log, values)
+        if log.closed_loop:
+            said.append(
+                f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
+                "fit a little, and the free run lacks the controller that held the axis, so its error grows with time"
+            )
+        said += [f"{log.name}: {finding.what}" for finding in log.findings if finding.gravity is not Gravity.NOTE]
+    return Estimate(
+        structure=structure.name,
+        options=structure.options,
+        method=method,
+        parameters=parameters,
+        covariance=covariance,
+        untold=tuple(notes),
+        initial_state=states,
+        free_run=free_run,
+        ahead=predictions,
+        logs=tuple(
+            {
+                "name": log.name,
+                "source": log.source,
+                "sha256": log.sha256,
+                "first": 0,
+                "end": len(log),
+                "command": (float(log.command.min()), float(log.command.max())),
+            }
+            for log in logs
+        ),
+        relative_error_percent=relative_error_percent,
+        warnings=tuple(dict.fromkeys(said)),
+        details=dict(details or {}),
+    )
+
+
+def t_quantile(freedom: float, share: float = 0.95) -> float:
+    """Half the width of the interval with this share, in standard errors (Student's t)."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), 0.5 + 0.5 * share))
+
+
+def _check_bounds(structure: Structure, name: str, value: float, method: str) -> None:
+    option, high = structure.parameters[name], structure.bounds(name)[1]
+    if not np.isfinite(value) or value < option.at_least or value <= option.more_than or value > high:
+        raise InputError(
+            f"by {method}, {name} = {value:.4g} {structure.units[name]}, which no axis has ({option.meaning}): the "
+            "sign of the command or the position is reversed, columns are swapped, or noise hides the motion; look at the "
+            "data with `rds data describe`, or try another method"
+        )
+
+
+def _runs(
+    structure: Structure, log: Log, values: Mapping[str, float]
+) -> tuple[tuple[float, ...], Errors, Mapping[int, Errors]]:
+    few = slice(0, min(len(log), _START))
+    state = estimate_start(structure, values, log.time[few], log.command[few], log.position[few])
+    with np.errstate(all="ignore"):
+        modelled = np.asarray(structure.respond(log.time, log.command, state, values), dtype=float)
+    if not np.isfinite(modelled).all():
+        lost = Errors(-np.inf, np.inf, np.inf, structure.output_unit)
+        return state, lost, {}
+    free_run = errors_of(log.position, modelled, structure.output_unit)
+    return state, free_run, ahead(log.position, modelled, structure.output_unit)
