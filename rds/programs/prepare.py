@@ -19,9 +19,7 @@ from rds.motion.segments import AXES, SEGMENT
 from rds.nc.check import Setup, check_program, compiled_if_current
 from rds.nc.compiled_file import open_compiled
 from rds.nc.toolpath import PathBlock
-from rds.programs.caps import caps
 from rds.runtime.program import Happening, Program
-from rds.runtime.retimed import FASTEST
 
 SPINDLE_UNIT = "rev/min"
 MOST_SAMPLES = 20_000_000  # whose references fit into memory: five and a half hours at 1 kHz
@@ -96,7 +94,6 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
         velocity=velocity,
         acceleration=acceleration,
         line=line,
-        caps=caps(velocity, acceleration, table, T, FASTEST),
         happenings=tuple(
             Happening(sample, event.kind, float(event.value), event.line)
             for sample, event in rows.events

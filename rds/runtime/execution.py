@@ -12,13 +12,13 @@ from typing import Protocol
 
 from rds.core.types import Ending
 from rds.runtime.changes import STOP
+from rds.runtime.homing import Homing
 from rds.runtime.laws import LiveReference
-from rds.runtime.program import HOLD, HOME, OPTIONAL_STOP, OVERRIDE, RESUME, Happening, Program, dwell_samples, leg
+from rds.runtime.program import HOLD, HOME, OPTIONAL_STOP, OVERRIDE, RESUME, Happening, Program, dwell_samples
 
 SPINDLE_WITHIN = 0.02  # of its speed, or two counts: at speed
 SPINDLE_STEADY = 10  # samples in a row at speed
 SPINDLE_PATIENCE = 10.0  # s until it should be
-_HOMING_SLEW = 0.5  # s in which the way home is brought to rest
 
 
 class State(IntEnum):
@@ -81,8 +81,7 @@ class Execution:
         self._line = self._shown_line = int(program.line[0])
         self._speed = 0.0
         self._position = [float(value) for value in program.position[0]]
-        self._legs: list[tuple[list[float], list[float], float]] = []
-        self._leg_place, self._leg_rate = 0.0, 1.0
+        self._way: Homing | None = None  # home
         for reference, value in zip(references, self._position, strict=False):
             reference.position.value = value
 
@@ -108,7 +107,9 @@ class Execution:
             self._step(positions)
         self._last = k
         shown = self._shown
-        rate = self._follower.rate if shown is State.RUNS else self._leg_rate if shown is State.HOME else 0.0
+        rate = self._follower.rate if shown is State.RUNS else 0.0
+        if shown is State.HOME and self._way is not None:
+            rate = self._way.rate
         row += (self._shown_line, self._follower.place, rate, shown)
 
     def over(self) -> tuple[Ending, str] | None:
@@ -253,54 +254,29 @@ class Execution:
 
     def _go_home(self) -> None:
         """Up first, then straight to the home position; the spindle stops once the tool is out of the work."""
-        program, here = self._program, list(self._position)
-        home = list(program.home)
-        self._legs = []
-        if "Z" in program.axes:
-            z = program.axes.index("Z")
-            if home[z] > here[z]:
-                up = [*here[:z], home[z], *here[z + 1 :]]
-                self._legs.append((here, up, leg(here, up, program.limits)))
-                here = up
-        if here != home:
-            self._legs.append((here, home, leg(here, home, program.limits)))
-        if len(self._legs) < 2:
+        program = self._program
+        z = program.axes.index("Z") if "Z" in program.axes else None
+        self._way = Homing(self._position, program.home, z, program.limits, self._T)
+        if len(self._way.legs) < 2:
             self._speed = 0.0
-        self._leg_place, self._leg_rate = 0.0, 1.0
         self.state = State.HOME
         self._rest()
 
     def _homing(self, positions: Sequence[float]) -> None:
-        if not self._legs:
+        way = self._way
+        assert way is not None
+        if not way.legs:
             self._rest()
             self._end(Ending.STOPPED, f"went home from line {self._line}")
             return
-        start, end, lasts = self._legs[0]
-        wanted = 0.0 if self._values[HOLD] or self._values[STOP] else 1.0
-        step = self._T / _HOMING_SLEW
-        before = self._leg_rate
-        self._leg_rate = rate = min(wanted, before + step) if wanted > before else max(wanted, before - step)
-        slew = (rate - before) / self._T
-        self._leg_place = place = min(self._leg_place + self._T * rate, lasts)
-        q = place / lasts
-        part = q * q * q * (10.0 + q * (6.0 * q - 15.0))
-        speed = 30.0 * q * q * (1.0 - q) * (1.0 - q) / lasts
-        push = 60.0 * q * (1.0 - q) * (1.0 - 2.0 * q) / (lasts * lasts)
-        ways = [b - a for a, b in zip(start, end, strict=True)]
-        self._put(
-            [a + way * part for a, way in zip(start, ways, strict=True)],
-            [way * speed * rate for way in ways],
-            [way * (push * rate * rate + speed * slew) for way in ways],
-        )
-        if rate == 0.0 and self._values[STOP]:
-            self._end(Ending.STOPPED, f"stopped on the way home from line {self._line}")
-        elif rate == 0.0 and not self._expects([STOP, HOLD]):
-            self._end(Ending.STOPPED, "held on the way home, and nobody is there to let it go on")
-        elif place >= lasts:
-            self._put(end, [0.0] * len(end), [0.0] * len(end))
-            self._legs.pop(0)
-            self._leg_place = 0.0
+        before = len(way.legs)
+        self._put(*way.advance(is_wanted=not (self._values[HOLD] or self._values[STOP])))
+        if len(way.legs) < before:
             self._speed = 0.0
+        if way.rate == 0.0 and self._values[STOP]:
+            self._end(Ending.STOPPED, f"stopped on the way home from line {self._line}")
+        elif way.rate == 0.0 and self._values[HOLD] and not self._expects([STOP, HOLD]):
+            self._end(Ending.STOPPED, "held on the way home, and nobody is there to let it go on")
 
     # --- what the laws see ----------------------------------------------------------------------------------------
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -33,9 +32,9 @@ class Program:
     """Planned samples of the axes that a program moves, one sample period apart, and what happens among them.
 
     Row 0 is where the motion begins, at rest; dwells have their rows. `position` (m × n, mm or degrees), `velocity` and
-    `acceleration` are in the order of `axes`; `line` (m) is the program line of each row; `caps` (m) is how many times
-    as fast as planned the axes can pass there. `spindle` is the axis that the words S, M3 and M4 drive. `home` (n) is
-    where the axes go home to; `limits` (3 × n) are velocity, acceleration and jerk of the axes on the way.
+    `acceleration` are in the order of `axes`; `line` (m) is the program line of each row. `spindle` is the axis
+    that the words S, M3 and M4 drive. `home` (n) is where the axes go home to; `limits` (3 × n) are velocity,
+    acceleration and jerk of the axes.
     """
 
     axes: tuple[str, ...]
@@ -44,7 +43,6 @@ class Program:
     velocity: np.ndarray
     acceleration: np.ndarray
     line: np.ndarray
-    caps: np.ndarray
     happenings: tuple[Happening, ...]
     home: tuple[float, ...]
     limits: np.ndarray
@@ -71,14 +69,3 @@ def program_channels() -> list[Channel]:
         switch(HOME, 0.0, "1 ends the program where it is and moves the axes home"),
         switch(OPTIONAL_STOP, 1.0, "1: M1 waits, 0: it does not"),
     ]
-
-
-def leg(start: Sequence[float], end: Sequence[float], limits: np.ndarray) -> float:
-    """Seconds that a straight move takes by the polynomial 10 q³ − 15 q⁴ + 6 q⁵, half of each limit being used.
-
-    Its velocity, acceleration and jerk are at most 15/8 d/D, 10/√3 d/D² and 60 d/D³ over a distance d.
-    """
-    way = 2.0 * np.abs(np.asarray(end) - np.asarray(start))
-    velocity, acceleration, jerk = limits
-    lasts = np.concatenate((1.875 * way / velocity, np.sqrt(5.7736 * way / acceleration), np.cbrt(60.0 * way / jerk)))
-    return float(lasts.max(initial=0.0))

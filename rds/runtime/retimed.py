@@ -1,23 +1,29 @@
 """Planned samples followed at another rate than planned: the feed override and the feed hold.
 
 Between two samples the path is the quintic through their positions, velocities and accelerations; at a rate of r it is
-passed with the velocity r v and the acceleration r² a + ṙ v. So no rate leaves the path, and r may change only as fast
-as every axis can follow: |r² a + ṙ v| at most its limit. A constant r up to 1 always can; above 1 it stays below the
-caps that the planner gives.
+passed with the velocity r v, the acceleration r² a + ṙ v and the jerk r³ j + 3 r ṙ a + r̈ v. So no rate leaves the path,
+and a constant r up to 1 keeps every limit that the plan keeps. A change of the rate is a `Ramp`; before it begins, each
+of its samples is worked out and held against velocity, acceleration and jerk of every axis. A rate above 1 is taken
+only with a way back to 1 that is known to keep the limits as well, and left where that way would no longer do so.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import ceil
 from typing import Any
 
 import numpy as np
 
 from rds.runtime.program import Program
+from rds.runtime.ramp import SHARPEST, STEEPEST, Ramp
 
-FASTEST = 10.0  # 1/s, change of the rate: 100 % of override in 0.1 s at the earliest
-SMOOTH = 200.0  # 1/s², change of that
-SPARE = 0.97  # of the acceleration that is used: the rest is for what changes between samples
+EXCESS = 0.001  # by which differences of the samples sent may exceed a limit, relative: quintics are no plan
+PATIENCE = 0.5  # s after which somebody who wants it slower gets the gentlest step, wherever the path is
+_SHORTEST, _LONGEST = 0.02, 600  # s and samples, of a ramp: a change that takes longer is made in steps
+_STAY = 8  # samples at a rate above 1 that are checked at once
+_AHEAD = 0.2  # s of the plan whose speed says how long a ramp will have to be
+# Ramps that are tried, one at each sample: share of the change that is wanted, times as long as the least.
+_TRIES = ((1.0, 1.05), (1.0, 1.5), (1.0, 2.2), (1.0, 3.5), (0.3, 1.5), (0.3, 3.5), (0.05, 2.0), (0.05, 5.0))
 
 
 class Retimed:
@@ -25,78 +31,117 @@ class Retimed:
 
     def __init__(self, program: Program, T: float):
         self._T = T
+        self._tables = tuple(
+            np.ascontiguousarray(table, dtype=float)
+            for table in (program.position, program.velocity, program.acceleration)
+        )
         # A memory view gives plain floats, one by one, without a list as large as the program.
-        tables = (program.position, program.velocity, program.acceleration, program.caps)
-        views: list[Any] = [np.ascontiguousarray(table, dtype=float).reshape(-1).data for table in tables]
-        self._p, self._v, self._a, self._caps = views
-        self._push = [SPARE * float(limit) for limit in program.limits[1]]
+        views: list[Any] = [table.reshape(-1).data for table in self._tables]
+        self._p, self._v, self._a = views
         self._n = len(program.axes)
-        self.place, self.rate, self._change = 0.0, 1.0, 0.0
+        self._limits = np.asarray(program.limits, dtype=float)
+        self.place, self.rate = 0.0, 1.0
         self.position: list[float] = self._p[: self._n].tolist()
         self.velocity: list[float] = [0.0] * self._n
         self.acceleration: list[float] = [0.0] * self._n
+        self._past = [self.position] * 3  # the last samples, for differences
+        self._ramp: Ramp | None = None
+        self._k, self._from = 0, 0.0  # how far the ramp is, and where it began
+        self._back = Ramp(1.0, 1.0, 1)  # from a rate above 1, known to keep the limits
+        self._tries = self._sure = 0
+        self._rests = True
 
     def advance(self, wanted: float, until: int) -> None:
         """One sample period towards the rate `wanted`, and along the path at most to the sample `until`."""
-        before = self.rate
-        self.rate = rate = self._next_rate(wanted)
-        self._change = (rate - before) / self._T
-        self.place = min(self.place + 0.5 * (before + rate), until)
-        self._evaluate(rate, self._change)
+        if self._ramp is None and (wanted != self.rate or self.rate > 1.0):
+            self._choose(wanted, until)
+        ramp, slope = self._ramp, 0.0
+        if ramp is None:
+            place = self.place + self.rate
+        else:
+            self._k += 1
+            place = self._from + ramp.passed(self._k)
+            self.rate, slope = ramp.rate(self._k), ramp.slope(self._k) / self._T
+            if self._k == ramp.samples:
+                self.rate, slope, self._ramp = ramp.end, 0.0, None
+        self._rests = self._rests and self.rate == 0.0
+        self.place = min(place, until)
+        self._evaluate(self.rate, slope)
+        self._past = [*self._past[1:], self.position]
+        if place >= until:
+            self.settle(wanted)
 
     def settle(self, wanted: float) -> None:
-        """Take the rate `wanted` at once: for a place where the path rests."""
-        self.rate, self._change = min(wanted, self._cap(self.place)), 0.0
+        """Take the rate `wanted`, at most 1, at once: for a place where the path rests."""
+        self.rate, self._ramp, self._rests = min(wanted, 1.0), None, True
+        self._past = [self.position] * 3
+        self._tries = self._sure = 0
 
-    def _next_rate(self, wanted: float) -> float:
-        place, rate, T = self.place, self.rate, self._T
-        i = int(place)
-        last = len(self._caps) - 1
-        if wanted > 1.0:
-            wanted = min(wanted, self._cap(place), self._cap(min(place + rate, last)))
-        if rate > 1.0:  # what the caps ahead demand comes before what is smooth
-            cap = self._cap(min(place + rate, last))
-            if rate >= cap:
-                return cap
-        off = wanted - rate
-        if off == 0.0 and self._change == 0.0:
-            return rate
-        aim = min(FASTEST, sqrt(2.0 * SMOOTH * abs(off)))
-        step = SMOOTH * T
-        change = min(max(aim if off > 0.0 else -aim, self._change - step), self._change + step)
-        low, high = self._room(i, rate)
-        change = min(max(change, low), high)
-        new = rate + change * T
-        if (off >= 0.0 and new >= wanted) or (off <= 0.0 and new <= wanted):
-            return wanted
-        if new > 1.0:
-            new = min(new, self._cap(min(place + new, last)))
-        return max(new, 0.0)
+    def _choose(self, wanted: float, until: int) -> None:
+        """Begin a ramp, if one keeps the limits from here on."""
+        rate = self.rate
+        if self._rests:
+            self.settle(wanted)
+            return
+        self._sure -= 1
+        if rate > 1.0 and self._sure < 0:
+            if self._share([Ramp(rate, rate, _STAY), self._back], until) > 1.0 + EXCESS:
+                self._begin(self._back)
+                return
+            self._sure = _STAY - 1
+        elif wanted != rate:
+            self._try(wanted, until)
 
-    def _cap(self, place: float) -> float:
-        i = int(place)
-        here = self._caps[i]
-        return here if i == place else here + (self._caps[i + 1] - here) * (place - i)
+    def _try(self, wanted: float, until: int) -> None:
+        """Begin one of the ramps towards `wanted`, if it keeps the limits; the next sample tries another one."""
+        ramp = self._towards(wanted, *_TRIES[self._tries % len(_TRIES)])
+        self._tries += 1
+        back = Ramp(ramp.end, 1.0, ramp.samples)
+        if self._share([ramp, back] if ramp.end > 1.0 else [ramp], until) <= 1.0 + EXCESS:
+            self._begin(ramp)
+            self._back = back
+        elif wanted < self.rate <= 1.0 and self._tries * self._T > PATIENCE:
+            self._begin(self._towards(wanted, *_TRIES[-1]))
 
-    def _room(self, i: int, rate: float) -> tuple[float, float]:
-        """How fast the rate may fall and rise from the sample `i` on, 1/s.
+    def _begin(self, ramp: Ramp) -> None:
+        self._ramp, self._k, self._from = ramp, 0, self.place
+        self._tries = self._sure = 0
 
-        Second differences of what is sent see the plan up to two samples further on.
-        """
-        low, high = -FASTEST, FASTEST
-        square = rate * rate
-        n = self._n
-        for start in range(i * n, min(i + 3, len(self._caps)) * n, n):
-            for axis, limit in enumerate(self._push, start):
-                v, a = self._v[axis], square * self._a[axis]
-                if v < 0.0:
-                    v, a = -v, -a
-                if v > 0.0:
-                    high = min(high, max(limit - a, 0.0) / v)
-                    low = max(low, -max(limit + a, 0.0) / v)
-        return low, high
+    def _towards(self, wanted: float, share: float, longer: float) -> Ramp:
+        """A ramp from the rate now by a share of what is wanted, `longer` times as long as the speed here asks for."""
+        i, T, rate = int(self.place), self._T, self.rate
+        v = np.abs(self._tables[1][i : i + 1 + ceil(_AHEAD / T)]).max(axis=0)
+        _, acceleration, jerk = self._limits
+        change, samples = share * (wanted - rate), 0
+        while samples == 0 or samples > _LONGEST:
+            change *= 1.0 if samples == 0 else (_LONGEST / samples) ** 2
+            speed = v * abs(change)
+            seconds = max(_SHORTEST, (STEEPEST * speed / acceleration).max(), np.sqrt(SHARPEST * speed / jerk).max())
+            samples = max(ceil(longer * float(seconds) / T), 4)
+        return Ramp(rate, wanted if change == wanted - rate else rate + change, samples)
 
-    def _evaluate(self, rate: float, change: float) -> None:
+    def _share(self, ramps: list[Ramp], until: int) -> float:
+        """The largest share of a limit that the samples of these ramps, one after the other, take of any axis."""
+        parts, place = [], self.place
+        for ramp in ramps:
+            parts.append(place + ramp.passed(np.arange(1.0, ramp.samples + 1.0)))
+            place = float(parts[-1][-1])
+        parts.append(place + ramps[-1].end * np.array((1.0, 2.0, 3.0)))  # and on at that rate
+        places = np.minimum(np.concatenate(parts), until)
+        i = np.minimum(places.astype(int), max(until - 1, 0))
+        q = (places - i)[:, None]
+        p, v, a = self._tables
+        T = self._T
+        there = min(1, len(p) - 1)
+        ends = (p[i], v[i] * T, a[i] * (T * T), p[i + there], v[i + there] * T, a[i + there] * (T * T))
+        samples = np.concatenate((self._past, _quintic(*ends, q)[0]))
+        worst = 0.0
+        for order, limit in enumerate(self._limits, 1):
+            change = np.abs(np.diff(samples, order, axis=0)[3 - order :])
+            worst = max(worst, float((change.max(axis=0) / (limit * T**order)).max()))
+        return worst
+
+    def _evaluate(self, rate: float, slope: float) -> None:
         n, T = self._n, self._T
         i = int(self.place)
         q = self.place - i
@@ -105,7 +150,7 @@ class Retimed:
         if q == 0.0:
             v, a = self._v[start : start + n].tolist(), self._a[start : start + n].tolist()
             self.position = self._p[start : start + n].tolist()
-            if rate == 1.0 and change == 0.0:
+            if rate == 1.0 and slope == 0.0:
                 self.velocity, self.acceleration = v, a
                 return
         else:
@@ -124,11 +169,11 @@ class Retimed:
                 v.append(dp / T)
                 a.append(ddp / (T * T))
         self.velocity = [rate * value for value in v]
-        self.acceleration = [square * push + change * value for push, value in zip(a, v, strict=True)]
+        self.acceleration = [square * push + slope * value for push, value in zip(a, v, strict=True)]
 
 
-def _quintic(p0: float, v0: float, a0: float, p1: float, v1: float, a1: float, q: float) -> tuple[float, float, float]:
-    """Value and derivatives at 0 ≤ q ≤ 1 of the quintic with these at its ends."""
+def _quintic(p0: Any, v0: Any, a0: Any, p1: Any, v1: Any, a1: Any, q: Any) -> tuple[Any, Any, Any]:
+    """Value and derivatives at 0 ≤ q ≤ 1 of the quintic with these at its ends; numbers or arrays."""
     way = p1 - p0
     half = 0.5 * a0
     c3 = 10.0 * way - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1
