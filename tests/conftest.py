@@ -24,7 +24,7 @@ LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it 
 # The folders whose tests start no loop, hub or machine: they may run side by side. All others run one by one.
 TOGETHER = {
     *("checks", "controllers", "core", "experiment", "interface", "interpolators", "models", "motion", "nc", "paths"),
-    *("reports", "results", "signals"),
+    *("reports", "results", "session", "signals"),
 }
 
 

@@ -1,0 +1,112 @@
+"""Long work, the claim to the machine, and the runs of a folder."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.runtime.record import NAME
+from rds.session import Session
+from rds.session.kept_runs import State
+from rds.session.task import Task
+
+
+def test_a_task_says_how_far_it_is_and_keeps_its_result(tmp_path: Path) -> None:
+    half, on = threading.Event(), threading.Event()
+
+    def work(task: Task[int]) -> int:
+        task.advance(5, 10, "fitting")
+        half.set()
+        on.wait(10)
+        return 42
+
+    task = Session(tmp_path).work("fit", work)
+    assert half.wait(10) and task.share == 0.5 and task.note == "fitting" and not task.done
+    assert task.seconds_left is not None and task.seconds_left >= 0.0
+    on.set()
+    assert task.wait(10) and task.result == 42 and task.share == 1.0
+
+
+def test_a_stopped_task_ends_at_its_next_word() -> None:
+    begun = threading.Event()
+
+    def work(task: Task[None]) -> None:
+        for step in range(10**9):
+            task.advance(step, 10**9)
+            begun.set()
+
+    task = Task("endless", work).start()
+    assert begun.wait(10)
+    task.stop()
+    assert task.wait(10) and task.stopped and task.result is None
+
+
+def test_a_task_keeps_its_error() -> None:
+    def work(task: Task[None]) -> None:
+        raise InputError("no data")
+
+    task = Task("bad", work).start()
+    assert task.wait(10) and isinstance(task.error, InputError) and not task.stopped
+
+
+class User:
+    """Something that uses the machine."""
+
+    stopped = False
+
+    def stop(self) -> None:
+        self.stopped = True
+
+
+def test_the_machine_has_one_user_on_a_page(tmp_path: Path) -> None:
+    session, user = Session(tmp_path), User()
+    session.take_machine("a run of X", user)
+    with pytest.raises(InputError, match="in use on this page"):
+        session.take_machine("another", User())
+    session.give_machine_back(User())  # of somebody who has it not: no change
+    assert session.machine_user is user
+    session.give_machine_back(user)
+    session.take_machine("another", User())
+
+
+def test_another_page_of_the_folder_is_told_who_has_the_machine(tmp_path: Path) -> None:
+    code = (
+        "import sys; from rds.session import Session\n"
+        "session = Session(sys.argv[1]); session.take_machine('a run of X', object()); print('has', flush=True)\n"
+        "sys.stdin.read()"
+    )
+    other = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert other.stdin is not None and other.stdout is not None
+    try:
+        assert other.stdout.readline() == "has\n"
+        here = Session(tmp_path)
+        with pytest.raises(InputError, match="in use by another page: a run of X, since"):
+            here.take_machine("mine", User())
+        other.kill()
+        other.wait(10)
+        here.take_machine("mine", User())  # a page that is gone holds nothing
+    finally:
+        other.kill()
+        other.communicate()
+
+
+def test_runs_of_the_folder_and_what_became_of_them(tmp_path: Path) -> None:
+    import rds
+
+    session = Session(tmp_path)
+    assert session.runs() == []
+    experiment = rds.Experiment(axis="X", duration=0.1, reference=rds.sinusoid(1.0, 5.0), controller="p")
+    experiment.run(out=tmp_path / "runs" / "first")
+    (tmp_path / "runs" / "second").mkdir()
+    (tmp_path / "runs" / "second" / NAME).write_bytes(b"RDS record 1\n")
+    (tmp_path / "runs" / "empty").mkdir()
+    found = {run.name: run.state for run in session.runs()}
+    assert found == {"first": State.WHOLE, "second": State.CUT_SHORT}
+    assert len(next(run for run in session.runs() if run.name == "first").open()) == 100
