@@ -28,6 +28,7 @@ ALLOWED: dict[str, set[str]] = {
     "programs": {"core", "machines", "motion", "nc", "runtime", "modes", "experiment", "results", "reports"},
     "paths": {"core", "results"},  # see ONLY
     "checks": {"core"},
+    "spread": {"core"},
     "bus": {"core", "machines", "models", "runtime", "results"},  # see ONLY
     "runtime": {"core", "interface", "machines"},
     "modes": {"core", "interface", "runtime", "bus"},

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.clock import LatePolicy
-from rds.core.load import STUDENT_MODULE
+from rds.core.portable import portable
 from rds.core.types import Controller, Model
 from rds.interface import converter
 from rds.machines import Axis, Machine
@@ -178,18 +178,8 @@ def dump(plan: Plan) -> bytes:
 
     A student's functions travel by value; modules that can be imported here can be imported there as well.
     """
-    import cloudpickle
-
-    students = [module for name, module in sys.modules.items() if name.startswith(STUDENT_MODULE)]
-    for module in students:
-        cloudpickle.register_pickle_by_value(module)
-    try:
-        # Twice: the folders are needed before the rest can be read.
-        data: bytes = cloudpickle.dumps([*plan.import_path, *sys.path]) + cloudpickle.dumps(plan)
-        return data
-    finally:
-        for module in students:
-            cloudpickle.unregister_pickle_by_value(module)
+    # Twice: the folders are needed before the rest can be read.
+    return portable([*plan.import_path, *sys.path]) + portable(plan)
 
 
 def load(path: Path) -> Plan:

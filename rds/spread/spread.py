@@ -1,0 +1,81 @@
+"""A pure function over many items: on local processes, or on a dask cluster. Workers that die are replaced."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
+from typing import Any, TypeVar
+
+from rds.core.errors import InputError
+from rds.spread.outcome import Outcome
+
+Item = TypeVar("Item")
+Progress = Callable[[int, int], None]  # items done, items in all
+
+RETRIES = 1
+
+
+def processors() -> int:
+    """How many processors this program may use."""
+    usable = getattr(os, "sched_getaffinity", None)
+    return len(usable(0)) if usable else os.cpu_count() or 1
+
+
+def spread(
+    function: Callable[[Item], Any],
+    items: Iterable[Item],
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    retries: int = RETRIES,
+    time_limit: float | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Outcome]:
+    """The outcomes of `function(item)`, in the order of the items, as they become known.
+
+    Runs in `jobs` fresh local processes (default: one for each processor), or on the workers of the dask `scheduler`
+    ("tcp://host:8786"), which need the same rds installed. The function and the items are pickled (by cloudpickle:
+    lambdas and notebook functions will do); the function must not depend on the process it runs in, so that the
+    values are the same wherever that is.
+
+    An exception becomes an outcome with its reason. A worker that dies is replaced, and its item tried again `retries`
+    times; so it is, on local processes, after `time_limit` s. (On a cluster the scheduler's own setting
+    `allowed-failures` says how often, and there is no time limit.) `progress(done, of)` is called in this thread.
+    Closing the iterator, and Ctrl-C, end the workers.
+
+    InputError if jobs and scheduler are both given, a number will not do, or no scheduler answers there within
+    seconds; MachineError if the cluster loses all its workers for good.
+    """
+    if jobs is not None and scheduler is not None:
+        raise InputError("jobs are local processes, and a scheduler has workers of its own; give one of them")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs = {jobs!r} must be at least 1")
+    if retries < 0:
+        raise InputError(f"retries = {retries!r} must be at least 0")
+    if time_limit is not None and scheduler is not None:
+        raise InputError("a time limit is for local processes; leave it out with a scheduler")
+    todo = list(items)
+    if scheduler is not None:
+        from rds.spread.cluster import on_cluster
+
+        found = on_cluster(function, todo, scheduler)
+    else:
+        from rds.spread.local import on_processes
+
+        found = on_processes(function, todo, min(jobs or processors(), max(len(todo), 1)), retries, time_limit)
+    return _in_order(found, len(todo), progress)
+
+
+def _in_order(found: Iterator[Outcome], count: int, progress: Progress | None) -> Iterator[Outcome]:
+    """The outcomes by rising index, each as soon as those before it are there."""
+    waiting: dict[int, Outcome] = {}
+    following = 0
+    with closing(found):  # type: ignore[type-var]  # both are generators
+        for done, outcome in enumerate(found, 1):
+            if progress:
+                progress(done, count)
+            waiting[outcome.index] = outcome
+            while following in waiting:
+                yield waiting.pop(following)
+                following += 1

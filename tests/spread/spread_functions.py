@@ -1,0 +1,57 @@
+"""Functions that are spread in tests."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+
+def square(x: float) -> float:
+    """x²."""
+    return x * x
+
+
+def picky(x: int) -> int:
+    """An exception for 3."""
+    if x == 3:
+        raise ValueError("three will not do")
+    return x
+
+
+def deadly_once(work: tuple[int, str]) -> int:
+    """The first to come for number 5 kills its process."""
+    number, folder = work
+    mark = Path(folder) / "died"
+    if number == 5 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def deadly(x: int) -> int:
+    """Number 2 always kills its process."""
+    if x == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return x
+
+
+def slow(x: int) -> int:
+    """Number 1 takes a minute."""
+    if x == 1:
+        time.sleep(60.0)
+    return x
+
+
+def loud(x: int) -> int:
+    """It prints."""
+    print("noise", x, flush=True)
+    os.write(1, b"more noise\n")
+    return x
+
+
+def process(x: int) -> int:
+    """The number of its process, once it has taken some time."""
+    time.sleep(0.05)
+    return os.getpid()
