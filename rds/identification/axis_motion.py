@@ -238,7 +238,7 @@ def move(t, u, x0, p, where, y, by):
                     final_by /= 1.0 + p[VISCOUS]
                     x_by = tangent[0, i] + final_by * time + (tangent[1, i] - final_by) * reach
                     v_by = final_by + (tangent[1, i] - final_by) * decay
-                    if kind == TAU or kind == VISCOUS:
+                    if kind in (TAU, VISCOUS):
                         rate_by = -rate / p[TAU] if kind == TAU else 1.0 / p[TAU]
                         decay_by = -decay * rate_by * time
                         x_by -= (v - final) * (decay_by + reach * rate_by) / rate

@@ -33,9 +33,11 @@ def made_estimate(
     warnings: Sequence[str] = (),
     relative_error_percent: float | None = None,
     details: Mapping[str, Any] | None = None,
+    states: Sequence[tuple[float, ...]] | None = None,
 ) -> Estimate:
     """The estimate with `values` in the structure's order; `covariance` is of those, `freedom` for Student's t.
 
+    `states` are the logs' initial states where the method has estimated them; else they are estimated here.
     Parameters that the structure says are given have no error. InputError for values outside the structure's bounds.
     """
     values = {name: float(values[name]) for name in structure.parameters}
@@ -54,9 +56,10 @@ def made_estimate(
             notes.append(
                 f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is hardly told by these data"
             )
-    states, free_run, predictions, said = {}, {}, {}, list(warnings)
-    for log in logs:
-        states[log.name], free_run[log.name], predictions[log.name] = _runs(structure, log, values)
+    begun, free_run, predictions, said = {}, {}, {}, list(warnings)
+    for number, log in enumerate(logs):
+        state = None if states is None else states[number]
+        begun[log.name], free_run[log.name], predictions[log.name] = _runs(structure, log, values, state)
         if log.closed_loop:
             said.append(
                 f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
@@ -70,7 +73,7 @@ def made_estimate(
         parameters=parameters,
         covariance=covariance,
         untold=tuple(notes),
-        initial_state=states,
+        initial_state=begun,
         free_run=free_run,
         ahead=predictions,
         logs=tuple(
@@ -108,10 +111,11 @@ def _check_bounds(structure: Structure, name: str, value: float, method: str) ->
 
 
 def _runs(
-    structure: Structure, log: Log, values: Mapping[str, float]
+    structure: Structure, log: Log, values: Mapping[str, float], state: tuple[float, ...] | None
 ) -> tuple[tuple[float, ...], Errors, Mapping[int, Errors]]:
-    few = slice(0, min(len(log), _START))
-    state = estimate_start(structure, values, log.time[few], log.command[few], log.position[few])
+    if state is None:
+        few = slice(0, min(len(log), _START))
+        state = estimate_start(structure, values, log.time[few], log.command[few], log.position[few])
     with np.errstate(all="ignore"):
         modelled = np.asarray(structure.respond(log.time, log.command, state, values), dtype=float)
     if not np.isfinite(modelled).all():

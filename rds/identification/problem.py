@@ -58,6 +58,11 @@ class Problem:
         low, high = zip(*pairs, *(states * len(self.logs)), strict=True)
         return np.array(low), np.array(high)
 
+    def columns(self, log: int) -> list[int]:
+        """Which of the free numbers the log with this number depends on, in the order of its derivatives."""
+        first = len(self.names) + log * self.structure.states
+        return [*range(len(self.names)), *range(first, first + self.structure.states)]
+
     def response(self, point: np.ndarray, log: int) -> np.ndarray:
         """The free run of one log: the output (N)."""
         one = self.logs[log]
@@ -79,14 +84,12 @@ class Problem:
 
     def triangle(self, point: np.ndarray) -> np.ndarray:
         """R (n + 1, n + 1) of [J r]; NaN where the free run leaves the finite numbers."""
-        n, states, free = self.size, self.structure.states, len(self.names)
-        blocks = []
+        n, blocks = self.size, []
         for number in range(len(self.logs)):
             error, by = self.residuals(point, number)
             if not (np.isfinite(error).all() and np.isfinite(by).all()):
                 return np.full((n + 1, n + 1), np.nan)
-            first = free + number * states
-            columns = [*range(free), *range(first, first + states), n]
+            columns = [*self.columns(number), n]
             wide = np.zeros((len(columns), n + 1))
             wide[:, columns] = triangle_of(by, error)
             blocks.append(wide)

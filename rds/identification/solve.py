@@ -12,7 +12,7 @@ from rds.identification.log import Log
 from rds.identification.problem import Problem
 from rds.identification.structure import Structure
 
-_EVALUATIONS = 100
+EVALUATIONS = 100
 # A step that lowers the sum of squares by less than this share of one residual's variance moves no number by more than
 # a hundredth of its standard error.
 _NEGLIGIBLE = 1e-4
@@ -34,7 +34,7 @@ class Solution:
         return float(self.triangle[:, -1] @ self.triangle[:, -1])
 
 
-def least_squares(problem: Problem, start: np.ndarray, evaluations: int = _EVALUATIONS) -> Solution:
+def least_squares(problem: Problem, start: np.ndarray, evaluations: int = EVALUATIONS) -> Solution:
     """The point with the least squared residuals near `start`. InputError if the free run there is not finite."""
     from scipy.optimize import least_squares as minimize
 
