@@ -109,7 +109,7 @@ def _warnings(rivals: Sequence[Rival], counted: Sequence[int], N: float) -> tupl
             "all models were fitted on these data: the criteria charge for their parameters, but only new data show "
             "what they predict"
         )
-    if N < max(counted) + 2:
+    if max(counted) + 2 > N:
         said.append(
             f"the residuals are worth {N:.3g} independent samples only, fewer than AICc needs for "
             f"{max(counted)} estimated numbers: a longer log is needed to choose between the models"
@@ -132,7 +132,7 @@ def _loss(mean_square: float, N: float) -> float:
 
 
 def _aicc(mean_square: float, k: int, N: float) -> float:
-    if not mean_square < inf or N <= k + 1:
+    if not mean_square < inf or k + 1 >= N:
         return inf
     return _loss(mean_square, N) + 2.0 * k + 2.0 * k * (k + 1) / (N - k - 1)
 

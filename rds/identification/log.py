@@ -32,6 +32,25 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Clock:
+    """Where times come from, and how sure they are: `uncertainty` s, one standard deviation of a single time stamp.
+
+    The times of a second recorder were made those of the first by `first = second + offset + drift (second - centre)`:
+    `offset` in s, `drift` in s per s, with a standard error each; `centre`, s on the second clock, is where the two
+    errors are independent of each other.
+    """
+
+    quantities: tuple[str, ...]  # those that this clock has stamped
+    source: str
+    uncertainty: float
+    offset: float = 0.0
+    drift: float = 0.0
+    offset_error: float = 0.0
+    drift_error: float = 0.0
+    centre: float = 0.0
+
+
+@dataclass(frozen=True)
 class Log:
     """One axis over time. All arrays are float64, one-dimensional, of one length, and finite.
 
@@ -54,6 +73,8 @@ class Log:
     source: str = ""  # the file that it was read from
     sha256: str = ""  # of that file
     findings: tuple[Finding, ...] = ()
+    first: int = 0  # the row of its source at which it begins
+    clocks: tuple[Clock, ...] = ()  # of the time stamps: their source and uncertainty
 
     def __post_init__(self) -> None:
         arrays = {"time": self.time, "command": self.command, "position": self.position, **self.extra}
@@ -79,6 +100,7 @@ class Log:
         chosen = slice(first, end)
         return replace(
             self,
+            first=self.first + chosen.indices(len(self))[0],
             time=self.time[chosen],
             command=self.command[chosen],
             position=self.position[chosen],

@@ -20,6 +20,7 @@ _BLOCKS = 400  # at most; of a longer log, blocks spread evenly
 _ROUNDS = 12
 _STEPS_OF_ENCODER = 5  # a block's motion must be more than so many, or its length is not known to 10 %
 _TRIAL = 0.02  # of the command's largest size: the first other voltage
+_FAR = 10.0 / _TRIAL  # trials: ten times the largest command is no voltage that an axis needs
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ def needed_voltage(
             middle = first + block // 2
             rows.append((log.time[middle], velocity[part].mean(), log.command[part][:-1].mean(), extra))
     table = np.array(rows, dtype=float).reshape(len(rows), 4)
-    return NeededVoltage(block, *table.T, left_out=len(chosen) - len(rows))
+    time, speed, command, extra = table.T
+    return NeededVoltage(block, time, speed, command, extra, left_out=len(chosen) - len(rows))
 
 
 def _extra(
@@ -100,6 +102,8 @@ def _extra(
         if not (np.isfinite(at_a) and np.isfinite(at_b)) or at_a == at_b:
             return None  # it sticks, or is unstable: the voltage makes no difference
         a, at_a, b = b, at_b, b - at_b * (b - a) / (at_b - at_a)
+        if abs(b) > _FAR * trial:
+            return None
         if abs(b - a) <= 1e-6 * trial:
             return b
         at_b = miss(b)

@@ -1,0 +1,106 @@
+"""The verdict of a validation: what the model is good for, in a sentence, with the reasons.
+
+Cannot tell      the data do not allow a verdict: they are the fit's own, hold too little motion, or are too good to be
+                 a measurement; or feedback hides what the model does by itself
+not valid        the model contradicts the data, also where only its sign or unit is wrong
+valid for ...    it passes what the sentence names, and fails or was not tried beyond
+valid            free run, residuals and voltage all within the bands, on data that the fit has not seen
+
+The bands are conventions, not truths: `Bands` holds them all, and a report shows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from enum import StrEnum
+from typing import Any
+
+from rds.core.errors import InputError
+
+
+class Word(StrEnum):
+    """The verdict in a word, from best to worst; `cannot tell` is none."""
+
+    VALID = "valid"
+    PARTLY = "valid for"
+    NOT = "not valid"
+    UNTOLD = "cannot tell"
+
+
+class Side(StrEnum):
+    """What a reason speaks for."""
+
+    FOR = "for"
+    AGAINST = "against"
+    UNTOLD = "cannot tell"
+    NOTE = "note"
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One reason: `kind` for programs, `what` a sentence with numbers and units."""
+
+    side: Side
+    kind: str
+    what: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict: `purpose` is what a model that is valid for something only is valid for, `sentence` says it all."""
+
+    word: Word
+    sentence: str
+    reasons: tuple[Reason, ...]
+    purpose: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the model may be used, for `purpose` if that is said: exit code 0."""
+        return self.word in (Word.VALID, Word.PARTLY)
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON's own types."""
+        return {
+            "verdict": str(self.word),
+            "purpose": self.purpose,
+            "sentence": self.sentence,
+            "reasons": [{"side": str(r.side), "kind": r.kind, "what": r.what} for r in self.reasons],
+        }
+
+
+@dataclass(frozen=True)
+class Bands:
+    """The limits of the verdict. Each can be set: `Bands(fit_percent=80.0)`, `--band fit_percent=80`."""
+
+    fit_percent: float = 90.0  # %: a free run that fits less is not that of the axis
+    voltage_percent: float = 15.0  # %: of the voltage that the model needs beside the one given, to the latter
+    significance: float = 0.01  # of the residual tests: 1 % of exact models fail each
+    seen: float = 0.05  # share of the log that the fit may have seen
+    least_blocks: float = 50.0  # blocks of motion at the rate of the residual tests
+    least_steps: float = 20.0  # of the encoder, that the axis must at least move
+    skill: float = 0.5  # a prediction's RMSE must be less than so much of that without a model
+    worse: float = 2.0  # RMSE here over RMSE on the fit's data, beyond which the fit has followed its own noise
+    beyond: float = 1.1  # speeds and voltages here over the fit's, beyond which the model extrapolates
+    covered: float = 0.5  # share of the fit's speeds that a log must cover to speak for all of them
+    floor: float = 0.8  # RMSE over the encoder's own rounding (step / √12), below which no measurement comes
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1e9:
+                raise InputError(f"band {field.name} = {value!r} must be a number of 0 or more")
+
+    @classmethod
+    def read(cls, given: Mapping[str, float]) -> Bands:
+        """The bands with those given in place of the usual ones; InputError for an unknown one."""
+        known = [field.name for field in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise InputError(f"there is no band {name!r}; the bands are {', '.join(known)}")
+        return cls(**given)
+
+    def to_json(self) -> dict[str, float]:
+        """Every band by name."""
+        return asdict(self)
