@@ -15,6 +15,7 @@ from rds.identification.estimate import Errors, Estimate, Parameter
 from rds.identification.initial_state import estimate_start
 from rds.identification.kstep import ahead, errors_of
 from rds.identification.log import Gravity, Log
+from rds.identification.same_data import fitted_stretch
 from rds.identification.structure import Structure
 
 _START = 1000  # samples from which a log's initial state is estimated
@@ -76,17 +77,7 @@ def made_estimate(
         initial_state=begun,
         free_run=free_run,
         ahead=predictions,
-        logs=tuple(
-            {
-                "name": log.name,
-                "source": log.source,
-                "sha256": log.sha256,
-                "first": 0,
-                "end": len(log),
-                "command": (float(log.command.min()), float(log.command.max())),
-            }
-            for log in logs
-        ),
+        logs=tuple(fitted_stretch(log) for log in logs),
         relative_error_percent=relative_error_percent,
         warnings=tuple(dict.fromkeys(said)),
         details=dict(details or {}),
@@ -105,8 +96,8 @@ def _check_bounds(structure: Structure, name: str, value: float, method: str) ->
     if not np.isfinite(value) or value < option.at_least or value <= option.more_than or value > high:
         raise InputError(
             f"by {method}, {name} = {value:.4g} {structure.units[name]}, which no axis has ({option.meaning}): the "
-            "sign of the command or the position is reversed, columns are swapped, or noise hides the motion; look at the "
-            "data with `rds data describe`, or try another method"
+            "sign of the command or the position is reversed, columns are swapped, or noise hides the motion; look at "
+            "the data with `rds data describe`, or try another method"
         )
 
 

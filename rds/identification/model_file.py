@@ -31,7 +31,7 @@ from rds.results.atomic import write_whole
 FORMAT = 1
 _SPREAD = ("std_error", "low", "high")
 _ERRORS = ("fit_percent", "rmse", "maximum")
-_LOG_TEXTS = ("name", "source", "sha256")
+_LOG_TEXTS = ("name", "source", "sha256", "fingerprint")
 _LOG_RANGES = ("command", "velocity")  # lowest and highest that occurred
 _HEADER = (
     "A model of an axis and how far to trust it, estimated from logged data.\n"
