@@ -35,10 +35,10 @@ def decoder(files_: Sequence[Path] = ()) -> Decoder:
     does not fit its description says so under its name. Raises InputError for a file that is no DBC, or if a file is
     given and cantools is missing.
     """
-    databases = [_load(path) for path in files_]
-    own = _own_dbc()
+    databases = [load_dbc(path) for path in files_]
+    own = own_dbc()
     if own is not None and find_spec("cantools") is not None:
-        databases.append(_load(own))
+        databases.append(load_dbc(own))
 
     def decode(message: can.Message) -> Decoded | None:
         if message.is_error_frame or message.is_remote_frame:
@@ -85,7 +85,8 @@ def _name(kinds: Any, value: int) -> str:
         return f"kind {value}"
 
 
-def _own_dbc() -> Path | None:
+def own_dbc() -> Path | None:
+    """The file of the dialect's own messages, where it is installed."""
     try:
         path = Path(str(files("rds.bus.oacs").joinpath(OWN_DBC)))
     except ModuleNotFoundError:
@@ -93,7 +94,8 @@ def _own_dbc() -> Path | None:
     return path if path.is_file() else None
 
 
-def _load(path: Path) -> Any:
+def load_dbc(path: Path) -> Any:
+    """cantools' database of a DBC file; InputError if it is none, or where cantools is missing."""
     try:
         import cantools.database
     except ImportError as error:

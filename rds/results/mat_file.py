@@ -53,16 +53,7 @@ def _variables(names: list[str]) -> list[str]:
 
 def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any] | None]:
     """The columns, and the description where there is one. Reads numbers and text only; nothing in it is executed."""
-    from scipy.io import loadmat
-
-    try:
-        content = loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True)
-    except NotImplementedError as error:
-        raise InputError("it is a MAT file of version 7.3; save it with -v7") from error
-    except OSError:
-        raise
-    except Exception as error:  # scipy raises whatever its decoder trips over: half a dozen types on bad bytes
-        raise InputError(f"it is not a MAT file, or is truncated ({error}); take another copy") from error
+    content = variables(path)
     text = content.get(_DESCRIPTION)
     if text is None:
         return _vectors(content), None
@@ -78,6 +69,20 @@ def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any] | None]:
             raise InputError(f"column {entry['name']!r} does not hold real numbers; save the result again")
         columns[entry["name"]] = values.reshape(-1)
     return columns, header
+
+
+def variables(path: Path) -> dict[str, Any]:
+    """All variables of a MAT file up to version 7.2, as scipy gives them; InputError for any other file."""
+    from scipy.io import loadmat
+
+    try:
+        return dict(loadmat(path, appendmat=False, squeeze_me=False, struct_as_record=True))
+    except NotImplementedError as error:
+        raise InputError("it is a MAT file of version 7.3; save it with -v7") from error
+    except OSError:
+        raise
+    except Exception as error:  # scipy raises whatever its decoder trips over: half a dozen types on bad bytes
+        raise InputError(f"it is not a MAT file, or is truncated ({error}); take another copy") from error
 
 
 def _vectors(content: dict[str, Any]) -> dict[str, np.ndarray]:

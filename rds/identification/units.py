@@ -1,0 +1,120 @@
+"""Units of logged columns, converted explicitly: a unit that is not in this table is refused, with the table.
+
+Each unit belongs to a dimension and is some factor of that dimension's base unit, which is what a `Log` holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from types import MappingProxyType
+
+from rds.core.errors import InputError
+
+# dimension -> (base unit, {unit: how many base units one of it is})
+_DIMENSIONS: Mapping[str, tuple[str, Mapping[str, float]]] = MappingProxyType(
+    {
+        "time": ("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}),
+        "length": ("mm", {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "in": 25.4, "ft": 304.8}),
+        "angle": ("deg", {"deg": 1.0, "rad": 57.29577951308232, "mrad": 0.05729577951308232, "rev": 360.0}),
+        "counts": ("counts", {"counts": 1.0}),
+        "speed": (
+            "mm/s",
+            dict(zip(("m/s", "cm/s", "mm/s", "um/s", "in/s"), (1e3, 10.0, 1.0, 1e-3, 25.4), strict=True))
+            | dict(zip(("m/min", "mm/min", "in/min"), (1e3 / 60.0, 1.0 / 60.0, 25.4 / 60.0), strict=True)),
+        ),
+        "angular speed": (
+            "rev/min",
+            {"rev/min": 1.0, "rev/s": 60.0, "rad/s": 9.549296585513721, "deg/s": 1.0 / 6.0, "krev/min": 1e3},
+        ),
+        "count speed": ("counts/s", {"counts/s": 1.0}),
+        "voltage": ("V", {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "kV": 1e3}),
+        "current": ("A", {"A": 1.0, "mA": 1e-3, "uA": 1e-6}),
+        "force": ("N", {"N": 1.0, "kN": 1e3, "mN": 1e-3}),
+        "torque": ("Nm", {"Nm": 1.0, "mNm": 1e-3}),
+        "ratio": ("1", {"1": 1.0, "%": 1e-2}),
+    }
+)
+# other spellings, after `plain` has made them so
+_SPELLINGS: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("sec", "secs", "second", "seconds", "Sekunden"), "s"),
+        **dict.fromkeys(("msec", "milliseconds"), "ms"),
+        **dict.fromkeys(("usec", "microseconds"), "us"),
+        **dict.fromkeys(("meter", "metre", "meters", "metres"), "m"),
+        **dict.fromkeys(("micron", "microns"), "um"),
+        **dict.fromkeys(("inch", "inches"), "in"),
+        **dict.fromkeys(("°", "degree", "degrees"), "deg"),
+        **dict.fromkeys(("radian", "radians"), "rad"),
+        **dict.fromkeys(("°/s",), "deg/s"),
+        **dict.fromkeys(("rpm", "RPM", "r/min", "U/min", "1/min", "min-1"), "rev/min"),
+        **dict.fromkeys(("U/s", "r/s", "rps"), "rev/s"),
+        **dict.fromkeys(("count", "cts", "inc", "incs", "increments", "ticks", "pulses"), "counts"),
+        **dict.fromkeys(("cts/s", "inc/s", "ticks/s"), "counts/s"),
+        **dict.fromkeys(("volt", "volts", "Volt", "Volts"), "V"),
+        **dict.fromkeys(("ampere", "amperes", "amp", "amps"), "A"),
+        **dict.fromkeys(("N.m", "N*m", "N·m"), "Nm"),
+        **dict.fromkeys(("percent", "pct"), "%"),
+    }
+)
+_BY_UNIT = MappingProxyType(
+    {unit: (dimension, factor) for dimension, (_, units) in _DIMENSIONS.items() for unit, factor in units.items()}
+)
+# endings of names that say a unit, as in `pos_mm`; not those that are as likely something else (x_in, a_1, p_m)
+_ENDINGS = ("s", "ms", "us", "ns", "mm", "um", "deg", "rad", "counts", "V", "mV", "A", "mA", "N", "Nm", "rpm")
+
+
+def unit_of_name(name: str) -> str | None:
+    """The unit that a name ends with, as `pos_mm` does; None where it ends with none."""
+    stem, _, ending = name.rpartition("_")
+    return ending if stem and ending in _ENDINGS else None
+
+
+def plain(unit: str) -> str:
+    """A unit as the table spells it: µ in either of its two codes is u; `rpm` is rev/min. Not checked."""
+    text = unit.strip().replace("µ", "u").replace("μ", "u").replace("⁻¹", "-1").replace(" ", "")
+    return _SPELLINGS.get(text, text)
+
+
+def dimension(unit: str) -> str | None:
+    """What a unit measures (time, length, voltage, ...); None for one that the table does not have."""
+    found = _BY_UNIT.get(plain(unit))
+    return found[0] if found else None
+
+
+def base(of: str) -> str:
+    """The unit in which a `Log` holds a dimension."""
+    return _DIMENSIONS[of][0]
+
+
+def factor(unit: str, to: str) -> float:
+    """What a number in `unit` is multiplied by to be in `to`; InputError if either is unknown or they do not match."""
+    from_dimension, from_factor = _known(unit)
+    to_dimension, to_factor = _known(to)
+    if from_dimension != to_dimension:
+        raise InputError(
+            f"{unit} measures {from_dimension}, and {to} measures {to_dimension}: neither becomes the other"
+        )
+    return from_factor / to_factor
+
+
+def check_unit(unit: str, dimensions: Iterable[str], what: str) -> str:
+    """The dimension of `unit`, which must be one of `dimensions`; InputError lists the units that would do."""
+    allowed = list(dimensions)
+    found = dimension(unit)
+    if found is None:
+        known = [name for d in allowed for name in _DIMENSIONS[d][1]]
+        close = get_close_matches(plain(unit), known, n=1, cutoff=0.5)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise InputError(f"unit {unit!r} of {what} is unknown; known units: {', '.join(known)}{hint}")
+    if found not in allowed:
+        known = [name for d in allowed for name in _DIMENSIONS[d][1]]
+        raise InputError(f"{what} is in {unit!r}, which measures {found}; it must be in one of {', '.join(known)}")
+    return found
+
+
+def _known(unit: str) -> tuple[str, float]:
+    found = _BY_UNIT.get(plain(unit))
+    if found is None:
+        raise InputError(f"unit {unit!r} is unknown; known units: {', '.join(_BY_UNIT)}")
+    return found
