@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import datetime
 import secrets
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rds.core.errors import ContractError, MachineError, RdsError
+from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.types import Ending
 from rds.core.words import Words
 from rds.experiment.outcome import outcome
@@ -94,6 +95,15 @@ class Experiment:
         experiment.plan()
         return experiment
 
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], folder: str | Path = ".") -> Experiment:
+        """The experiment of a table that says what a TOML file would; files are looked for from `folder`."""
+        experiment = cls.__new__(cls)
+        experiment._words = Words(dict(table))
+        experiment._folder = Path(folder).resolve()
+        experiment.plan()
+        return experiment
+
     @property
     def mode(self) -> str:
         """The mode that `run()` takes unless it is told another."""
@@ -104,6 +114,24 @@ class Experiment:
         """What the user calls it."""
         title = self._words.table.get("title")
         return None if title is None else str(title)
+
+    def with_model(self, model: Any) -> Experiment:
+        """The same experiment with another model of its axis, given as for `Experiment`; controllers are designed anew.
+
+        InputError for an experiment of several axes, each of which has a model of its own.
+        """
+        table = {key: value for key, value in self._words.table.items() if key != "model"}
+        if len(self.plan().axes) > 1 or isinstance(table.get("axis"), dict):
+            raise InputError("it has several axes, each with a model of its own; name these in the experiment's file")
+        changed = copy.copy(self)
+        changed._words = self._words.over_written(table | {"model": model})
+        changed.plan()
+        return changed
+
+    @property
+    def periods(self) -> dict[str, float | None]:
+        """The period of each axis's reference, s; None where it does not repeat. Metrics leave the first one out."""
+        return dict(self._resolve(None)[1]["period"])
 
     def plan(self, mode: str | None = None) -> Plan:
         """What would run: every part made and checked. Raises InputError for what will not do."""

@@ -45,9 +45,14 @@ class Choices:
             self.set(name, each.default)
 
     def replace(self, fields: Iterable[Field]) -> None:
-        """Other fields for the same names, or new ones; a value that will not do any more becomes the default."""
+        """Other fields for the same names, or new ones.
+
+        A value that will not do any more, or that was in another unit, becomes the default.
+        """
         for each in fields:
-            old = self._values.get(each.name, each.default)
+            before = self._fields.get(each.name)
+            same = getattr(before, "unit", None) == getattr(each, "unit", None)
+            old = self._values[each.name] if before is not None and same else each.default
             self._fields[each.name] = each
             try:
                 self._values[each.name] = each.check(old)
