@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands import analyse, bus, estop, fault, interpolate, modules, nc, reports
+from rds.commands import analyse, bus, estop, fault, interpolate, modules, nc, reports, validate
 from rds.commands.app import app as app_page
 from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
 from rds.commands.guard import guarded
@@ -34,6 +34,7 @@ bus.app.command()(fault.nodes)
 app.command()(modules.scan)
 app.command()(estop.estop)
 app.command()(reports.report)
+app.command()(validate.validate)
 app.command("app")(app_page)
 app.command()(interpolate.interpolate)
 
