@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import hypot
 from typing import Any
+
+import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.registry import Registry
 from rds.identification.estimate import Estimate
 from rds.identification.log import Log
 from rds.identification.structure import Structure
+
+SPEED = "rev/min"  # of a structure whose output is a speed
 
 METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Estimate`
     "method",
@@ -32,7 +38,59 @@ def fit(
     """
     if not logs:
         raise InputError("there is no log to fit; name at least one")
+    named = _names_apart(logs)
+    _check_units(named, structure)
     estimated: Estimate = METHODS.module(method or structure.default_method).estimate(
-        list(logs), structure, dict(options or {})
+        named, structure, dict(options or {})
     )
+    if estimated.relative_error_percent is None:
+        estimated = replace(estimated, relative_error_percent=voltage_error_percent(named, structure, estimated))
     return estimated
+
+
+def voltage_error_percent(logs: Sequence[Log], structure: Structure, estimate: Estimate) -> float | None:
+    """100 |the voltage that the model needs beside the one given| / |the one given|, over the motion of all logs.
+
+    None where the logs hold too little motion to say.
+    """
+    from rds.identification.assessment import smoothed_velocity
+    from rds.identification.needed_voltage import needed_voltage
+    from rds.identification.residuals import bandwidth, block_length
+
+    values, is_rate = estimate.values(), structure.output_unit == SPEED
+    extra = given = 0.0
+    for log in logs:
+        with np.errstate(all="ignore"):
+            response = structure.respond(log.time, log.command, estimate.initial_state[log.name], values)
+        if len(log) < 20 or not np.isfinite(response).all():
+            return None
+        rate = response if is_rate else np.diff(response) / np.diff(log.time)
+        block = max(block_length(bandwidth(rate, log.sample_period), log.sample_period, len(log)), 4)
+        velocity = smoothed_velocity(log, block, is_rate)
+        found = needed_voltage(log, structure, values, velocity, block, is_rate)
+        if found.relative_percent is None:
+            return None
+        extra = hypot(extra, float(np.linalg.norm(found.extra)))
+        given = hypot(given, float(np.linalg.norm(found.command)))
+    return 100.0 * extra / given
+
+
+def _names_apart(logs: Sequence[Log]) -> list[Log]:
+    """The logs, numbered where two have the same name: an estimate speaks of them by name."""
+    names = [log.name for log in logs]
+    return [
+        replace(log, name=f"{log.name} ({names[: i + 1].count(log.name)})") if names.count(log.name) > 1 else log
+        for i, log in enumerate(logs)
+    ]
+
+
+def _check_units(logs: Sequence[Log], structure: Structure) -> None:
+    for log in logs:
+        for quantity, unit in (("position", structure.output_unit), ("command", "V")):
+            has = log.units.get(quantity, unit)
+            if unit and has and has != unit:
+                raise InputError(
+                    f"{quantity} is in {has}, and structure {structure.name} takes {unit}; state the unit in a map "
+                    "beside the data, or choose the structure for it (spindle for a speed)",
+                    log.source or log.name,
+                )

@@ -1,8 +1,8 @@
 """The least-squares problem of a simulation-error fit: which numbers are free, and the residuals they leave.
 
 The free numbers are the parameters that are not fixed and, for each log, its initial state. A residual is measurement
-minus free run. However long the logs, the solver sees one small triangular problem: with [J r] = Q R, the last column of
-R stands for the residuals and the others for their derivatives, with the same sums of squares and products.
+minus free run. However long the logs, the solver sees one small triangular problem: with [J r] = Q R, the last column
+of R stands for the residuals and the others for their derivatives, with the same sums of squares and products.
 """
 
 from __future__ import annotations

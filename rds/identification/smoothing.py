@@ -52,3 +52,14 @@ def _difference(t: np.ndarray, y: np.ndarray, half: int) -> np.ndarray:
     index = np.arange(len(y))
     before, after = np.maximum(index - half, 0), np.minimum(index + half, len(y) - 1)
     return (y[after] - y[before]) / (t[after] - t[before])
+
+
+def encoder_step(y: np.ndarray) -> float | None:
+    """The step that all differences of the position are whole multiples of; None where there is none."""
+    changes = np.abs(np.diff(y))
+    changes = changes[changes > 0.0]
+    if len(changes) < 8:
+        return None
+    step = float(changes.min())
+    multiples = changes / step
+    return step if float(np.abs(multiples - np.round(multiples)).max()) < 0.01 else None

@@ -1,8 +1,7 @@
-"""Least squares by scipy over a problem, and free runs with an initial state that is estimated."""
+"""Least squares by scipy over a problem."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,10 +55,17 @@ def least_squares(problem: Problem, start: np.ndarray, evaluations: int = EVALUA
     if not problem.size:
         return Solution(start, triangle(start), 1, True, np.zeros(0))
     samples = sum(len(log) for log in problem.logs)
+
+    def residuals(point: np.ndarray) -> np.ndarray:
+        return triangle(point)[:, -1]
+
+    def derivatives(point: np.ndarray) -> np.ndarray:
+        return -triangle(point)[:, :-1]
+
     found = minimize(
-        lambda point: triangle(point)[:, -1],
+        residuals,
         start,
-        jac=lambda point: -triangle(point)[:, :-1],
+        jac=derivatives,
         bounds=(low, high),
         x_scale="jac",
         ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
@@ -68,21 +74,6 @@ def least_squares(problem: Problem, start: np.ndarray, evaluations: int = EVALUA
         max_nfev=evaluations,
     )
     return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
-
-
-def initial_state(structure: Structure, values: Mapping[str, float], log: Log) -> tuple[float, ...]:
-    """The initial state with which the free run of a known model fits the log best, its parameters left alone."""
-    problem = Problem([log], structure, {name: values[name] for name in structure.parameters})
-    solved = least_squares(problem, problem.point({}, [first_state(structure, log)]))
-    return problem.state(solved.point, 0)
-
-
-def free_run(
-    structure: Structure, values: Mapping[str, float], log: Log, x0: Sequence[float] | None = None
-) -> np.ndarray:
-    """The output (N) that the model gives to the log's commands, from `x0` or the state estimated from the log."""
-    state = initial_state(structure, values, log) if x0 is None else x0
-    return structure.respond(log.time, log.command, state, values)
 
 
 def first_state(structure: Structure, log: Log) -> tuple[float, ...]:

@@ -38,8 +38,8 @@ def _search(problem: Problem, solution: Solution) -> list[str]:
     for name, side in zip(problem.names, solution.at_bound, strict=False):
         if side:
             said.append(
-                f"{name} = {values[name]:.4g} lies at its bound ({problem.structure.parameters[name].meaning}): the data "
-                "ask for a value beyond it, so the structure, a sign or a unit is wrong"
+                f"{name} = {values[name]:.4g} lies at its bound ({problem.structure.parameters[name].meaning}): the "
+                "data ask for a value beyond it, so the structure, a sign or a unit is wrong"
             )
     return said
 
@@ -49,8 +49,8 @@ def _implausible(problem: Problem, values: Mapping[str, float]) -> list[str]:
     K, tau = values.get("K"), values.get("tau")
     if K is not None and K < 0.0:
         said.append(
-            f"K = {K:.4g} {problem.structure.units['K']} is negative: a positive command moves the axis backward. Is the "
-            "sign of the command or of the position reversed?"
+            f"K = {K:.4g} {problem.structure.units['K']} is negative: a positive command moves the axis backward. Is "
+            "the sign of the command or of the position reversed?"
         )
     if tau is not None and not _TIMES[0] <= tau <= _TIMES[1]:
         said.append(
@@ -70,15 +70,15 @@ def _residuals(problem: Problem, solution: Solution, number: int) -> list[str]:
     fit = 100.0 * (1.0 - float(error.std()) / spread) if spread > 0.0 else 0.0
     if fit < _POOR:
         said.append(
-            f"{log.name}: the free run explains {fit:.1f} % of the motion only: do not use these parameters; look at the "
-            "data with `rds data describe` (columns, signs, units), and try other options or structures"
+            f"{log.name}: the free run explains {fit:.1f} % of the motion only: do not use these parameters; look at "
+            "the data with `rds data describe` (columns, signs, units), and try other options or structures"
         )
     noise = motion_of(log).noise
     if noise > 0.0 and size > _MISSED * noise:
         said.append(
             f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / noise:.1f} times the measurement's noise "
-            f"({noise:.2g} {unit}): the machine does something that structure {_named(problem)} lacks. The intervals count "
-            "the residuals' correlation, but not that the parameters make up for what is missing"
+            f"({noise:.2g} {unit}): the machine does something that structure {_named(problem)} lacks. The intervals "
+            "count the residuals' correlation, but not that the parameters make up for what is missing"
         )
     correlation = _autocorrelation(error)
     band = _WHITE / np.sqrt(len(error))
@@ -104,15 +104,21 @@ def _autocorrelation(error: np.ndarray) -> dict[int, float]:
 
 
 def _twins(names: Sequence[str], uncertainty: Uncertainty) -> list[str]:
-    said = []
+    """One sentence: the parameters that are told together rather than each, and the strongest correlation."""
     error = np.sqrt(np.diag(uncertainty.covariance))
+    pairs = {}
     for i, name in enumerate(names):
         for j in range(i):
             if np.isfinite(error[i] + error[j]) and error[i] * error[j] > 0.0:
-                correlation = uncertainty.covariance[i, j] / (error[i] * error[j])
+                correlation = float(uncertainty.covariance[i, j] / (error[i] * error[j]))
                 if abs(correlation) > _TWINS:
-                    said.append(
-                        f"{names[j]} and {name} are correlated {correlation:+.3f}: these data tell a combination of them "
-                        "far better than either"
-                    )
-    return said
+                    pairs[names[j], name] = correlation
+    if not pairs:
+        return []
+    strongest = max(pairs, key=lambda pair: abs(pairs[pair]))
+    together = [name for name in names if any(name in pair for pair in pairs)]
+    return [
+        f"{', '.join(together[:-1])} and {together[-1]} are told together far better than each "
+        f"({strongest[0]} and {strongest[1]} are correlated {pairs[strongest]:+.4f}): their intervals hold, but a log "
+        "in which the command's amplitude varies would narrow them"
+    ]

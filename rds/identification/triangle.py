@@ -24,7 +24,7 @@ def triangle_of(columns: np.ndarray, last: np.ndarray) -> np.ndarray:
         return R
     for row in range(0, len(last), _NUMPY_ROWS):
         chosen = slice(row, row + _NUMPY_ROWS)
-        R = np.linalg.qr(np.vstack((R, np.column_stack((columns[chosen], last[chosen])))), mode="r")
+        R[:] = np.linalg.qr(np.vstack((R, np.column_stack((columns[chosen], last[chosen])))), mode="r")
     return R
 
 

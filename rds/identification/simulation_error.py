@@ -1,0 +1,142 @@
+"""Parameters by simulation error: those with whose free run the model comes closest to what was measured.
+
+The free run starts from an initial state of its own for each log, estimated with the parameters, and sees no
+measurement after that. The sum of squared differences is made least by scipy's `least_squares` (trust region, bounds,
+scaled by the derivatives) with the structure's exact derivatives.
+
+Options: `fixed` {name: value}, parameters that are held; `start` {name: value}, where the search begins; `progress`
+(done, of) -> None, called after every free run of a log, of the most that there can be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.core.options import check_known
+from rds.identification.estimate import Estimate
+from rds.identification.log import Log
+from rds.identification.made_estimate import made_estimate
+from rds.identification.problem import Problem
+from rds.identification.smoothing import encoder_step, motion_of
+from rds.identification.solve import EVALUATIONS, Solution, first_state, least_squares
+from rds.identification.structure import Structure
+from rds.identification.suspicions import suspicions
+from rds.identification.uncertainty import uncertainty_of
+from rds.identification.untold import untold_by
+
+OPTIONS = ("fixed", "start", "progress")
+_ENOUGH = 2.0  # times the noise: with residuals that small, no other start can do much better
+
+
+def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Estimate:
+    """The parameters with the least squared free-run error over all logs together, and how far to trust them.
+
+    InputError for an unknown option or parameter, a value out of its bounds, fewer samples than unknowns, or logs
+    that hold no motion.
+    """
+    check_known(options, OPTIONS, "method simulation")
+    logs = [log if log.resolution is not None else replace(log, resolution=encoder_step(log.position)) for log in logs]
+    fixed = _checked(options.get("fixed") or {}, structure)
+    begun = _checked(options.get("start") or {}, structure)
+    given = structure.given(logs) if structure.given else {}
+    for name in given:
+        if name in fixed:
+            raise InputError(f"structure {structure.name}: {name} is given with the log and cannot be fixed as well")
+    held = structure.held(frozenset(fixed)) if structure.held else {}
+    holding = {**fixed, **given, **{name: value for name, (value, _) in held.items()}}
+    problem = Problem(logs, structure, holding, _ticker(options.get("progress"), structure, len(logs)))
+    samples = sum(len(log) for log in logs)
+    if samples <= problem.size:
+        raise InputError(
+            f"{samples} samples are too few for {problem.size} unknowns ({len(problem.names)} parameters and the "
+            "initial states); give longer logs"
+        )
+    solution, tried = _search(problem, begun)
+    uncertainty = uncertainty_of(problem, solution)
+    values = problem.values(solution.point)
+    order = list(structure.parameters)
+    places = [order.index(name) for name in problem.names]
+    free = len(problem.names)
+    covariance = np.zeros((len(order), len(order)))
+    covariance[np.ix_(places, places)] = uncertainty.covariance[:free, :free]
+    return made_estimate(
+        structure,
+        "simulation",
+        logs,
+        values,
+        covariance,
+        uncertainty.effective - problem.size,
+        untold=[
+            *(sentence for name, (_, sentence) in held.items()),
+            *untold_by(structure, problem.names, values, uncertainty),
+        ],
+        warnings=suspicions(problem, solution, uncertainty),
+        details={
+            "fixed": dict(fixed),
+            "evaluations": solution.evaluations,
+            "starts": tried,
+            "noise_rms": uncertainty.noise,
+            "correlated_over_samples": uncertainty.block,
+            "effective_samples": uncertainty.effective,
+        },
+        states=[problem.state(solution.point, number) for number in range(len(logs))],
+    )
+
+
+def _search(problem: Problem, begun: Mapping[str, float]) -> tuple[Solution, int]:
+    """The best end of a search from each start, and how many starts that took."""
+    logs, structure = problem.logs, problem.structure
+    if structure.start is not None:
+        starts = structure.start(logs)
+    else:
+        if missing := [name for name in problem.names if name not in begun]:
+            raise InputError(f"structure {structure.name} needs a value to start from for {', '.join(missing)}")
+        starts = [({}, [first_state(structure, log) for log in logs])]
+    if not problem.names:
+        starts = starts[:1]
+    noise = sum(len(log) * motion_of(log).noise ** 2 for log in logs)
+    best: Solution | None = None
+    tried = 0
+    for values, states in starts:
+        found = least_squares(problem, problem.point({**values, **begun}, states))
+        tried += 1
+        if best is None or found.squares < best.squares:
+            best = found
+        if best.squares <= _ENOUGH**2 * noise:
+            break
+    assert best is not None
+    return best, tried
+
+
+def _checked(given: Mapping[str, Any], structure: Structure) -> dict[str, float]:
+    owner = f"structure {structure.name}"
+    check_known(given, structure.parameters, owner)
+    values = {name: structure.parameters[name].check(value, name, owner) for name, value in given.items()}
+    for name, value in values.items():
+        if value > structure.bounds(name)[1]:
+            raise InputError(
+                f"{owner}: {name} = {value:g} must be at most {structure.bounds(name)[1]:g} "
+                f"({structure.parameters[name].meaning})"
+            )
+    return values
+
+
+def _ticker(progress: Callable[[int, int], None] | None, structure: Structure, logs: int) -> Callable[[], None]:
+    """Counts free runs; how many there will be is not known, only how many there can be."""
+    if progress is None:
+        return lambda: None
+    done = 0
+    each = 1 if structure.sensitivities else 1 + len(structure.parameters) + structure.states
+    most = EVALUATIONS * logs * each
+
+    def tick() -> None:
+        nonlocal done
+        done = min(done + 1, most)
+        progress(done, most)
+
+    return tick
