@@ -34,6 +34,7 @@ ALLOWED: dict[str, set[str]] = {
     "modes": {"core", "interface", "runtime", "bus"},
     "results": {"core", "runtime"},  # see ONLY
     "reports": {"core", "results", "bus"},
+    "identification": {"core", "machines", "results", "bus", "models", "motion"},  # see ONLY
     "experiment": {
         *("core", "controllers", "models", "signals", "machines", "runtime", "modes", "results", "bus"),
     },
@@ -49,6 +50,7 @@ ONLY = {
     ("paths", "results"): {"rds.results.figure"},  # pictures
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     ("reports", "bus"): {"rds.bus.frames", "rds.bus.logs"},  # which frames are commands and answers; their logs
+    ("identification", "bus"): {"rds.bus", "rds.bus.frames", "rds.bus.decode", "rds.bus.logs"},  # what a log holds
     ("motion", "results"): {"rds.results.figure"},  # what all plots share
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record
 }
