@@ -88,7 +88,7 @@ class Model:
     `advance(x, u, T, params) -> next x` with x the state (position mm, velocity mm/s, ...), u the voltage in V
     and T in s. `output(x) -> y` is what the encoder sees (default: the first state).
     `start(T)` gives the model in motion (see `contracts.Motion`); a model with a faster way of running
-    hands in its own `motion`.
+    hands in its own `motion`. `fitted` is the model file that the numbers came from, if they did.
     """
 
     advance: Callable[[Sequence[float], float, float, Mapping[str, Any]], Sequence[float]]
@@ -97,6 +97,7 @@ class Model:
     output: Callable[[Sequence[float]], float] | None = None
     source: Source = Source("user-defined")
     motion: Callable[[Model, float], Any] | None = None
+    fitted: Source | None = None
 
 
 class Ending(StrEnum):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.types import Ending, Source
+from rds.core.types import Ending, Model, Source
 from rds.experiment.bus_note import bus_note
 from rds.modes import load_mode
 from rds.modes.again import as_recorded
@@ -92,7 +92,7 @@ def _description(plan: Plan, rows: Rows) -> dict[str, Any]:
         "controller": {
             p.axis.name: _part(p.controller.source, p.controller.params) for p in plan.axes if p.controller is not None
         },
-        "model": {p.axis.name: _part(p.model.source, p.model.params) for p in plan.axes},
+        "model": {p.axis.name: _model(p.model) for p in plan.axes},
         "ending": str(rows.ending),
         "ending_reason": rows.reason,
         "changes": [list(change) for change in rows.changes],
@@ -105,6 +105,11 @@ def _description(plan: Plan, rows: Rows) -> dict[str, Any]:
 def _part(source: Source, params: Any) -> dict[str, Any]:
     plain = {key: _plain(value) for key, value in dict(params).items()}
     return {"name": source.name, "path": source.path, "sha256": source.sha256, "source": source.text, "params": plain}
+
+
+def _model(model: Model) -> dict[str, Any]:
+    part, file = _part(model.source, model.params), model.fitted
+    return part | ({"fitted": {"path": file.path, "sha256": file.sha256, "source": file.text}} if file else {})
 
 
 def _plain(value: Any) -> Any:

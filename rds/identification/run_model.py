@@ -9,7 +9,7 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.integrate import SUBSTEPS
-from rds.core.load import load_student
+from rds.core.load import StudentFile, load_student
 from rds.core.types import Model, Source
 from rds.identification.model_file import ModelFile, file_sha256
 from rds.identification.structure import Structure
@@ -27,19 +27,20 @@ def run_model(file: ModelFile, values: Mapping[str, float] | None = None, unit: 
     Raises InputError where names or units are not those of the structure, a value will not do, or a student's file
     is not the one that was fitted.
     """
-    if unit is not None and (file.structure == "spindle") != (unit == SPINDLE_UNIT):
+    if unit is not None and not file.is_student and (file.structure == "spindle") != (unit == SPINDLE_UNIT):
         what = "a spindle" if file.structure == "spindle" else "a linear axis"
         raise InputError(f"it is a model of {what}, and this axis is measured in {unit}", file.path)
     merged = file.values() | dict(values or {})
     try:
         if file.is_student:
-            return _student(file, merged)
-        table = library_table(checked_structure(file), merged)
-        model = library_model(table.pop("name"), **table)
+            model = student_model(student_structure(file), merged, SUBSTEPS)
+        else:
+            table = library_table(checked_structure(file), merged)
+            model = library_model(table.pop("name"), **table)
     except InputError as error:
         raise error if error.where else InputError(str(error), file.path) from error
     path = Path(file.path)
-    return replace(model, source=Source(path.name, str(path.resolve()), file.sha256, file.text))
+    return replace(model, fitted=Source(path.name, str(path.resolve()), file.sha256, file.text))
 
 
 def checked_structure(file: ModelFile) -> Structure:
@@ -80,7 +81,8 @@ def _named(made: Structure) -> str:
     return f"structure {made.name}{options}"
 
 
-def _student(file: ModelFile, values: Mapping[str, float]) -> Model:
+def student_structure(file: ModelFile) -> StudentFile:
+    """The student's file that a model file names; InputError if it is not the one that was fitted."""
     path = Path(file.structure)
     if file.structure_sha256 and path.is_file() and file_sha256(path) != file.structure_sha256:
         raise InputError(
@@ -88,4 +90,4 @@ def _student(file: ModelFile, values: Mapping[str, float]) -> Model:
             "the change does not matter",
             file.path,
         )
-    return student_model(load_student(path), values, SUBSTEPS)
+    return load_student(path)

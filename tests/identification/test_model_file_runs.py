@@ -34,8 +34,8 @@ def test_a_plain_axis_is_the_linear_axis_compiled_or_not(tmp_path: Path) -> None
     assert np.array_equal(measured(file), wanted)
     result = rds.Experiment(model=file, compiled=True, **TRACKED).run()
     assert result.meta["notes"] == [] and np.array_equal(result["X_measured"], wanted)
-    source = result.meta["model"]["X"]
-    assert source["sha256"] == read_model(file).sha256 and source["path"] == file
+    fitted = result.meta["model"]["X"]["fitted"]
+    assert fitted["sha256"] == read_model(file).sha256 and fitted["path"] == file
 
 
 def test_an_axis_with_options_is_the_machine_s_own(tmp_path: Path) -> None:
