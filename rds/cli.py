@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands import analyse, bus, estop, fault, interpolate, modules, nc, reports, validate
+from rds.commands import analyse, bus, data, estop, fault, interpolate, modules, nc, reports, validate
 from rds.commands.app import app as app_page
 from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
 from rds.commands.guard import guarded
@@ -28,6 +28,7 @@ app.add_typer(machine_app, name="machine")
 app.add_typer(modules.module_app, name="module")
 app.add_typer(bus.app, name="bus")
 app.add_typer(nc.app, name="nc")
+app.add_typer(data.app, name="data")
 bus.app.command()(analyse.analyse)
 bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
