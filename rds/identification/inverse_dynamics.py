@@ -91,7 +91,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         structure,
         "inverse-dynamics",
         logs,
-        found.values | given,
+        {**found.values, **given},
         covariance,
         freedom,
         untold=untold,
