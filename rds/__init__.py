@@ -24,6 +24,8 @@ _NAMES = {
     "square": "rds.signals",
     "triangle": "rds.signals",
     "constant": "rds.signals",
+    "multisine": "rds.signals",
+    "chirp": "rds.signals",
     "user": "rds.signals",
     "check_file": "rds.checks",
     "check_controller": "rds.checks",

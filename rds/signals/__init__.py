@@ -9,14 +9,17 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.options import check_known
+from rds.signals.broadband import chirp, multisine
 from rds.signals.periodic import constant, sinusoid, square, triangle
 from rds.signals.signal import Signal, sample, sample_voltage
 from rds.signals.user import user
 
 __all__ = [
     "Signal",
+    "chirp",
     "constant",
     "make_signal",
+    "multisine",
     "sample",
     "sample_voltage",
     "signal_kinds",
@@ -27,7 +30,15 @@ __all__ = [
 ]
 
 _KINDS: Mapping[str, Callable[..., Signal]] = MappingProxyType(
-    {"square": square, "triangle": triangle, "sinusoid": sinusoid, "user": user, "constant": constant}
+    {
+        "square": square,
+        "triangle": triangle,
+        "sinusoid": sinusoid,
+        "user": user,
+        "constant": constant,
+        "multisine": multisine,
+        "chirp": chirp,
+    }
 )
 
 

@@ -28,6 +28,7 @@ class Signal:
     period: float | None = None  # s; None if it does not repeat
     settings: Mapping[str, Any] = field(default_factory=dict)
     voltage: Callable[[np.ndarray], np.ndarray] | None = None
+    fastest: float | None = None  # Hz, the highest frequency in it, where that is not 1/`period`
 
     def value(self, t: Any) -> Any:
         """The voltage at time `t` (s): an array for an array of times, a float for one."""
@@ -45,9 +46,10 @@ class Signal:
     def check_sampling(self, T: float) -> None:
         """InputError if the signal repeats faster than half the sampling frequency 1/`T` can show."""
         Option("sample period, s", more_than=0.0).check(T, "T", "signal")
-        if self.period is not None and self.period < 2.0 * T * (1.0 - 1e-9):
+        frequency = self.fastest or (1.0 / self.period if self.period is not None else 0.0)
+        if 2.0 * T * frequency * (1.0 - 1e-9) > 1.0:
             raise InputError(
-                f"{self.kind}: frequency = {1.0 / self.period:g} Hz is above half the sampling frequency "
+                f"{self.kind}: frequency = {frequency:g} Hz is above half the sampling frequency "
                 f"({0.5 / T:g} Hz at a sample period of {T:g} s); lower the frequency or shorten the sample period"
             )
 
