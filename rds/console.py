@@ -110,6 +110,8 @@ def show_result(result: Result, files: Mapping[str, Path]) -> None:
     screen = console()
     if result.verdict is not None:
         screen.print(escape(verdict_line(result)))
+    for axis, validation in (result.meta.get("validation") or {}).items():
+        screen.print(f"model of {escape(axis)}: {escape(validation['sentence'])}", soft_wrap=True)
     for kind in ("report", "csv"):
         if kind in files:
             screen.print(f"{kind}: {escape(str(files[kind]))}", soft_wrap=True)

@@ -37,6 +37,7 @@ ALLOWED: dict[str, set[str]] = {
     "identification": {"core", "machines", "results", "bus", "models", "motion"},  # see ONLY
     "experiment": {
         *("core", "controllers", "models", "signals", "machines", "runtime", "modes", "results", "bus"),
+        "identification",  # model files, and what a validation proves
     },
 }
 # Of some rooms, only these modules.

@@ -103,8 +103,10 @@ def _show(made: Validation) -> None:
         show_table(f"{made.candidate.name} on {name}", ["prediction", "fit %", "RMSE", "max", "unit"], rows, note)
     for name, ranking in made.rankings.items():
         rows = [
-            [r.name, str(r.counted), cell(r.rmse), cell(r.aicc_difference), f"{r.aicc_weight:.3f}"]
-            + [cell(r.bic_difference), f"{r.bic_weight:.3f}"]
+            [
+                *(r.name, str(r.counted), cell(r.rmse), cell(r.aicc_difference), f"{r.aicc_weight:.3f}"),
+                *(cell(r.bic_difference), f"{r.bic_weight:.3f}"),
+            ]
             for r in ranking.ranks
         ]
         columns = ["model", "k", "RMSE", "AICc - best", "weight", "BIC - best", "weight"]

@@ -16,6 +16,7 @@ from rds.core.words import Words
 from rds.experiment.outcome import outcome
 from rds.experiment.resolve import resolve
 from rds.experiment.run import Run
+from rds.experiment.validation import validated
 from rds.modes import load_mode
 from rds.modes.host import Progress, Rows, run_plan
 from rds.modes.live import Live
@@ -194,6 +195,8 @@ class Experiment:
         if not len(rows.values):
             raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
         result = self._complete(outcome(plan, rows, known))
+        if load_mode(plan.mode).validates:
+            result = validated(plan, result)
         if out is not None:
             result.save(out)
             if rows.changes:

@@ -32,8 +32,19 @@ def save_with_report(result: Result, folder: Path, title: str) -> dict[str, Path
     for axis in result.axes:
         files[f"plot_{axis}"] = folder / f"{axis}.png"
         result.plot(axis).savefig(files[f"plot_{axis}"])
-    files["report"] = write_report(folder / "report.html", title, [result], files=list(files.values()))
+    files["report"] = write_report(
+        folder / "report.html", title, [result], files=list(files.values()), sections=_validations(result)
+    )
     return files
+
+
+def _validations(result: Result) -> list[str]:
+    """What the run proved of its models, as HTML: a section per axis."""
+    if not result.validation:
+        return []
+    from rds.identification.validation_report import section
+
+    return [section(f"Validation of the model of {axis}", found) for axis, found in result.validation.items()]
 
 
 def run_json(result: Result, files: dict[str, Path]) -> dict[str, Any]:
@@ -55,6 +66,7 @@ def run_json(result: Result, files: dict[str, Path]) -> dict[str, Any]:
             for axis, values in result.metrics.items()
         },
         "timing": {**stages, **counts} if counts else None,
+        "validation": result.meta.get("validation"),
         "environment": result.meta.get("environment"),
         "notes": [*result.meta.get("notes", []), *result.notes],
         "files": {kind: str(path) for kind, path in files.items()},

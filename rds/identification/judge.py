@@ -22,6 +22,7 @@ _FACTORS = {  # of measured over modelled, and what makes it
     1.0 / 60.0: "the speed is per second where it is stated per minute",
 }
 _NEAR = 0.15  # how near to such a factor is suspicious
+_FEW = 0.1  # share of lags beyond the plain band that is still called white
 _IDENTICAL = 1e-9  # RMSE over the motion: only the model's own output comes so near
 
 
@@ -214,15 +215,22 @@ def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
     tests = a.tests
     if tests is None or tests.blocks < bands.least_blocks or a.motion == 0.0:
         return
-    how = f"{tests.blocks} means over {tests.block * a.log.sample_period * 1e3:.3g} ms"
-    white = tests.p_white > bands.significance
     r, lag = tests.auto.largest
-    yield Reason(
-        Side.FOR if white else Side.AGAINST,
-        "whiteness",
-        f"the residual is {'white' if white else 'not white'} (p = {tests.p_white:.3f}, {how}; largest "
-        f"autocorrelation {r:.2f} after {lag:.3g} s)",
+    numbers = (
+        f"p = {tests.p_white:.3f}, {tests.blocks} means over {tests.block * a.log.sample_period * 1e3:.3g} ms; largest "
+        f"autocorrelation {r:.2f} after {lag:.3g} s"
     )
+    if tests.p_white <= bands.significance:
+        yield Reason(Side.AGAINST, "whiteness", f"the residual is not white ({numbers})")
+    elif tests.auto.outside > _FEW:
+        yield Reason(
+            Side.FOR,
+            "whiteness",
+            "the residual is not white, but no less so than the encoder's rounding and the uncertainty of the "
+            f"parameters make it ({numbers})",
+        )
+    else:
+        yield Reason(Side.FOR, "whiteness", f"the residual is white ({numbers})")
     if a.log.closed_loop:
         yield Reason(
             Side.NOTE,
@@ -330,7 +338,7 @@ def _limits(a: Assessment, bands: Bands) -> Iterator[str]:
 
 
 def _sentence(candidate: Candidate, a: Assessment, word: Word, purpose: str, reasons: list[Reason]) -> str:
-    name, log = candidate.name, a.log.name
+    name, log = candidate.name, f"{a.log.name} ({_tried(a)})"
     if word is Word.UNTOLD:
         why = [reason.what for reason in reasons if reason.side is Side.UNTOLD]
         if not why:
@@ -347,6 +355,12 @@ def _sentence(candidate: Candidate, a: Assessment, word: Word, purpose: str, rea
         return f"{name} is valid for {log}: {'; '.join(speaks)}."
     but = f"; but {'; '.join(against)}" if against else ""
     return f"{name} is valid for {purpose} only, by {log}: {'; '.join(speaks) or 'see the predictions'}{but}."
+
+
+def _tried(a: Assessment) -> str:
+    """How fast and at which voltages the log went: what a verdict by it speaks of."""
+    speed, command = a.ranges["velocity"], a.ranges["command"]
+    return f"up to {_size(speed.here):.3g} {speed.unit} and {_size(command.here):.3g} {command.unit}"
 
 
 def _and(words: list[str]) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from base64 import b64encode
 from collections.abc import Iterator
+from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from rds.identification.assessment import Assessment
 from rds.identification.criterion import Ranking
@@ -41,8 +42,17 @@ def write(validation: Validation, folder: Path) -> list[Path]:
         folder / NUMBERS: numbers.encode(),
         **contents,
     }
-    write_files({path: lambda stream, data=data: stream.write(data) for path, data in files.items()})
+    write_files({path: partial(_fill, data) for path, data in files.items()})
     return list(files)
+
+
+def _fill(data: bytes, stream: BinaryIO) -> None:
+    stream.write(data)
+
+
+def section(title: str, validation: Validation) -> str:
+    """The validation as a part of another report."""
+    return f"<section><h2>{escape(title)}</h2></section>{fragment(validation)}"
 
 
 def fragment(validation: Validation, pictures: bool = True) -> str:

@@ -11,4 +11,5 @@ MODE = Mode(
     drives=("signal",),
     followed="modelled",
     late=LatePolicy(discard=True),
+    validates=True,
 )

@@ -32,15 +32,17 @@ def write_report(
     tables: Sequence[Mapping[str, Any]] = (),
     notes: Sequence[str] = (),
     files: Sequence[str | Path] = (),
+    sections: Sequence[str] = (),
 ) -> Path:
     """Write the report of `results`, one section each, to `path`; whole or not at all.
 
     `tables` are shown first, each {title, columns, rows, note}; `notes` are sentences under the title; `files` are
-    linked by their way from the report. All text is escaped. Raises InputError for a table that lacks its columns
+    linked by their way from the report. All text is escaped; `sections` are HTML, and stand as they are after the
+    tables. Raises InputError for a table that lacks its columns
     or rows, no results, or a path that can't be written.
     """
     path = Path(path)
-    text = report(title, results, tables, notes, [_link(path, file) for file in files])
+    text = report(title, results, tables, notes, [_link(path, file) for file in files], sections)
 
     def write(stream: BinaryIO) -> None:
         stream.write(text.encode("utf-8"))
@@ -55,8 +57,9 @@ def report(
     tables: Sequence[Mapping[str, Any]] = (),
     notes: Sequence[str] = (),
     files: Sequence[str] = (),
+    sections: Sequence[str] = (),
 ) -> str:
-    """The report as HTML text; `files` are relative paths."""
+    """The report as HTML text; `files` are relative paths, `sections` HTML."""
     if not results:
         raise InputError("there is nothing to report; give at least one result")
     labels = _labels(results)
@@ -64,6 +67,7 @@ def report(
         f"<header><h1>{escape(title)}</h1>{_subtitle(results)}{html.notes_list(notes)}</header>",
         f"<section><h2>Runs</h2>{_runs(results, labels)}{_verdicts(results, labels)}</section>",
         *(f"<section>{_extra(table)}</section>" for table in tables),
+        *sections,
         f"<section><h2>Tracking and fit</h2>{_metrics(results, labels)}</section>",
         _together(results, labels),
         *(_run_section(result, label) for result, label in zip(results, labels, strict=True)),

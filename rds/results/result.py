@@ -37,6 +37,9 @@ class Result:
     `controller` ({axis: {name, sha256, params}}), `model`, `versions`, `started` and `voltage_range` (V, of the
     converter) are used where they are there.
 
+    `validation` is what a run in the mode model-validation proved of its models, per axis (an
+    `rds.identification.validate.Validation`); it is not saved, but its numbers are, in `meta["validation"]`.
+
     Raises InputError for columns of different lengths, other than real numbers, or not finite, for a time that
     does not increase, and for a meta that lacks its needed keys. Only a `..._command` column may hold NaN or
     infinity: it is the evidence of a controller that broke its contract.
@@ -53,6 +56,7 @@ class Result:
         _check_columns(self.columns)
         _check_meta(self.meta)
         self.units: dict[str, str] = _units(self.columns, units or {})
+        self.validation: Mapping[str, Any] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
         """The column called `name`; KeyError names the columns there are."""

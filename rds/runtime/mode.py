@@ -20,7 +20,7 @@ class Mode:
     clock. `drivers` says whether the mode needs the machine's
     drivers: not at all, as a dry run (timed, without effect on the machine) or live. A mode with drivers runs in
     real time, in the target process. `followed` names the column of what its models give besides. `drives` says
-    what may drive the axes.
+    what may drive the axes, `validates` whether a run ends with a verdict on the models.
     """
 
     name: str
@@ -29,6 +29,7 @@ class Mode:
     drives: tuple[Literal["controller", "signal"], ...]
     followed: str | None = None
     late: LatePolicy = field(default_factory=LatePolicy)
+    validates: bool = False
 
     @property
     def real_time(self) -> bool:
