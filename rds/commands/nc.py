@@ -15,7 +15,7 @@ import typer
 
 from rds.commands import nc_make, nc_run
 from rds.commands.common import Json, print_json, progress_bars, refusals
-from rds.commands.nc_options import MachineName, Parameters, Program, Tools, With, setup
+from rds.commands.nc_options import MachineName, MaxJumps, Parameters, Program, Tools, With, setup
 
 if TYPE_CHECKING:
     from rds.nc.check import Setup
@@ -36,6 +36,7 @@ def check(
     tools: Tools = None,
     parameters: Parameters = None,
     with_: With = None,
+    max_jumps: MaxJumps = None,
     proof: Annotated[
         bool, typer.Option("--proof", help="Prove the cutter compensation, with a picture of each stretch beside FILE.")
     ] = False,
@@ -46,7 +47,7 @@ def check(
         from rds.machines import load_machine
         from rds.nc.check import check_program
 
-        what = setup(tools, parameters, with_)
+        what = setup(tools, parameters, with_, max_jumps)
         with progress_bars() as bar:
             result, compiled = check_program(file, load_machine(machine), what, bar("check"))
         proved, pictures = _prove(file, what) if proof else (None, [])
@@ -107,6 +108,7 @@ def canon(
     tools: Tools = None,
     parameters: Parameters = None,
     with_: With = None,
+    max_jumps: MaxJumps = None,
     json: Json = False,
 ) -> None:
     """Print the canonical calls of a program, in the form of LinuxCNC's `rs274 -g`: as they are read.
@@ -116,7 +118,7 @@ def canon(
     with refusals():
         from rds.nc.canon import text, texts
 
-        items = setup(tools, parameters, [*(with_ or ()), "any-exit"]).interpret(file)
+        items = setup(tools, parameters, [*(with_ or ()), "any-exit"], max_jumps).interpret(file)
         if json:
             calls = (json_text.dumps({"n": n, "call": call}) for n, call in texts(items))
             _print_when_whole(_json_lines(file, calls))
@@ -152,6 +154,7 @@ def plot(
     tools: Tools = None,
     parameters: Parameters = None,
     with_: With = None,
+    max_jumps: MaxJumps = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The picture: png, svg or pdf; by default FILE's name -path.png.")
     ] = None,
@@ -167,7 +170,7 @@ def plot(
         from rds.nc.validate import Validator
 
         path = out or file.with_name(f"{file.stem}-path.png")
-        of, what = load_machine(machine), setup(tools, parameters, with_)
+        of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
         validator = Validator(of, what.tool_list(), str(file))
         trace = Trace()
         with progress_bars() as bar:
@@ -205,6 +208,7 @@ def time(
     tools: Tools = None,
     parameters: Parameters = None,
     with_: With = None,
+    max_jumps: MaxJumps = None,
     sample_period: Annotated[
         float | None, typer.Option(help="Sample period, s; by default the machine's.", min=1e-6)
     ] = None,
@@ -216,7 +220,7 @@ def time(
         from rds.nc.check import motion
         from rds.nc.cycle_time import cycle_time
 
-        of, what = load_machine(machine), setup(tools, parameters, with_)
+        of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
         with progress_bars() as bar:
             found = cycle_time(motion(file, of, what, bar("plan")), of, sample_period)
     if json:

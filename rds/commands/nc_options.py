@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,10 +22,18 @@ With = Annotated[
         help="Of the dialect: block-delete, gr, program-numbers, inch-machine or any-exit.",
     ),
 ]
+MaxJumps = Annotated[
+    int | None,
+    typer.Option(
+        min=1, help="Calls and jumps back after which a program is taken for endless (default 1000000).", metavar="N"
+    ),
+]
 DIALECT = ("block-delete", "gr", "program-numbers", "inch-machine", "any-exit")
 
 
-def setup(tools: Path | None, parameters: Path | None, options: list[str] | None) -> Setup:
+def setup(
+    tools: Path | None, parameters: Path | None, options: list[str] | None, max_jumps: int | None = None
+) -> Setup:
     """What a program is read with. InputError for an option that there is not."""
     from rds.core.errors import InputError
     from rds.nc.check import Setup
@@ -34,4 +42,7 @@ def setup(tools: Path | None, parameters: Path | None, options: list[str] | None
     for name in options or ():
         if name not in DIALECT:
             raise InputError(f"--with {name!r} is no option of the dialect; there are {', '.join(DIALECT)}")
-    return Setup(tools, parameters, Dialect(**{name.replace("-", "_"): True for name in options or ()}))
+    given: dict[str, Any] = {name.replace("-", "_"): True for name in options or ()}
+    if max_jumps is not None:
+        given["max_jumps"] = max_jumps
+    return Setup(tools, parameters, Dialect(**given))

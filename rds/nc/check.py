@@ -17,8 +17,8 @@ from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_co
 from rds.nc.dialect import Dialect
 from rds.nc.interpreter import interpret
 from rds.nc.parameters import read_parameters
-from rds.nc.reading_on import later_faults
-from rds.nc.toolpath import PathBlock, toolpath
+from rds.nc.reading_on import Later
+from rds.nc.toolpath import PathBlock, Report, toolpath
 from rds.nc.tools import Tool, read_tools
 from rds.nc.validate import Validation, Validator
 from rds.results.atomic import write_files
@@ -40,12 +40,11 @@ class Setup:
         """The tools of the table; none without one. Raises ProgramError for a table that is wrong."""
         return read_tools(self.tools) if self.tools else []
 
-    def interpret(self, program: Path) -> Iterator[Item]:
-        """The canonical calls of a program. Raises ProgramError."""
+    def interpret(self, program: Path, remark: Report | None = None) -> Iterator[Item]:
+        """The canonical calls of a program; `remark` gets what is no fault and worth a look. Raises ProgramError."""
         parameters = read_parameters(self.parameters) if self.parameters else None
-        return interpret(
-            program, tools=self.tool_list(), parameters=parameters, options=self.options, name=str(program)
-        )
+        tools, name = self.tool_list(), str(program)
+        return interpret(program, tools=tools, parameters=parameters, options=self.options, name=name, remark=remark)
 
 
 def motion(program: Path, machine: Machine, setup: Setup, progress: Progress | None = None) -> Iterator[PathBlock]:
@@ -71,16 +70,18 @@ def check_program(
     if place.exists() and not is_ours(place):
         raise InputError("is where the compiled program would go, and is none; rename or move it", str(place))
     validator = Validator(machine, setup.tool_list(), str(program))
-    items = followed(setup.interpret(program), program, progress)
-    blocks = validator.watch(toolpath(items, report=validator.report))
+    items = followed(setup.interpret(program, validator.warn), program, progress)
+    blocks = validator.watch(toolpath(items, report=validator.report, warn=validator.warn_of_spindle))
     try:
         write_files({place: write_compiled(header, _while_valid(blocks, validator), lambda: _summary(validator))})
     except _Faulty:
         for _ in blocks:  # the rest is looked at all the same
             pass
         if validator.stopped is not None:
-            for fault in later_faults(validator.stopped, setup.options):
+            later = Later(validator.stopped, setup.options)
+            for fault in later.faults():
                 validator.report(fault)
+            validator.read_on = later.some
         place.unlink(missing_ok=True)
         return validator.result(), None
     return validator.result(), place

@@ -16,10 +16,12 @@ from pathlib import Path
 from rds.nc.dialect import Dialect
 from rds.nc.errors import ProgramError
 from rds.nc.expressions import Fault
-from rds.nc.owords import Word, nested, read_gr, read_word
+from rds.nc.owords import Word, nested, read_gr, read_word, spelled
 from rds.nc.parameters import Parameters
 from rds.nc.source import Place, Source, open_file
+from rds.nc.words import column_of, line_number, tidy
 
+_ENDS = {"sub": "ENDSUB", "if": "ENDIF", "while": "ENDWHILE", "do": "WHILE [...]", "repeat": "ENDREPEAT"}
 _FILE_NAME = re.compile(r"[^/\\\x00]+")
 
 
@@ -49,7 +51,8 @@ class Control:
     def __init__(self, source: Source, parameters: Parameters, dialect: Dialect):
         self.source = source
         self.skipping = ""  # the label that execution goes on at
-        self.since = 0  # line at which skipping began
+        self._since_place = source.place  # the block at which skipping began
+        self._since = Word()  # the call whose definition is being looked for
         self._main = source
         self._parameters = parameters
         self._dialect = dialect
@@ -61,6 +64,7 @@ class Control:
         self._done_if = True  # whether a branch of the present IF has been executed
         self._breaking = self._continuing = False
         self._jumps = 0
+        self._kept: tuple | None = None  # label, changes and what was visible at an earlier jump
         self._opened: dict[Path, Source] = {}
         self.value = 0.0  # what the last subroutine returned
         self.returned = False
@@ -100,23 +104,33 @@ class Control:
         """The file ends. Raises ProgramError when something is still open."""
         if self._seeking:
             name = self._seeking
-            raise ProgramError(
+            label = Label("call", self._frames[-1].source, self._since_place)
+            word = f"{self._since.spelled} CALL"
+            raise self._fault_at(
+                label,
+                word,
                 f"the subroutine is not defined in {self.source.name or 'the program'} after the call; define it"
                 f" between O<{name}> SUB and ENDSUB, or in a file {name}.ngc beside the program",
-                file=self._frames[-1].source.name,
-                line=self.since,
-                word=f"O<{name}> CALL",
             )
         if self.skipping:
-            label = self.skipping.rpartition("#")[2]
-            raise ProgramError(
-                f"the file ends inside the part that O<{label}> in line {self.since} passes over; close it with"
-                " ENDIF, ENDWHILE, ENDREPEAT or ENDSUB"
-            )
+            label = self._labels.get(self.skipping, Label("", self.source, self._since_place))
+            name = spelled(self.skipping.rpartition("#")[2])
+            end = _ENDS.get(label.kind, "ENDIF, ENDWHILE, ENDREPEAT or ENDSUB")
+            word = f"{name} {label.kind.upper()}".rstrip()
+            raise self._fault_at(label, word, f"is not closed before the file's end; write {name} {end} where it ends")
+
+    def _fault_at(self, label: Label, word: str, message: str) -> ProgramError:
+        """A fault at the O word of a block that was read before."""
+        source, place = label.source, label.place
+        source.go_to(place)
+        raw = source.read()
+        text = tidy(raw)
+        column = column_of(raw, max(text.find("o", line_number(text)[2]), 0)) + place.column
+        return ProgramError(message, file=source.name, line=place.line, column=column, word=word)
 
     def _skip_to(self, name: str) -> None:
         self.skipping = name
-        self.since = self.source.line
+        self._since_place = self.source.place
 
     def _define(self, word: Word) -> None:
         self._labels[word.name] = Label(word.kind, self.source, self.source.place)
@@ -149,10 +163,36 @@ class Control:
         if self._jumps > self._dialect.max_jumps:
             raise ProgramError(
                 f"more than {self._dialect.max_jumps} calls and jumps back: the program does not seem to end; check its"
-                " loops, or allow more (max_jumps)"
+                " loops, or allow more (--max-jumps)"
             )
+        self._look_for_progress(label)
         self.source = label.source
         self.source.go_to(label.place)
+
+    def _look_for_progress(self, label: Label) -> None:
+        """Raises ProgramError when everything that the program can see is as it was at an earlier jump to the label.
+
+        Compared with one earlier jump: the last whose number is a power of two, so that a round of any length is found.
+        """
+        parameters, kept = self._parameters, self._kept
+        if kept is not None and kept[:2] == (label, parameters.changes):
+            if kept[2:] == self._visible():
+                kind = label.kind.upper()
+                raise ProgramError(
+                    f"the {kind} loop in line {label.place.line} never ends: a round leaves everything as it was;"
+                    " change in it what its test asks for, or leave it by BREAK"
+                )
+        elif kept is None or not self._jumps & (self._jumps - 1):
+            self._kept = (label, parameters.changes, *self._visible())
+
+    def _visible(self) -> tuple:
+        """What a program can ask for or depend on, besides where it is."""
+        parameters = self._parameters
+        flags = (self._done_if, self._breaking, self._continuing, self.value, self.returned, len(self._labels))
+        tool = parameters.known["_selected_tool"]() if "_selected_tool" in parameters.known else 0.0
+        rounds = [sorted(frame.repeats.items()) for frame in self._frames] + [sorted(self._repeats.items())]
+        frames = [id(frame) for frame in self._frames]
+        return flags, tool, rounds, frames, parameters.state.values(), parameters.snapshot()
 
     def _rounds(self) -> dict[str, int]:
         return self._frames[-1].repeats if self._frames else self._repeats
@@ -189,7 +229,7 @@ class Control:
                 f"more than {self._dialect.max_depth} subroutine calls inside one another; call fewer", at=word.at
             )
         frame = Frame(word.name, self.source, self.source.following(), self._parameters.enter(word.arguments))
-        line = self.source.line
+        place = self.source.place
         self._frames.append(frame)
         label = self._labels.get(word.name)
         if label is not None and label.kind == "sub":
@@ -200,7 +240,7 @@ class Control:
         if found is not None:
             self.source = found
         self._skip_to(word.name)
-        self.since = line
+        self._since_place, self._since = place, word
         self._seeking = word.name
 
     def _file(self, word: Word) -> Source | None:

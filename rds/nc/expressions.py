@@ -23,7 +23,7 @@ DEEPEST = 50  # brackets and # inside one another
 
 _NUMBER = re.compile(r"[+-]*[0-9.]*")
 _SPELLED = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
-_FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
+FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
 _OPERATION = re.compile(r"\*\*|[-+*/\]]|and|mod|or|xor|eq|ne|ge|gt|le|lt")
 _PRECEDENCE = {
     **dict.fromkeys(("and", "or", "xor"), 2),
@@ -151,7 +151,7 @@ class Reader:
         return match[0]
 
     def _function(self) -> float:
-        match = _FUNCTION.match(self.text, self.at)
+        match = FUNCTION.match(self.text, self.at)
         if match is None:
             raise self.fault(f"a value cannot begin with {self.peek()!r}; functions are {_FUNCTIONS_TEXT}")
         at, name = self.at, match[0]
@@ -267,10 +267,10 @@ def _circular(function: Callable) -> Callable[[float], float]:
     return lambda degrees: float(function(np.longdouble(degrees) * _PI / 180))
 
 
-def _arc(function: Callable[[float], float], name: str) -> Callable[[float], float]:
+def _arc(function: Callable[[float], float]) -> Callable[[float], float]:
     def angle(argument: float) -> float:
         if not -1.0 <= argument <= 1.0:
-            raise Fault(f"{name} of {argument:g}, which is not between -1 and 1; check the expression")
+            raise Fault(f"a number from -1 to 1 is asked for, and got {argument:g}; check the expression")
         return float(np.longdouble(function(argument) * 180.0) / _PI)
 
     return angle
@@ -285,20 +285,20 @@ def _exponential(argument: float) -> float:
 
 def _logarithm(argument: float) -> float:
     if argument <= 0.0:
-        raise Fault(f"LN of {argument:g}, which is not positive; check the expression")
+        raise Fault(f"a positive number is asked for, and got {argument:g}; check the expression")
     return math.log(argument)
 
 
 def _root(argument: float) -> float:
     if argument < 0.0:
-        raise Fault(f"SQRT of {argument:g}, which is negative; check the expression")
+        raise Fault(f"a number from 0 is asked for, and got {argument:g}; check the expression")
     return math.sqrt(argument)
 
 
 _UNARY: dict[str, Callable[[float], float]] = {
     "abs": lambda argument: -argument if argument < 0.0 else argument,
-    "acos": _arc(math.acos, "ACOS"),
-    "asin": _arc(math.asin, "ASIN"),
+    "acos": _arc(math.acos),
+    "asin": _arc(math.asin),
     "cos": _circular(np.cos),
     "exp": _exponential,
     "fix": lambda argument: float(math.floor(argument)),

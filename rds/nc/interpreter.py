@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from rds.nc.blocks import AXIS_SET, CHECKED, NON_MODAL, Block, check, settle_motion
+from rds.nc.blocks import AXIS_SET, CHECKED, NON_MODAL, STOP, Block, check, settle_motion
 from rds.nc.canon import Call, MotionBlock
 from rds.nc.context import Context
 from rds.nc.control import Control
@@ -15,6 +15,7 @@ from rds.nc.dialect import Dialect
 from rds.nc.errors import ProgramError
 from rds.nc.expressions import Fault
 from rds.nc.fast_lane import FastLane
+from rds.nc.left_over import LeftOver
 from rds.nc.modes import execute
 from rds.nc.moves import move
 from rds.nc.names import known_names
@@ -24,7 +25,7 @@ from rds.nc.source import LONGEST, open_source
 from rds.nc.state import NO_MOTION, State
 from rds.nc.stream import Stream
 from rds.nc.tools import Tool, ToolTable, read_tools
-from rds.nc.words import columns, fill, line_number, place_of, read_plain, read_words, tidy, word_at
+from rds.nc.words import column_of, fill, line_number, place_of, read_plain, read_words, tidy, word_at
 
 if TYPE_CHECKING:
     from rds.nc.compensation_moves import Stretch
@@ -41,16 +42,18 @@ def interpret(
     options: Dialect = Dialect(),  # noqa: B008 (frozen)
     name: str = "",
     stretches: list[Stretch] | None = None,
+    remark: Callable[[ProgramError], None] | None = None,
 ) -> Iterator[MotionBlock | Call]:
     """The canonical calls of a program, as it is read.
 
     `source`: a Path is a file, a str is the program itself, a file object is read as it goes. Subroutine files are
     looked for beside a file. `tools` and `parameters`: LinuxCNC's files, or what they hold, in the machine's units.
-    `name` stands for the program in messages. `stretches`, when given, gets what cutter compensation made of what.
+    `name` stands for the program in messages. `stretches`, when given, gets what cutter compensation made of what;
+    `remark` is called with what is no fault and worth a look: blocks after the program's end.
     Raises ProgramError at the first fault; what came before it has been handed out by then.
     """
     interpreter = Interpreter(
-        source, tools=tools, parameters=parameters, options=options, name=name, stretches=stretches
+        source, tools=tools, parameters=parameters, options=options, name=name, stretches=stretches, remark=remark
     )
     try:
         yield from interpreter.run()
@@ -70,6 +73,7 @@ class Interpreter:
         options: Dialect = Dialect(),  # noqa: B008 (frozen)
         name: str = "",
         stretches: list[Stretch] | None = None,
+        remark: Callable[[ProgramError], None] | None = None,
     ):
         table = ToolTable(read_tools(tools) if isinstance(tools, Path) else tools or ())
         kept = read_parameters(parameters) if isinstance(parameters, Path) else parameters
@@ -81,10 +85,12 @@ class Interpreter:
         self.control = Control(self.source, self.context.parameters, options)
         self.context.parameters.known = known_names(self.context, self.control, lambda: self.control.source.line)
         self.lane = FastLane(self.context, self.source)
+        self._remark = remark
         self._percent = False
         self._first = True  # no block has been executed
         self._text = ""
         self._places: dict[str, int] = {}
+        self._left_over: LeftOver | None = None  # what stands behind M2 or M30, once it has been met
 
     def close(self) -> None:
         self.control.close()
@@ -113,6 +119,7 @@ class Interpreter:
             out.flush()
             yield from self._take()  # what was right before the fault
             raise
+        self._look_behind()
         out.line, out.digits = 0, 0
         out.call("ON_RESET")
         out.call("ON_RESET")
@@ -126,6 +133,7 @@ class Interpreter:
 
     def _open(self) -> None:
         """See whether the program stands between % and %."""
+        self.source.fill()
         first = self.source.following()
         while raw := self.source.read():
             if len(raw) > LONGEST + 1:
@@ -233,7 +241,7 @@ class Interpreter:
         context.parameters.settle()
         ended = execute(context, block)
         if ended:
-            self._after_end()
+            self._after_end(f"M{block.m[STOP]}")
         return ended
 
     def _program_number(self, text: str) -> bool:
@@ -261,13 +269,27 @@ class Interpreter:
         self.out.call("FINISH")
         return True
 
-    def _after_end(self) -> None:
+    def _look_behind(self) -> None:
+        """Remark on blocks behind the end; a program may also end in a subroutine's file."""
+        source = self.source
+        if self._remark is None or self.control.source is not source:
+            return
+        if self._left_over is None:
+            self._left_over = LeftOver("%", source.line)
+        while raw := source.read():
+            self._left_over.look(raw, source.line)
+        if found := self._left_over.remark(source.name):
+            self._remark(found)
+
+    def _after_end(self, word: str) -> None:
         """A program that began with % ends with one, after M2."""
+        source = self.control.source
+        self._left_over = LeftOver(word, source.line)
         if not self._percent:
             return
-        source = self.control.source
         last = b""
         while raw := source.read():
+            self._left_over.look(raw, source.line)
             if len(raw) <= LONGEST + 1:
                 if raw.strip() == b"%":
                     return
@@ -289,15 +311,11 @@ class Interpreter:
             at = self._places.get(fault.key, -1)
             if at < 0:
                 at = text.find("(") if fault.key == "(" else place_of(fault.key, text)
+        column = 0
         if at == -2:
-            column = raw.rfind(b"(") + 1
+            column = len(raw[: raw.rfind(b"(")].decode("utf-8", "replace")) + 1 + source.column
             word = "("
         elif at >= 0 and text:
-            places = columns(raw)
-            column = places[at] if at < len(places) else len(raw.rstrip()) + 1
+            column = column_of(raw, at) + source.column
             word = word_at(text, at).encode("latin-1").decode("utf-8", "replace")
-        else:
-            column = 0
-        if column:  # of the line's characters, not bytes
-            column = len(raw[: column - 1].decode("utf-8", "replace")) + 1 + source.column
         return ProgramError(fault.message, file=source.name, line=source.line, column=column, word=word)

@@ -47,7 +47,7 @@ def read_word(text: str, at: int, parameters: Parameters, *, scope: str, definin
         raise
     match = _KIND.match(text, reader.at)
     word = Word(match[0] if match else "", at=at)
-    word.spelled = f"O{label if label.lstrip('-').isdigit() else f'<{label}>'}"
+    word.spelled = spelled(label)
     word.name = label if word.kind in _GLOBAL else f"{scope}#{label}"
     if match:
         reader.at = match.end()
@@ -63,6 +63,11 @@ def read_word(text: str, at: int, parameters: Parameters, *, scope: str, definin
             said = f"{word.spelled} {word.kind.upper()}"
             raise reader.fault(f"only a comment can follow {said}; move the rest to a new line")
     return word
+
+
+def spelled(label: str) -> str:
+    """An O word's number or name as programs write it: O100, O<pocket>."""
+    return f"O{label if label.lstrip('-').isdigit() else f'<{label}>'}"
 
 
 def _read_values(word: Word, reader: Reader, defining: str, skipping: str) -> None:

@@ -19,8 +19,11 @@ G28_HOME, G30_HOME = 5161, 5181
 G92_APPLIED, G92 = 5210, 5211
 SYSTEM = 5220  # which coordinate system is selected
 _SETTING = re.compile(  # what int() and float() take and LinuxCNC does not, like 1_000, is no number here either
-    r"\s*([-+]?[0-9]+)\s+([-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?|inf|nan))", re.ASCII | re.IGNORECASE
+    r"\s*([-+]?[0-9]+)\s+([-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?|inf|nan))(?=\s*(?:$|[;#(])|\s+[a-z])",
+    re.ASCII | re.IGNORECASE,
 )
+_REMARK = re.compile(r"\s*(?:[;#(].*)?", re.DOTALL)
+_SHOWN = 40  # characters of a line that is no setting
 _DIGITS_MOST = 18  # of a number; more would be out of range all the same
 SYSTEMS = 5200  # + 20 * system + 1...: origin X Y Z A B C U V W, rotation
 
@@ -35,6 +38,7 @@ class Parameters:
         self.globals: dict[str, float] = {}
         self.locals: list[dict[str, float]] = [{}]  # one for each subroutine being executed
         self.state = state
+        self.changes = 0  # settings that gave a parameter another value
         self.known: dict[str, Callable[[], float]] = {}  # read-only names
         self._numbered: list[tuple[int, float]] = []
         self._named: list[tuple[str, float]] = []
@@ -83,11 +87,18 @@ class Parameters:
     def settle(self) -> None:
         """Do the settings of the block, in order."""
         for index, value in self._numbered:
+            self.changes += self.numbers[index] != value
             self.numbers[index] = value
         for name, value in self._named:
-            (self.globals if name[:1] == "_" else self.locals[-1])[name] = value
+            names = self.globals if name[:1] == "_" else self.locals[-1]
+            self.changes += names[name] != value
+            names[name] = value
         self._numbered.clear()
         self._named.clear()
+
+    def snapshot(self) -> tuple[list[float], dict[str, float], list[dict[str, float]]]:
+        """What all parameters are, to compare later."""
+        return self.numbers.copy(), self.globals.copy(), [names.copy() for names in self.locals]
 
     # -- subroutines ---------------------------------------------------------------------------------------------------
 
@@ -106,13 +117,14 @@ class Parameters:
 def read_parameters(path: Path) -> dict[int, float]:
     """A parameter file as LinuxCNC keeps it (.var): a number and a value on each line, numbers ascending.
 
-    Lines that do not begin with two numbers are passed over, as LinuxCNC does; lengths are in the machine's units.
-    Raises ProgramError with the line for a number out of range or out of order.
+    Empty lines, remarks (behind `;`, `#` or `(`, or words behind the value) and a heading without digits say nothing.
+    LinuxCNC passes over any other line too, and what it should have set with it; here that is a fault. Lengths are in
+    the machine's units. Raises ProgramError with the line for a number out of range or out of order as well.
     """
     values: dict[int, float] = {}
     last = 0
     try:
-        lines = path.read_bytes().decode("utf-8", "replace").split("\n")  # as editors count them
+        lines = path.read_bytes().decode("utf-8-sig", "replace").split("\n")  # as editors count them
     except OSError as error:
         raise ProgramError(
             f"the parameter file cannot be read ({error.strerror}); check its path", file=str(path)
@@ -120,7 +132,15 @@ def read_parameters(path: Path) -> dict[int, float]:
     for line, text in enumerate(lines, start=1):
         match = _SETTING.match(text)
         if match is None:
-            continue
+            if _REMARK.fullmatch(text) or not (last or any(map(str.isdigit, text))):
+                continue
+            shown = text.strip()[:_SHOWN]
+            raise ProgramError(
+                f"{shown!r} is no setting; write a parameter's number, blanks and its value, as in 5221 1.5, or a ;"
+                " before a remark",
+                file=str(path),
+                line=line,
+            )
         number, value = int(match[1][:_DIGITS_MOST]), float(match[2])
         if not 1 <= number < COUNT:
             raise ProgramError(

@@ -30,12 +30,15 @@ class _Reading(Interpreter):
             return False
         return super()._other(text)
 
+    some = False  # whether there was anything after that line
+
     def faults(self, after: int) -> Iterator[ProgramError]:
         """Those of the lines after line `after`, up to M2 or M30."""
         self.out.file = self.source.name
         while raw := self.source.read():
             if self.source.line <= after:
                 continue
+            self.some = self.some or bool(raw.strip())
             try:
                 if self._line(raw):
                     return
@@ -43,13 +46,21 @@ class _Reading(Interpreter):
                 yield fault
 
 
-def later_faults(first: ProgramError, options: Dialect) -> Iterator[ProgramError]:
-    """What is wrong with words after the fault that ended a program, in the file that it is in."""
-    path = Path(first.file)
-    if not first.line or not path.is_file():
-        return
-    reading = _Reading(path, options=options, name=first.file)
-    try:
-        yield from reading.faults(first.line)
-    finally:
-        reading.close()
+class Later:
+    """The rest of the file in which a fault ended a program: `faults` of its words; `some`: there was something."""
+
+    def __init__(self, first: ProgramError, options: Dialect):
+        self._first, self._options = first, options
+        self.some = False
+
+    def faults(self) -> Iterator[ProgramError]:
+        """What is wrong with words after the fault."""
+        path = Path(self._first.file)
+        if not self._first.line or not path.is_file():
+            return
+        reading = _Reading(path, options=self._options, name=self._first.file)
+        try:
+            yield from reading.faults(self._first.line)
+        finally:
+            self.some = reading.some
+            reading.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import os
 import tempfile
@@ -53,6 +54,7 @@ class Source:
         self._next = Place(self._base, 1, 0)
         self._semicolons = semicolons
         self._ended = False
+        self._fresh = True  # nothing has been read
 
     def size(self) -> int:
         """Bytes of the whole program; 0 when that is not known before it is read."""
@@ -67,6 +69,9 @@ class Source:
         """Read on until the buffer holds a whole line after `at` (or the program's end). False: nothing is left."""
         while not self._ended and self.buffer.find(b"\n", self.at) < 0:
             more = self._stream.read(CHUNK)
+            if self._fresh:
+                self._fresh = False
+                more = self._without_mark(more)
             self._ended = not more
             self._base += self.at
             self.buffer = self.buffer[self.at :] + more
@@ -74,6 +79,18 @@ class Source:
             if len(self.buffer) > 2 * CHUNK and b"\n" not in self.buffer:
                 break  # the line is too long anyway
         return self.at < len(self.buffer)
+
+    def _without_mark(self, text: bytes) -> bytes:
+        """What some editors put before the text to tell its coding is none of it. Raises ProgramError for UTF-16."""
+        if text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise ProgramError(
+                "the file is in the coding UTF-16; save it as UTF-8 or plain ASCII", file=self.name, line=1
+            )
+        if text.startswith(codecs.BOM_UTF8):
+            text = text[len(codecs.BOM_UTF8) :]
+            self._base += len(codecs.BOM_UTF8)
+            self._next = Place(self._base, 1, 0)
+        return text
 
     def read(self) -> bytes:
         """The next block, with the line break that ends it; b"" at the end."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 XY, XZ, YZ = 0, 1, 2  # planes: G17, G18, G19
 PLANES = ("XY", "XZ", "YZ")
 PER_MINUTE, INVERSE_TIME, PER_REVOLUTION = 0, 1, 2  # feed modes: G94, G93, G95
@@ -63,6 +65,11 @@ class State:
         self.axis_offset = [0.0] * 6  # G92
         self.rotation = 0.0  # degrees
         self.tool_offset = [0.0] * 6
+
+    def values(self) -> list[Any]:
+        """All of it, to compare; vectors are copied."""
+        found = (getattr(self, name) for name in self.__slots__)
+        return [list(value) if isinstance(value, list) else value for value in found]
 
     def position(self) -> list[float]:
         return [self.x, self.y, self.z, self.a, self.b, self.c]

@@ -66,13 +66,15 @@ def toolpath(
     items: Iterable[MotionBlock | Call],
     *,
     report: Report = raise_it,
+    warn: Report = lambda _: None,
 ) -> Iterator[PathBlock]:
     """The machine's motion for a stream of canonical calls, block by block; memory does not grow with its length.
 
     What no machine can do (an arc in a plane that the rotation tilts, a feed per revolution of a standing spindle, a
-    call that nothing here carries out) goes to `report` as a ProgramError; if that returns, the path goes on.
+    call that nothing here carries out) goes to `report` as a ProgramError; if that returns, the path goes on. What is
+    allowed and hardly meant (a spindle started at S0) goes to `warn`.
     """
-    converter = _Converter(report)
+    converter = _Converter(report, warn)
     try:
         for item in items:
             if isinstance(item, MotionBlock):
@@ -91,8 +93,8 @@ def toolpath(
 class _Converter:
     """Gathers rows while nothing changes that matters to them, then makes segments of them at once."""
 
-    def __init__(self, report: Report):
-        self._report = report
+    def __init__(self, report: Report, warn: Report):
+        self._report, self._warn = report, warn
         self._frame = Frame()
         self._mode, self._tolerance, self._collinear = BLEND, inf, 0.0
         self._per_revolution = False
@@ -274,6 +276,9 @@ class _Converter:
         self._spin(call.line)
 
     def _spin(self, line: int) -> None:
+        if not self._speed:
+            message = "the spindle is on at a speed of 0, and stands still; give one (S) on the line or before"
+            self._warn(ProgramError(message, file=self._file, line=line))
         self._event("spindle", self._turning * self._speed, line)
 
     def _stop_spindle(self, call: Call) -> None:

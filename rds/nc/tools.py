@@ -76,7 +76,7 @@ def read_tools(path: Path) -> list[Tool]:
     """
     tools: list[Tool] = []
     try:
-        lines = path.read_bytes().decode("utf-8", "replace").split("\n")  # as editors count them
+        lines = path.read_bytes().decode("utf-8-sig", "replace").split("\n")  # as editors count them
     except OSError as error:
         raise ProgramError(
             f"the tool table cannot be read ({error.strerror}); check its path", file=str(path)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
 MOST_FAULTS = 1000  # are kept; others are counted
+MOST_WARNINGS = 100  # are kept
 _FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
 _UNITS = ("mm", "mm", "mm", "degrees", "degrees", "degrees")
 
@@ -37,7 +38,7 @@ class Validation:
     """What became of a program: `faults` in the order of files and lines; `more` of them were counted only.
 
     `low` and `high` are how far the path reaches along the axes that move (machine coordinates, mm and degrees);
-    lengths are in mm. `stopped`: the fault that ended the program; the lines after it were only read.
+    lengths are in mm. `stopped`: the fault that ended the program; the lines after it, if any, were only read.
     """
 
     program: str
@@ -52,6 +53,8 @@ class Validation:
     tools: tuple[int, ...] = ()
     spindle: float = 0.0  # rev/min, the fastest
     stopped: ProgramError | None = None
+    read_on: bool = False  # there are lines after that
+    warnings: tuple[ProgramError, ...] = ()  # what is no fault and worth a look
 
     @property
     def ok(self) -> bool:
@@ -64,16 +67,8 @@ class Validation:
             "program": self.program,
             "machine": self.machine,
             "ok": self.ok,
-            "faults": [
-                {
-                    "file": fault.file,
-                    "line": fault.line,
-                    "column": fault.column,
-                    "word": fault.word,
-                    "message": fault.reason,
-                }
-                for fault in self.faults
-            ],
+            "faults": [_to_json(fault) for fault in self.faults],
+            "warnings": [_to_json(warning) for warning in self.warnings],
             "more_faults": self.more,
             "segments": self.segments,
             "cutting_mm": self.cutting,
@@ -85,23 +80,40 @@ class Validation:
         }
 
     def __str__(self) -> str:
+        lines = [_as_warning(warning) for warning in self.warnings]
         if self.ok:
             reach = ", ".join(
                 f"{axis} {plain(self.low[axis])} to {plain(self.high[axis])} {_UNITS[AXES.index(axis)]}"
                 for axis in self.low
             )
-            return (
+            lines.append(
                 f"{self.program}: {self.machine} can run it: {self.segments} move{'s' * (self.segments != 1)}, "
                 f"{self.cutting:.6g} mm at feed, {self.rapid:.6g} mm rapid; {reach or 'nothing moves'}"
             )
-        lines = [str(fault) for fault in self.faults]
+            return "\n".join(lines)
+        lines += [str(fault) for fault in self.faults]
         if self.more:
             lines.append(f"and {self.more} faults more")
         count = len(self.faults) + self.more
-        if self.stopped and self.stopped.line:
+        if self.stopped and self.stopped.line and self.read_on:
             lines.append(f"{self.program}: not run from line {self.stopped.line} on: the words after it were only read")
         lines.append(f"{self.program}: {self.machine} can't run it: {count} fault{'s' * (count > 1)}")
         return "\n".join(lines)
+
+
+def _to_json(fault: ProgramError) -> dict[str, Any]:
+    return {
+        "file": fault.file,
+        "line": fault.line,
+        "column": fault.column,
+        "word": fault.word,
+        "message": fault.reason,
+    }
+
+
+def _as_warning(found: ProgramError) -> str:
+    said = f"{found.word}: warning" if found.word else "warning"
+    return str(ProgramError(f"{said}: {found.reason}", file=found.file, line=found.line, column=found.column))
 
 
 class Validator:
@@ -128,6 +140,17 @@ class Validator:
         self._low, self._high = np.full(6, inf), np.full(6, -inf)
         self._used: dict[int, None] = {}
         self.stopped: ProgramError | None = None  # the fault that ended the program
+        self.read_on = False  # there are lines after it
+        self._warnings: dict[tuple[str, int, str], tuple[ProgramError, str]] = {}
+
+    def warn(self, found: ProgramError, letters: str = "") -> None:
+        """Keep what is no fault and worth a look, once for each line; `letters` of the word it is about."""
+        if len(self._warnings) < MOST_WARNINGS:
+            self._warnings.setdefault((found.file, found.line, found.reason), (found, letters))
+
+    def warn_of_spindle(self, found: ProgramError) -> None:
+        """The same, of what M3, M4 and S say."""
+        self.warn(found, "M3 M4 S")
 
     @property
     def ok(self) -> bool:
@@ -297,6 +320,8 @@ class Validator:
             tools=tuple(self._used),
             spindle=self._fastest,
             stopped=self.stopped,
+            read_on=self.read_on,
+            warnings=tuple(at_their_words(self._warnings.values())),
         )
 
 

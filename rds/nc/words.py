@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from rds.nc.blocks import Block
-from rds.nc.expressions import Fault, Reader
+from rds.nc.expressions import FUNCTION, Fault, Reader
 from rds.nc.outside import GR_IS_OFF, no_such_letter
 from rds.nc.parameters import Parameters
 
@@ -18,7 +18,8 @@ _LINE_NUMBER = re.compile(r"/?(?:n([0-9]*)(\.?)([0-9]*))?")
 _OTHERS = frozenset("abcdfhijklpqrstxyz")
 _DIGITS_MOST = 9
 _ANYTHING = re.compile(
-    r"gr[0-9]*|[a-z]?[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)|#(?:<[^>]*>|[0-9]+)|[\x80-\xff]+|.", re.DOTALL
+    rf"gr[0-9]*|(?:{FUNCTION.pattern})(?=\[)|[a-z]?[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)|#(?:<[^>]*>|[0-9]+)|[\x80-\xff]+|.",
+    re.DOTALL,
 )
 
 
@@ -42,6 +43,13 @@ def columns(raw: bytes) -> list[int]:
         base = len(b"".join(_COMMENT.split(raw.rstrip())[:index]))
         found += [base + at + 1 for at, byte in enumerate(part) if index % 2 or byte not in _BLANKS]
     return found
+
+
+def column_of(raw: bytes, at: int) -> int:
+    """Which character of the line (from 1) character `at` of tidy(raw) is; one after the last where `at` is its end."""
+    places = columns(raw)
+    column = places[at] if at < len(places) else len(raw.rstrip()) + 1
+    return len(raw[: column - 1].decode("utf-8", "replace")) + 1  # characters, not bytes
 
 
 def line_number(text: str) -> tuple[int, int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import pickle
 
 import pytest
@@ -9,6 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rds.nc import Dialect, ProgramError, interpret
+from rds.nc.canon import text as canon_text
+from rds.nc.tools import Tool
 from tests.nc.random_programs import program
 
 
@@ -70,8 +73,16 @@ FAULTS = [
     ("o1 endif\nM2", 1, 1, "O1", "has no O1 IF before it"),
     ("o1 foo\nM2", 1, 1, "O1", "no control word"),
     ("o1 call [1] X2\nM2", 1, 13, "X2", "only a comment can follow O1 CALL"),
-    ("G0\n  o<part> call\nM2", 2, 0, "O<part> CALL", "in a file part.ngc beside the program"),
-    ("o1 if [0]\nM2", 2, 0, "", "close it with"),
+    ("G0\n  o<part> call\nM2", 2, 3, "O<part> CALL", "in a file part.ngc beside the program"),
+    ("n5 o1 if [0]\nM2", 1, 4, "O1 IF", "is not closed before the file's end; write O1 ENDIF"),
+    ("G0 X1\n o<a> sub\nM2", 2, 2, "O<a> SUB", "write O<a> ENDSUB where it ends"),
+    ("o1 while [0]\nM2", 1, 1, "O1 WHILE", "write O1 ENDWHILE"),
+    ("o1 repeat [0]\nM2", 1, 1, "O1 REPEAT", "write O1 ENDREPEAT"),
+    ("o1 do\no1 break\nM2", 1, 1, "O1 DO", "write O1 WHILE [...]"),
+    ("G0 X[SQRT[-1]]\nM2", 1, 6, "SQRT", "a number from 0 is asked for, and got -1"),
+    ("G0 X[1 + LN[0]]\nM2", 1, 10, "LN", "a positive number is asked for, and got 0"),
+    ("G0 XACOS[2]\nM2", 1, 5, "ACOS", "a number from -1 to 1 is asked for, and got 2"),
+    ("\ufeffG0 X1 U2\nM2", 1, 7, "U2", "the axes are X Y Z A B C"),
     ("o1 sub\no2 sub\nM2", 2, 1, "O2", "a subroutine inside the subroutine '1'"),
     ("G0 X1", 1, 0, "", "the program does not end; write M2, M30 or %"),
     ("%\nG0 X1\n", 2, 0, "", "the program does not end; write % on its last line"),
@@ -92,9 +103,48 @@ def test_a_fault_is_told_with_its_place_and_word(text: str, line: int, column: i
 
 
 def test_a_program_that_does_not_end_is_stopped() -> None:
-    error = fault("o1 while [1]\no1 endwhile\nM2", max_jumps=50)
+    error = fault("o1 while [1]\n#1=[#1+1]\no1 endwhile\nM2", max_jumps=50)
     assert "more than 50 calls and jumps back" in error.reason
-    assert error.line == 2
+    assert error.line == 3
+
+
+ENDLESS = [
+    "o1 while [1]\no1 endwhile\nM2",
+    "o1 do\no1 while [#1 eq 0]\nM2",
+    "#1=1\no1 while [#1 gt 0]\nG0 X1\nG0 X0\n#1=1\no1 endwhile\nM2",
+    "o1 while [1]\no2 repeat [3]\nG91 G0 X1\nX-1\no2 endrepeat\no1 continue\no1 endwhile\nM2",
+    "o5 sub\n#31=5\no5 endsub\n#31=5\no1 while [#31]\no5 call [1]\no1 endwhile\nM2",
+]
+
+
+@pytest.mark.parametrize("text", ENDLESS)
+def test_a_loop_that_leaves_everything_as_it_was_is_found_at_once(text: str) -> None:
+    assert "never ends: a round leaves everything as it was" in fault(text, max_jumps=40).reason
+
+
+ENDING = [
+    "o1 while [#<_x> lt 30]\nG91 G0 X1\no1 endwhile\nM2",
+    "o1 while [#5221 lt 30]\nG10 L2 P1 X[#5221 + 1]\no1 endwhile\nM2",
+    "#<a>=0\no1 while [#<a> lt 30]\n#<a>=[#<a>+1]\no1 endwhile\nM2",
+    "o1 repeat [30]\no1 endrepeat\nM2",
+    "o1 while [#<_selected_tool> lt 7]\no2 if [#<_selected_tool> eq 1]\nT2\no2 elseif [#<_selected_tool> eq 2]\nT7\n"
+    "o2 else\nT1\no2 endif\no1 endwhile\nM2",
+    "o1 while [#<_value> lt 3]\no2 if [#<_value> eq 1]\no5 call [2]\no2 elseif [#<_value> eq 2]\no5 call [3]\no2 else\n"
+    "o5 call [1]\no2 endif\no1 endwhile\nM2\no5 sub\no5 endsub [#1]",
+]
+
+
+@pytest.mark.parametrize("text", ENDING)
+def test_a_loop_that_ends_is_not_taken_for_endless(text: str) -> None:
+    tools = [Tool(number, number, 1.0) for number in (1, 2, 7)]
+    assert list(interpret(text, tools=tools, options=Dialect(max_jumps=60)))
+
+
+def test_a_mark_of_the_coding_before_the_text_is_no_part_of_it() -> None:
+    plain, marked = "G0 X1\no1 repeat [2]\nX2\no1 endrepeat\nM2\n", "\ufeffG0 X1\no1 repeat [2]\nX2\no1 endrepeat\nM2\n"
+    assert list(canon_text(interpret(marked))) == list(canon_text(interpret(plain)))
+    with pytest.raises(ProgramError, match="UTF-16; save it as UTF-8"):
+        list(interpret(io.BytesIO("G0 X1\nM2".encode("utf-16"))))
 
 
 def test_a_subroutine_that_calls_itself_without_end_is_stopped() -> None:

@@ -57,7 +57,7 @@ def test_what_is_wrong_in_a_tool_table_is_told(
 
 def test_a_parameter_file_is_read(tmp_path: Path) -> None:
     path = tmp_path / "p.var"
-    path.write_text("5161\t1.500000\n# a note\n5220 2\n5241\t-3\n")
+    path.write_text("Parameter  Value\n\n5161\t1.500000 G28 of X\n# a note\n5220 2 ; G55\n\n5241\t-3\n")
     assert read_parameters(path) == {5161: 1.5, 5220: 2.0, 5241: -3.0}
     calls = list(text(interpret("G28\nM2", parameters=path)))
     assert "SET_G5X_OFFSET(2, -3.0000, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000)" in calls[1]
@@ -71,6 +71,12 @@ def test_a_parameter_file_is_read(tmp_path: Path) -> None:
         ("5161 1\n5161 2\n", 2, "ascending order"),
         ("0 1\n", 1, "numbers go from 1 to 5601"),
         ("5161 nan\n", 1, "no finite number"),
+        ("5161 1\n5162 1,5\n", 2, "'5162 1,5' is no setting"),
+        ("5161 1\n5162 1 5\n", 2, "'5162 1 5' is no setting"),
+        ("5161=1\n", 1, "'5161=1' is no setting"),
+        ("5161 1\n5162\n", 2, "'5162' is no setting"),
+        ("5161 1\nhome of X\n", 2, "'home of X' is no setting"),
+        ("x5161 1\n", 1, "'x5161 1' is no setting"),
     ],
 )
 def test_what_is_wrong_in_a_parameter_file_is_told(tmp_path: Path, kept: str, line: int, message: str) -> None:

@@ -94,6 +94,37 @@ def test_check_of_an_invalid_program(folder: Path) -> None:
     ]
 
 
+WARNED = [
+    ("M3\nG0 X1\nM2\n", "1:1: M3: warning: the spindle is on at a speed of 0, and stands still; give one (S)", 1),
+    ("S500 M3\nG0 X1 S0\nM2\n", "2:7: S0: warning: the spindle is on at a speed of 0", 1),
+    ("\ufeffS500 M4\nS0 M3\nM2\n", "2:4: M3: warning: the spindle is on at a speed of 0", 1),
+    ("G0 X1\nM2\n(note)\n\nG0 X2\nX3\n", "5: warning: the program ends by M2 in line 2, and what follows is", 1),
+    ("%\nG0 X1\n%\nM3 X2\n", "4: warning: the program ends by % in line 3, and what follows is not run", 1),
+    ("%\nG0 X1\nM30\nX2\n%\nX3\n", "4: warning: the program ends by M30 in line 3, and what follows is", 1),
+    ("o1 call\nM2\n(its definition)\no1 sub\nG0 X1\no1 endsub\n; done\n", "", 0),
+    ("%\nG0 X1 M2\n%\n\n", "", 0),
+    ("S500 M3\nM5\nS0\nM2\n", "", 0),
+]
+
+
+@pytest.mark.parametrize(("program", "warning", "count"), WARNED)
+def test_check_warns_of_what_is_allowed_and_hardly_meant(folder: Path, program: str, warning: str, count: int) -> None:
+    (folder / "warned.ngc").write_text(program, encoding="utf-8")
+    done = nc("check", "warned.ngc")
+    assert done.exit_code == 0
+    assert f"warned.ngc:{warning}" in done.stdout and done.stdout.count("warning:") == count
+    found = json.loads(nc("check", "warned.ngc", "--json").stdout)
+    assert found["ok"] and len(found["warnings"]) == count
+
+
+def test_a_program_is_given_more_rounds(folder: Path) -> None:
+    (folder / "rounds.ngc").write_text("o1 while [#1 lt 50]\n#1=[#1+1]\no1 endwhile\nM2\n", encoding="utf-8")
+    done = nc("check", "rounds.ngc", "--max-jumps", "49")
+    assert done.exit_code == 1 and "more than 49 calls and jumps back" in done.stdout
+    assert "allow more (--max-jumps)" in done.stdout
+    assert nc("check", "rounds.ngc", "--max-jumps", "50").exit_code == 0
+
+
 def test_check_with_proof(folder: Path) -> None:
     done = nc(*given("check", "--proof"))
     assert done.exit_code == 0, done.stdout
