@@ -15,6 +15,8 @@ PANELS = Registry(
     "panel",
     {
         "menu": "rds.panels.menu",
+        "equipment-model": "rds.panels.equipment_model",
+        "equipment-control": "rds.panels.equipment_control",
     },
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from functools import cache
 from html import escape
@@ -82,9 +83,11 @@ class Shell:
     def _built(self, module: ModuleType) -> Any:
         try:
             return module.build(self)
-        except RdsError as error:
+        except Exception as error:  # whatever it is, the other panels and the emergency stop go on
+            if not isinstance(error, RdsError):
+                logging.getLogger(__name__).exception("panel %s could not be built", module.NAME)
             notice = Notice()
-            notice.say(str(error), "error")
+            notice.say(f"this panel cannot be shown: {error}", "error")
             return notice
 
     def _button(self, name: str) -> widgets.Button:

@@ -58,7 +58,7 @@ class StripChart(anywidget.AnyWidget):
         chosen = self._thinned(np.asarray(rows, dtype=float))
         if len(chosen):
             self._rows = np.concatenate((self._rows, chosen))[-KEPT:]
-            self._send(chosen)
+            self._deliver(chosen)
 
     def _thinned(self, rows: np.ndarray) -> np.ndarray:
         keep = []
@@ -68,7 +68,7 @@ class StripChart(anywidget.AnyWidget):
                 self._next = time + 1.0 / RATE
         return rows[keep]
 
-    def _send(self, rows: np.ndarray) -> None:
+    def _deliver(self, rows: np.ndarray) -> None:
         self.send({"kind": "rows", "width": rows.shape[1]}, [np.ascontiguousarray(rows, dtype="<f8").tobytes()])
 
     def _asked(self, _: Any, content: Any, __: Any) -> None:
@@ -76,4 +76,4 @@ class StripChart(anywidget.AnyWidget):
         if content == {"kind": "all"}:
             self.send({"kind": "clear"})
             if len(self._rows):
-                self._send(self._rows)
+                self._deliver(self._rows)

@@ -19,6 +19,7 @@ class Choices:
     def __init__(self, fields: Iterable[Field]):
         self._fields = {each.name: each for each in fields}
         self._values = {name: each.default for name, each in self._fields.items()}
+        self._waiting: dict[str, Any] = {}  # kept values of fields that are not there yet
         self._watchers: list[Callable[[str], None]] = []
 
     @property
@@ -52,7 +53,8 @@ class Choices:
         for each in fields:
             before = self._fields.get(each.name)
             same = getattr(before, "unit", None) == getattr(each, "unit", None)
-            old = self._values[each.name] if before is not None and same else each.default
+            waiting = self._waiting.pop(each.name, each.default)
+            old = waiting if before is None else self._values[each.name] if same else each.default
             self._fields[each.name] = each
             try:
                 self._values[each.name] = each.check(old)
@@ -77,9 +79,15 @@ class Choices:
         return dict(self._values)
 
     def load(self, values: Mapping[str, Any]) -> list[str]:
-        """Set what was kept earlier; sentences for what will not do any more and was left at its default."""
+        """Set what was kept earlier; sentences for what will not do any more and was left at its default.
+
+        A name with a dot belongs to something that is chosen (a controller's gain): its value waits for its field.
+        """
         refused = []
         for name, value in values.items():
+            if "." in name and name not in self._fields:
+                self._waiting[name] = value
+                continue
             try:
                 self.set(name, value)
             except InputError as error:

@@ -28,7 +28,10 @@ class Work(Protocol):
         """Whether it is over."""
         ...
 
-    note: str
+    @property
+    def note(self) -> str:
+        """What it does now."""
+        ...
 
     def stop(self) -> None:
         """Ask it to end."""
@@ -39,7 +42,7 @@ class WorkBar(widgets.HBox):
     """Hidden until `follow(work, ended)`; when the work is over it calls `ended()` once, and hides again."""
 
     def __init__(self, ticker: Ticker):
-        self._bar = widgets.FloatProgress(0.0, 0.0, 1.0)
+        self._bar = widgets.FloatProgress(value=0.0, min=0.0, max=1.0)
         self._bar.add_class("rds-progress")
         self._text = widgets.Label("")
         self.stop_button = widgets.Button(

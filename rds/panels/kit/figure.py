@@ -1,0 +1,50 @@
+"""A matplotlib figure to read: zoom, pan and save through ipympl, or a picture where that is not installed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ipywidgets as widgets
+
+DPI = 88  # of a figure 10 inches wide: as wide as a panel on a screen of 1280
+
+
+class FigureView(widgets.VBox):
+    """Empty until `show(figure)`; the figure before is closed."""
+
+    def __init__(self) -> None:
+        super().__init__([])
+        self.add_class("rds-figure")
+        self.figure: Any = None
+        self._canvas: Any = None
+
+    def show(self, figure: Any, caption: str = "") -> None:
+        """Show a matplotlib figure that belongs to no pyplot; `caption` is read out in its place."""
+        self.clear()
+        figure.set_dpi(DPI)
+        self.figure = figure
+        self._canvas = _canvas(figure)
+        words = [widgets.HTML(f"<p>{caption}</p>")] if caption else []
+        self.children = [self._canvas, *words]
+
+    def clear(self) -> None:
+        """Nothing to show."""
+        self.children = []
+        if self._canvas is not None:
+            self._canvas.close()
+        self.figure = self._canvas = None
+
+
+def _canvas(figure: Any) -> widgets.DOMWidget:
+    try:
+        from ipympl.backend_nbagg import Canvas, FigureManager
+    except ImportError:
+        return widgets.Image(value=figure.png(), format="png")
+    canvas = Canvas(figure)
+    FigureManager(canvas, 0)
+    canvas.header_visible = False
+    canvas.footer_visible = True
+    canvas.toolbar_visible = True
+    canvas.resizable = False
+    canvas.draw_idle()
+    return canvas
