@@ -1,0 +1,192 @@
+"""One cell: the processes of one submission behind their walls, from outside. Fresh for every case."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import struct
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from rds.grading.grade import Status
+from rds.grading.sandbox import frames
+from rds.grading.sandbox.budget import Budget
+from rds.grading.sandbox.errors import SandboxError, SubmissionError
+from rds.grading.sandbox.interpreter import Interpreter
+from rds.grading.sandbox.output import Output, printable
+from rds.grading.sandbox.processes import usage
+from rds.grading.sandbox.supervise import Supervisor
+
+_START = 60.0  # s that the kernel may take for three forks on a busy computer
+_END = 5.0  # s until init has said how its child ended
+_CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: written by the kernel, for the number spaces of the receiver
+_UNBLAMED = "its processes were ended from outside"
+
+
+class Cell:
+    """Started with `interpreter`, within `budget`, watched by `supervisor`; it may run on `cpus` (all if empty).
+
+    `turn` is odd while the submission has to answer; `turn_limit` is how many s it may take for that.
+    """
+
+    def __init__(self, interpreter: Interpreter, budget: Budget, supervisor: Supervisor, cpus: Sequence[int] = ()):
+        self.turn = 0
+        self.turn_limit = budget.limits.load_seconds
+        self._budget, self._supervisor = budget, supervisor
+        self._verdict: tuple[Status, str] | None = None
+        self._cpu, self._turn_seen, self._turn_time = 0.0, 0, 0.0
+        self._baseline = interpreter.resident_bytes
+        self.is_closed = False
+        inner_questions, self.questions = os.pipe()
+        self.answers, inner_answers = os.pipe()
+        printed, inner_output = os.pipe()
+        self._status, inner_status = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._status.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+        self.output = Output(printed, max(budget.limits.output_bytes - budget.printed, 0))
+        inner = (inner_questions, inner_answers, inner_output, inner_status.detach())
+        try:
+            limits = {key: getattr(budget.limits, key) for key in budget.limits.__dataclass_fields__}
+            interpreter.fork({"limits": limits, "cpus": list(cpus)}, inner)
+        finally:
+            for descriptor in inner:
+                os.close(descriptor)
+        self._process = self._started()
+        self._handle = os.pidfd_open(self._process)
+        supervisor.watch(self)
+
+    def exchange(self, value: Any, seconds: float) -> Any:
+        """One frame out and one back, within `seconds`. SubmissionError if there is none, or not JSON as agreed."""
+        self.turn_limit = seconds
+        self.turn += 1
+        try:
+            data = frames.encode(value)
+            while data:
+                data = data[os.write(self.questions, data) :]
+        except BrokenPipeError:
+            self.fail()
+        answer = self.frame()
+        self.turn += 1
+        return answer
+
+    def frame(self) -> Any:
+        """The next frame from inside."""
+        try:
+            return frames.decode(self.receive(frames.size(self.receive(frames.HEADER.size))))
+        except frames.FrameError as error:
+            self.kill(Status.BROKE_CONTRACT, f"it wrote into the grader's pipe: {printable(str(error))}")
+            self.fail()
+
+    def receive(self, count: int, data: bytes = b"") -> bytes:
+        """`count` bytes from inside, of which `data` are here already. SubmissionError if there will not be as many."""
+        while len(data) < count:
+            part = os.read(self.answers, count - len(data))
+            if not part:
+                self.fail()
+            data += part
+        return data
+
+    def inspect(self, seconds: float) -> None:
+        """By the supervisor, `seconds` after the last time: count, and end the cell if a limit is exceeded."""
+        turn = self.turn
+        if turn != self._turn_seen:
+            self._turn_seen, self._turn_time = turn, 0.0
+        elif turn % 2:
+            self._turn_time += self._budget.step(seconds)
+        used = usage(self._process)
+        self._cpu = max(self._cpu, used.cpu_seconds)
+        memory = used.memory_bytes - used.processes * self._baseline
+        fault = self._budget.fault(self._cpu, memory, self._turn_time, self.turn_limit)
+        if fault is not None:
+            self.kill(*fault)
+
+    def take_output(self) -> bool:
+        """By the supervisor: read what was printed; False once nothing more can come."""
+        goes_on = self.output.collect()
+        if self.output.is_flood:
+            self.kill(Status.KILLED, f"it printed more than {self._budget.limits.output_bytes} bytes many times over")
+            return False
+        return goes_on
+
+    def kill(self, status: Status, reason: str) -> None:
+        """End all its processes; the first who does so says why."""
+        if self._verdict is None:
+            self._verdict = (status, reason)
+        self._end()
+
+    def fail(self) -> NoReturn:
+        """It has ended, or cannot go on: close it and raise SubmissionError with the reason."""
+        said = self._last_words()
+        verdict = self._verdict
+        self.close()
+        if said.startswith("broken"):
+            raise SandboxError(f"the sandbox could not be put up: {said}")
+        raise SubmissionError(*(verdict or _blame(said)))
+
+    def close(self) -> None:
+        """End all its processes, and forget it."""
+        if self.is_closed:
+            return
+        self.is_closed = True
+        self._cpu = max(self._cpu, usage(self._process).cpu_seconds)
+        self._end()
+        _wait(self._handle, _END)
+        self._supervisor.forget(self)
+        self.output.collect()
+        self._budget.cpu_before += self._cpu
+        self._budget.printed += len(self.output.text)
+        for descriptor in (self.questions, self.answers, self.output.descriptor, self._handle):
+            os.close(descriptor)
+        self._status.close()
+
+    def _started(self) -> int:
+        """The number of its init, as the kernel gives it."""
+        self._status.settimeout(_START)
+        try:
+            data, ancillary, _, _ = self._status.recvmsg(1024, socket.CMSG_SPACE(_CREDENTIALS.size))
+        except OSError:
+            data, ancillary = b"no sign of life", []
+        for level, kind, payload in ancillary:
+            if data == b"started" and (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS):
+                return int(_CREDENTIALS.unpack(payload)[0])
+        for descriptor in (self.questions, self.answers, self.output.descriptor):
+            os.close(descriptor)
+        self._status.close()
+        raise SandboxError(f"the sandbox could not be put up: {data.decode(errors='replace') or 'it ended at once'}")
+
+    def _end(self) -> None:
+        try:
+            signal.pidfd_send_signal(self._handle, signal.SIGKILL)
+        except OSError:
+            return  # it has ended
+
+    def _last_words(self) -> str:
+        """What init says of the end."""
+        self._status.settimeout(_END)
+        try:
+            return self._status.recv(1024).decode(errors="replace")
+        except OSError:
+            return ""
+
+
+def _blame(said: str) -> tuple[Status, str]:
+    """How it ended by itself, from init's words."""
+    word, _, number = said.partition(" ")
+    if word != "ended":
+        return Status.KILLED, _UNBLAMED
+    code = int(number)
+    if code >= 0:
+        return Status.KILLED, f"it ended its own process, with exit code {code}"
+    if -code == signal.SIGXCPU:
+        return Status.TIMED_OUT, "it took more computing time than is allowed"
+    name = signal.Signals(-code).name if -code in {each.value for each in signal.Signals} else f"signal {-code}"
+    hint = "; too deep a recursion, or compiled code gone wrong" if -code == signal.SIGSEGV else ""
+    return Status.KILLED, f"its process was ended by {name}{hint}"
+
+
+def _wait(handle: int, seconds: float) -> None:
+    """Until the process behind the pidfd `handle` has ended."""
+    poll = select.poll()
+    poll.register(handle, select.POLLIN)
+    poll.poll(int(seconds * 1000))

@@ -1,0 +1,35 @@
+"""Figures of a run's work that are the same each time, on a busy computer too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rds.grading.sandbox.run import Run, Sample
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Deterministic figures of one run's work: the same for the same input, on a busy computer too.
+
+    `events` are lines, calls and returns of Python, and calls of compiled functions, in all `calls` together. They are
+    None where they could not be counted; `refused` says why.
+    """
+
+    calls: int
+    events: int | None = None
+    instructions: int | None = None  # of the processor, where the kernel counts them: a hint, never quite the same
+    refused: str = ""
+
+
+def count_again(first: Sequence[Sample], again: Run) -> Counts:
+    """The questions of a run asked once more in the counted run `again`, which must give the same answers."""
+    for asked, answered in first:
+        if again.ask(*asked) != answered:
+            t = (again.k - 1) * again.T
+            return Counts(len(first), refused=f"at t = {t:.3f} s it answered otherwise while it was counted")
+    told = again.total()
+    events = told.get("events")
+    if told.get("is_whole") is not True or not isinstance(events, int) or isinstance(events, bool) or events < 0:
+        return Counts(len(first), refused="it has tampered with the counter")
+    return Counts(len(first), events)

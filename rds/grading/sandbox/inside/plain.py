@@ -1,0 +1,47 @@
+"""A submission's values as JSON can carry them: numbers, texts, lists and dicts, bounded."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+DEEPEST = 12
+MOST = 20_000  # single values
+
+
+class NotPlain(ValueError):
+    """A value that is none; the text says which."""
+
+
+def plain(value: Any) -> Any:
+    """`value` with tuples and arrays as lists. NotPlain for NaN, infinity, objects, and what is too large or deep."""
+    return _plain(value, 0, [MOST])
+
+
+def _plain(value: Any, depth: int, left: list[int]) -> Any:
+    left[0] -= 1
+    if left[0] < 0:
+        raise NotPlain(f"it holds more than {MOST} values")
+    if depth > DEEPEST:
+        raise NotPlain(f"it has more than {DEEPEST} lists inside each other")
+    if value is None or type(value) in (bool, str):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        if value.dtype.kind not in "fiub":
+            raise NotPlain(f"it holds an array of {value.dtype}")
+        if value.size > MOST:
+            raise NotPlain(f"it holds more than {MOST} values")
+        value = value.tolist()
+    if type(value) in (int, float, bool):
+        if not isfinite(value):
+            raise NotPlain(f"it holds {value!r}")
+        return value
+    if isinstance(value, list | tuple):
+        return [_plain(part, depth + 1, left) for part in value]
+    if isinstance(value, dict):
+        if not all(type(key) is str for key in value):
+            raise NotPlain("it holds a dict whose keys are not all texts")
+        return {key: _plain(part, depth + 1, left) for key, part in value.items()}
+    raise NotPlain(f"it holds a {type(value).__name__}")

@@ -1,0 +1,144 @@
+"""The submission's side of the loop: one question in, one answer out, until the grader closes the pipe.
+
+The laws, models in motion and rows are those of every other run of RDS, so that graded answers are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from rds.checks.rows import iterate, row_of
+from rds.checks.values import shown
+from rds.core.blame import STUDENT_ERRORS, student_error
+from rds.core.errors import InputError
+from rds.core.load import StudentFile
+from rds.core.types import ArcSegment, LineSegment, Segment
+from rds.grading.sandbox import records
+from rds.grading.sandbox.inside import walls
+from rds.grading.sandbox.inside.channel import Channel
+from rds.grading.sandbox.inside.counting import Count
+from rds.interface import as_voltage
+from rds.models.student import student_model
+from rds.modes.parts import start
+from rds.runtime.laws import LiveReference, controlled, coupled
+
+
+def control(channel: Channel, student: StudentFile, order: dict[str, Any], count: Count) -> None:
+    """A controller of `order["axes"]` axes, in lock step."""
+    axes = int(order["axes"])
+    layout = records.control_layout(axes)
+    question, answer = layout.question, layout.answer
+    references = [LiveReference() for _ in range(axes)]
+    cells = [each for r in references for each in (r.position, r.velocity, r.acceleration)]
+    try:
+        controller = student.controller(coupled=axes > 1, params=order["params"])
+        if order["initial_state"] is not None:
+            controller = replace(controller, initial_state=order["initial_state"])
+        controller = replace(controller, control=count.around(controller.control))
+        params, names = dict(controller.params), [str(name) for name in order["names"]]
+        if axes == 1:
+            law = controlled(0, names[0], controller, references[0], order["T"], as_voltage, params)
+        else:
+            each = range(axes)
+            law = coupled(each, names, controller, references, order["T"], [as_voltage] * axes, params)
+    except (InputError, *STUDENT_ERRORS) as error:
+        return _refuse(channel, error, student)
+    channel.tell({"begun": True})
+    receive, send, positions_at = channel.receive, channel.send, 2 + 3 * axes
+    while True:
+        values = question.unpack(receive(question.size))
+        if values[0] == records.TOTAL:
+            return count.tell(channel)
+        for cell, value in zip(cells, values[2:positions_at], strict=True):
+            cell.value = value
+        voltages: list[float] = []
+        try:
+            law(values[0], values[positions_at:], [], voltages)
+        except (InputError, *STUDENT_ERRORS) as error:
+            return _fault(channel, layout, values[0], error, student, values[0] * order["T"])
+        send(answer.pack(values[0], records.OK, *voltages))
+
+
+def model(channel: Channel, student: StudentFile, order: dict[str, Any], count: Count) -> None:
+    """A model in motion: voltage in, output after that sample out."""
+    layout = records.MODEL
+    question, answer = layout.question, layout.answer
+    try:
+        motion = start(student_model(student, order["params"]), order["T"])
+        write, read = count.around(motion.write), count.around(motion.read)
+        first = as_voltage(read())
+    except (InputError, *STUDENT_ERRORS) as error:
+        return _refuse(channel, error, student)
+    channel.tell({"begun": True, "output": first})
+    while True:
+        k, voltage = question.unpack(channel.receive(question.size))
+        if k == records.TOTAL:
+            return count.tell(channel)
+        try:
+            write(voltage)
+            output = float(read())
+        except (InputError, *STUDENT_ERRORS) as error:
+            return _fault(channel, layout, k, error, student, k * order["T"])
+        channel.send(answer.pack(k, records.OK, output))
+
+
+def rows(channel: Channel, student: StudentFile, order: dict[str, Any], count: Count) -> None:
+    """An interpolator's rows, a block at each question."""
+    segment = _segment(order["segment"])
+    axes = len(segment.start)
+    layout = records.rows_layout(axes)
+    question, answer = layout.question, layout.answer
+    try:
+        given = iterate(student.functions["interpolate"](segment, order["T"], student.parameters(order["params"])))
+        if isinstance(given, str):
+            raise InputError(f"interpolate() returned {given}")
+    except (InputError, *STUDENT_ERRORS) as error:
+        return _refuse(channel, error, student)
+    channel.tell({"begun": True})
+    following: Callable[[], Any] = count.around(lambda: next(given, None))
+    taken = 0
+    while True:
+        (k,) = question.unpack(channel.receive(question.size))
+        if k == records.TOTAL:
+            return count.tell(channel)
+        block: list[float] = []
+        code = records.OK
+        for _ in range(records.ROWS):
+            try:
+                row = following()
+                if row is None:
+                    code = records.END
+                    break
+                values = row_of(row, axes)
+                if isinstance(values, tuple):
+                    raise InputError(f"row {taken} is {shown(row)}; {values[1]}")
+            except (InputError, *STUDENT_ERRORS) as error:
+                return _fault(channel, layout, k, error, student, taken * order["T"])
+            block += values.ravel().tolist()
+            taken += 1
+        padding = [0.0] * (records.ROWS * 3 * axes - len(block))
+        channel.send(answer.pack(k, code, float(len(block) // (3 * axes)), *block, *padding))
+
+
+def _segment(data: dict[str, Any]) -> Segment:
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}
+    return ArcSegment(**fields) if fields.pop("kind") == "arc" else LineSegment(**fields)
+
+
+def _refuse(channel: Channel, error: BaseException, student: StudentFile) -> None:
+    channel.tell({"error": _said(error, student)})
+
+
+def _fault(
+    channel: Channel, layout: records.Layout, k: int, error: BaseException, student: StudentFile, t: float
+) -> None:
+    channel.send(layout.answer.pack(k, records.FAULT, *[0.0] * layout.answers))
+    said = _said(error, student)
+    channel.tell({"error": said if f"t = {t:.3f}" in said else f"at t = {t:.3f} s: {said}"})
+
+
+def _said(error: BaseException, student: StudentFile) -> str:
+    said = str(error) if isinstance(error, InputError) else student_error(error, student.source)
+    return said.replace(f"{walls.HOME}/", "")[:2000]

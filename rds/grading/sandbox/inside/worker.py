@@ -1,0 +1,99 @@
+"""The submission's process: loads the file, says what it defines, then runs the one thing that it is asked for."""
+
+from __future__ import annotations
+
+import base64
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from rds.core.blame import STUDENT_ERRORS, student_error
+from rds.core.errors import ContractError, InputError
+from rds.core.load import StudentFile, load_student
+from rds.core.signature import INTERFACES, form
+from rds.grading.sandbox.inside import runs, walls
+from rds.grading.sandbox.inside.channel import Channel, Closed
+from rds.grading.sandbox.inside.counting import counter
+from rds.grading.sandbox.inside.plain import NotPlain, plain
+
+_RUNS = {"control": runs.control, "model": runs.model, "rows": runs.rows}
+
+
+def main(questions: int, answers: int) -> int:
+    """Serve one submission; the process's exit code."""
+    channel = Channel(questions, answers)
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(line_buffering=True)  # type: ignore[union-attr] # nothing is lost if it is ended
+    try:
+        order = channel.ask()
+        file = Path(walls.HOME) / order["name"]
+        file.write_bytes(base64.b64decode(order["text"]))
+        loaded = _load(channel, order["kind"], file)
+        if loaded is None:
+            return 0
+        while True:
+            order = channel.ask()
+            if order["op"] == "call":
+                _call(channel, loaded, order, file)
+            elif order["op"] in _RUNS and isinstance(loaded, StudentFile):
+                _RUNS[order["op"]](channel, loaded, order, counter(order.get("counted", False)))
+    except Closed:
+        return 0
+
+
+def _load(channel: Channel, kind: str, file: Path) -> StudentFile | ModuleType | None:
+    """Run the file and tell what it defines; None if it cannot be used."""
+    try:
+        loaded = _functions(file) if kind == "functions" else _interface(kind, file)
+    except (InputError, *STUDENT_ERRORS) as error:
+        said = str(error) if isinstance(error, InputError) else student_error(error, file)
+        channel.tell({"error": said.replace(f"{walls.HOME}/", "")[:2000]})
+        return None
+    given = loaded if isinstance(loaded, StudentFile) else None
+    names = sorted(given.functions if given else (n for n, v in vars(loaded).items() if callable(v) and n[0] != "_"))
+    params, fault = _shown(dict(given.params) if given else {})
+    state, state_fault = _shown(given.initial_state if given else None)
+    problem = "; ".join(f"{name}: {text}" for name, text in [("params", fault), ("initial_state", state_fault)] if text)
+    channel.tell({"defines": names[:1000], "params": params or {}, "initial_state": state, "problem": problem})
+    return loaded
+
+
+def _interface(kind: str, file: Path) -> StudentFile:
+    student = load_student(file)
+    if kind not in student.interfaces:
+        wanted = " or ".join(form(name) for name, interface in INTERFACES.items() if interface == kind)
+        raise ContractError(f"no {kind}: it defines no {wanted}", file.name)
+    return student
+
+
+def _functions(file: Path) -> ModuleType:
+    """The file as a module; what it defines is looked up when it is called."""
+    spec = importlib.util.spec_from_file_location("submission", file)
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _shown(value: Any) -> tuple[Any, str]:
+    try:
+        return plain(value), ""
+    except NotPlain as fault:
+        return None, str(fault)
+
+
+def _call(channel: Channel, loaded: Any, order: dict[str, Any], file: Path) -> None:
+    """One function with plain arguments; its answer, or what it raised."""
+    functions = loaded.functions if isinstance(loaded, StudentFile) else vars(loaded)
+    name = order["name"]
+    if not callable(functions.get(name)):
+        channel.tell({"error": f"it defines no function {name}()"})
+        return
+    try:
+        channel.tell({"value": plain(functions[name](*order["args"]))})
+    except NotPlain as fault:
+        channel.tell({"error": f"{name}() returned what is not made of numbers, texts and lists: {fault}"})
+    except STUDENT_ERRORS as error:
+        channel.tell({"error": f"{name}() failed: {student_error(error, file)}".replace(f"{walls.HOME}/", "")[:2000]})

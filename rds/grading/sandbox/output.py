@@ -1,0 +1,52 @@
+"""What a submission prints: kept up to a limit, counted beyond it, and harmless to show."""
+
+from __future__ import annotations
+
+import os
+
+_FLOOD = 8  # times the limit, from which on printing is an attack and no longer talk
+_READ = 1 << 16
+
+
+class Output:
+    """The outer end of a submission's stdout and stderr; `descriptor` does not block."""
+
+    def __init__(self, descriptor: int, most_bytes: int):
+        self.descriptor = descriptor
+        os.set_blocking(descriptor, False)
+        self._kept = bytearray()
+        self._most = most_bytes
+        self._seen = 0
+
+    def collect(self) -> bool:
+        """Take what there is; False once nothing more can come."""
+        while True:
+            try:
+                data = os.read(self.descriptor, _READ)
+            except BlockingIOError:
+                return True
+            except OSError:
+                return False
+            if not data:
+                return False
+            self._seen += len(data)
+            self._kept += data[: max(self._most - len(self._kept), 0)]
+            if self.is_flood:
+                return True
+
+    @property
+    def is_flood(self) -> bool:
+        """Whether it is far more than anyone reads."""
+        return self._seen > _FLOOD * self._most
+
+    @property
+    def text(self) -> str:
+        """What was kept, without control characters, and how much is missing."""
+        return printable(bytes(self._kept).decode(errors="replace")) + (
+            f"\n… {self._seen - self._most} bytes more were cut" if self._seen > self._most else ""
+        )
+
+
+def printable(text: str) -> str:
+    """`text` without characters that move a terminal's cursor or hide others; lines and tabs stay."""
+    return "".join(each if each.isprintable() or each in "\n\t" else "\N{REPLACEMENT CHARACTER}" for each in text)

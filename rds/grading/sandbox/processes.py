@@ -1,0 +1,66 @@
+"""What the processes of one cell use up, read in /proc from outside, where the cell cannot reach."""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+_TICK = 1.0 / os.sysconf("SC_CLK_TCK")
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+
+
+class Usage(NamedTuple):
+    """Of all processes of a cell together."""
+
+    cpu_seconds: float
+    memory_bytes: int  # resident; what processes share counts for each
+    processes: int
+
+
+def usage(top: int) -> Usage:
+    """Of all processes below `top`, the cell's init, which is not counted itself; zeros once it has gone.
+
+    Nothing can leave the tree: the orphans of a cell are adopted by its init. CPU time includes that of children that
+    were waited for, so that work done by short-lived children adds up.
+    """
+    cpu, memory, count = _own_cpu(top, only_children=True), 0, 0
+    waiting = _children(top)
+    while waiting:
+        process = waiting.pop()
+        count += 1
+        cpu += _own_cpu(process)
+        memory += _resident(process)
+        waiting += _children(process)
+    return Usage(cpu, memory, count)
+
+
+def _children(process: int) -> list[int]:
+    found: list[int] = []
+    try:
+        threads = os.listdir(f"/proc/{process}/task")
+    except OSError:
+        return found
+    for thread in threads:
+        found += [int(word) for word in _read(f"/proc/{process}/task/{thread}/children").split()]
+    return found
+
+
+def _own_cpu(process: int, only_children: bool = False) -> float:
+    fields = _read(f"/proc/{process}/stat").rpartition(b")")[2].split()  # the name may hold anything
+    if len(fields) < 15:
+        return 0.0
+    user, system, child_user, child_system = map(int, fields[11:15])
+    return (child_user + child_system + (0 if only_children else user + system)) * _TICK
+
+
+def _resident(process: int) -> int:
+    fields = _read(f"/proc/{process}/statm").split()
+    return int(fields[1]) * _PAGE if len(fields) > 1 else 0
+
+
+def _read(path: str) -> bytes:
+    try:
+        with open(path, "rb", buffering=0) as file:
+            return file.read()
+    except OSError:  # the process has just ended
+        return b""

@@ -1,0 +1,90 @@
+"""The grader's side of a run: a question of fixed size out, an answer of fixed size back, in step."""
+
+from __future__ import annotations
+
+import os
+from math import isfinite
+from typing import Any, NoReturn
+
+from rds.grading.grade import Status
+from rds.grading.sandbox import records
+from rds.grading.sandbox.cell import Cell
+from rds.grading.sandbox.output import printable
+
+LONGEST_REASON = 600  # characters of what a submission's error says
+
+Sample = tuple[tuple[float, ...], tuple[float, ...]]
+"""What was asked and what was answered."""
+
+
+class Run:
+    """A run of `what` (control, model, rows) with samples of `T` s, begun in `cell`. `k` is the next sample."""
+
+    def __init__(self, cell: Cell, what: str, layout: records.Layout, T: float):
+        self.cell, self.what, self.layout, self.T = cell, what, layout, T
+        self.k = 0
+        self.has_ended = False
+        self._asked: list[tuple[float, ...]] = []
+        self._answered: list[tuple[float, ...]] = []
+        question, answer = layout.question, layout.answer
+        self._pack, self._unpack, self._size = question.pack, answer.unpack, answer.size
+        self._questions, self._answers = cell.questions, cell.answers
+
+    def ask(self, *values: float) -> tuple[float, ...]:
+        """The answer to `values`, finite; SubmissionError if there is none, or one to something else."""
+        cell, k = self.cell, self.k
+        cell.turn += 1
+        try:
+            os.write(self._questions, self._pack(k, *values))
+        except BrokenPipeError:
+            cell.fail()
+        data = os.read(self._answers, self._size)
+        if len(data) != self._size:
+            data = cell.receive(self._size, data)
+        number, code, *answer = self._unpack(data)
+        if number != k or code != records.OK or not all(map(isfinite, answer)):
+            self._judge(number, code)
+        cell.turn += 1
+        self.k = k + 1
+        self._asked.append(values)
+        self._answered.append(given := tuple(answer))
+        return given
+
+    def recorded(self, most: int | None = None) -> list[Sample]:
+        """What was asked and answered so far, of the first `most` samples."""
+        return list(zip(self._asked[:most], self._answered[:most], strict=True))
+
+    def total(self) -> dict[str, Any]:
+        """After the last sample of a counted run: what its counter says."""
+        self.cell.turn += 1
+        try:
+            os.write(self._questions, self._pack(records.TOTAL, *[0.0] * self.layout.asks))
+        except BrokenPipeError:
+            self.cell.fail()
+        told = self.cell.frame()
+        self.cell.turn += 1
+        return told if isinstance(told, dict) else {}
+
+    def _judge(self, number: int, code: int) -> None:
+        if number == self.k and code == records.END and self.what == "rows":
+            self.has_ended = True
+        elif number == self.k and code == records.FAULT:
+            answer = self.cell.frame()
+            self.give_up(reason(answer.get("error") if isinstance(answer, dict) else None))
+        elif number == self.k and code == records.OK:
+            self.give_up(f"at t = {self.k * self.T:.3f} s it answered what is not finite")
+        else:
+            self.give_up("it wrote into the grader's pipe")
+
+    def give_up(self, why: str) -> NoReturn:
+        """SubmissionError: the submission has broken its contract."""
+        self.cell.kill(Status.BROKE_CONTRACT, why)
+        self.cell.fail()
+
+
+def reason(said: object) -> str:
+    """What came out of a sandbox as an error's text: one line that can be shown."""
+    if not isinstance(said, str) or not said:
+        return "it failed, and did not say why"
+    text = " ".join(printable(said).split())
+    return text if len(text) <= LONGEST_REASON else text[: LONGEST_REASON - 1] + "…"

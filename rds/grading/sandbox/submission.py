@@ -1,0 +1,52 @@
+"""A file that was handed in, read without running or trusting it."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from rds.grading.grade import Status
+from rds.grading.sandbox.errors import SubmissionError
+
+LARGEST = 512 << 10  # bytes; a file of data, not of code
+
+_SAFE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,60}\.py")
+_IMPORTS = re.compile(rb"^[ \t]*(?:import|from)[ \t]([^\n]*)", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Submission:
+    """Its bytes, and a name for messages that can be shown anywhere."""
+
+    name: str
+    data: bytes
+
+    def imports(self, package: str) -> bool:
+        """Whether a line imports `package`: a guess that saves time, and need not be right.
+
+        By pattern, because parsing what somebody wrote to crash a parser is not for the grader's process.
+        """
+        word = re.compile(rb"\b%s\b" % package.encode())
+        return any(word.search(line) for line in _IMPORTS.findall(self.data))
+
+
+def read_submission(path: Path) -> Submission:
+    """The regular file at `path`. SubmissionError for anything else: a link, a device, or one that is too large."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except FileNotFoundError:
+        raise SubmissionError(Status.MISSING, "there is no such file") from None
+    except (OSError, ValueError) as error:
+        said = error.strerror if isinstance(error, OSError) else str(error)
+        raise SubmissionError(Status.REFUSED, f"it cannot be opened, or is a link: {said}") from None
+    with os.fdopen(descriptor, "rb") as file:
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode):
+            raise SubmissionError(Status.REFUSED, "it is not a regular file; hand in one Python file")
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise SubmissionError(Status.REFUSED, f"it has more than {LARGEST} bytes; keep data out of it")
+    return Submission(path.name if _SAFE_NAME.fullmatch(path.name) else "submission.py", data)
