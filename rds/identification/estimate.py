@@ -58,3 +58,14 @@ class Estimate:
     def values(self) -> dict[str, float]:
         """The estimates by name."""
         return {name: parameter.value for name, parameter in self.parameters.items()}
+
+    def to_json(self) -> dict[str, Any]:
+        """As a dict that JSON can hold, as `rds fit --json` prints it."""
+        from rds.identification.estimate_json import to_json
+
+        return to_json(self)
+
+    def _repr_html_(self) -> str:
+        from rds.identification.fit_report import fragment
+
+        return fragment(self)

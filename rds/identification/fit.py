@@ -40,6 +40,7 @@ def fit(
         raise InputError("there is no log to fit; name at least one")
     named = _names_apart(logs)
     _check_units(named, structure)
+    structure = structure.prepare(named) if structure.prepare else structure
     estimated: Estimate = METHODS.module(method or structure.default_method).estimate(
         named, structure, dict(options or {})
     )
