@@ -11,9 +11,9 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands import analyse, bus, data, estop, fault, interpolate, modules, nc, reports, validate
+from rds.commands import analyse, bus, data, estop, fault, fit, interpolate, modules, nc, reports, robustness, validate
 from rds.commands.app import app as app_page
-from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, stdout_kept
+from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
 from rds.commands.guard import guarded
 
 app = typer.Typer(
@@ -35,9 +35,11 @@ bus.app.command()(fault.nodes)
 app.command()(modules.scan)
 app.command()(estop.estop)
 app.command()(reports.report)
+app.command()(fit.fit)
 app.command()(validate.validate)
 app.command("app")(app_page)
 app.command()(interpolate.interpolate)
+app.command()(robustness.robustness)
 
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]
 
@@ -74,6 +76,7 @@ def run(
     with refusals(), stdout_kept(json):
         from rds.experiment.report import exit_code, run_and_save, run_json
 
+        say_what_is_replaced(out)
         with progress_bars() as bar:
             result, files = run_and_save(experiment, mode, out, bar(mode or "run"))
     if json:
@@ -186,7 +189,7 @@ def explain(result: Any) -> None:
 def main() -> None:
     """The console command `rds`. What runs a student's code in this process does so in a child of it."""
     # a program in a terminal takes keys, which a process group in the background may not
-    if sys.argv[1:2] == ["run"] or (sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()):
+    if sys.argv[1:2] in (["run"], ["robustness"]) or (sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()):
         guarded(_app)
     app()
 

@@ -34,7 +34,7 @@ def obstacle(plan: Plan) -> str | None:
         name = axis.axis.name
         if axis.model.motion is not LinearAxisMotion:
             return f"axis {name}: only the library's linear-axis model can be compiled"
-        if axis.controller is not None and _law(axis) is None:
+        if axis.controller is not None and pure_law(axis) is None:
             return f"axis {name}: only the library's controllers can be compiled"
     return None
 
@@ -59,7 +59,7 @@ def run_compiled(plan: Plan) -> Rows:
         if axis.controller is None:
             playing()(np.asarray(axis.signal, dtype=float), constants, start, interface, table, voltage)
         else:
-            reference, law = axis.reference, _law(axis)
+            reference, law = axis.reference, pure_law(axis)
             assert reference is not None and law is not None
             parts = (reference.position, reference.velocity, reference.acceleration)
             tracking = controlled(law)
@@ -131,7 +131,7 @@ def playing() -> Callable[..., None]:
     return compiled
 
 
-def _law(axis: AxisPlan) -> Callable[..., Any] | None:
+def pure_law(axis: AxisPlan) -> Callable[..., Any] | None:
     """The pure function behind a library controller."""
     assert axis.controller is not None
     control = axis.controller.control
