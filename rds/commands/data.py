@@ -95,8 +95,12 @@ def _show(found: Description) -> None:
         return "" if value is None else f"{value:.6g}"
 
     rows = [
-        [heading(c.name, c.unit), *(("words", "", "") if c.words else map(shown, (c.low, c.high, c.step)))]
-        + [str(c.values), str(c.missing or "")]
+        [
+            heading(c.name, c.unit),
+            *(("words", "", "") if c.words else map(shown, (c.low, c.high, c.step))),
+            str(c.values),
+            str(c.missing or ""),
+        ]
         for c in found.columns
     ]
     show_table(

@@ -15,7 +15,8 @@ import numpy as np
 from rds.core.errors import InputError
 
 _LEAST_CORRELATION = 0.6
-_RIVAL = 0.98  # of the peak: another as high, apart from it, and the offset is not told
+_RIVAL = 0.8  # of the peak: another as high, apart from it, and the offset is not told
+_FLOOR = 1e-6  # of the variance: nothing is explained better than that by a grid of samples
 _LEAST_OVERLAP = 0.3  # of the shorter log
 _MOST = 1 << 20  # points in the coarse search
 _BLOCKS = 32
@@ -101,13 +102,15 @@ def _coarse(t1: np.ndarray, x1: np.ndarray, t2: np.ndarray, x2: np.ndarray, wind
     overlap = np.rint(correlate(ones_a, ones_b, mode="full", method="fft"))
     energy = correlate(a * a, ones_b, mode="full", method="fft") * correlate(ones_a, b * b, mode="full", method="fft")
     scale = np.sqrt(np.maximum(energy, 1e-12 * float(np.max(energy))))
-    height = np.abs(raw) / scale
+    alike = np.minimum(np.abs(raw) / scale, 1.0)
     lags = np.arange(-(len(b) - 1), len(a)) * step + (t1[0] - t2[0])
+    # how much a lag explains, in how many points: a short overlap that fits by chance is no rival of a long one
+    height = -overlap * np.log(1.0 - alike * alike + _FLOOR)
     height[(overlap < _LEAST_OVERLAP * min(len(a), len(b))) | (np.abs(lags) > window)] = 0.0
     best = int(np.argmax(height))
-    if height[best] < _LEAST_CORRELATION:
+    if alike[best] < _LEAST_CORRELATION or height[best] <= 0.0:
         raise InputError(
-            f"the two columns do not look like one motion: their largest correlation is {height[best]:.2f}, where "
+            f"the two columns do not look like one motion: their largest correlation is {alike[best]:.2f}, where "
             f"{_LEAST_CORRELATION} is needed; choose other columns, give window (s), or offset and drift as numbers"
         )
     peaks, _ = find_peaks(height, height=_RIVAL * height[best])
@@ -159,6 +162,11 @@ def _fine(t1: np.ndarray, x1: np.ndarray, t2: np.ndarray, x2: np.ndarray, lag: f
         span = max(float(at[-1] - at[0]), margin)
         if abs(change[0]) + abs(change[1]) * span < 1e-6 * margin:
             break
+    else:
+        raise InputError(
+            "offset and drift of the two clocks could not be refined: the columns differ by more than time, gain and "
+            "offset; choose columns that saw the same motion"
+        )
     errors = _errors(jacobian / scales, residual) / scales
     correlation = float(np.corrcoef(shape, measured)[0, 1])
     return Alignment(float(p[0]), float(p[1]), float(errors[0]), float(errors[1]), float(centre), correlation)

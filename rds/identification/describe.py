@@ -142,7 +142,7 @@ def _numbers(name: str, unit: str, values: np.ndarray) -> ColumnFacts:
 
 
 def _log_columns(logs: Iterable[Log]) -> tuple[ColumnFacts, ...]:
-    found = []
+    found: list[ColumnFacts] = []
     for log in logs:
         if not found:
             found.append(_numbers("time", "s", log.time))

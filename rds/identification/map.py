@@ -102,7 +102,7 @@ class LogMap:
     samples: int | None = None  # that there should be
     jitter_limit: float = JITTER_LIMIT
     duplicates: str = "refuse"  # or drop
-    gaps: str = "refuse"  # or split: a log for each stretch between gaps
+    gaps: str = "refuse"  # or split: a log for each stretch between gaps; or keep: the command was held over them
     blanks: str = "refuse"  # or drop: rows with an empty cell
     said: tuple[str, ...] = field(default=())
 
@@ -127,7 +127,7 @@ class LogMap:
             samples=words.whole("samples", None, "how many there should be", 2),
             jitter_limit=words.number("jitter_limit", JITTER_LIMIT, "parts of the sample period", 0.0, 0.5),
             duplicates=words.choice("duplicates", "refuse", ("refuse", "drop")),
-            gaps=words.choice("gaps", "refuse", ("refuse", "split")),
+            gaps=words.choice("gaps", "refuse", ("refuse", "split", "keep")),
             blanks=words.choice("blanks", "refuse", ("refuse", "drop")),
         )
         for part in (table, bus, words):

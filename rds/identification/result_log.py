@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.identification.log import Clock, Finding, Gravity, Log
+from rds.identification.time_base import time_base
 from rds.identification.units import dimension, factor
 from rds.results.header import FORMAT
 from rds.results.result import Result
@@ -116,7 +118,9 @@ def _lateness(result: Result) -> float:
 
 
 def _findings(result: Result, command: str) -> list[Finding]:
-    meta, found = result.meta, []
+    meta = result.meta
+    # a loop that discarded periods held its command over them: its times are used as they are
+    found = list(time_base(_floats(result, "time"), inf, "refuse", "keep", "result").findings)
     if meta.get("ending") not in (None, "done"):
         what = f"the run ended early ({meta['ending']}); the log goes on to there"
         found.append(Finding("cut", what, Gravity.WARNING))

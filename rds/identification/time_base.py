@@ -25,7 +25,7 @@ class TimeBase:
 
 
 def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str, where: str) -> TimeBase:
-    """Judge the times `time` (s). `duplicates`: refuse or drop; `gaps`: refuse or split.
+    """Judge the times `time` (s). `duplicates`: refuse or drop; `gaps`: refuse, split, or keep (the command was held).
 
     InputError at `where` for a time that goes back, fewer than two samples, and, naming the first sample, for
     duplicates and gaps that are to be refused and for a step further from the period than `jitter_limit` of it.
@@ -59,9 +59,10 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
     wide = np.flatnonzero(steps > _GAP * period)
     if len(wide):
         findings.append(_gaps(time[keep], steps, wide, period, gaps, where))
+    if len(wide) and gaps == "split":
         ends = [0, *(wide + 1).tolist(), len(keep)]
         stretches = [(a, b) for a, b in pairwise(ends) if b - a >= 2]
-        steps = np.delete(steps, wide)
+    steps = np.delete(steps, wide)
     findings += _jitter(time[keep], steps, wide, period, jitter_limit, where)
     return TimeBase(keep, tuple(stretches), period, tuple(findings))
 
@@ -74,8 +75,13 @@ def _gaps(time: np.ndarray, steps: np.ndarray, wide: np.ndarray, period: float, 
         f"({time[k - 1]:.9g} s, then {time[k]:.9g} s, where the sample period is {period:.6g} s)"
     )
     if gaps == "refuse":
-        raise InputError(f'{what}; with gaps = "split" in the map each stretch between gaps is a log', where)
-    return Finding("gap", f"{what}; split there", Gravity.WARNING, k)
+        raise InputError(
+            f'{what}; in the map, gaps = "split" makes a log of each stretch between gaps, and "keep" says that the '
+            "command was held",
+            where,
+        )
+    done = "split there" if gaps == "split" else "kept: the command is taken to have been held over them"
+    return Finding("gap", f"{what}; {done}", Gravity.WARNING, k)
 
 
 def _jitter(
