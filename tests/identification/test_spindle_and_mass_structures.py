@@ -28,16 +28,15 @@ def by_differences(made: Structure, values: dict[str, float], x0: tuple[float, .
     for i, (name, value) in enumerate(values.items()):
         step = 1e-6 * max(abs(value), 1e-3)
         above, below = (made.respond(t, u, x0, {**values, name: value + s}) for s in (step, -step))
-        difference = (above - below) / (2.0 * step)
-        worst = max(
-            worst, float(np.abs(difference - slopes[:, i]).max() / max(float(np.abs(slopes[:, i]).max()), 1e-9))
-        )
+        worst = max(worst, _off((above - below) / (2.0 * step), slopes[:, i]))
     for i in range(made.states):
-        moved = [[x + s * (j == i) for j, x in enumerate(x0)] for s in (1e-6, -1e-6)]
-        difference = (made.respond(t, u, moved[0], values) - made.respond(t, u, moved[1], values)) / 2e-6
-        column = slopes[:, len(values) + i]
-        worst = max(worst, float(np.abs(difference - column).max() / max(float(np.abs(column).max()), 1e-9)))
+        above, below = (made.respond(t, u, [x + s * (j == i) for j, x in enumerate(x0)], values) for s in (1e-6, -1e-6))
+        worst = max(worst, _off((above - below) / 2e-6, slopes[:, len(values) + i]))
     return worst
+
+
+def _off(difference: np.ndarray, slope: np.ndarray) -> float:
+    return float(np.abs(difference - slope).max() / max(float(np.abs(slope).max()), 1e-3))
 
 
 @settings(max_examples=20)
