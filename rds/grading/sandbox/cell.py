@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 from rds.grading.grade import Status
 from rds.grading.sandbox import frames
 from rds.grading.sandbox.budget import Budget
+from rds.grading.sandbox.door import make_bell, make_memory
 from rds.grading.sandbox.errors import SandboxError, SubmissionError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.output import Output, printable
@@ -45,12 +46,13 @@ class Cell:
         self._status, inner_status = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._status.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
         self.output = Output(printed, max(budget.limits.output_bytes - budget.printed, 0))
-        inner = (inner_questions, inner_answers, inner_output, inner_status.detach())
+        self.door = (make_memory(), make_bell(), make_bell())
+        inner = (inner_questions, inner_answers, inner_output, *self.door, inner_status.detach())
         try:
             limits = {key: getattr(budget.limits, key) for key in budget.limits.__dataclass_fields__}
             interpreter.fork({"limits": limits, "cpus": list(cpus)}, inner)
         finally:
-            for descriptor in inner:
+            for descriptor in set(inner) - set(self.door):
                 os.close(descriptor)
         self._process = self._started()
         self._handle = os.pidfd_open(self._process)
@@ -136,7 +138,7 @@ class Cell:
         self.output.collect()
         self._budget.cpu_before += self._cpu
         self._budget.printed += len(self.output.text)
-        for descriptor in (self.questions, self.answers, self.output.descriptor, self._handle):
+        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door, self._handle):
             os.close(descriptor)
         self._status.close()
 
@@ -150,7 +152,7 @@ class Cell:
         for level, kind, payload in ancillary:
             if data == b"started" and (level, kind) == (socket.SOL_SOCKET, socket.SCM_CREDENTIALS):
                 return int(_CREDENTIALS.unpack(payload)[0])
-        for descriptor in (self.questions, self.answers, self.output.descriptor):
+        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
             os.close(descriptor)
         self._status.close()
         raise SandboxError(f"the sandbox could not be put up: {data.decode(errors='replace') or 'it ended at once'}")

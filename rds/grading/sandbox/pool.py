@@ -35,7 +35,7 @@ class Pool:
         if fault:
             raise SandboxError(fault)
         self._user = unused_user() if os.geteuid() == 0 else 0
-        self._place = Place.of(jobs, slot)
+        self._jobs, self._slot = jobs, slot
         self._lock = threading.Lock()
         self._supervisor = Supervisor()
         self._interpreters: dict[tuple[str, ...], Interpreter] = {}
@@ -54,7 +54,12 @@ class Pool:
         submission = read_submission(Path(path))
         kit = _kit([name for name in KITS[-1] if submission.imports(name)])
         return Subject(
-            submission, kind, limits or Limits(), lambda: self._interpreter(kit), self._supervisor, self._place
+            submission,
+            kind,
+            limits or Limits(),
+            lambda: self._interpreter(kit),
+            self._supervisor,
+            Place.of(self._jobs, self._slot),
         )
 
     def close(self) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from math import isfinite
 from typing import Any, NoReturn
 
 from rds.grading.grade import Status
 from rds.grading.sandbox import records
 from rds.grading.sandbox.cell import Cell
+from rds.grading.sandbox.door import ANSWER, QUESTION, Door
 from rds.grading.sandbox.output import printable
 
 LONGEST_REASON = 600  # characters of what a submission's error says
@@ -17,38 +19,69 @@ Sample = tuple[tuple[float, ...], tuple[float, ...]]
 """What was asked and what was answered."""
 
 
-class Run:
-    """A run of `what` (control, model, rows) with samples of `T` s, begun in `cell`. `k` is the next sample."""
+Exchange = Callable[[int, tuple[float, ...]], tuple[Any, ...]]
 
-    def __init__(self, cell: Cell, what: str, layout: records.Layout, T: float):
+
+class Run:
+    """A run of `what` (control, model, rows) with samples of `T` s, begun in `cell`. `k` is the next sample.
+
+    With `through_door` question and answer go through shared memory, else through the cell's pipes.
+    """
+
+    def __init__(self, cell: Cell, what: str, layout: records.Layout, T: float, through_door: bool = False):
         self.cell, self.what, self.layout, self.T = cell, what, layout, T
         self.k = 0
         self.has_ended = False
         self._asked: list[tuple[float, ...]] = []
         self._answered: list[tuple[float, ...]] = []
-        question, answer = layout.question, layout.answer
-        self._pack, self._unpack, self._size = question.pack, answer.unpack, answer.size
-        self._questions, self._answers = cell.questions, cell.answers
+        self._exchange = self._door() if through_door else self._pipes()
 
     def ask(self, *values: float) -> tuple[float, ...]:
         """The answer to `values`, finite; SubmissionError if there is none, or one to something else."""
         cell, k = self.cell, self.k
         cell.turn += 1
-        try:
-            os.write(self._questions, self._pack(k, *values))
-        except BrokenPipeError:
-            cell.fail()
-        data = os.read(self._answers, self._size)
-        if len(data) != self._size:
-            data = cell.receive(self._size, data)
-        number, code, *answer = self._unpack(data)
-        if number != k or code != records.OK or not all(map(isfinite, answer)):
-            self._judge(number, code)
+        answer = self._exchange(k, values)
+        if answer[0] != k or answer[1] != records.OK or not all(map(isfinite, answer)):
+            self._judge(answer[0], answer[1])
         cell.turn += 1
         self.k = k + 1
+        given = answer[2:]
         self._asked.append(values)
-        self._answered.append(given := tuple(answer))
+        self._answered.append(given)
         return given
+
+    def _pipes(self) -> Exchange:
+        cell, pack, answer = self.cell, self.layout.question.pack, self.layout.answer
+        unpack, size = answer.unpack, answer.size
+        questions, answers, write, read = cell.questions, cell.answers, os.write, os.read
+
+        def exchange(k: int, values: tuple[float, ...]) -> tuple[Any, ...]:
+            try:
+                write(questions, pack(k, *values))
+            except BrokenPipeError:
+                cell.fail()
+            data = read(answers, size)
+            return unpack(data if len(data) == size else cell.receive(size, data))
+
+        return exchange
+
+    def _door(self) -> Exchange:
+        cell, pack_into, unpack_from = self.cell, self.layout.question.pack_into, self.layout.answer.unpack_from
+        memory, question_bell, answer_bell = cell.door
+        door = Door(memory, answer_bell, question_bell, cell.answers, asks=True)
+        shared, wait, post = door.memory, door.wait, door.post
+        number = 0
+
+        def exchange(k: int, values: tuple[float, ...]) -> tuple[Any, ...]:
+            nonlocal number
+            number += 1
+            pack_into(shared, QUESTION, k, *values)
+            post(number)
+            if not wait(number):
+                cell.fail()
+            return unpack_from(shared, ANSWER)
+
+        return exchange
 
     def recorded(self, most: int | None = None) -> list[Sample]:
         """What was asked and answered so far, of the first `most` samples."""
@@ -57,10 +90,7 @@ class Run:
     def total(self) -> dict[str, Any]:
         """After the last sample of a counted run: what its counter says."""
         self.cell.turn += 1
-        try:
-            os.write(self._questions, self._pack(records.TOTAL, *[0.0] * self.layout.asks))
-        except BrokenPipeError:
-            self.cell.fail()
+        self._exchange(records.TOTAL, (0.0,) * self.layout.asks)
         told = self.cell.frame()
         self.cell.turn += 1
         return told if isinstance(told, dict) else {}

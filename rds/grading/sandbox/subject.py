@@ -66,8 +66,7 @@ class Subject:
         self._order: Mapping[str, Any] = {}
         self._counts: Counts | None = None
         self._affinity = os.sched_getaffinity(0)
-        if place.cpus:
-            os.sched_setaffinity(0, place.cpus)
+        os.sched_setaffinity(0, place.own)
         try:
             self._load()
         except BaseException:
@@ -171,8 +170,7 @@ class Subject:
     def close(self) -> None:
         """End its processes."""
         self._leave()
-        if self._place.cpus:
-            os.sched_setaffinity(0, self._affinity)
+        os.sched_setaffinity(0, self._affinity)
 
     def __enter__(self) -> Subject:
         return self
@@ -192,15 +190,17 @@ class Subject:
         if cell is None or cell.is_closed or not self._is_fresh:
             cell = self._load()
         self._is_fresh, self._counts = False, None
-        answer = self._answer(cell, order, self.limits.call_seconds, Status.BROKE_CONTRACT)
-        self._run, self._order = Run(cell, str(order["op"]), layout, T), order
+        through_door = self._place.apart and order["op"] != "rows"
+        whole = {**order, "through_door": through_door}
+        answer = self._answer(cell, whole, self.limits.call_seconds, Status.BROKE_CONTRACT)
+        self._run, self._order = Run(cell, str(order["op"]), layout, T, through_door), order
         return answer
 
     def _load(self, budget: Budget | None = None) -> Cell:
         """A fresh cell, with the submission loaded in it."""
         self._leave()
         interpreter = self._interpreter()  # its start is not the submission's time
-        self._cell = cell = Cell(interpreter, budget or self._budget, self._supervisor, self._place.cpus)
+        self._cell = cell = Cell(interpreter, budget or self._budget, self._supervisor, self._place.inner)
         self._run, self._is_fresh = None, True
         text = base64.b64encode(self._submission.data).decode()
         order = {"kind": self._kind, "name": self._submission.name, "text": text}
@@ -241,7 +241,9 @@ class Subject:
         first = run.recorded(most_samples)
         try:
             cell = self._load(Budget(generous))
-            self._answer(cell, {**order, "counted": True}, generous.call_seconds, Status.BROKE_CONTRACT)
+            self._answer(
+                cell, {**order, "counted": True, "through_door": False}, generous.call_seconds, Status.BROKE_CONTRACT
+            )
             again = Run(cell, run.what, run.layout, run.T)
             return count_again(first, again)
         except SubmissionError as error:

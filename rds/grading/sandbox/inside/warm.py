@@ -32,6 +32,9 @@ class Ends(NamedTuple):
     questions: int
     answers: int
     output: int
+    memory: int  # of the door, and its bells
+    question_bell: int
+    answer_bell: int
     status: int  # of init alone
 
 
@@ -100,7 +103,7 @@ def _init(request: dict[str, Any], ends: Ends, baseline: int, calls: bytes, work
         child = os.fork()
         if child == 0:
             _submission(request, ends, status, baseline, calls, worker)
-        for fd in (ends.questions, ends.answers, ends.output, 0, 1, 2):
+        for fd in (*ends[:-1], 0, 1, 2):
             os.close(fd)
         kernel.drop_capabilities()
         while True:
@@ -124,13 +127,13 @@ def _submission(
         os.dup2(ends.output, 1)
         os.dup2(ends.output, 2)
         os.dup2(os.open("/dev/null", os.O_RDONLY), 0)
-        questions, answers = (fcntl.fcntl(fd, fcntl.F_DUPFD, _ABOVE) for fd in (ends.questions, ends.answers))
+        questions, answers, _, *door = (fcntl.fcntl(fd, fcntl.F_DUPFD, _ABOVE) for fd in ends[:-1])
         walls.confine(request["limits"], baseline, calls, request["cpus"])
     except BaseException as error:
         status.send(f"broken: {type(error).__name__}: {error}".encode()[:500])
         os._exit(0)
     status.close()
     os.closerange(3, _ABOVE)
-    code = worker.main(questions, answers)
+    code = worker.main(questions, answers, door)
     sys.stdout.flush()
     os._exit(code)

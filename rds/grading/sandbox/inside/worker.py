@@ -21,9 +21,9 @@ from rds.grading.sandbox.inside.plain import NotPlain, plain
 _RUNS = {"control": runs.control, "model": runs.model, "rows": runs.rows}
 
 
-def main(questions: int, answers: int) -> int:
-    """Serve one submission; the process's exit code."""
-    channel = Channel(questions, answers)
+def main(questions: int, answers: int, door: list[int]) -> int:
+    """Serve one submission; the process's exit code. `door` is its memory and bells."""
+    channel = Channel(questions, answers, *door)
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(line_buffering=True)  # type: ignore[union-attr] # nothing is lost if it is ended
     try:
