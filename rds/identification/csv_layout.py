@@ -127,21 +127,24 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
     The rows have the width that most have, and numbers where nearly all of them do: a line of a preamble such as
     `gain;2.5` is none of them.
     """
-    rows: dict[int, list[tuple[int, list[bool]]]] = {}
+    rows: dict[int, list[tuple[int, list[bool]]]] = {}  # by width: line, and which cells are a number or blank
+    numbers: dict[int, int] = {}
     for number, line in enumerate(lines):
         if line.strip() and not is_comment(line):
             cells = split(line, delimiter)
             kinds = [is_number(cell, decimal) or bool(_DATE.fullmatch(cell)) for cell in cells]
             blanks = sum(cell.lower() in BLANKS for cell in cells)
             if any(kinds) and sum(kinds) + blanks >= len(cells) / 2:
-                rows.setdefault(len(cells), []).append((number, kinds))
+                fits = [kind or cell.lower() in BLANKS for kind, cell in zip(kinds, cells, strict=True)]
+                rows.setdefault(len(cells), []).append((number, fits))
+                numbers[len(cells)] = numbers.get(len(cells), 0) + sum(kinds)
     if not rows:
         return 0, 0, 0.0
     width = max(rows, key=lambda w: (len(rows[w]), -rows[w][0][0]))
     found = rows[width]
-    usual = [sum(kinds[i] for _, kinds in found) > 0.9 * len(found) - 1 for i in range(width)]
-    first = next((n for n, kinds in found if all(k or not u for k, u in zip(kinds, usual, strict=True))), found[0][0])
-    return first, width, float(sum(sum(kinds) for _, kinds in found))
+    usual = [sum(fits[i] for _, fits in found) > 0.9 * len(found) - 1 for i in range(width)]
+    first = next((n for n, fits in found if all(f or not u for f, u in zip(fits, usual, strict=True))), found[0][0])
+    return first, width, float(numbers[width])
 
 
 def _headings(
