@@ -109,6 +109,13 @@ def make(options: Sequence[str] = ()) -> Structure:
 
         return axis_starts(logs, names, states)
 
+    def unmoved(logs: Sequence[Log]) -> list[str]:
+        from rds.identification.smoothing import motion_of
+
+        motions = [motion_of(log) for log in logs]
+        ways = {"friction_plus": 1, "friction_minus": -1}
+        return [name for name, way in ways.items() if name in table and not any(m.goes(way) for m in motions)]
+
     return Structure(
         name="axis",
         parameters=table,
@@ -122,6 +129,7 @@ def make(options: Sequence[str] = ()) -> Structure:
         state_names=("position", "velocity", "place in the play")[:states],
         state_bounds=((-np.inf, np.inf), (-np.inf, np.inf), (-1.0, 1.0))[:states],
         start=start,
+        unmoved=unmoved,
         held=_held if "viscous" in options else None,
         no_effect={name: why for name, why in NO_EFFECT.items() if name in table},
     )

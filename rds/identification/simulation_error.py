@@ -49,6 +49,9 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
             raise InputError(f"structure {structure.name}: {name} is given with the log and cannot be fixed as well")
     held = structure.held(frozenset(fixed)) if structure.held else {}
     holding = {**fixed, **given, **{name: value for name, (value, _) in held.items()}}
+    unmoved = [name for name in (structure.unmoved(logs) if structure.unmoved else ()) if name not in holding]
+    starts = _starts(logs, structure, begun, holding)
+    holding |= {name: starts[0][0][name] for name in unmoved}
     problem = Problem(logs, structure, holding, _ticker(options.get("progress"), structure, len(logs)))
     samples = sum(len(log) for log in logs)
     if samples <= problem.size:
@@ -56,7 +59,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
             f"{samples} samples are too few for {problem.size} unknowns ({len(problem.names)} parameters and the "
             "initial states); give longer logs"
         )
-    solution, tried = _search(problem, begun)
+    solution, tried = _search(problem, starts)
     uncertainty = uncertainty_of(problem, solution)
     values = problem.values(solution.point)
     order = list(structure.parameters)
@@ -64,6 +67,8 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     free = len(problem.names)
     covariance = np.zeros((len(order), len(order)))
     covariance[np.ix_(places, places)] = uncertainty.covariance[:free, :free]
+    for name in unmoved:
+        covariance[order.index(name), order.index(name)] = np.inf
     return made_estimate(
         structure,
         "simulation",
@@ -73,7 +78,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         uncertainty.effective - problem.size,
         untold=[
             *(sentence for name, (_, sentence) in held.items()),
-            *untold_by(structure, problem.names, values, uncertainty),
+            *untold_by(structure, problem.names, values, uncertainty, unmoved),
         ],
         warnings=suspicions(problem, solution, uncertainty),
         details={
@@ -88,22 +93,26 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     )
 
 
-def _search(problem: Problem, begun: Mapping[str, float]) -> tuple[Solution, int]:
-    """The best end of a search from each start, and how many starts that took."""
-    logs, structure = problem.logs, problem.structure
+def _starts(
+    logs: Sequence[Log], structure: Structure, begun: Mapping[str, float], holding: Mapping[str, float]
+) -> list[tuple[dict[str, float], list[tuple[float, ...]]]]:
+    """Values and initial states to search from, best first; what the user gave goes before what the data say."""
     if structure.start is not None:
-        starts = structure.start(logs)
-    else:
-        if missing := [name for name in problem.names if name not in begun]:
-            raise InputError(f"structure {structure.name} needs a value to start from for {', '.join(missing)}")
-        starts = [({}, [first_state(structure, log) for log in logs])]
-    if not problem.names:
-        starts = starts[:1]
-    noise = sum(len(log) * motion_of(log).noise ** 2 for log in logs)
+        return [({**values, **begun}, states) for values, states in structure.start(logs)]
+    if missing := [name for name in structure.parameters if name not in begun and name not in holding]:
+        raise InputError(f"structure {structure.name} needs a value to start from for {', '.join(missing)}")
+    return [(dict(begun), [first_state(structure, log) for log in logs])]
+
+
+def _search(
+    problem: Problem, starts: Sequence[tuple[Mapping[str, float], Sequence[tuple[float, ...]]]]
+) -> tuple[Solution, int]:
+    """The best end of a search from each start, and how many starts that took."""
+    noise = sum(len(log) * motion_of(log).noise ** 2 for log in problem.logs)
     best: Solution | None = None
     tried = 0
-    for values, states in starts:
-        found = least_squares(problem, problem.point({**values, **begun}, states))
+    for values, states in starts if problem.names else starts[:1]:
+        found = least_squares(problem, problem.point(values, states))
         tried += 1
         if best is None or found.squares < best.squares:
             best = found

@@ -11,7 +11,8 @@ from rds.identification.log import Log
 from rds.identification.problem import Problem
 from rds.identification.structure import Structure
 
-EVALUATIONS = 100
+EVALUATIONS = 150  # at most, and for each parameter beyond four
+MORE = 50
 # A step that lowers the sum of squares by less than this share of one residual's variance moves no number by more than
 # a hundredth of its standard error.
 _NEGLIGIBLE = 1e-4
@@ -33,7 +34,7 @@ class Solution:
         return float(self.triangle[:, -1] @ self.triangle[:, -1])
 
 
-def least_squares(problem: Problem, start: np.ndarray, evaluations: int = EVALUATIONS) -> Solution:
+def least_squares(problem: Problem, start: np.ndarray) -> Solution:
     """The point with the least squared residuals near `start`. InputError if the free run there is not finite."""
     from scipy.optimize import least_squares as minimize
 
@@ -71,7 +72,7 @@ def least_squares(problem: Problem, start: np.ndarray, evaluations: int = EVALUA
         ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
         xtol=1e-9,
         gtol=1e-12,
-        max_nfev=evaluations,
+        max_nfev=EVALUATIONS + MORE * max(len(problem.names) - 4, 0),
     )
     return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
 

@@ -52,6 +52,8 @@ class Structure:
     # parameters that the logs state and no fit can tell (a force per volt), held at these values, with 0 std error
     given: Callable[[Sequence[Log]], Mapping[str, float]] | None = None
     default_method: str = "simulation"  # the method where the user names none
+    # parameters that these logs have no occasion to tell (friction of a direction in which the axis never moves)
+    unmoved: Callable[[Sequence[Log]], Sequence[str]] | None = None
     # the same structure in a form that answers these logs sooner, as exactly as their noise asks
     prepare: Callable[[Sequence[Log]], Structure] | None = None
     no_effect: Mapping[str, str] = field(default_factory=dict)  # what it means that a parameter changes nothing

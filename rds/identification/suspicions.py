@@ -16,6 +16,7 @@ _POOR = 90.0  # per cent: a model that fits worse does not explain the motion
 _MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
 _WHITE = 2.576  # 99 % band, in units of 1/√N
 _TIMES = (1e-4, 10.0)  # s: time constants of the axes of machine tools
+_SPEEDS = (0.05, 5000.0)  # mm/s: the highest speed of a log
 _LAGS = (1, 10, 100)
 
 
@@ -57,6 +58,14 @@ def _implausible(problem: Problem, values: Mapping[str, float]) -> list[str]:
             f"tau = {tau:.3g} s is no time constant of an axis ({_TIMES[0]:g} to {_TIMES[1]:g} s): is the time in "
             "seconds, and are the columns the right ones?"
         )
+    if problem.structure.output_unit == "mm":
+        for log in problem.logs:
+            fastest = float(np.abs(motion_of(log).velocity).max())
+            if not _SPEEDS[0] <= fastest <= _SPEEDS[1]:
+                said.append(
+                    f"{log.name}: the axis moves at {fastest:.3g} mm/s at most, and axes do at {_SPEEDS[0]:g} to "
+                    f"{_SPEEDS[1]:g} mm/s: is the position in mm, and the time in s?"
+                )
     return said
 
 
@@ -119,6 +128,6 @@ def _twins(names: Sequence[str], uncertainty: Uncertainty) -> list[str]:
     together = [name for name in names if any(name in pair for pair in pairs)]
     return [
         f"{', '.join(together[:-1])} and {together[-1]} are told together far better than each "
-        f"({strongest[0]} and {strongest[1]} are correlated {pairs[strongest]:+.4f}): their intervals hold, but a log "
-        "in which the command's amplitude varies would narrow them"
+        f"({strongest[0]} and {strongest[1]} are correlated {pairs[strongest]:+.4f}): a change of one makes up for a "
+        "change of the other; logs with other amplitudes and frequencies would narrow them (`rds excite`)"
     ]

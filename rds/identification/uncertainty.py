@@ -26,6 +26,8 @@ from rds.identification.triangle import triangle_of
 _RANK = 1e-7  # of the largest singular value of the scaled derivatives: below it, a direction is not told
 _ROUGH_RANK = 1e-5  # where the derivatives are differences
 _NOTHING = 1e-9  # of the motion: what a number changes less than, it does not change
+_ZERO = 1e-9  # of the units used: what is smaller than any parameter that means something
+_PART = 0.05  # of a direction, in numbers scaled by their effect: what takes a smaller part in it is left out
 _SHARE = 0.05  # of a log: the longest block
 _DRAWS = 40  # of the rounding
 _COARSE = 1.0  # encoder steps: noise beyond it makes rounding as good as white
@@ -50,8 +52,8 @@ def uncertainty_of(problem: Problem, solution: Solution) -> Uncertainty:
     samples = sum(len(log) for log in problem.logs)
     motion = float(np.sqrt(sum(len(log) * log.position.var() for log in problem.logs))) or 1.0
     scale = np.linalg.norm(R, axis=0)
-    empty = scale * np.maximum(np.abs(point), 1e-12) <= _NOTHING * motion
-    empty[len(problem.names) :] = scale[len(problem.names) :] <= _NOTHING * motion  # states may well be 0
+    # what a number of this size changes; of one that is 0, a whole unit
+    empty = scale * np.where(np.abs(point) > _ZERO, np.abs(point), 1.0) <= _NOTHING * motion
     scale[empty] = 1.0
     kept = np.flatnonzero(~empty)
     _, size, right = np.linalg.svd(R[:, kept] / scale[kept])
@@ -81,7 +83,7 @@ def uncertainty_of(problem: Problem, solution: Solution) -> Uncertainty:
     directions = []
     for row in right[~told]:
         together = np.zeros(n)
-        together[kept] = row / scale[kept]
+        together[kept] = np.where(np.abs(row) > _PART, row / scale[kept], 0.0)
         directions.append(together / np.where(point == 0.0, 1.0, np.abs(point)))
     hidden = empty.copy()
     for row in right[~told]:

@@ -9,23 +9,27 @@ import numpy as np
 from rds.identification.structure import Structure
 from rds.identification.uncertainty import Uncertainty
 
-_PART = 0.05  # of a direction's largest component: smaller ones are not named
 _HARDLY = 0.5  # standard error over value
 
 
 def untold_by(
-    structure: Structure, names: Sequence[str], values: Mapping[str, float], uncertainty: Uncertainty
+    structure: Structure,
+    names: Sequence[str],
+    values: Mapping[str, float],
+    uncertainty: Uncertainty,
+    unmoved: Sequence[str] = (),
 ) -> list[str]:
-    """Sentences about the free parameters `names`: without effect, only together, or hardly at all."""
+    """Sentences about the free parameters `names`: without effect, only together, or hardly at all.
+
+    `unmoved` are those that the logs give no occasion to tell, and that were not estimated.
+    """
     said = []
-    for i in uncertainty.without_effect:
-        if i < len(names):
-            name = names[i]
-            why = structure.no_effect.get(name)
-            said.append(
-                f"{name} changes nothing in the response to these commands{f' ({why})' if why else ''}: its value, "
-                f"{_with_unit(structure, name, values[name])}, is only where the search began"
-            )
+    for name in (*unmoved, *(names[i] for i in uncertainty.without_effect if i < len(names))):
+        why = structure.no_effect.get(name)
+        said.append(
+            f"{name} changes nothing in the response to these commands{f' ({why})' if why else ''}: its value, "
+            f"{_with_unit(structure, name, values[name])}, is only where the search began"
+        )
     for direction in uncertainty.directions:
         sentence = _together(names, direction)
         if sentence:
@@ -47,8 +51,7 @@ def _together(names: Sequence[str], direction: np.ndarray) -> str | None:
     largest = float(np.abs(changes).max(initial=0.0))
     if largest == 0.0:
         return None
-    parts = [(name, change / largest) for name, change in zip(names, changes, strict=True)]
-    parts = [(name, change) for name, change in parts if abs(change) > _PART]
+    parts = [(name, change / largest) for name, change in zip(names, changes, strict=True) if change]
     if len(parts) < 2:
         return None
     if len(parts) == 2 and abs(abs(parts[0][1]) - abs(parts[1][1])) < 0.02:
