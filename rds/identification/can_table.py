@@ -1,7 +1,7 @@
 """A bus log as columns: each signal of each message, with the times at which it was received.
 
-Our own cyclic messages are known (command.slot_0 ..., answer_2.position); others need a DBC file, whose signals are
-called `Message.Signal`.
+A DBC file says what its messages are; their signals are called `Message.Signal`. Without one, our own are known:
+the cyclic messages (command.slot_0 ..., answer_2.position) and those of the distributed modules.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     Times are those that the recorder gave each frame, from the first frame on.
     """
     databases = [load_dbc(file) for file in dbc]
-    own = own_dbc()
+    own = own_dbc() if not databases else None  # another bus may use the same identifiers for something else
     if own is not None:
         databases.append(load_dbc(own))
     times: dict[str, array[float]] = {}
@@ -51,7 +51,7 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
             continue
         start = message.timestamp if start is None else start
         try:
-            signals = list(_signals(message, databases))
+            signals = list(_signals(message, databases, cyclic=not dbc))
         except ValueError:
             misfits += 1
             continue
@@ -65,7 +65,8 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     if not times:
         seen = ", ".join(f"{identifier:#x}" for identifier in sorted(unknown)[:8]) or "none"
         raise InputError(
-            f"none of its {number} frames is known (identifiers {seen}); give the DBC file that describes them: "
+            f"none of its {number} frames is known (unknown identifiers: {seen}; {misfits} frames do not fit their "
+            f"description); give the DBC file that describes them: "
             f'dbc = "axes.dbc" under [bus] in {path.name}.map.toml',
             str(path),
         )
@@ -84,9 +85,9 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     return Table(path, "can", columns, findings=tuple(findings))
 
 
-def _signals(message: can.Message, databases: Sequence[Any]) -> Iterator[Signal]:
+def _signals(message: can.Message, databases: Sequence[Any], cyclic: bool) -> Iterator[Signal]:
     """The numbers in a frame, with unit; none for an unknown one. ValueError for one that does not fit."""
-    own = None if message.is_extended_id else _cyclic(message.arbitration_id, bytes(message.data))
+    own = None if message.is_extended_id or not cyclic else _cyclic(message.arbitration_id, bytes(message.data))
     if own is not None:
         yield from own
         return
