@@ -7,7 +7,9 @@ import select
 import signal
 import socket
 import struct
+import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NoReturn
 
 from rds.grading.grade import Status
@@ -40,6 +42,7 @@ class Cell:
         self._cpu, self._turn_seen, self._turn_time = 0.0, 0, 0.0
         self._baseline = interpreter.resident_bytes
         self.is_closed = False
+        self._lock = threading.Lock()  # the supervisor's thread ends cells too
         inner_questions, self.questions = os.pipe()
         self.answers, inner_answers = os.pipe()
         printed, inner_output = os.pipe()
@@ -103,6 +106,13 @@ class Cell:
         if fault is not None:
             self.kill(*fault)
 
+    @property
+    def printed(self) -> str:
+        """What it has printed so far."""
+        if not self.is_closed:
+            self._supervisor.drain(self)
+        return self.output.text
+
     def take_output(self) -> bool:
         """By the supervisor: read what was printed; False once nothing more can come."""
         goes_on = self.output.collect()
@@ -138,7 +148,10 @@ class Cell:
         self.output.collect()
         self._budget.cpu_before += self._cpu
         self._budget.printed += len(self.output.text)
-        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door, self._handle):
+        with self._lock:
+            os.close(self._handle)
+            self._handle = -1
+        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
             os.close(descriptor)
         self._status.close()
 
@@ -158,10 +171,9 @@ class Cell:
         raise SandboxError(f"the sandbox could not be put up: {data.decode(errors='replace') or 'it ended at once'}")
 
     def _end(self) -> None:
-        try:
-            signal.pidfd_send_signal(self._handle, signal.SIGKILL)
-        except OSError:
-            return  # it has ended
+        with self._lock, suppress(ProcessLookupError):
+            if self._handle >= 0:
+                signal.pidfd_send_signal(self._handle, signal.SIGKILL)
 
     def _last_words(self) -> str:
         """What init says of the end."""

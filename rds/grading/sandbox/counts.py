@@ -18,7 +18,6 @@ class Counts:
 
     calls: int
     events: int | None = None
-    instructions: int | None = None  # of the processor, where the kernel counts them: a hint, never quite the same
     refused: str = ""
 
 

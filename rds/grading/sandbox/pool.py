@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,11 +10,12 @@ from types import TracebackType
 from rds.grading.sandbox.errors import SandboxError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.limits import Limits
+from rds.grading.sandbox.place import Place
 from rds.grading.sandbox.requirements import available
-from rds.grading.sandbox.subject import Place, Subject
+from rds.grading.sandbox.subject import Subject
 from rds.grading.sandbox.submission import read_submission
 from rds.grading.sandbox.supervise import Supervisor
-from rds.grading.sandbox.user import unused_user
+from rds.grading.sandbox.user import sandbox_user
 
 KITS = (("numpy",), ("numpy", "scipy"), ("numpy", "scipy", "control"))
 """What warm interpreters have imported; a submission gets the first that has all it imports."""
@@ -34,7 +34,7 @@ class Pool:
         fault = available()
         if fault:
             raise SandboxError(fault)
-        self._user = unused_user() if os.geteuid() == 0 else 0
+        self._user = sandbox_user()
         self._jobs, self._slot = jobs, slot
         self._lock = threading.Lock()
         self._supervisor = Supervisor()
@@ -53,14 +53,8 @@ class Pool:
         """
         submission = read_submission(Path(path))
         kit = _kit([name for name in KITS[-1] if submission.imports(name)])
-        return Subject(
-            submission,
-            kind,
-            limits or Limits(),
-            lambda: self._interpreter(kit),
-            self._supervisor,
-            Place.of(self._jobs, self._slot),
-        )
+        place = Place.of(self._jobs, self._slot)
+        return Subject(submission, kind, limits or Limits(), lambda: self._interpreter(kit), self._supervisor, place)
 
     def close(self) -> None:
         """End all processes."""

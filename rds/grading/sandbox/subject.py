@@ -165,7 +165,7 @@ class Subject:
     @property
     def output(self) -> str:
         """What it has printed in the cells that have ended, and in this one so far."""
-        return "".join([*self._printed, self._cell.output.text if self._cell else ""])
+        return "".join([*self._printed, self._cell.printed if self._cell else ""])
 
     def close(self) -> None:
         """End its processes."""

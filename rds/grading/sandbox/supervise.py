@@ -35,6 +35,12 @@ class Supervisor:
             self._poll.register(cell.output.descriptor, select.POLLIN)
         self._is_needed.set()
 
+    def drain(self, cell: Cell) -> None:
+        """Read what `cell` has printed so far."""
+        with self._lock:
+            if cell.output.descriptor in self._cells:
+                cell.take_output()
+
     def forget(self, cell: Cell) -> None:
         """`cell` has ended, and what it printed has been read."""
         with self._lock:

@@ -16,6 +16,11 @@ _FIRST, _COUNT = 0x6F000000, 0x10000  # far from any system's ranges for people,
 _PLACE = "/tmp"
 
 
+def sandbox_user() -> int:
+    """Whom to become: nobody else if the caller is root, 0 for the caller itself if it is not."""
+    return unused_user() if os.geteuid() == 0 else 0
+
+
 def unused_user() -> int:
     """The number of a user that has no name and no process."""
     taken = {entry.pw_uid for entry in pwd.getpwall()}

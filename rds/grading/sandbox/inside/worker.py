@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import base64
 import importlib.util
+import random
 import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+
+import numpy as np
 
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import ContractError, InputError
@@ -26,6 +29,8 @@ def main(questions: int, answers: int, door: list[int]) -> int:
     channel = Channel(questions, answers, *door)
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(line_buffering=True)  # type: ignore[union-attr] # nothing is lost if it is ended
+    random.seed(0)
+    np.random.seed(0)
     try:
         order = channel.ask()
         file = Path(walls.HOME) / order["name"]
