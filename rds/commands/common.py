@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -38,6 +39,14 @@ def refusals() -> Iterator[None]:
         remedy = "check that the folder can be written and that the disk has room"
         typer.echo(f"rds: {place}{error.strerror or error}; {remedy}", err=True)
         raise typer.Exit(2) from error
+
+
+def say_what_is_replaced(folder: Path | None) -> None:
+    """A note on stderr if the results of an earlier run are in `folder`: those of the next one take their place."""
+    from rds.experiment.folder import holds_result
+
+    if folder is not None and holds_result(folder):
+        typer.echo(f"rds: note: {folder}: replaces the results of an earlier run there", err=True)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.commands.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.commands.common import Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
 from rds.commands.nc_options import Parameters, Program, Tools, With, setup
 
 if TYPE_CHECKING:
@@ -51,12 +51,19 @@ def run(
     Elsewhere `rds nc operate` does the same.
     """
     with refusals(), stdout_kept(json):
-        from rds.experiment.experiment import new_folder
+        from rds.core.errors import InputError
+        from rds.experiment.folder import new_folder, require_writable
         from rds.experiment.report import exit_code, run_json
         from rds.modes import load_mode
         from rds.programs.report import save_run
         from rds.programs.run import PartProgram
 
+        if override == 0.0:
+            raise InputError(
+                "--override 0 never moves; begin with more, and hold with space or `rds nc operate --hold`"
+            )
+        if out is not None:  # before the program is checked and planned, which may take a while
+            require_writable(out)
         experiment = Path(controller) if controller is not None and controller.endswith(".toml") else None
         with progress_bars() as bar:
             part = PartProgram(
@@ -69,7 +76,8 @@ def run(
                 progress=bar("check"),
             )
         plan = part.plan()
-        folder = out if out is not None else new_folder(plan)
+        folder = out if out is not None else new_folder(plan.names, plan.mode)
+        say_what_is_replaced(folder)
         changes = [(0.0, "override", override / 100.0)] if override != 100.0 else []
         changes += [] if optional_stop else [(0.0, "optional_stop", 0.0)]
         if load_mode(plan.mode).real_time:

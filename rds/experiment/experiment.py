@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import datetime
-import secrets
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +11,7 @@ from typing import Any
 from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.types import Ending
 from rds.core.words import Words
+from rds.experiment.folder import new_folder, require_writable
 from rds.experiment.outcome import outcome
 from rds.experiment.resolve import resolve
 from rds.experiment.run import Run
@@ -176,7 +175,11 @@ class Experiment:
     def _prepared(self, mode: str | None, out: str | Path | None, changes: Iterable[Any]) -> Run:
         plan, known = self._resolve(mode)
         plan = plan.with_changes(changes)
-        folder = Path(out) if out is not None else (new_folder(plan) if load_mode(plan.mode).real_time else None)
+        if out is not None:
+            require_writable(out)
+            folder: Path | None = Path(out)
+        else:
+            folder = new_folder(plan.names, plan.mode) if load_mode(plan.mode).real_time else None
 
         def work(live: Live | None, progress: Progress | None) -> Result:
             return self._finished(plan, known, self._rows(plan, folder, progress, live), folder, out)
@@ -201,6 +204,8 @@ class Experiment:
             result.save(out)
             if rows.changes:
                 write_whole(Path(out) / CHANGES, as_text(rows.changes).encode())
+            else:
+                (Path(out) / CHANGES).unlink(missing_ok=True)  # of an earlier run
         return result
 
     def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
@@ -221,9 +226,3 @@ class Experiment:
             note = f"not compiled: {note}"
         rows = run_plan(plan, folder, progress, live)
         return replace(rows, notes=(note,)) if note else rows
-
-
-def new_folder(plan: Plan) -> Path:
-    """Where a run's results go when nobody says: a new folder under `runs/`."""
-    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-    return Path("runs") / f"{stamp}-{'-'.join(plan.names)}-{plan.mode}-{secrets.token_hex(2)}"

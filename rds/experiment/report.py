@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rds.core.types import Ending, Verdict
-from rds.experiment.experiment import Experiment, new_folder
+from rds.experiment.experiment import Experiment
+from rds.experiment.folder import new_folder
 from rds.modes.host import Progress
 from rds.results import Result
 from rds.results.files import save_all
@@ -21,19 +23,24 @@ def run_and_save(
 ) -> tuple[Result, dict[str, Path]]:
     """Run the experiment in the file `path`, and save tables, plots and a report in `out` (default: under runs/)."""
     experiment = Experiment.from_toml(path)
-    folder = out if out is not None else new_folder(experiment.plan(mode))
+    folder = out if out is not None else _new_folder(experiment, mode)
     result = experiment.run(mode, out=folder, progress=progress)
     return result, save_with_report(result, folder, experiment.title or path.stem)
 
 
-def save_with_report(result: Result, folder: Path, title: str) -> dict[str, Path]:
-    """Tables, one plot per axis, and the report; each file's path by its kind."""
+def _new_folder(experiment: Experiment, mode: str | None) -> Path:
+    plan = experiment.plan(mode)
+    return new_folder(plan.names, plan.mode)
+
+
+def save_with_report(result: Result, folder: Path, title: str, beside: Sequence[Path] = ()) -> dict[str, Path]:
+    """Tables, one plot per axis, and the report, which also links what is `beside` it; each file's path by its kind."""
     files = save_all(result, folder)
     for axis in result.axes:
         files[f"plot_{axis}"] = folder / f"{axis}.png"
         result.plot(axis).savefig(files[f"plot_{axis}"])
     files["report"] = write_report(
-        folder / "report.html", title, [result], files=list(files.values()), sections=_validations(result)
+        folder / "report.html", title, [result], files=[*beside, *files.values()], sections=_validations(result)
     )
     return files
 

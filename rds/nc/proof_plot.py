@@ -116,7 +116,7 @@ def _plane(axes: Axes, stretch: StretchProof) -> None:
             label=None if number else "gouge",
         )
     names = ("X", "Y") if stretch.stretch.plane == XY else ("Z", "X")
-    axes.set(xlabel=f"{names[0]} / mm", ylabel=f"{names[1]} / mm")
+    axes.set(xlabel=f"{names[0]} [mm]", ylabel=f"{names[1]} [mm]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize="small")
 
@@ -161,7 +161,7 @@ def _all(axes: Axes, stretch: StretchProof) -> None:
     parts = [part for part in stretch.parts if part.role != RAPID]
     _curves(axes, parts, 1.0)
     _mark_gouges(axes, stretch.gouges(), 1.0)
-    axes.set_ylabel("edge to contour / mm")
+    axes.set_ylabel("edge to contour [mm]")
     axes.set_title("Whole path: + clear of the contour, − beyond it", loc="left", fontsize="small")
 
 
@@ -172,7 +172,7 @@ def _contour(axes: Axes, stretch: StretchProof) -> None:
     _mark_gouges(axes, [part for part in stretch.gouges() if part.role == CONTOUR], factor)
     most = max(stretch.max_deviation * factor * 1.15, 1.0 if unit == "nm" else 0.0)
     axes.set_ylim(-most, most)
-    axes.set(xlabel="length of the path of the cutter's centre / mm", ylabel=f"edge to contour / {unit}")
+    axes.set(xlabel="length of the path of the cutter's centre [mm]", ylabel=f"edge to contour [{unit}]")
     text = "Contour alone"
     if stretch.uncut > 1e-6:
         text += f"; inside corners keep up to {_length(stretch.uncut)}"

@@ -1,4 +1,4 @@
-"""What was measured of a program's run, against the program: where each axis lags most, and the contour error."""
+"""What was measured of a program's run, against the program: where each axis follows worst, and the contour error."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rds.motion.segments import AXES, BLEND
 from rds.programs.contour import contour_error
 from rds.programs.prepare import Prepared
 from rds.results import Result
+from rds.results.metrics import moving
 from rds.runtime.execution import State
 
 WAITS = {
@@ -30,19 +31,30 @@ def judged(result: Result, prepared: Prepared) -> Result:
     columns = dict(result.columns)
     units = dict(result.units)
     columns["contour_error"], units["contour_error"] = error, "mm"
+    moves = moving(result)
+    on_path = moves & (state != State.HOME)
+
+    def worst(values: np.ndarray, line: np.ndarray, where: np.ndarray, unit: str) -> dict[str, Any] | None:
+        return _worst(values[where], line[where], result["time"][where], unit) if where.any() else None
+
     about = {
         "file": prepared.file.name,
         **_times(result, prepared, state),
         "certificate": prepared.certificate.to_dict() if prepared.certificate else None,
-        "contour_error": _worst(error, line, result["time"], "mm") if len(prepared.path) else None,
+        "waiting_samples": len(result) - int(moves.sum()),
+        "limit_shares": _limit_shares(result, prepared),
+        "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) else None,
         "following_error": {
-            name: _worst(
-                np.abs(result[f"{name}_reference"] - result[f"{name}_measured"]),
-                result["program_line"].astype(int),
-                result["time"],
-                result.units[f"{name}_measured"],
-            )
+            name: found
             for name in prepared.program.axes
+            if (
+                found := worst(
+                    np.abs(result[f"{name}_reference"] - result[f"{name}_measured"]),
+                    result["program_line"].astype(int),
+                    moves,
+                    result.units[f"{name}_measured"],
+                )
+            )
         },
     }
     meta = result.meta | {"program": about, "notes": [*result.meta.get("notes", []), *prepared.notes]}
@@ -51,10 +63,10 @@ def judged(result: Result, prepared: Prepared) -> Result:
 
 def worst_lines(result: Result, column: np.ndarray, count: int = 5) -> list[tuple[int, float, float]]:
     """The program lines with the largest values of a column: line, value and when it was, s."""
-    line = result["program_line"].astype(int)
+    line, moves = result["program_line"].astype(int), moving(result)
     found = []
-    for number in np.unique(line):
-        here = np.flatnonzero(line == number)
+    for number in np.unique(line[moves]):
+        here = np.flatnonzero((line == number) & moves)
         worst = here[np.argmax(column[here])]
         found.append((int(number), float(column[worst]), float(result["time"][worst])))
     return sorted(found, key=lambda entry: -entry[1])[:count]
@@ -101,6 +113,24 @@ def _times(result: Result, prepared: Prepared, state: np.ndarray) -> dict[str, A
         "completed": result.meta.get("ending") == "done",
         "done_percent": 100.0 * min(float(result["program_sample"].max() + 1.0) / prepared.program.samples, 1.0),
     }
+
+
+def _limit_shares(result: Result, prepared: Prepared) -> dict[str, dict[str, float]]:
+    """Of each axis the largest velocity, acceleration and jerk that was sent, by differences, over its limit.
+
+    Where samples were discarded there are no differences.
+    """
+    program, T = prepared.program, prepared.T
+    whole = np.diff(np.rint(result["time"] / T)) == 1
+    shares: dict[str, dict[str, float]] = {name: {} for name in program.axes}
+    for order, kind in enumerate(("velocity", "acceleration", "jerk"), 1):
+        known = np.ones(max(len(result) - order, 0), dtype=bool)
+        for i in range(order):
+            known &= whole[i : i + len(known)]
+        for name, limit in zip(program.axes, program.limits[order - 1], strict=True):
+            sent = np.abs(np.diff(result[f"{name}_reference"], order))[known] / T**order
+            shares[name][kind] = float(sent.max(initial=0.0) / limit)
+    return shares
 
 
 def _worst(values: np.ndarray, line: np.ndarray, time: np.ndarray, unit: str) -> dict[str, Any]:

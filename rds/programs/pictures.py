@@ -9,7 +9,7 @@ import numpy as np
 from rds.programs.judge import worst_lines
 from rds.programs.prepare import Prepared
 from rds.results import Result
-from rds.results.figure import BLACK, CYCLE, GREY, ORANGE, VERMILLION, Picture, dress, legend
+from rds.results.figure import BLACK, CYCLE, GREY, ORANGE, SKY, VERMILLION, Picture, dress, legend
 from rds.runtime.execution import State
 
 if TYPE_CHECKING:
@@ -18,40 +18,52 @@ if TYPE_CHECKING:
 _POINTS = 6000  # of a curve in a picture
 _VIEWS = (("XY", "X", "Y"), ("ZX", "X", "Z"), ("YZ", "Y", "Z"))
 _NAMED = 3  # of the worst lines
+_MARKERS = ("o", "s", "D")
+_WORST: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "color": VERMILLION, "zorder": 3}
+_CUT: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1, "label": "cut, as planned"}
+_RAPID: dict[str, Any] = {
+    "color": SKY,
+    "linewidth": 1.2,
+    "linestyle": (0, (5, 3)),
+    "zorder": 1,
+    "label": "rapid, as planned",
+}
 
 
 def path(result: Result, prepared: Prepared) -> Picture:
-    """The measured path from up to three sides, its colour the contour error; the worst lines are named."""
+    """The path from up to three sides: rapids dashed as planned, cuts as measured in the colour of their contour error.
+
+    The worst lines are marked, and named in the legend.
+    """
     axes = prepared.program.axes
     views = [view for view in _VIEWS if view[1] in axes and view[2] in axes]
     error = result["contour_error"] * 1e3
-    at = _thinned(error)
-    picture = Picture(4.2 if len(views) == 1 else 7.6)
+    rapid = prepared.path["rapid"][prepared.segment] if len(prepared.path) else np.zeros(len(prepared.segment), bool)
+    row = np.clip(np.ceil(result["program_sample"]).astype(int), 0, len(rapid) - 1)
+    at = _thinned(error, np.flatnonzero(~rapid[row] & (result["program_state"] != State.HOME)))
+    picture = Picture(4.6 if len(views) == 1 else 8.0)
     places = picture.subplots(-(-len(views) // 2), min(len(views), 2) or 1, squeeze=False).ravel()
     drawn: Any = None
     for place, (title, across, up) in zip(places, views, strict=False):
         x, y = result[f"{across}_measured"], result[f"{up}_measured"]
-        wanted = prepared.program.position[:: max(1, len(prepared.program.position) // _POINTS)]
-        place.plot(wanted[:, axes.index(across)], wanted[:, axes.index(up)], color=GREY, linewidth=0.8, zorder=1)
+        edges = _edges(len(rapid))
+        u, v = (prepared.program.position[edges, axes.index(name)] for name in (across, up))
+        for kind, style in ((False, _CUT), (True, _RAPID)):
+            place.plot(np.where(rapid[edges] == kind, u, np.nan), np.where(rapid[edges] == kind, v, np.nan), **style)
         drawn = place.scatter(x[at], y[at], c=error[at], s=5.0, cmap="viridis", linewidths=0, zorder=2)
-        for i, (line, _, when) in enumerate(worst_lines(result, error, _NAMED)):
+        for (line, value, when), marker in zip(worst_lines(result, error, _NAMED), _MARKERS, strict=False):
             k = int(np.searchsorted(result["time"], when))
-            place.plot(x[k], y[k], marker="o", markersize=9, markerfacecolor="none", color=VERMILLION, zorder=3)
-            place.annotate(
-                f"line {line}",
-                (x[k], y[k]),
-                xytext=(8, 8 + 11 * i),
-                textcoords="offset points",
-                fontsize="small",
-                color=BLACK,
-            )
+            label = f"line {line}: {value:.1f} µm"
+            place.plot(x[k], y[k], linestyle="none", marker=marker, label=label, **_WORST)
         dress(place, f"{up} [mm]", f"{across} [mm]")
         place.set_aspect("equal", adjustable="datalim")
         place.set_title(title, loc="left", fontsize="medium")
     for place in places[len(views) :]:
         place.set_axis_off()
     if drawn is not None:
-        picture.colorbar(drawn, ax=list(places), label="contour error [µm]", shrink=0.8)
+        picture.colorbar(drawn, ax=list(places), label="contour error of the cuts [µm]", shrink=0.8)
+        handles, texts = places[0].get_legend_handles_labels()
+        picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
     return picture
 
 
@@ -72,7 +84,7 @@ def along(result: Result, prepared: Prepared) -> Picture:
         style = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))[i % 4]
         values = _largest(off, edges)
         middle.plot(time[edges], values, color=CYCLE[i % 6], linestyle=style, linewidth=1.1, label=f"{name} [{unit}]")
-    dress(middle, "following error", None)
+    dress(middle, "|following error|", None)
     legend(middle)
     bottom.plot(time[edges], feed(result, prepared.program.axes)[edges], color=CYCLE[0], linewidth=1.1)
     dress(bottom, "feed [mm/min]")
@@ -126,10 +138,11 @@ def _largest(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
     return largest
 
 
-def _thinned(error: np.ndarray) -> np.ndarray:
-    """Samples to draw, among them the worst; the worst last, on top."""
-    chosen = _edges(len(error))
-    worst = np.argsort(error)[-50:]
-    both = np.union1d(chosen, worst)
+def _thinned(error: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Those of the samples `shown` to draw, among them the worst; the worst last, on top."""
+    if not len(shown):
+        return shown
+    worst = np.argsort(error[shown])[-50:]
+    both = shown[np.union1d(_edges(len(shown)), worst)]
     ordered: np.ndarray = both[np.argsort(error[both])]
     return ordered

@@ -30,8 +30,11 @@ _WAITED = {
 
 def save_run(result: Result, prepared: Prepared, folder: Path) -> dict[str, Path]:
     """Save the result, its pictures and reports in `folder`; each file's path by its kind."""
-    files = save_with_report(result, folder, f"{prepared.file.name}, {result.mode}")
     written = write(program_report(result, prepared), folder)
+    for pattern in ("*.csv", "*.png"):  # a table that an earlier run had and this one has not
+        for left in set(folder.glob(f"{KIND}-{pattern}")) - set(written):
+            left.unlink(missing_ok=True)
+    files = save_with_report(result, folder, f"{prepared.file.name}, {result.mode}", written)
     return files | {KIND: written[0]} | {path.stem: path for path in written[1:] if path.suffix == ".png"}
 
 
@@ -64,6 +67,7 @@ def program_report(result: Result, prepared: Prepared) -> Report:
             **({"certificate": prepared.certificate.plot} if prepared.certificate else {}),
         },
         findings=[*findings(about), *_certified(prepared), *map(str, result.meta.get("notes", ()))],
+        links={"responses, voltages and timing of each axis": "report.html", "all samples": "result.csv"},
     )
 
 
@@ -82,7 +86,11 @@ def findings(about: dict[str, Any]) -> list[str]:
             ((axis, worst) for axis, worst in following.items() if worst["unit"] == unit), key=lambda of: of[1]["max"]
         )
         if worst["max"] > 0.0:
-            said.append(f"{axis} lags most: {worst['max']:.4f} {unit} in line {worst['line']}.")
+            said.append(f"{axis} follows worst: {worst['max']:.4f} {unit} in line {worst['line']}.")
+    share, kind, axis = max(
+        (share, kind, axis) for axis, shares in about["limit_shares"].items() for kind, share in shares.items()
+    )
+    said.append(f"What was sent to the axes is at most {share:.1%} of a limit ({kind} of {axis}).")
     predicted, moving = about["predicted_s"], about["moving_s"]
     if not about["completed"]:
         said.append(f"The run ended after {about['done_percent']:.1f} % of the program.")
@@ -124,12 +132,17 @@ def _following(about: dict[str, Any], text: list[str]) -> Table:
         for name, worst in about["following_error"].items()
     ]
     return Table(
-        "Where each axis lags most",
-        ["axis", "largest error", "unit", "line", "at [s]", "RMS error", "program"],
+        "Where each axis follows worst",
+        ["axis", "largest |error|", "unit", "line", "at [s]", "RMS error", "program"],
         rows,
-        "Reference minus measured position.",
-        {"largest error": 4, "at [s]": 3, "RMS error": 4},
+        f"The error is reference minus measured position{_left_out(about)}.",
+        {"largest |error|": 4, "at [s]": 3, "RMS error": 4},
     )
+
+
+def _left_out(about: dict[str, Any]) -> str:
+    waited = about["waiting_samples"]
+    return f", while the program moves the axes; {waited} samples of waiting are left out" if waited else ""
 
 
 def _changes(result: Result) -> Table:

@@ -63,6 +63,7 @@ class Report:
     tables: Sequence[Table]
     figures: Mapping[str, Drawing]  # name -> draws the picture
     findings: Sequence[str]
+    links: Mapping[str, str] = field(default_factory=dict)  # what is said of them -> files beside the page
 
     def table(self, title: str) -> Table:
         """The table with this title; KeyError if there is none."""

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from html import escape
 from pathlib import Path
 from typing import BinaryIO
+from urllib.parse import quote
 
 from rds.reports.content import Report, Table
 from rds.results import html
@@ -46,6 +47,7 @@ def to_html(report: Report, pictures: dict[str, bytes]) -> str:
             for table in report.tables
         ),
         *(f"<section><h2>{escape(name)}</h2>{_image(png, name)}</section>" for name, png in pictures.items()),
+        _links(report),
         f"<details><summary>Options</summary>{html.key_values(settings)}</details>" if settings else "",
     ]
     return page(report.title, "\n".join(filter(None, parts)))
@@ -54,6 +56,17 @@ def to_html(report: Report, pictures: dict[str, bytes]) -> str:
 def slug(text: str) -> str:
     """`text` as a part of a file's name: letters, digits, `-`."""
     return re.sub(r"[^0-9A-Za-z]+", "-", text).strip("-").lower() or "unnamed"
+
+
+def _links(report: Report) -> str:
+    if not report.links:
+        return ""
+    # "./" keeps a name with a colon from being taken for a scheme
+    items = "".join(
+        f'<li><a href="{escape("./" + quote(file))}">{escape(file)}</a>: {escape(said)}</li>'
+        for said, file in report.links.items()
+    )
+    return f"<section><h2>Beside this page</h2><ul>{items}</ul></section>"
 
 
 def _named(report: Report) -> dict[str, Table]:

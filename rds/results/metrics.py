@@ -14,6 +14,7 @@ import numpy as np
 if TYPE_CHECKING:
     from rds.results.result import Result
 
+MOVING = (0, 6)  # of `program_state`, where a part program moves the axes: it runs, or goes home
 ERROR_METRICS = ("mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error")
 
 
@@ -26,7 +27,8 @@ def axis_metrics(result: Result) -> dict[str, dict[str, float | None]]:
     not defined: no samples, or a fit to a measured response that never moves.
 
     The first period of a periodic reference is left out, because the axis starts from rest; a run that is not
-    longer than one period is used whole (`metric_notes` says so).
+    longer than one period is used whole. Of a part program the samples count in which it moves the axes: waiting,
+    holding and dwelling at one place would thin the errors out. `metric_notes` says what is left out.
     """
     return {axis: _one_axis(result, axis) for axis in result.axes}
 
@@ -72,25 +74,34 @@ def fit_percent(measured: np.ndarray, modelled: np.ndarray) -> float | None:
     return _finite(100.0 * (1.0 - miss / spread)) if spread else None
 
 
-def settled(result: Result, axis: str) -> slice:
-    """The samples that the metrics use: after the first period, or all if none are left by that."""
+def settled(result: Result, axis: str) -> slice | np.ndarray:
+    """The samples that the metrics use, as an index of columns.
+
+    Those in which a part program moves the axes; else after the first period, or all if none are left by that.
+    """
+    if "program_state" in result:
+        return moving(result)
     period = _period(result, axis)
-    if period is None:
-        return slice(None)
-    time = result["time"]
-    # half a sample less, so that rounding in k·T does not decide about the sample at the period's end
-    first = int(np.searchsorted(time, time[0] + period - result.sample_period / 2)) if len(time) else 0
-    return slice(first, None) if first < len(time) else slice(None)
+    return slice(None) if period is None else slice(_first_settled(result, period), None)
+
+
+def moving(result: Result) -> np.ndarray:
+    """Whether each sample of a part program's run is one in which it moves the axes."""
+    return np.isin(result["program_state"], MOVING)
 
 
 def metric_notes(result: Result) -> list[str]:
     """What the metrics leave out, or could not, in a sentence per case."""
+    if "program_state" in result:
+        waited = len(result) - int(moving(result).sum())
+        said = f"The metrics leave out {waited} of {len(result)} samples, in which the part program waited, dwelt or"
+        return [f"{said} was held."] if waited else []
     notes: dict[str, list[str]] = {}
     for axis in result.axes:
         period = _period(result, axis)
         if period is None or not len(result):
             continue
-        first = settled(result, axis).start
+        first = _first_settled(result, period)
         if first is None:
             note = f"the run is not longer than one period of the reference ({period:g} s): the metrics use all of it"
         else:
@@ -100,6 +111,14 @@ def metric_notes(result: Result) -> list[str]:
                 note += f"; only {rest:g} s of the second are there"
         notes.setdefault(note, []).append(axis)
     return [f"{', '.join(axes)}: {note}." for note, axes in notes.items()]
+
+
+def _first_settled(result: Result, period: float) -> int | None:
+    """The first sample after one period; None if there is none."""
+    time = result["time"]
+    # half a sample less, so that rounding in k·T does not decide about the sample at the period's end
+    first = int(np.searchsorted(time, time[0] + period - result.sample_period / 2)) if len(time) else 0
+    return first if first < len(time) else None
 
 
 def metric_units(result: Result, axis: str) -> dict[str, str]:

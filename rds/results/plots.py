@@ -115,7 +115,7 @@ def _draw_error(axes: Axes, result: Result, axis: str) -> None:
     axes.plot(time, difference, color=BLUE, linewidth=0.9)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     for value, name, style in _means(difference[used]):
-        axes.plot([time[used][0], time[-1]], [value, value], color=VERMILLION, linewidth=1.3, linestyle=style)
+        axes.plot(time[used][[0, -1]], [value, value], color=VERMILLION, linewidth=1.3, linestyle=style)
         axes.plot([], [], color=VERMILLION, linewidth=1.3, linestyle=style, label=f"{name} {value:.3g}")
     _mark_late(axes, result)
     dress(axes, heading(f"{axis} {label}", unit))

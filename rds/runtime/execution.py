@@ -78,8 +78,10 @@ class Execution:
         self._steady = 0
         self._resumed = 0.0  # the value of resume when a stop began
         self._last = -1  # sample of the run; -1: the program begins
-        self._line = self._shown_line = int(program.line[0])
+        self._line = self._shown_line = int(program.line[min(1, program.samples - 1)])  # the first row is at rest
         self._speed = 0.0
+        self._turns = False  # the spindle may turn
+        self._changes_tool = False  # as soon as the spindle stands
         self._position = [float(value) for value in program.position[0]]
         self._way: Homing | None = None  # home
         for reference, value in zip(references, self._position, strict=False):
@@ -103,6 +105,7 @@ class Execution:
             self._rest()
             self._follower.settle(self._wanted())
             self._happen()
+            self._shown_line = self._line
         for _ in range(k - self._last):
             self._step(positions)
         self._last = k
@@ -188,16 +191,26 @@ class Execution:
                 self.state = State.DWELL
         elif kind == "spindle":
             self._speed = value
-            if value and self._spindle_axis is not None:
-                self._left, self._steady = round(SPINDLE_PATIENCE / self._T), 0
-                self.state = State.SPINDLE
+            if value:
+                self._await_spindle()
+        elif kind == "tool" and self._turns:
+            self._speed, self._changes_tool = 0.0, True
+            self._await_spindle()
         elif kind == "tool" or (kind == "stop" and not (value and not self._values[OPTIONAL_STOP])):
-            self._resumed = self._values[RESUME]
-            self.state = State.TOOL if kind == "tool" else State.STOP
+            self._await_somebody(State.TOOL if kind == "tool" else State.STOP)
         elif kind == "end":
             self._next = len(self._program.happenings)
             self._end(Ending.DONE, "")
         return self.state is not State.RUNS or self.ending is not None
+
+    def _await_spindle(self) -> None:
+        if self._spindle_axis is not None:
+            self._left, self._steady, self._turns = round(SPINDLE_PATIENCE / self._T), 0, self._speed != 0.0
+            self.state = State.SPINDLE
+
+    def _await_somebody(self, state: State) -> None:
+        self._resumed = self._values[RESUME]
+        self.state = state
 
     def _interrupted(self) -> bool:
         """Whether somebody wants the end where the axes rest anyhow."""
@@ -227,7 +240,10 @@ class Execution:
         is_near = off <= max(SPINDLE_WITHIN * abs(self._speed), 2.0 * self._resolution)
         self._steady = self._steady + 1 if is_near else 0
         self._left -= 1
-        if self._steady >= SPINDLE_STEADY:
+        if self._steady >= SPINDLE_STEADY and self._changes_tool:
+            self._changes_tool = False
+            self._await_somebody(State.TOOL)
+        elif self._steady >= SPINDLE_STEADY:
             self._go_on()
         elif self._left <= 0:
             said = f"the spindle turns at {positions[self._spindle_axis]:.0f} rev/min"

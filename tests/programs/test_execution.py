@@ -210,6 +210,27 @@ def test_cutting_begins_when_the_spindle_turns_as_fast_as_it_should() -> None:
     assert (ran.speed[2:] == 2000.0).all()
 
 
+def test_the_first_sample_is_of_the_line_that_it_waits_for() -> None:
+    assert execute(prepared(PATH, Event(-1, "spindle", 2000.0, 5))).line[0] == 5
+    assert execute(prepared(PATH)).line[0] == 1
+
+
+def test_a_tool_is_changed_when_the_spindle_stands() -> None:
+    events = (Event(-1, "spindle", 2000.0, 5), Event(0, "tool", 3.0, 9))
+    turns = [0.0]
+
+    def coasting(k: int, wanted: float) -> float:
+        turns[0] += 0.02 * (wanted - turns[0])
+        return turns[0]
+
+    ran = execute(prepared(PATH, *events), speed=coasting)
+    change = np.flatnonzero(ran.state == State.TOOL)[0]
+    stops = np.flatnonzero((ran.state == State.SPINDLE) & (ran.line == 9))
+    assert len(stops) > 250 and stops[-1] == change - 1  # 2000 to 2 rev/min at 2 % a sample
+    assert (ran.speed[stops[0] + 1 :] == 0.0).all()
+    assert (np.diff(ran.position[stops], axis=0) == 0.0).all()
+
+
 def test_a_spindle_that_never_gets_there_is_told() -> None:
     program = prepared(PATH, Event(-1, "spindle", -2000.0, 5))
     ran = execute(program, speed=lambda k, wanted: 0.5 * wanted)

@@ -18,7 +18,9 @@ import rds
 from rds.programs.prepare import prepare
 from rds.programs.report import findings, program_report, save_run
 from rds.programs.run import PartProgram, ProgramRun
+from rds.results.metrics import MOVING
 from rds.runtime.execution import State
+from rds.runtime.retimed import EXCESS
 
 PERIOD = 0.002  # s: with room for a busy computer
 STOP_LINE = 7
@@ -95,6 +97,34 @@ def test_the_contour_error_is_the_distance_to_the_path(part: Path) -> None:
     assert following["max"] == np.abs(result["X_reference"] - x).max()
 
 
+def test_metrics_are_of_motion_alone(part: Path, tmp_path: Path) -> None:
+    """A program that is held for two seconds has the metrics of one that is not, but for the halt itself."""
+    program = PartProgram(part)
+    plain, held = program.run(), program.run(changes=[(0.3, "hold", 1), (2.3, "hold", 0)])
+    assert MOVING == (State.RUNS, State.HOME)
+    used = np.isin(held["program_state"], MOVING)
+    error = (held["X_reference"] - held["X_measured"])[used]
+    assert held.metrics["X"]["rms_error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+    assert held.meta["program"]["waiting_samples"] == len(held) - used.sum() > 1800
+    following = held.meta["program"]["following_error"]["X"]
+    assert following["rms"] == pytest.approx(held.metrics["X"]["rms_error"], rel=1e-12)
+    assert following["rms"] > 0.8 * plain.metrics["X"]["rms_error"]
+    said = f"The metrics leave out {len(held) - used.sum()} of {len(held)} samples"
+    assert held.notes[0].startswith(said)
+    assert any(note.startswith(said) for note in held.compare(plain).notes)
+    assert said in save_run(held, program.prepared, tmp_path / "out")["report"].read_text()
+
+
+def test_what_is_sent_keeps_the_limits_by_its_own_account(part: Path) -> None:
+    program = PartProgram(part)
+    result = program.run(changes=[(0.2, "override", 1.7), (0.4, "hold", 1), (0.9, "hold", 0)])
+    shares = result.meta["program"]["limit_shares"]
+    assert set(shares) == {"X", "Y", "Z"}
+    assert 0.9 < shares["X"]["jerk"] <= 1.0 + 1.1 * EXCESS
+    jerk = np.abs(np.diff(result["X_reference"], 3)).max() / 0.001**3
+    assert shares["X"]["jerk"] == pytest.approx(jerk / program.prepared.program.limits[2, 0], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("program", "said"),
     [
@@ -142,13 +172,15 @@ def test_a_machine_without_coolant_says_so(part: Path) -> None:
 
 def test_the_report_says_where_it_is_worst(part: Path, tmp_path: Path) -> None:
     program = PartProgram(part)
-    result = program.run(changes=[(0.5, "hold", 1), (0.7, "hold", 0)])
+    result = program.run(changes=[(0.5, "hold", 1), (1.0, "hold", 0)])
     files = save_run(result, program.prepared, tmp_path / "out")
     page = files["program"].read_text()
     worst = result.meta["program"]["contour_error"]
     assert f"{worst['max']:.4f} mm off the programmed path, in line {worst['line']}" in page
     assert part.read_text().splitlines()[worst["line"] - 1] in page
     assert "data:image/png;base64" in page
+    assert 'href="./report.html"' in page
+    assert 'href="./program.html"' in files["report"].read_text()
     saved = rds.open_result(tmp_path / "out")
     assert same(saved, result)
     assert saved.meta["program"] == result.meta["program"]

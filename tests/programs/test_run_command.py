@@ -63,6 +63,7 @@ def test_every_column_state_and_live_value_is_named() -> None:
     [
         (["--mode", "system-test"], "mode system-test has no controllers"),
         (["--override", "250"], "less than or equal to 200"),
+        (["--override", "0"], "--override 0 never moves; begin with more, and hold"),
         (["--controller", "nonsense"], "nonsense"),
         (["--controller", "nothing.toml"], "cannot be read"),
         (["--machine", "nowhere"], "there is no machine 'nowhere'"),
@@ -74,6 +75,35 @@ def test_refusals(options: list[str], said: str, part: Path) -> None:
     assert done.exit_code == 2
     assert said in done.output
     assert not (part.parent / "out").exists()
+
+
+@pytest.mark.parametrize("out", ["part.ngc", "part.ngc/inside", "/proc/nope"])
+@pytest.mark.parametrize("command", [["nc", "run", "part.ngc"], ["run", "experiment.toml"]], ids=["nc run", "run"])
+def test_a_folder_that_cannot_be_is_told_before_anything_runs(
+    out: str, command: list[str], part: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(part.parent)
+    words = 'axis = "X"\nduration = 1.0\n[reference]\nkind = "constant"\nvalue = 1.0\n[controller]\nname = "p"\n'
+    Path("experiment.toml").write_text(words)
+        'axis = "X"\nduration = 1.0\n[reference]\nkind = "constant"\nvalue = 1.0\n[controller]\nname = "p"\n'
+    )
+    started: list[object] = []
+    monkeypatch.setattr("rds.experiment.experiment.run_plan", lambda *arguments: started.append(arguments))
+    done = CliRunner().invoke(app, [*command, "--out", out])
+    assert done.exit_code == 2
+    assert "name another folder" in done.stderr
+    assert not started
+
+
+def test_what_is_replaced_is_told(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(part.parent)
+    command = ["nc", "run", "part.ngc", "--out", "out", "--override", "90"]
+    assert "replaces" not in CliRunner().invoke(app, command).stderr
+    assert Path("out/program-changed-while-it-ran.csv").is_file()
+    again = CliRunner().invoke(app, command[:-2])
+    assert "out: replaces the results of an earlier run there" in again.stderr
+    assert not Path("out/program-changed-while-it-ran.csv").exists()
+    assert not Path("out/changes.csv").exists()
 
 
 def test_keys_come_one_by_one() -> None:
