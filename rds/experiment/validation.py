@@ -39,7 +39,6 @@ def _candidate(model: Model, unit: str) -> Any:
     """The model with the record of its fit, where it came from a model file."""
     from rds.identification.candidate import as_candidate, of_model
 
-    path = model.source.path
-    if path is not None and path.endswith(".toml"):
-        return as_candidate(path)
+    if model.fitted is not None and model.fitted.path is not None:
+        return as_candidate(model.fitted.path)
     return of_model(model, unit=unit)

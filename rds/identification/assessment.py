@@ -85,6 +85,15 @@ class Assessment:
         return self.log.units.get("position", "mm")
 
     @property
+    def changes(self) -> int:
+        """How often the measured velocity goes from clearly above its mean to clearly below it, or back."""
+        step = 0.0 if self.log.resolution is None else self.log.resolution / (self.block * self.log.sample_period)
+        far = self.block_velocity - self.block_velocity.mean()
+        least = max(0.5 * float(far.std()), step, 1e-9)
+        sides = np.sign(far[np.abs(far) > least])
+        return int(np.count_nonzero(np.diff(sides)))
+
+    @property
     def motion(self) -> float:
         """The distance between the lowest and the highest position measured."""
         return float(np.ptp(self.measured))

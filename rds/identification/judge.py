@@ -21,6 +21,7 @@ _FACTORS = {  # of measured over modelled, and what makes it
     60.0: "the speed is per minute where it is stated per second",
     1.0 / 60.0: "the speed is per second where it is stated per minute",
 }
+_BLOCKS = 50  # with fewer, the residual tests find nothing
 _NEAR = 0.15  # how near to such a factor is suspicious
 _FEW = 0.1  # share of lags beyond the plain band that is still called white
 _IDENTICAL = 1e-9  # RMSE over the motion: only the model's own output comes so near
@@ -64,12 +65,12 @@ def _data(a: Assessment, bands: Bands) -> Iterator[Reason]:
             f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of its encoder; {bands.least_steps:.0f} are "
             "needed to tell a model from none",
         )
-    elif len(a.block_time) < bands.least_blocks:
+    elif a.changes < bands.least_changes:
         yield Reason(
             Side.UNTOLD,
             "short",
-            f"the log holds {len(a.block_time)} blocks of {a.block * log.sample_period:.3g} s, the time in which the "
-            f"axis does something new; {bands.least_blocks:.0f} are needed",
+            f"in {a.time[-1] - a.time[0]:.3g} s the velocity changes between fast and slow, or forward and back, "
+            f"{a.changes} times; {bands.least_changes:.0f} are needed to see any dynamics",
         )
     if float(log.command.min()) == float(log.command.max()):
         yield Reason(
@@ -213,7 +214,7 @@ def _voltage(a: Assessment, bands: Bands) -> Iterator[Reason]:
 
 def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
     tests = a.tests
-    if tests is None or tests.blocks < bands.least_blocks or a.motion == 0.0:
+    if tests is None or tests.blocks < _BLOCKS or a.motion == 0.0:
         return
     r, lag = tests.auto.largest
     numbers = (

@@ -62,7 +62,7 @@ def overlap(candidate: Candidate, log: Log) -> Overlap:
     hashes = [str(fitted["sha256"]) for fitted in candidate.fitted_on if fitted.get("sha256")]
     alike = shared(log, prints)
     rows = _rows_seen(candidate, log) if log.sha256 in hashes and log.sha256 else 0.0
-    if rows > 0.0 and rows >= alike:
+    if rows > 0.0:
         return Overlap(rows, f"the file is one that the model was fitted on ({log.source or log.name})", known=True)
     if alike > 0.0:
         return Overlap(alike, "the file is another, but holds the same numbers as the fit's data", known=True)

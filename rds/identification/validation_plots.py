@@ -29,11 +29,11 @@ def overlay(a: Assessment) -> Picture:
     panels = picture.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     t, measured, modelled = (_thinned(values) for values in (a.time, a.measured, a.modelled))
     _pair(panels[0], t, measured, modelled)
-    dress(panels[0], quantity(a.log.name, a.unit), None)
+    dress(panels[0], quantity("", a.unit).strip(), None)
     legend(panels[0])
     if a.velocity is not None:
         _pair(panels[1], a.block_time, a.block_velocity, a.block_modelled)
-        dress(panels[1], heading(f"{a.log.name} velocity", a.velocity.unit), None)
+        dress(panels[1], heading("velocity", a.velocity.unit), None)
     last = panels[-1]
     last.plot(t, measured - modelled, color=BLUE, linewidth=0.9)
     last.axhline(0.0, color=GREY, linewidth=0.8)
@@ -129,6 +129,7 @@ def intervals(models: Sequence[Candidate]) -> Picture | None:
         axes.set_ylim(len(models) - 0.5, -0.5)
         dress(axes, "", heading(name, unit))
         axes.margins(x=0.1)
+        axes.locator_params(axis="x", nbins=4)
     return picture
 
 

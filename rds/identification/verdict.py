@@ -78,7 +78,7 @@ class Bands:
     voltage_percent: float = 15.0  # %: of the voltage that the model needs beside the one given, to the latter
     significance: float = 0.01  # of the residual tests: 1 % of exact models fail each
     seen: float = 0.05  # share of the log that the fit may have seen
-    least_blocks: float = 50.0  # blocks of motion at the rate of the residual tests
+    least_changes: float = 3.0  # of the velocity, from above its mean to below it or back
     least_steps: float = 20.0  # of the encoder, that the axis must at least move
     skill: float = 0.5  # a prediction's RMSE must be less than so much of that without a model
     worse: float = 2.0  # RMSE here over RMSE on the fit's data, beyond which the fit has followed its own noise
