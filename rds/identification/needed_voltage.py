@@ -77,8 +77,8 @@ def needed_voltage(
             middle = first + block // 2
             rows.append((log.time[middle], velocity[part].mean(), log.command[part][:-1].mean(), extra))
     table = np.array(rows, dtype=float).reshape(len(rows), 4)
-    time, speed, command, extra = table.T
-    return NeededVoltage(block, time, speed, command, extra, left_out=len(chosen) - len(rows))
+    time, speed, command, extras = table.T
+    return NeededVoltage(block, time, speed, command, extras, left_out=len(chosen) - len(rows))
 
 
 def _extra(

@@ -155,7 +155,8 @@ def test_bad_input_is_a_sentence_and_exit_code_2(
         arguments = tuple("both.csv" if a == "data.csv" else a for a in arguments)
     model_file(Path("m.toml"))
     Path("other.toml").write_text(
-        'structure = "axis"\nparameters.tau = {value = 0.01, unit = "s"}\nparameters.K = {value = 1.0, unit = "(mm/s)/V"}\n'
+        'structure = "axis"\nparameters.tau = {value = 0.01, unit = "s"}\n'
+        'parameters.K = {value = 1.0, unit = "(mm/s)/V"}\n'
     )
     found = rds(*arguments)
     assert found.exit_code == 2, found.output
