@@ -1,6 +1,6 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
-python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [--json]
+python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [robustness] [--json]
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from benchmarks import bus, cia402, desk, imports, machine, nc, realtime, simulation, timed_bus
+from benchmarks import bus, cia402, desk, imports, machine, nc, realtime, robustness, simulation, timed_bus
 from benchmarks.figures import TITLES, Figure
 from rds.console import show_table
 
@@ -26,6 +26,7 @@ SUBJECTS = {
     "cia402": "CiA 402 drives at 1 Mbit/s: our cyclic loop beside the canopen library's",
     "nc": "Part programs: 200,000 lines and arcs, beside rs274 -g",
     "desk": "Live values and part programs in the loop",
+    "robustness": "10,000 closed loops with drawn parameters",
 }
 
 
@@ -78,6 +79,7 @@ def main() -> int:
         "timed-bus": run_timed_bus,
         "cia402": run_cia402,
         "desk": desk.run,
+        "robustness": robustness.run,
         "nc": lambda: nc.run(peer_python=options.peer_python),
     }
     report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}

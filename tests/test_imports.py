@@ -39,6 +39,9 @@ ALLOWED: dict[str, set[str]] = {
         *("core", "controllers", "models", "signals", "machines", "runtime", "modes", "results", "bus"),
         "identification",  # model files, and what a validation proves
     },
+    "robustness": {
+        *("core", "models", "runtime", "modes", "results", "experiment", "identification", "spread"),
+    },
 }
 # Of some rooms, only these modules.
 ONLY = {
