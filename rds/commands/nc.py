@@ -15,7 +15,7 @@ import typer
 
 from rds.commands import nc_make, nc_run
 from rds.commands.common import Json, print_json, progress_bars, refusals
-from rds.commands.nc_options import MachineName, MaxJumps, Parameters, Program, Tools, With, setup
+from rds.commands.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
 
 if TYPE_CHECKING:
     from rds.nc.check import Setup
@@ -212,9 +212,13 @@ def time(
     sample_period: Annotated[
         float | None, typer.Option(help="Sample period, s; by default the machine's.", min=1e-6)
     ] = None,
+    profile: ProfileName = "planned",
     json: Json = False,
 ) -> None:
-    """Predict a program's cycle time, with the planner that runs it: at feed, in rapids, in dwells, for each tool."""
+    """Predict a program's cycle time, with the planner that runs it: at feed, in rapids, in dwells, for each tool.
+
+    Another --profile is for comparison: `rds nc run` runs the planned one.
+    """
     with refusals():
         from rds.machines import load_machine
         from rds.nc.check import motion
@@ -222,9 +226,9 @@ def time(
 
         of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
         with progress_bars() as bar:
-            found = cycle_time(motion(file, of, what, bar("plan")), of, sample_period)
+            found = cycle_time(motion(file, of, what, bar("plan")), of, sample_period, profile)
     if json:
-        print_json({"program": str(file), "machine": of.name, **found.to_json()})
+        print_json({"program": str(file), "machine": of.name, "profile": profile, **found.to_json()})
         raise typer.Exit(0 if found.certificate.ok else 1)
     from rds.console import show_table
 
@@ -232,7 +236,8 @@ def time(
     if len(shares) != 1:
         shares.append(("all", found.whole))
     rows = [[tool, *(f"{value:.3f}" for value in share.seconds)] for tool, share in shares]
-    title = f"{file}: {_clock(found.total)} on {of.name}, {found.samples} samples of {found.T:g} s"
+    how = "" if profile == "planned" else f", profile {profile}"
+    title = f"{file}: {_clock(found.total)} on {of.name}{how}, {found.samples} samples of {found.T:g} s"
     show_table(title, ["tool", "cutting [s]", "rapid [s]", "dwell [s]", "total [s]"], rows)
     typer.echo(found.certificate.sentence())
     raise typer.Exit(0 if found.certificate.ok else 1)

@@ -22,6 +22,9 @@ With = Annotated[
         help="Of the dialect: block-delete, gr, program-numbers, inch-machine or any-exit.",
     ),
 ]
+ProfileName = Annotated[
+    str, typer.Option("--profile", help="Of the motion: planned, trapezoid, blended or point-to-point.")
+]
 MaxJumps = Annotated[
     int | None,
     typer.Option(

@@ -56,27 +56,35 @@ class BlendedMotion:
 
 
 def blended(
-    points: Sequence[Sequence[float]] | np.ndarray, feed: float, T: float, *, share: float = 0.25, blend: bool = True
+    points: Sequence[Sequence[float]] | np.ndarray,
+    feed: float | Sequence[float],
+    T: float,
+    *,
+    share: float = 0.25,
+    blend: bool = True,
 ) -> BlendedMotion:
-    """The motion through `points` (moves + 1, axes; mm) at `feed` (mm/s), sampled every T s.
+    """The motion through `points` (moves + 1, axes; mm) at `feed` (mm/s; one for all moves, or one each), every T s.
 
     share: AccPeriod, the part of the deadline that a change of velocity takes, from 0 to 0.5 (chosen: the thesis prints
     no value). Without `blend` every move stops at its target. The speed along a line is at most the feed. Raises
     InputError for fewer than 2 different points, and for a feed, period or share that cannot be.
     """
-    if not (isfinite(feed) and feed > 0.0 and isfinite(T) and T > 0.0):
+    feeds = np.atleast_1d(np.array(feed, dtype=float))
+    if not (np.isfinite(feeds).all() and (feeds > 0.0).all() and isfinite(T) and T > 0.0):
         raise InputError(f"feed = {feed!r} mm/s and T = {T!r} s must each be more than 0")
     if not 0.0 < share <= 0.5:
         raise InputError(f"share = {share!r} must be more than 0 and at most 0.5 (of a move's deadline)")
     through = np.array(points, dtype=float)
     if through.ndim != 2 or not np.isfinite(through).all():
         raise InputError("points must be rows of finite positions, one row for each point and one column for each axis")
-    keep = np.insert(np.linalg.norm(np.diff(through, axis=0), axis=1) >= SAME, 0, True)
-    through = through[keep]
+    if len(feeds) not in (1, len(through) - 1):
+        raise InputError(f"{len(feeds)} feeds for {len(through) - 1} moves; give one for all, or one for each")
+    moves = np.linalg.norm(np.diff(through, axis=0), axis=1) >= SAME
+    through, feeds = through[np.insert(moves, 0, True)], np.broadcast_to(feeds, moves.shape)[moves]
     if len(through) < 2:
         raise InputError("the points are all the same; give at least two that differ")
     ways = np.diff(through, axis=0)
-    deadlines = np.maximum(np.linalg.norm(ways, axis=1) / feed, SHORTEST * T)
+    deadlines = np.maximum(np.linalg.norm(ways, axis=1) / feeds, SHORTEST * T)
     ramps = np.ceil(share * deadlines / T - 1e-9) * T  # duration of each move's accel and decel
     entry = np.zeros(through.shape[1])
     stages: list[tuple[int, int, float, np.ndarray, np.ndarray]] = []  # move, stage, duration, velocity at its ends

@@ -64,6 +64,7 @@ class Certificate:
 
     limits: Limits
     tolerance: float = TOLERANCE
+    promised: tuple[str, ...] = (*KINDS, "deviation")  # other kinds are measured, and no violations
     samples: int = 0
     T: float = 0.0
     count: int = 0  # violations
@@ -159,7 +160,7 @@ class Certificate:
         k = int(np.argmax(share))
         if share[k] > worst.share or (share[k] == worst.share and values[k] > worst.value):
             self.worst[kind, axis] = Worst(float(values[k]), float(limit[k]), float(share[k]), int(line[k]), first + k)
-        if over.any():
+        if kind in self.promised and over.any():
             rows = np.flatnonzero(over)
             self.count += len(rows)
             for k in rows[: max(LISTED - len(self.violations), 0)]:
@@ -197,6 +198,7 @@ class Certificate:
                 axes.setdefault(axis, {})[kind] = vars(worst).copy()
         return {
             "ok": self.ok,
+            "promised": list(self.promised),
             "samples": self.samples,
             "sample_period": self.T,
             "time": self.time,
@@ -210,14 +212,28 @@ class Certificate:
         """The certificate for people: verdict, and how close the motion comes to its limits."""
         if not self.ok:
             return f"The planned motion breaks its limits in {self.count} places; first: {self.violations[0]}."
-        shares = [(worst.share, kind, axis, worst.line) for (kind, axis), worst in self.worst.items() if axis]
-        share, kind, axis, line = max(shares, default=(0.0, "velocity", "none", 0))
+        kept = [kind for kind in KINDS if kind in self.promised]
+        share, axis, line, kind = max((*self._most(kind), kind) for kind in kept)
         away = self.worst.get(("deviation", ""), Worst())
-        return (
-            f"Certificate: all {self.samples} planned samples keep the velocity, acceleration and jerk of every axis "
-            f"(at most {100.0 * share:.1f} %: {kind} of {axis} in line {line}) and the tolerance of the path "
-            f"(at most {away.value:.4f} mm off, in line {away.line})."
+        off = f"at most {away.value:.4f} mm off, in line {away.line}"
+        words = f"{', '.join(kept[:-1])} and {kept[-1]}" if len(kept) > 1 else kept[0]
+        said = (
+            f"Certificate: all {self.samples} planned samples keep the {words} of every axis "
+            f"(at most {100.0 * share:.1f} %: {kind} of {axis} in line {line})"
         )
+        said += f" and the tolerance of the path ({off})." if "deviation" in self.promised else "."
+        others = []
+        for kind in KINDS:
+            if kind not in kept:
+                share, axis, line = self._most(kind)
+                others.append(f"{kind} ({100.0 * share:.0f} % of the limit: {axis} in line {line})")
+        others += [] if "deviation" in self.promised else [f"the path ({off})"]
+        return f"{said} Not promised: {', '.join(others)}." if others else said
+
+    def _most(self, kind: str) -> tuple[float, str, int]:
+        """The largest share of a kind's limit, its axis and line."""
+        found = [(worst.share, axis, worst.line) for (what, axis), worst in self.worst.items() if what == kind]
+        return max(found, default=(0.0, "none", 0))
 
     def plot(self, path: Any = None) -> Any:
         """The matplotlib figure of the shares of the limits over time; saved at `path` if given."""

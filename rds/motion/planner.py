@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.motion.checking import check_segments
 from rds.motion.limits import Limits
 from rds.motion.samples import Rows, SampleBlock
-from rds.motion.segments import AXES, LINE, SEGMENT
+from rds.motion.segments import SEGMENT
 
 TOLERANCE = 0.05  # mm (degrees), of G64 without P; chosen
 LONGEST_RAMP = 1000.0  # s, acceleration over jerk of an axis, over which the motion is averaged
 MARGIN = 1e-3  # relative, kept off the limits for rounding
 PASSING = ("coolant",)  # kinds of events for which the motion does not come to rest
 ENOUGH = 2048  # segments, or samples, that are gathered before they are handed on
-JUMP = 1e-6  # mm or degrees that a segment may start from where the last one ended
 
 
 def plan(
@@ -95,39 +95,10 @@ class _Planner:
             self.events.append((self.taken + event.after, event))
         if not len(segments):
             return
-        self._check(segments)
+        check_segments(segments, self.limits.present, self.end)
         self.end = segments["end"][-1].copy()
         self.waiting.append(segments)
         self.taken += len(segments)
-
-    def _check(self, segments: np.ndarray) -> None:
-        start, end = segments["start"], segments["end"]
-
-        def refuse(bad: np.ndarray, message: str) -> None:
-            if bad.any():
-                k = int(np.argmax(bad))
-                raise InputError(message.format(segment=segments[k], k=k), f"line {segments['line'][k]}")
-
-        numbers = (start, end, segments["centre"], segments["length"][:, None], segments["sweep"][:, None])
-        refuse(~np.isfinite(np.hstack(numbers)).all(axis=1), "a position of this move is not finite; mend the program")
-        feed = ~segments["rapid"] & (segments["length"] > 0.0)
-        refuse(feed & ~(segments["rate"] > 0.0), "this move has the rate 0; program a feed rate (F) above 0")
-        moved = start != end
-        arcs = segments["plane"] != LINE
-        for plane, axes in ((0, (0, 1)), (1, (2, 0)), (2, (1, 2))):
-            moved[np.ix_(segments["plane"] == plane, axes)] = True
-        absent = moved & ~self.limits.present
-        if absent.any():
-            k, axis = np.argwhere(absent)[0]
-            raise InputError(
-                f"this move wants axis {AXES[axis]}, for which there are no limits; "
-                f"give the machine [axis.{AXES[axis]}.limits], or leave the axis out",
-                f"line {segments['line'][k]}",
-            )
-        refuse(arcs & (segments["sweep"] == 0.0), "this arc has the angle 0; give it an end other than its start")
-        before = np.vstack((start[:1] if self.end is None else self.end[None], end[:-1]))
-        far = np.abs(start - before).max(axis=1)
-        refuse(far > JUMP, "this move does not start where the last one ended; hand in all moves, in order")
 
     def run(self, final: bool) -> Iterator[SampleBlock]:
         if not final and sum(map(len, self.waiting)) < ENOUGH:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from rds.machines import Machine
-from rds.motion.certificate import Certificate, certified
+from rds.motion.certificate import Certificate
 from rds.motion.limits import Limits
-from rds.motion.planner import plan
+from rds.motion.profiles import motion_of
 from rds.motion.samples import SampleBlock
 from rds.nc.toolpath import PathBlock
 
@@ -74,7 +74,9 @@ class CycleTime:
         }
 
 
-def cycle_time(blocks: Iterable[PathBlock], machine: Machine, T: float | None = None) -> CycleTime:
+def cycle_time(
+    blocks: Iterable[PathBlock], machine: Machine, T: float | None = None, profile: str = "planned"
+) -> CycleTime:
     """Plan the motion, and count. T: sample period, s, by default the machine's. In bounded memory.
 
     Raises ProgramError and InputError as the blocks and the planner do.
@@ -85,8 +87,8 @@ def cycle_time(blocks: Iterable[PathBlock], machine: Machine, T: float | None = 
     dwells: list[tuple[int, int, int]] = []  # samples, from and up to, and the tool
     samples = 0
     limits = Limits.of(machine)
-    certificate = Certificate(limits)
-    for block in certified(plan(tools.watch(blocks), limits, T, start=np.zeros(6)), certificate):
+    motion, certificate = motion_of(profile, tools.watch(blocks), limits, T, start=np.zeros(6))
+    for block in motion:
         number = np.arange(block.first, block.first + len(block))
         for at, event in block.events:
             if event.kind == "dwell":

@@ -7,7 +7,7 @@ _LATHE = "lathe cycles and threading are outside this dialect; write their moves
 _PROBE = "probing is outside this dialect; leave it away"
 _SPLINE = "splines are outside this dialect; write lines (G1) or arcs (G2, G3), for example from `rds nc make points`"
 _G = {
-    **dict.fromkeys((50, 51, 52, 53), _SPLINE),
+    **dict.fromkeys((50, 51, 52, 53, 61, 62, 63), _SPLINE),
     70: "diameter mode is outside this dialect; program radii and leave G7 away",
     80: "radius mode is how X is read here always; leave G8 away",
     110: "G11 is outside this dialect; leave it away",
