@@ -11,7 +11,21 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands import analyse, bus, data, estop, fault, fit, interpolate, modules, nc, reports, robustness, validate
+from rds.commands import (
+    analyse,
+    bus,
+    data,
+    estop,
+    excite,
+    fault,
+    fit,
+    interpolate,
+    modules,
+    nc,
+    reports,
+    robustness,
+    validate,
+)
 from rds.commands.app import app as app_page
 from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
 from rds.commands.guard import guarded
@@ -36,6 +50,7 @@ app.command()(modules.scan)
 app.command()(estop.estop)
 app.command()(reports.report)
 app.command()(fit.fit)
+app.command()(excite.excite)
 app.command()(validate.validate)
 app.command("app")(app_page)
 app.command()(interpolate.interpolate)

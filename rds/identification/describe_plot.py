@@ -11,6 +11,7 @@ from rds.identification.log import Gravity, Log
 from rds.results.figure import BLUE, GREEN, GREY, ORANGE, VERMILLION, Picture, dress, legend, quantity
 
 _POINTS = 4_000  # drawn of a line: each is the lowest or highest of a stretch
+_REGULAR = 1.0  # %: the least that the plot of the steps shows to either side, so that rounding looks like none
 _MOST = 4  # logs side by side
 
 
@@ -33,10 +34,13 @@ def overview(logs: Sequence[Log]) -> Picture:
             )
         position.plot(*thin(log.time, log.position), color=BLUE, linewidth=1.0, label="measured")
         seen = motion(log)
-        middle = log.time[: len(seen.speed) * seen.width : seen.width]
+        middle = log.time[: len(seen.speed) * seen.width : seen.width] + 0.5 * seen.width * log.sample_period
         what = f"speed [{unit}/s]" if unit != "rev/min" else "speed [rev/min]"
         speed.plot(*thin(middle, seen.speed), color=GREEN, linewidth=1.0, label=f"means over {seen.width} samples")
-        clock.plot(*thin(log.time[1:], np.diff(log.time) * 1e3), color=ORANGE, linewidth=0.8)
+        off = 100.0 * (np.diff(log.time) / log.sample_period - 1.0)
+        clock.plot(*thin(log.time[1:], off), color=ORANGE, linewidth=0.8)
+        reach = max(_REGULAR, 1.1 * float(np.abs(off).max()))
+        clock.set_ylim(-reach, reach)
         for finding in log.findings:
             if finding.sample is not None and finding.gravity is not Gravity.NOTE and finding.sample < len(log):
                 for axes in (command, position):
@@ -44,7 +48,7 @@ def overview(logs: Sequence[Log]) -> Picture:
         dress(command, f"command [{log.units.get('command', 'V')}]", None)
         dress(position, quantity("axis", unit), None)
         dress(speed, what, None)
-        dress(clock, "steps of\ntime [ms]")
+        dress(clock, "step off the\nperiod [%]")
         legend(position)
         legend(speed)
     return picture

@@ -68,7 +68,8 @@ def own_logs(path: Path) -> list[Log]:
             digest.update(name.encode() + b"\0" + values.tobytes())
         sha256 = digest.hexdigest()
     machine = _machine(result.meta.get("machine"))
-    logs = logs_of_result(result, path.stem if path.suffix else path.name, str(path), sha256)
+    name = path.resolve().parent.name if path.stem in ("result", "record") else path.stem if path.suffix else path.name
+    logs = logs_of_result(result, name, str(path), sha256)
     axes = [log.name.rpartition(":")[2] if ":" in log.name else result.axes[0] for log in logs]
     return [
         with_findings(log, machine.axes.get(axis) if machine else None) for log, axis in zip(logs, axes, strict=True)
