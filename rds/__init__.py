@@ -26,6 +26,7 @@ _NAMES = {
     "constant": "rds.signals",
     "multisine": "rds.signals",
     "chirp": "rds.signals",
+    "staircase": "rds.signals",
     "user": "rds.signals",
     "check_file": "rds.checks",
     "check_controller": "rds.checks",

@@ -12,6 +12,7 @@ from rds.core.options import check_known
 from rds.signals.broadband import chirp, multisine
 from rds.signals.periodic import constant, sinusoid, square, triangle
 from rds.signals.signal import Signal, sample, sample_voltage
+from rds.signals.staircase import staircase
 from rds.signals.user import user
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "signal_kinds",
     "sinusoid",
     "square",
+    "staircase",
     "triangle",
     "user",
 ]
@@ -38,6 +40,7 @@ _KINDS: Mapping[str, Callable[..., Signal]] = MappingProxyType(
         "constant": constant,
         "multisine": multisine,
         "chirp": chirp,
+        "staircase": staircase,
     }
 )
 

@@ -1,4 +1,4 @@
-"""Multisine and chirp: the frequencies they hold, their peaks and derivatives."""
+"""Multisine, chirp and staircase: the frequencies they hold, their peaks and derivatives."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, sampled_from
 
 from rds.core.errors import InputError
-from rds.signals import chirp, make_signal, multisine, sample_voltage
+from rds.signals import chirp, make_signal, multisine, sample_voltage, staircase
 
 
 @settings(max_examples=25)
@@ -58,6 +58,15 @@ def test_a_chirp_goes_up_and_down_through_its_band() -> None:
     expected = 21.0 - 20.0 * np.abs(np.mod(middle, 20.0) - 10.0) / 10.0
     slow = expected > 3.0  # below, the frequency changes much within one period
     np.testing.assert_allclose(frequency[slow], expected[slow], rtol=0.1)
+
+
+def test_a_staircase_level_by_level() -> None:
+    u = sample_voltage(staircase(4.0, 1.0, 2, offset=1.0), 0.125, 16)
+    np.testing.assert_array_equal(u, [1, 3, 5, 3, 1, -1, -3, -1] * 2)
+    with pytest.raises(InputError, match="whole number"):
+        staircase(4.0, 1.0, 2.5)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="half the sampling frequency"):
+        sample_voltage(staircase(4.0, 100.0, 5), 1e-3, 100)
 
 
 def test_what_will_not_do_is_refused() -> None:
