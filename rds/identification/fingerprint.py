@@ -28,25 +28,22 @@ def fingerprint(log: Log) -> str:
 
 
 def shared(log: Log, fingerprints: Iterable[str]) -> float:
-    """The share, 0 to 1, of windows that the log has in common with the data of these fingerprints.
+    """The share, 0 to 1, of the log's windows that are among the data of these fingerprints."""
+    own, known = _chosen(log), [_hashes(text) for text in fingerprints]
+    known = [hashes for hashes in known if len(hashes)]
+    if not known:
+        return 0.0
+    # of data with more windows the smallest hashes were kept: those of the log are compared up to there
+    cut = [int(hashes.max()) for hashes in known if len(hashes) >= _MOST]
+    comparable = own[own <= np.uint64(min(cut))] if cut else own
+    return len(np.intersect1d(np.concatenate(known), comparable)) / len(comparable) if len(comparable) else 0.0
 
-    The larger of both directions: a log that is part of the data, and one that contains them, both share all.
-    """
-    own = _chosen(log)
-    most = 0.0
-    for text in fingerprints:
-        try:
-            known = np.array([int(value, 16) for value in text.split()], dtype=np.uint64)
-        except (ValueError, OverflowError):
-            raise InputError(f"fingerprint = {text!r:.60} must be hashes of 16 hexadecimal digits") from None
-        if not len(known):
-            continue
-        comparable = own
-        if len(known) >= _MOST:  # only its smallest were kept: those of the log are compared up to there
-            comparable = own[own <= known.max()]
-        common = len(np.intersect1d(known, own))
-        most = max(most, common / len(known), common / len(comparable) if len(comparable) else 0.0)
-    return most
+
+def _hashes(text: str) -> np.ndarray:
+    try:
+        return np.array([int(value, 16) for value in text.split()], dtype=np.uint64)
+    except (ValueError, OverflowError):
+        raise InputError(f"fingerprint = {text!r:.60} must be hashes of 16 hexadecimal digits") from None
 
 
 def _chosen(log: Log) -> np.ndarray:

@@ -20,6 +20,8 @@ _BLOCKS = 400  # at most; of a longer log, blocks spread evenly
 _ROUNDS = 12
 _STEPS_OF_ENCODER = 5  # a block's motion must be more than so many, or its length is not known to 10 %
 _TRIAL = 0.02  # of the command's largest size: the first other voltage
+_SETTLE = (0.25, 1.0, 4.0, 16.0)  # s, of a constant voltage until the velocity is steady
+_STEP = 0.005  # s, at most
 _FAR = 10.0 / _TRIAL  # trials: ten times the largest command is no voltage that an axis needs
 
 
@@ -115,7 +117,7 @@ def static_curve(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Steady velocities (mm/s) of the model at constant voltages, and these voltages; (n,) each.
 
-    Found by holding each voltage until the velocity no longer changes, 2 s at most. Where the model does not settle or
+    Found by holding each voltage until the velocity no longer changes, 16 s at most. Where the model does not settle or
     does not move, the voltage is left out.
     """
     found = []
@@ -128,13 +130,14 @@ def static_curve(
 
 
 def _steady(structure: Structure, values: Mapping[str, float], voltage: float, is_rate: bool) -> float | None:
-    for seconds in (0.25, 0.5, 1.0, 2.0):
-        t = np.linspace(0.0, seconds, 101)
+    for seconds in _SETTLE:
+        t = np.linspace(0.0, seconds, max(101, round(seconds / _STEP)))
         with np.errstate(all="ignore"):
-            y = np.asarray(structure.respond(t, np.full(101, voltage), [0.0] * structure.states, values), dtype=float)
+            u, rest = np.full(len(t), voltage), [0.0] * structure.states
+            y = np.asarray(structure.respond(t, u, rest, values), dtype=float)
         v = y if is_rate else np.diff(y) / np.diff(t)
         if not np.isfinite(v).all():
             return None
-        if abs(v[-1] - v[-11]) <= 1e-3 * abs(v[-1]):
+        if abs(v[-1] - v[-len(v) // 10]) <= 1e-3 * abs(v[-1]):
             return float(v[-1])
     return None

@@ -3,9 +3,9 @@
 Residuals are tested at the rate of the motion, not of the sampling: at 1 kHz an axis that is slow, or at rest for a
 while, keeps its encoder's rounding error over many samples, and fails by that alone. So residuals and commands are
 averaged over blocks (a quarter of the period of the frequency below which 99 % of the motion's power lies), and the
-statistics are compared with those of surrogates: the model's own output with parameters drawn from the fit's covariance, white noise
-of the residual's size, and the encoder's rounding. A model that is exact fails at 1 % in one of a hundred logs, however
-coarse the encoder.
+statistics are compared with those of surrogates: the model's own output with parameters drawn from the fit's
+covariance, white noise of the residual's size, and the encoder's rounding. A model that is exact fails at 1 % in one of
+a hundred logs, however coarse the encoder.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MOST_POINTS = 20_000  # that a line is drawn with
-_CURVE = 41  # voltages of a friction curve
+_CURVE = 81  # voltages of a friction curve
 
 
 def overlay(a: Assessment) -> Picture:
@@ -53,8 +53,8 @@ def correlations(a: Assessment) -> Picture:
     picture = Picture(3.1)
     left, right = picture.subplots(1, 2, sharey=True)
     _stems(left, a.tests.auto, "autocorrelation of the residual", "lag [s]")
-    command = "command" if not a.log.closed_loop else "command (closed loop)"
-    _stems(right, a.tests.cross, f"correlation with the {command}", "lag [s], positive: residual after command")
+    loop = ", in a closed loop" if a.log.closed_loop else ""
+    _stems(right, a.tests.cross, "correlation with the command", f"lag [s], positive: residual after command{loop}")
     return picture
 
 
@@ -65,14 +65,15 @@ def friction_curve(candidate: Candidate, a: Assessment) -> Picture:
     there. What acceleration takes is left out by that, as far as the model knows it.
     """
     assert a.voltage is not None
-    top = 1.05 * float(np.abs(a.log.command).max())
+    top = float(np.abs(a.log.command).max())
     speeds, voltages = static_curve(
         candidate.structure, candidate.values, np.linspace(-top, top, _CURVE), candidate.is_rate
     )
+    reach = 1.3 * float(np.abs(a.voltage.velocity).max())
     picture = Picture(3.8)
     axes = picture.subplots()
     for sign in (1.0, -1.0):
-        branch = speeds * sign > 0.0
+        branch = (speeds * sign > 0.0) & (np.abs(speeds) <= reach)
         order = np.argsort(speeds[branch])
         x, y = speeds[branch][order], voltages[branch][order]
         points = a.voltage.velocity * sign > 0.0

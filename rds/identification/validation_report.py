@@ -6,6 +6,7 @@ import json
 from base64 import b64encode
 from collections.abc import Iterator
 from functools import partial
+from math import isfinite
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -170,10 +171,10 @@ def _ranking(ranking: Ranking) -> str:
             r.rmse,
             r.aicc,
             r.aicc_difference,
-            f"{r.aicc_weight:.3f}",
+            _weight(r.aicc_weight),
             r.bic,
             r.bic_difference,
-            f"{r.bic_weight:.3f}",
+            _weight(r.bic_weight),
         ]
         for r in ranking.ranks
     ]
@@ -182,6 +183,10 @@ def _ranking(ranking: Ranking) -> str:
         "k counts what was estimated from these data: variance, initial state, and parameters if fitted here."
     )
     return table(columns, rows, note=note) + notes_list(ranking.warnings)
+
+
+def _weight(value: float) -> str | None:
+    return f"{value:.3f}" if isfinite(value) else None
 
 
 def _parameters(validation: Validation) -> str:

@@ -148,6 +148,9 @@ def test_fingerprints_know_cut_and_shifted_data_and_no_others() -> None:
     moved_away = made_log(u, whole.position - 31.0)
     assert shared(whole.part(1500, 5200), [known]) == 1.0
     assert shared(moved_away, [known]) == 1.0
+    first, last = fingerprint(whole.part(0, 4000)), fingerprint(whole.part(4000, 8000))
+    assert shared(whole, [first]) == pytest.approx(0.5, abs=0.2)
+    assert shared(whole, [first, last]) > 0.9
     assert shared(made_log(square(8.0, 2.9, 0.7)), [known]) == 0.0
     assert shared(whole, []) == 0.0 and shared(whole, [""]) == 0.0
     with pytest.raises(InputError, match="must be hashes of 16 hexadecimal digits"):
