@@ -17,6 +17,7 @@ PANELS = Registry(
         "menu": "rds.panels.menu",
         "equipment-model": "rds.panels.equipment_model",
         "equipment-control": "rds.panels.equipment_control",
+        "help": "rds.panels.guide",
     },
 )
 

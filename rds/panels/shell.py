@@ -37,7 +37,8 @@ class Shell:
         self.ticker = Ticker()
         self.panels: dict[str, Any] = {}
         self.here = ""
-        self.on_help: Callable[[str], None] | None = None  # called with the help page of the panel one is in
+        self.help_page = "readme"
+        self.on_help: Callable[[str], None] | None = None  # turns the help to a page, once its panel is there
         self._notice = Notice()
         self._heard: list[Message] = []
         self._title = widgets.HTML()
@@ -123,8 +124,13 @@ class Shell:
         (self.widget.add_class if dark else self.widget.remove_class)("rds-dark")
 
     def _help(self) -> None:
+        """The help, at the page of the panel one is in."""
+        if self.here == "help":
+            return
+        self.help_page = PANELS.module(self.here).HELP
+        self.open("help")
         if self.on_help is not None:
-            self.on_help(PANELS.module(self.here).HELP)
+            self.on_help(self.help_page)
 
     def _show_messages(self) -> None:
         heard, self._heard[:] = list(self._heard), []

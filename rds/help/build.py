@@ -1,0 +1,133 @@
+"""Building the help pages: once for each state of the documents, into the user's cache."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from rds.core.errors import InputError
+
+_HERE = Path(__file__).parent
+FIRST = "index"
+# the order in which a reader needs them; documents that are not named here come last
+ORDER = (
+    *("readme", "panels", "experiments", "paper", "data", "identification", "identification-methods", "validation"),
+    *("robustness", "part-programs", "part-program-language", "cutter-compensation", "motion", "interpolation"),
+    *("paths", "grading", "grading-setup", "sandbox", "safety", "bus", "bus-timing", "oacs", "cia402"),
+    *("thesis-reports", "changelog"),
+)
+
+
+def sources() -> dict[str, Path]:
+    """The documents by name; InputError where the package was installed without them."""
+    for folder in (_HERE / "docs", _HERE.parents[1] / "docs"):  # installed, or a checkout
+        if (folder / "experiments.md").is_file():
+            found = {path.stem: path for path in sorted(folder.glob("*.md"))}
+            for name in ("README", "CHANGELOG"):
+                beside = (folder if folder.parent == _HERE else folder.parent) / f"{name}.md"
+                if beside.is_file():
+                    found[name.lower()] = beside
+            return found
+    raise InputError("the documents are not installed; install rds from a wheel or a checkout that has docs/")
+
+
+def help_pages(out: Path | None = None) -> Path:
+    """The folder with the built pages (`index.html`), by default in the user's cache, built if they are not there.
+
+    InputError where sphinx is missing, the documents have faults, or the folder cannot be written to.
+    """
+    documents = sources()
+    place = out or _cache() / _fingerprint(documents)
+    if out is None and (place / f"{FIRST}.html").is_file():
+        return place
+    if out is not None and place.exists():
+        _check_replaceable(place)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".rds-help-", dir=place.parent) as work:
+            built = _built(documents, Path(work))
+            if out is not None and place.exists():
+                shutil.rmtree(place)
+            if not place.exists():  # else another process was quicker
+                os.replace(built, place)
+    except OSError as error:
+        raise InputError(f"the help cannot be written: {error.strerror or error}", str(place)) from error
+    return place
+
+
+def page_file(name: str) -> str:
+    """The file of the page on a subject, as panels name it; the first page for a subject without one."""
+    known = sources()
+    return f"{name if name in known else FIRST}.html"
+
+
+def _built(documents: dict[str, Path], work: Path) -> Path:
+    if importlib.util.find_spec("sphinx") is None or importlib.util.find_spec("myst_parser") is None:
+        raise InputError("help needs sphinx and myst-parser, which are not installed: pip install 'rds[lab]'")
+    source, target = work / "source", work / "html"
+    source.mkdir()
+    for name, path in documents.items():
+        (source / f"{name}.md").write_text(_local(path.read_text(encoding="utf-8"), set(documents)), encoding="utf-8")
+    (source / f"{FIRST}.md").write_text(_contents(documents), encoding="utf-8")
+    # in a process of its own: sphinx changes docutils for the whole process
+    command = [sys.executable, "-m", "sphinx", "-q", "-b", "html", "-c", str(_HERE), "-d", str(work / "doctrees")]
+    done = subprocess.run([*command, str(source), str(target)], capture_output=True, text=True, check=False)
+    faults = "\n".join(line for line in done.stderr.splitlines() if "WARNING" in line or "ERROR" in line)
+    if done.returncode or faults:
+        raise InputError(f"the documents have faults: {(faults or done.stderr).strip()[:2000]}", str(source))
+    return target
+
+
+def _contents(documents: dict[str, Path]) -> str:
+    order = [name for name in ORDER if name in documents]
+    order += sorted(set(documents) - set(order))
+    return "# RDS\n\n```{toctree}\n:maxdepth: 1\n\n" + "\n".join(order) + "\n```\n"
+
+
+def _local(text: str, known: set[str]) -> str:
+    """Links between the documents as they lie side by side here; links to other files of the checkout become text."""
+
+    def link(match: re.Match[str]) -> str:
+        words, target = match.group(1), match.group(2)
+        if re.match(r"[a-z]+:|#", target):
+            return match.group(0)
+        path, _, place = target.partition("#")
+        name = Path(path).stem.lower() if path.endswith(".md") else ""
+        if name in known:
+            return f"[{words}]({name}.md{'#' + place if place else ''})"
+        return words
+
+    return "".join(
+        part if part.startswith("```") else re.sub(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)", link, part)
+        for part in _parts(text)
+    )
+
+
+def _parts(text: str) -> Iterator[str]:
+    """Prose and fenced blocks in turn: what stands in a block is left alone."""
+    return iter(re.split(r"(^```.*?^```$)", text, flags=re.M | re.S))
+
+
+def _fingerprint(documents: dict[str, Path]) -> str:
+    digest = hashlib.sha256((_HERE / "conf.py").read_bytes() + Path(__file__).read_bytes())
+    for name, path in sorted(documents.items()):
+        digest.update(name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache() -> Path:
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    return (Path(home) if home else Path.home() / ".cache") / "rds" / "help"
+
+
+def _check_replaceable(place: Path) -> None:
+    if any(place.iterdir()) and not (place / "searchindex.js").is_file():
+        raise InputError("is a folder with other things in it; choose a new one", str(place))

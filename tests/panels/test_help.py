@@ -1,0 +1,79 @@
+"""The help: built from the documents without a fault, searchable, opened at the page of the panel one is in."""
+
+from __future__ import annotations
+
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.help.build import _local, help_pages, page_file, sources
+from rds.help.serve import HelpServer
+from rds.panels import PANELS
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return help_pages(tmp_path_factory.mktemp("help") / "pages")
+
+
+@pytest.fixture
+def server(pages: Path) -> Iterator[HelpServer]:
+    server = HelpServer(pages)
+    yield server
+    server.close()
+
+
+def test_every_document_is_a_page_and_found_by_the_search(pages: Path) -> None:
+    index = (pages / "searchindex.js").read_text()
+    for name in sources():
+        assert (pages / f"{name}.html").is_file() and f'"{name}' in index, name
+    assert "stick" in index
+
+
+def test_pages_ask_nobody_for_anything(pages: Path) -> None:
+    for page in pages.glob("*.html"):
+        text = page.read_text()
+        assert 'src="http' not in text and "@import" not in text, page
+        assert not [line for line in text.splitlines() if "<link" in line and 'href="http' in line], page
+
+
+def test_every_panel_names_a_page_that_exists() -> None:
+    for name in PANELS.names():
+        subject = PANELS.module(name).HELP
+        assert page_file(subject) == f"{subject}.html", f"panel {name}: no document {subject}"
+
+
+def test_links_to_other_files_of_the_checkout_become_text() -> None:
+    text = _local("see [a](examples/x.toml), [b](docs/bus.md#x), [c](#here), [d](https://e.org)", {"bus"})
+    assert text == "see a, [b](bus.md#x), [c](#here), [d](https://e.org)"
+
+
+def test_a_folder_with_other_things_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(InputError, match="other things"):
+        help_pages(tmp_path)
+    assert (tmp_path / "thesis.txt").read_text() == "mine"
+
+
+def test_only_who_knows_the_path_reads_the_pages(server: HelpServer) -> None:
+    with urllib.request.urlopen(server.url("experiments.html"), timeout=10) as answer:
+        assert b"Experiments" in answer.read()
+    base = server.url("").rsplit("/", 2)[0]
+    for path in ("/", "/experiments.html", "/x/experiments.html", server.url("../../../etc/passwd")[len(base) :]):
+        with pytest.raises(urllib.error.HTTPError):
+            urllib.request.urlopen(base + path, timeout=10)
+
+
+def test_help_opens_at_the_page_of_the_panel(open_page: Callable[..., Any]) -> None:
+    page = open_page("Equipment control")
+    page.click('.rds-head button:text-is("Help")')
+    frame = page.frame_locator(".rds-guide iframe")
+    frame.locator('h1:has-text("Experiments")').wait_for()
+    frame.locator('input[name="q"]').fill("friction")
+    frame.locator('input[name="q"]').press("Enter")
+    frame.locator("#search-results li").first.wait_for()
