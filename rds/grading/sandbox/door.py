@@ -81,7 +81,7 @@ class Door:
     def close(self) -> None:
         """Let go of the memory."""
         self._words.release()
-        self.memory.close()
+        self.memory.close()  # a second time does nothing, for either
 
     def _sleep(self, number: int) -> bool:
         words, asleep = self._words, self._own + 1

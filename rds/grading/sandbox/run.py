@@ -34,11 +34,14 @@ class Run:
         self.has_ended = False
         self._asked: list[tuple[float, ...]] = []
         self._answered: list[tuple[float, ...]] = []
-        self._exchange = self._door() if through_door else self._pipes()
+        self._door = self._open_door() if through_door else None
+        self._exchange = self._pipes() if self._door is None else self._through(self._door)
 
     def ask(self, *values: float) -> tuple[float, ...]:
         """The answer to `values`, finite; SubmissionError if there is none, or one to something else."""
         cell, k = self.cell, self.k
+        if cell.is_closed:
+            raise ValueError("this run has ended; begin another one")
         cell.turn += 1
         answer = self._exchange(k, values)
         if answer[0] != k or answer[1] != records.OK or not all(map(isfinite, answer)):
@@ -65,10 +68,12 @@ class Run:
 
         return exchange
 
-    def _door(self) -> Exchange:
+    def _open_door(self) -> Door:
+        memory, question_bell, answer_bell = self.cell.door
+        return Door(memory, answer_bell, question_bell, self.cell.answers, asks=True)
+
+    def _through(self, door: Door) -> Exchange:
         cell, pack_into, unpack_from = self.cell, self.layout.question.pack_into, self.layout.answer.unpack_from
-        memory, question_bell, answer_bell = cell.door
-        door = Door(memory, answer_bell, question_bell, cell.answers, asks=True)
         shared, wait, post = door.memory, door.wait, door.post
         number = 0
 
@@ -82,6 +87,11 @@ class Run:
             return unpack_from(shared, ANSWER)
 
         return exchange
+
+    def close(self) -> None:
+        """Let go of the door; what was recorded stays."""
+        if self._door is not None:
+            self._door.close()
 
     def recorded(self, most: int | None = None) -> list[Sample]:
         """What was asked and answered so far, of the first `most` samples."""

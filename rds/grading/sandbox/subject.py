@@ -203,7 +203,7 @@ class Subject:
         self._cell = cell = Cell(interpreter, budget or self._budget, self._supervisor, self._place.inner)
         self._run, self._is_fresh = None, True
         text = base64.b64encode(self._submission.data).decode()
-        order = {"kind": self._kind, "name": self._submission.name, "text": text}
+        order = {"kind": self._kind, "name": self._submission.name, "text": text, "counted": budget is not None}
         answer = self._answer(cell, order, self.limits.load_seconds, Status.FAILED_TO_LOAD)
         defines, params, problem = (answer.get(key) for key in ("defines", "params", "problem"))
         if not isinstance(defines, list) or not isinstance(params, dict) or not isinstance(problem, str):
@@ -226,6 +226,8 @@ class Subject:
 
     def _leave(self) -> None:
         """End the cell, and keep what it printed."""
+        if self._run is not None:
+            self._run.close()
         if self._cell is not None:
             self._cell.close()
             self._printed.append(self._cell.output.text)

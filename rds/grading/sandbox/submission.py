@@ -42,10 +42,10 @@ def read_submission(path: Path) -> Submission:
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else str(error)
         raise SubmissionError(Status.REFUSED, f"it cannot be opened, or is a link: {said}") from None
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise SubmissionError(Status.REFUSED, "it is not a regular file; hand in one Python file")
     with os.fdopen(descriptor, "rb") as file:
-        found = os.fstat(descriptor)
-        if not stat.S_ISREG(found.st_mode):
-            raise SubmissionError(Status.REFUSED, "it is not a regular file; hand in one Python file")
         data = file.read(LARGEST + 1)
     if len(data) > LARGEST:
         raise SubmissionError(Status.REFUSED, f"it has more than {LARGEST} bytes; keep data out of it")

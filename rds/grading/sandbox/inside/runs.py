@@ -14,7 +14,7 @@ from rds.checks.values import shown
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import InputError
 from rds.core.load import StudentFile
-from rds.core.types import ArcSegment, LineSegment, Segment
+from rds.core.types import ArcSegment, LineSegment, Reference, Segment
 from rds.grading.sandbox import records
 from rds.grading.sandbox.inside import walls
 from rds.grading.sandbox.inside.channel import Channel
@@ -30,7 +30,7 @@ def control(channel: Channel, student: StudentFile, order: dict[str, Any], count
     axes = int(order["axes"])
     layout = records.control_layout(axes)
     references = [LiveReference() for _ in range(axes)]
-    cells = [each for r in references for each in (r.position, r.velocity, r.acceleration)]
+    cells = [getattr(each, part) for part in Reference._fields for each in references]
     try:
         controller = student.controller(coupled=axes > 1, params=order["params"])
         if order["initial_state"] is not None:

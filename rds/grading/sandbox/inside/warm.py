@@ -127,7 +127,8 @@ def _submission(
         os.dup2(ends.output, 1)
         os.dup2(ends.output, 2)
         os.dup2(os.open("/dev/null", os.O_RDONLY), 0)
-        questions, answers, _, *door = (fcntl.fcntl(fd, fcntl.F_DUPFD, _ABOVE) for fd in ends[:-1])
+        kept = (ends.questions, ends.answers, ends.memory, ends.question_bell, ends.answer_bell)
+        questions, answers, *door = (fcntl.fcntl(fd, fcntl.F_DUPFD, _ABOVE) for fd in kept)
         walls.confine(request["limits"], baseline, calls, request["cpus"])
     except BaseException as error:
         status.send(f"broken: {type(error).__name__}: {error}".encode()[:500])

@@ -18,7 +18,7 @@ from rds.core.load import StudentFile, load_student
 from rds.core.signature import INTERFACES, form
 from rds.grading.sandbox.inside import runs, walls
 from rds.grading.sandbox.inside.channel import Channel, Closed
-from rds.grading.sandbox.inside.counting import counter
+from rds.grading.sandbox.inside.counting import counter, work_alone
 from rds.grading.sandbox.inside.plain import NotPlain, plain
 
 _RUNS = {"control": runs.control, "model": runs.model, "rows": runs.rows}
@@ -33,6 +33,8 @@ def main(questions: int, answers: int, door: list[int]) -> int:
     np.random.seed(0)
     try:
         order = channel.ask()
+        if order["counted"]:
+            work_alone()
         file = Path(walls.HOME) / order["name"]
         file.write_bytes(base64.b64decode(order["text"]))
         loaded = _load(channel, order["kind"], file)
