@@ -15,6 +15,8 @@ from rds.commands import (
     analyse,
     bus,
     data,
+    design,
+    docs,
     estop,
     excite,
     fault,
@@ -53,8 +55,11 @@ app.command()(fit.fit)
 app.command()(excite.excite)
 app.command()(validate.validate)
 app.command("app")(app_page)
+app.command()(docs.docs)
 app.command()(interpolate.interpolate)
 app.command()(robustness.robustness)
+app.add_typer(design.app, name="design")
+machine_app.command("from")(design.machine_from)
 
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]
 
@@ -107,15 +112,20 @@ def run(
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(help="A file with control(), derivatives(), advance() or interpolate().")],
+    file: Annotated[Path, typer.Argument(help="A .py file with control(), derivatives(), ...; or a model file.")],
     sample_period: Annotated[float, typer.Option(help="Sample period that a call must fit into, s.")] = 0.001,
     json: Json = False,
 ) -> None:
     """Say which interface a file fills, and whether it keeps it."""
     with refusals(), stdout_kept(json):
-        from rds.checks import check_file
+        if file.suffix == ".toml":
+            from rds.identification.run_model import check_model_file
 
-        report = check_file(file, sample_period)
+            report = check_model_file(file, sample_period)
+        else:
+            from rds.checks import check_file
+
+            report = check_file(file, sample_period)
     if json:
         print_json(report.to_json())
     else:

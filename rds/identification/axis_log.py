@@ -119,6 +119,8 @@ def _on_one_time(
     others = [part.time for part in parts.values() if part.time is not None and part.time is not grid]
     if any(len(time) == 0 for time in others):
         raise InputError("a column that the map names holds no values", str(table.path))
+    if not others:  # the times themselves are judged by time_base
+        return grid, {name: part.values for name, part in parts.items()}
     first, last = max([grid[0], *(t[0] for t in others)]), grid[-1]
     if second is not None and any(part.second for part in parts.values()):
         last = min([last, *(p.time[-1] for p in parts.values() if p.second and p.time is not None)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.identification.data_steps import BEYOND_MEASURE
 from rds.identification.log import Finding, Gravity
 from rds.identification.map import DIMENSIONS, ColumnMap, TimeMap
 from rds.identification.table import Column, Table
@@ -27,6 +28,7 @@ def column_time(table: Table, about: TimeMap) -> np.ndarray:
         )
     column = table.column(about.column, about.place)
     unit = _unit(column, about.unit, "time", about.place)
+    _check_size(column.values, f"time ({column.name!r})", about.place)
     values = (
         column.time if column.time is not None else (about.scale * column.values + about.offset) * factor(unit, "s")
     )
@@ -52,6 +54,7 @@ def quantity(
         )
         findings.append(Finding("units", what, Gravity.WARNING))
     values = column.values
+    _check_size(values, f"{name} ({column.name!r})", about.place)
     if about.scale != 1.0 or about.offset != 0.0 or about.sign != 1:
         values = about.sign * (about.scale * values + about.offset)
     if of in ("counts", "count speed"):
@@ -68,6 +71,15 @@ def quantity(
         unit_out = "deg/s"
     times = factor(unit, unit_out)
     return (values if times == 1.0 else values * times), unit_out, findings
+
+
+def _check_size(values: np.ndarray, what: str, place: str) -> None:
+    with np.errstate(invalid="ignore"):
+        far = np.abs(values) > BEYOND_MEASURE
+    far &= np.isfinite(values)  # what is not finite is a blank, and told as such
+    if far.any():
+        k = int(np.argmax(far))
+        raise InputError(f"{what} holds {values[k]:g} in row {k}, beyond what is measured ({BEYOND_MEASURE:g})", place)
 
 
 def _unit(column: Column, stated: str | None, name: str, place: str) -> str:

@@ -55,7 +55,8 @@ def read_csv(
         unit = unit_of_name(name) if unit is None else unit
         if at in texts:
             columns[name] = Column(name, unit, np.full(rows, np.nan), text=texts[at])
-        elif not (at and at == len(names) - 1 and np.isnan(values[at]).all()):  # a delimiter at the end of each line
+        elif not (at and at == len(names) - 1 and name == f"column {at + 1}" and np.isnan(values[at]).all()):
+            # but for what a delimiter at the end of each line makes
             columns[name] = Column(name, "s" if at in layout.dates else unit, values[at])
     return Table(path, "csv", columns, findings=tuple(findings))
 

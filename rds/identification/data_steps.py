@@ -7,6 +7,7 @@ import numpy as np
 from rds.identification.log import Finding, Gravity, Log
 from rds.machines.machine import Axis
 
+BEYOND_MEASURE = 1e15  # nothing that was measured is larger, in whatever unit; squares and sums of less stay finite
 _LOOKED_AT = 200_000  # samples
 _CHUNKS = 20
 _ULPS = 8.0  # of the largest value: what rounding makes of a difference
@@ -22,8 +23,10 @@ def step_of(values: np.ndarray) -> float | None:
 
     The greatest common divisor of the differences, to within rounding; then fitted to all of them.
     """
-    differences = np.abs(np.concatenate([np.diff(chunk) for chunk in _chunks(values)]))
     largest = float(np.max(np.abs(values), initial=0.0))
+    if largest > BEYOND_MEASURE:
+        return None
+    differences = np.abs(np.concatenate([np.diff(chunk) for chunk in _chunks(values)]))
     single = bool(np.all(values[:1000] == values[:1000].astype(np.float32)))
     rounding = _ULPS * float(np.spacing(np.float32(largest)) if single else np.spacing(largest))
     differences = differences[differences > rounding]

@@ -137,6 +137,9 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     units = {dimension(c.unit or "") for c in columns} | {"adc" for c in columns if c.name.endswith("_adc")}
     numbered = next((c.name for c in columns if c.name.lower() in _ORDINALS), None)
     sentence = f"{_NO_LOG}: "
+    if any(_role(c.name) == "time" for c in in_time):
+        name = next(c.name for c in in_time if _role(c.name) == "time")
+        return f"{sentence}{name!r} does not increase from row to row ({len(in_time[0].values)} rows)"
     if in_time:
         names = ", ".join(c.name for c in in_time[:3]) + (" ..." if len(in_time) > 3 else "")
         sentence += f"its columns in s ({names}) are durations, and none increases from row to row"

@@ -226,6 +226,11 @@ def _axis(name: str, words: Words, machine: Machine | None) -> AxisMap:
     for needed in ("command", "position"):
         if needed not in columns:
             raise InputError(f"axis {name} needs {needed} = {{ column = ..., unit = ... }}", words.place())
+    command, position = columns["command"], columns["position"]
+    if (command.column, command.second) == (position.column, position.second):
+        raise InputError(
+            f"command and position are both {command.column!r}; one of them is another column", command.place
+        )
     of = words.text("machine_axis")
     if of is not None and machine is None:
         raise words.fault("machine_axis", 'names an axis of no machine; add machine = "mini-cnc" at the top')
@@ -300,7 +305,7 @@ def _range(words: Words) -> tuple[float, float] | None:
     if value is None:
         return None
     numbers = value if isinstance(value, list) else [value]
-    if not all(isinstance(n, int | float) and not isinstance(n, bool) for n in numbers) or len(numbers) > 2:
+    if not all(isinstance(n, int | float) and not isinstance(n, bool) for n in numbers) or len(numbers) not in (1, 2):
         raise words.fault("voltage_range", "must be [lowest, highest] in V, or one number for both directions")
     low, high = (float(numbers[0]), float(numbers[1])) if len(numbers) == 2 else (-float(numbers[0]), float(numbers[0]))
     if not -inf < low < high < inf:

@@ -49,7 +49,8 @@ def read_table(
     except InputError as error:
         raise error if error.where else InputError(str(error), str(path)) from error
     except OSError as error:
-        raise InputError(f"it cannot be read: {error.strerror or error}", str(path)) from error
+        reason = error.strerror or f"{error}; it is cut or damaged: take another copy"
+        raise InputError(f"it cannot be read: {reason}", str(path)) from error
 
 
 def _is_bus_csv(path: Path) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from data_files import MAP, axis, headed, write
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
@@ -207,3 +207,45 @@ def test_headed_and_mapped_logs_agree(tmp_path: Path) -> None:
     (guessed,) = read_log(write(tmp_path / "log.csv", headed(axis())))
     mapped = read(tmp_path / "mapped", axis())
     assert np.array_equal(guessed.position, mapped.position) and np.array_equal(guessed.time, mapped.time)
+
+
+# --- files at the edge
+
+
+def rows(time: str, command: str, position: str, count: int = 200) -> str:
+    """A table by a format of each cell; `i` is the row."""
+    body = "".join(f"{time},{command},{position}\n".format(i=i, j=i % 7, k=i % 3) for i in range(count))
+    return "time [s],u [V],y [mm]\n" + body
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (rows("{i}", "{j}", "{k}", 0), "no lines of numbers"),
+        (rows("{i}", "{j}", "{k}", 1), r"'time' does not increase from row to row \(1 rows\)"),
+        (rows("1", "{j}", "{k}"), r"'time' does not increase from row to row \(200 rows\)"),
+        (rows("{i}", "{j}", "nan"), "position has no number in 200 of 200 samples"),
+        (rows("{i}", "{j}", "inf"), "position has no number in 200 of 200 samples"),
+        (rows("{i}", "{j}e300", "{k}"), r"command \('u'\) holds 1e\+300 in row 1, beyond what is measured"),
+        (rows("{i}e-3", "{j}", "{k}").replace("9e-3", "9e300"), "beyond what is measured|goes back"),
+    ],
+)
+def test_files_at_the_edge_are_refused_in_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        read_log(path)
+
+
+@pytest.mark.parametrize("ending", [".mat", ".parquet", ".blf", ".asc", ".log", ".trc", ".csv"])
+@settings(max_examples=8)
+@given(data=st.binary(max_size=300), whole=st.booleans())
+def test_rubbish_of_every_ending_is_refused_in_a_sentence(
+    tmp_path_factory: pytest.TempPathFactory, ending: str, data: bytes, whole: bool
+) -> None:
+    begin = {".mat": b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM", ".parquet": b"PAR1", ".blf": b"LOGG"}
+    path = tmp_path_factory.mktemp("rubbish") / f"log{ending}"
+    path.write_bytes((begin.get(ending, b"") if whole else b"") + data)
+    with pytest.raises(InputError) as refusal:
+        read_log(path)
+    assert str(refusal.value).startswith(str(path))

@@ -34,6 +34,8 @@ def saved(folder: Path, text: str) -> Path:
         (MAP + "resolution = -1.0\n", 8, "resolution = -1.0 must be from"),
         (MAP + 'machine_axis = "X"\n', 8, "add machine ="),
         (MAP + "voltage_range = [10, -10]\n", 8, "the lowest first"),
+        (MAP + "voltage_range = []\n", 8, "must be [lowest, highest] in V, or one number"),
+        (MAP.replace('"voltage"', '"position"'), 6, "command and position are both 'position'"),
         (MAP + "force_gain = 0.0\n", 8, "make no force"),
         (MAP + 'closed_loop = "yes"\n', 8, "must be true or false"),
         ('gaps = "fill"\n' + MAP, 1, "known: refuse, split, keep"),
