@@ -203,7 +203,7 @@ def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[
         force = np.concatenate([force[:1], 0.5 * (force[1:] + force[:-1])])
     inside = slice(settings.drop, len(log) - settings.drop)
     table = np.column_stack([force, form.columns(velocity, acceleration)])[inside]
-    rest = np.zeros(len(log), bool) if form.is_rate else _at_rest(log, settings)
+    rest = np.abs(log.position) <= (log.resolution or 0.0) if form.is_rate else _at_rest(log, settings)
     q = settings.decimation
     if q == 1:
         return table, rest[inside]

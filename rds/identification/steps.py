@@ -68,7 +68,8 @@ def find_windows(log: Log, is_rate: bool) -> list[Window]:
         voltage = float(u[first:end].mean())
         before = float(u[first - 1]) if number else None
         if is_rate:
-            windows.append(Window(first, last, voltage, before, 1, False))
+            if np.abs(y[first:last]).max() > 2.0 * (log.resolution or 0.0):  # at rest, friction answers any voltage
+                windows.append(Window(first, last, voltage, before, 1, False))
             continue
         found = _axis_window(log.time, y, first, last, log.resolution or 0.0)
         if found is not None:
