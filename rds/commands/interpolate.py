@@ -5,14 +5,15 @@ from __future__ import annotations
 import json as json_text
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, NoReturn
 
 import typer
 
 from rds.commands.common import Json, print_json, progress_bars, refusals, stdout_kept
-from rds.commands.nc_options import MachineName, Parameters, Tools, With, setup
+from rds.commands.nc_options import MachineName, MaxJumps, Parameters, Tools, With, setup
 
 if TYPE_CHECKING:
+    from rds.commands.interpolate_path import Programmed
     from rds.core.types import Segment
     from rds.interpolators.acceleration import Acceleration
     from rds.interpolators.interpolator import Interpolator
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 MOST = 2_000_000  # samples of a program
 _FOLDER = Path("interpolation")
+_METHOD = "constant-velocity"
 
 
 def interpolate(
@@ -36,7 +38,7 @@ def interpolate(
     period: Annotated[float, typer.Option(help="Sample period, s.")] = 0.001,
     method: Annotated[
         str, typer.Option("--method", "-m", help="Interpolator: a library name, or a file with interpolate().")
-    ] = "constant-velocity",
+    ] = _METHOD,
     arc_method: Annotated[str | None, typer.Option(help="Another one for arcs, with its default options.")] = None,
     option: Annotated[
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="Of --method: blu=0.001, steps=39, a file's params.")
@@ -46,6 +48,12 @@ def interpolate(
         float | None, typer.Option(help="How long the velocity rises, s; of exponential its time constant.")
     ] = None,
     multipliers: Annotated[str | None, typer.Option(help="Of s-shape, one for each sample: 1,2,3,2,1.")] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a part program, in place of an interpolator: planned, trapezoid, blended or point-to-point."
+        ),
+    ] = None,
     exact_stop: Annotated[
         bool, typer.Option("--exact-stop", help="With --acceleration: come to rest at the end of each segment.")
     ] = False,
@@ -53,6 +61,7 @@ def interpolate(
     tools: Tools = None,
     parameters: Parameters = None,
     with_: With = None,
+    max_jumps: MaxJumps = None,
     plot: Annotated[
         bool, typer.Option("--plot", help="Save pictures too, in --out or the folder interpolation.")
     ] = False,
@@ -60,22 +69,36 @@ def interpolate(
     json: Json = False,
 ) -> None:
     """Position, velocity and acceleration of each axis along a path, and how far it is from what was programmed."""
+    reading = (tools, parameters, with_, max_jumps)
+    if profile is not None:
+        with refusals():
+            _check_words(file, {"--line": line, "--arc": arc}, clockwise, plane, feed)
+            given = {"--method": method != _METHOD, "--arc-method": arc_method, "--option": option}
+            given |= {"--acceleration": acceleration, "--acceleration-time": acceleration_time is not None}
+            given |= {"--multipliers": multipliers, "--exact-stop": exact_stop}
+            _follow_profile(profile, file, given, machine, period, reading, plot, out, json)
     with refusals(), stdout_kept(json):
         from rds.interpolators.path import interpolate as follow
 
-        words = {"--line": line, "--arc": arc}
-        _check_words(file, words, clockwise, plane, feed)
+        _check_words(file, {"--line": line, "--arc": arc}, clockwise, plane, feed)
         notes: list[str] = []
         chosen = _method(method, option, period, notes)
         arcs = None if arc_method is None else _method(arc_method, None, period, notes)
         filter_ = _acceleration(acceleration, acceleration_time, multipliers, exact_stop)
+        rests: dict[int, float] = {}
         if file is not None:
-            segments, left_out = _program(file, machine, period, (tools, parameters, with_))
-            notes += left_out
+            segments, rests, said = _program(file, machine, period, reading)
+            notes += said
         else:
-            _check_program_words(machine=machine != "mini-cnc", tools=tools, parameters=parameters, with_=with_)
+            of_programs: dict[str, Any] = {
+                "tools": tools,
+                "parameters": parameters,
+                "with": with_,
+                "max-jumps": max_jumps,
+            }
+            _check_program_words({"machine": machine != "mini-cnc", **of_programs})
             segments = _segments(line, arc, clockwise, plane, feed or "")
-        done = follow(segments, period, chosen, arcs=arcs, acceleration=filter_, exact_stop=exact_stop)
+        done = follow(segments, period, chosen, arcs=arcs, acceleration=filter_, exact_stop=exact_stop, rests=rests)
         files = _save(done, out, plot)
     if json:
         print_json({**done.to_json(), "notes": notes, "files": [str(path) for path in files]})
@@ -108,12 +131,12 @@ def _check_words(
         raise InputError(f"--{'clockwise' if clockwise else 'plane'} is for --arc, and {given[0]} was given")
 
 
-def _check_program_words(**given: Any) -> None:
+def _check_program_words(given: dict[str, Any]) -> None:
     from rds.core.errors import InputError
 
     for name, value in given.items():
         if value:
-            raise InputError(f"--{name.strip('_')} is for a part program; --line and --arc are taken as they are")
+            raise InputError(f"--{name} is for a part program; --line and --arc are taken as they are")
 
 
 def _method(name: str, options: list[str] | None, T: float, notes: list[str]) -> Interpolator:
@@ -186,24 +209,48 @@ def _segments(line: str | None, arc: str | None, clockwise: bool, plane: str | N
     return words.arc(arc or "", rate, clockwise, plane or "XY")
 
 
-def _program(file: Path, machine: str, T: float, reading: tuple[Any, Any, Any]) -> tuple[list[Segment], list[str]]:
-    from rds.commands.interpolate_path import program
+def _follow_profile(
+    profile: str,
+    file: Path | None,
+    given: dict[str, Any],
+    machine: str,
+    T: float,
+    reading: tuple[Any, Any, Any, Any],
+    plot: bool,
+    out: Path | None,
+    json: bool,
+) -> NoReturn:
+    """`--profile`: a part program by a profile of rds.motion."""
+    from rds.commands.interpolate_profile import follow
+    from rds.core.errors import InputError
+
+    if file is None:
+        raise InputError("--profile is for a part program; --line and --arc go through interpolators (--method)")
+    for name, used in given.items():
+        if used:
+            raise InputError(f"{name} is of interpolators, and --profile takes their place; leave one of them")
+    _check_program_file(file, T)
+    follow(profile, file, machine, T, setup(*reading), folder=out or (_FOLDER if plot else None), plot=plot, json=json)
+
+
+def _check_program_file(file: Path, T: float) -> None:
     from rds.core.errors import InputError
     from rds.core.options import Option
-    from rds.machines import load_machine
-    from rds.nc.check import motion
 
     Option("sample period, s", more_than=0.0).check(T, "--period", "rds interpolate")
     if not file.is_file():
         raise InputError("there is no such part program; check the name and the folder", str(file))
+
+
+def _program(file: Path, machine: str, T: float, reading: tuple[Any, Any, Any, Any]) -> Programmed:
+    from rds.commands.interpolate_path import program
+    from rds.machines import load_machine
+    from rds.nc.check import motion
+
+    _check_program_file(file, T)
     loaded = load_machine(machine)
     with progress_bars() as bar:
-        found = program(motion(file, loaded, setup(*reading), bar("read")), loaded, T, MOST)
-    if not found.left_out:
-        return found.segments, []
-    return found.segments, [
-        f"{' and '.join(found.left_out)} left out here, where only moves take time; `rds nc time` counts them"
-    ]
+        return program(motion(file, loaded, setup(*reading), bar("read")), loaded, T, MOST)
 
 
 def _save(done: Interpolation, out: Path | None, plot: bool) -> list[Path]:

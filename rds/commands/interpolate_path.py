@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 PLANES = {"XY": (0, 1), "ZX": (2, 0), "YZ": (1, 2)}
 _PER_SECOND = {"mm/min": 1 / 60, "mm/s": 1.0, "m/min": 1000 / 60, "in/min": 25.4 / 60, "in/s": 25.4}  # mm/s
 _FEED = re.compile(r"\s*([^\s/a-z]+)\s*([a-z/]*)\s*")
+_RESTING = {"dwell": "dwell (G4)", "stop": "stop (M0, M1, M60)", "tool": "tool change (M6)"}
 _TURN = 2 * pi * (1 + 1e-12)
 
 
 class Programmed(NamedTuple):
-    """A program's moves, and what in it takes time or stops the axes and is no move."""
+    """A program's moves, after which of them the axes rest and for how long (s; -1: before the first), and notes."""
 
     segments: list[Segment]
-    left_out: list[str]
+    rests: dict[int, float]
+    notes: list[str]
 
 
 def feed_rate(text: str) -> float:
@@ -74,14 +76,14 @@ def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) 
 
     fastest = Limits.of(machine).velocity
     segments: list[Segment] = []
-    left_out: dict[str, int] = {}
+    rests: dict[int, float] = {}
+    counts: dict[str, int] = {}
     samples = 0.0
     for block in blocks:
-        for event in block.events:
-            if event.kind in ("dwell", "stop", "tool"):
-                left_out[event.kind] = left_out.get(event.kind, 0) + 1
+        made = [len(segments) - 1]  # the segment made of the last row before each row
         for row in block.segments:
             if row["length"] <= 0.0:
+                made.append(len(segments) - 1)
                 continue
             if np.any(row["start"][3:] != row["end"][3:]):
                 raise InputError(
@@ -89,17 +91,33 @@ def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) 
                     f"line {row['line']}",
                 )
             rate = _rapid(row, fastest) if row["rapid"] else float(row["rate"])
-            samples += row["length"] / rate / T + 1.0
-            if samples > most:
-                raise InputError(
-                    f"the program takes more than {most} samples of {T:g} s, which are held in memory; "
-                    f"give a longer --period, or plan it with `rds nc`"
-                )
+            samples = _counted(samples + row["length"] / rate / T + 1.0, most, T)
             segments += _segments(row, rate)
+            made.append(len(segments) - 1)
+        for event in block.events:
+            if event.kind in _RESTING:
+                seconds = float(event.value) if event.kind == "dwell" else 0.0
+                after = made[event.after + 1]
+                rests[after] = rests.get(after, 0.0) + seconds
+                counts[event.kind] = counts.get(event.kind, 0) + 1
+                samples = _counted(samples + seconds / T, most, T)
     if not segments:
         raise InputError("the program moves nothing; there is nothing to interpolate")
-    names = {"dwell": "dwell (G4)", "stop": "stop (M0, M1, M60)", "tool": "tool change (M6)"}
-    return Programmed(segments, [f"{count} × {names[kind]}" for kind, count in left_out.items()])
+    said = [f"{count} × {_RESTING[kind]}" for kind, count in counts.items() if kind != "dwell"]
+    notes = [f"{' and '.join(said)}: the axes rest, and it goes on at once"] if said else []
+    if seconds := sum(rests.values()):
+        notes.append(f"{counts['dwell']} × {_RESTING['dwell']}: the axes rest for {seconds:g} s in all")
+    return Programmed(segments, rests, notes)
+
+
+def _counted(samples: float, most: int, T: float) -> float:
+    """The same count, unless it is too large: InputError."""
+    if samples > most:
+        raise InputError(
+            f"the program takes more than {most} samples of {T:g} s, which are held in memory; "
+            f"give a longer --period, or plan it with `rds nc`"
+        )
+    return samples
 
 
 def _segments(row: np.ndarray, rate: float) -> list[Segment]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rds.commands.common import Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
-from rds.commands.nc_options import Parameters, Program, Tools, With, setup
+from rds.commands.nc_options import MaxJumps, Parameters, Program, Tools, With, setup
 
 if TYPE_CHECKING:
     from rds.commands.keys import Keys
@@ -34,6 +34,7 @@ def run(
     tools: Tools = None,
     parameters: Parameters = None,
     with_: With = None,
+    max_jumps: MaxJumps = None,
     override: Annotated[float, typer.Option(help="Feed, per cent of the programmed one.", min=0, max=200)] = 100.0,
     controller: Annotated[
         str | None,
@@ -69,7 +70,7 @@ def run(
             part = PartProgram(
                 file,
                 machine,
-                setup=setup(tools, parameters, with_),
+                setup=setup(tools, parameters, with_, max_jumps),
                 controller=None if experiment is not None else controller,
                 experiment=experiment,
                 mode=mode,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from math import ceil
 
 import numpy as np
 
@@ -28,12 +29,14 @@ def interpolate(
     acceleration: Acceleration | None = None,
     exact_stop: bool = False,
     axes: Sequence[str] | None = None,
+    rests: Mapping[int, float] | None = None,
 ) -> Interpolation:
     """The whole path sampled every `T` s, from rest at its start.
 
     `method` (default: constant velocity) interpolates it, `lines` and `arcs` in its stead what they are for.
     `acceleration` filters the motion as one stream, so that corners are rounded; with `exact_stop` each segment by
-    itself, so that the axes come to rest at its end. `axes` are their names (default X, Y, Z, A, B, C).
+    itself, so that the axes come to rest at its end. `axes` are their names (default X, Y, Z, A, B, C). `rests` says
+    after which segments (by index; -1: before the first) the axes rest, and for how many s at least, a dwell's.
     Positions are in whole BLU where one of the methods says so. Raises InputError for segments that don't follow each
     other or that a method doesn't take, ContractError for a user's method that breaks its interface.
     """
@@ -44,26 +47,10 @@ def interpolate(
     chosen = [pair[isinstance(segment, ArcSegment)] for segment in segments]
     parts = [each.rows(segment, T) for each, segment in zip(chosen, segments, strict=True)]
     weights = acceleration.weights(T) if acceleration else np.ones(1)
-    index = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    if not len(index):
+    if not any(map(len, parts)):
         raise InputError("the path has no length: each of its segments ends where it starts; give another end")
-    if acceleration is None:
-        rows = np.concatenate(parts)
-        first = last = index
-    else:
-        streams = parts if exact_stop else [np.concatenate(parts)]
-        rows = np.array([row for rows in _smoothed(streams, segments, weights, T) for row in rows])
-        held = len(weights) - 1
-        if exact_stop:
-            index = np.repeat(np.arange(len(parts)), [len(part) + held if len(part) else 0 for part in parts])
-            first = last = index
-        else:
-            last = np.concatenate([index, np.full(held, index[-1])])
-            first = np.concatenate([np.full(held, index[0]), index])  # what is still in the filter
-    start = np.zeros((1, 3, len(names)))
-    start[0, 0] = segments[0].start
-    rows = np.concatenate([start, rows])
-    first, last = (np.concatenate([each[:1], each]) for each in (first, last))
+    ends = range(len(parts)) if exact_stop and acceleration is not None else ()
+    rows, first, last = _streams(parts, np.array(segments[0].start, dtype=float), weights, T, dict(rests or {}), ends)
     blu = next((each.blu for each in chosen if each.blu is not None), None)
     theory = rows[:, 0]
     position = theory if blu is None else np.rint(theory / blu) * blu
@@ -87,14 +74,44 @@ def interpolate(
     )
 
 
-def _smoothed(
-    streams: Sequence[np.ndarray], segments: Sequence[Segment], weights: np.ndarray, T: float
-) -> Iterator[Iterator[np.ndarray]]:
-    start = np.array(segments[0].start, dtype=float)
-    for stream in streams:
-        yield (np.array(row) for row in smooth(stream, start, weights, T))
+def _streams(
+    parts: Sequence[np.ndarray],
+    start: np.ndarray,
+    weights: np.ndarray,
+    T: float,
+    rests: dict[int, float],
+    ends: Iterable[int],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows (samples + 1, 3, axes) of the whole motion; the first and the last segment that each sample is made of.
+
+    Filtered stream by stream: one ends after each of the segments `ends` and those after which the axes rest.
+    """
+    held = len(weights) - 1
+    here = start
+    rows: list[np.ndarray] = []
+    first: list[np.ndarray] = []
+    last: list[np.ndarray] = []
+
+    def stay(count: int, segment: int) -> None:
+        still = np.zeros((count, 3, len(start)))
+        still[:, 0] = here
+        rows.append(still)
+        first.append(np.full(count, max(segment, 0)))
+        last.append(first[-1])
+
+    stay(1 + ceil(rests.get(-1, 0.0) / T - 1e-9), -1)
+    begin = 0
+    for end in sorted({*ends, *(k for k in rests if k >= 0), len(parts) - 1}):
+        stream = np.concatenate(parts[begin : end + 1])
+        index = np.repeat(np.arange(begin, end + 1), [len(part) for part in parts[begin : end + 1]])
         if len(stream):
-            start = stream[-1, 0]
+            rows.append(stream if not held else np.array(list(smooth(stream, here, weights, T))))
+            first.append(np.concatenate([np.full(held, index[0]), index]))  # what is still in the filter
+            last.append(np.concatenate([index, np.full(held, index[-1])]))
+            here = stream[-1, 0]
+        stay(ceil(rests.get(end, 0.0) / T - 1e-9), end)
+        begin = end + 1
+    return np.concatenate(rows), np.concatenate(first), np.concatenate(last)
 
 
 def _names(axes: Sequence[str] | None, segments: Sequence[Segment]) -> tuple[str, ...]:

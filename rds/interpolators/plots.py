@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -28,16 +29,23 @@ def pictures(done: Interpolation) -> dict[str, Picture]:
 
 def motion(done: Interpolation) -> Picture:
     """Position, velocity and acceleration of each axis over time."""
+    return over_time(done.time, done.axes, done.position, done.velocity, done.acceleration_rows)
+
+
+def over_time(
+    time: np.ndarray, names: Sequence[str], position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray
+) -> Picture:
+    """The same of samples (m, axes) in mm, mm/s and mm/s² at `time` (m) in s."""
     picture = Picture(7.5)
     grid = picture.subplots(3, 1, sharex=True)
     quantities = (
-        ("position [mm]", done.position),
-        ("velocity [mm/s]", done.velocity),
-        ("acceleration [mm/s²]", done.acceleration_rows),
+        ("position [mm]", position),
+        ("velocity [mm/s]", velocity),
+        ("acceleration [mm/s²]", acceleration),
     )
     for axes, (name, values) in zip(grid, quantities, strict=True):
-        for k, axis in enumerate(done.axes):
-            axes.plot(done.time, values[:, k], color=CYCLE[k], linestyle=_STYLES[k], linewidth=1.3, label=axis)
+        for k, axis in enumerate(names):
+            axes.plot(time, values[:, k], color=CYCLE[k], linestyle=_STYLES[k], linewidth=1.3, label=axis)
         dress(axes, name, "time [s]" if axes is grid[-1] else None)
     legend(grid[0], columns=6)
     picture.align_ylabels()

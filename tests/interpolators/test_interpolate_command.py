@@ -77,13 +77,72 @@ def test_a_part_program(tmp_path: Path) -> None:
     # rapid, line, quarter, helix, half circle in ZX, and P3: two whole turns and a part
     assert said["segments"] == 8 and said["axes"] == ["X", "Y", "Z"]
     length = 10 * np.sqrt(2) + 30 + 5 * np.pi + np.hypot(20 * np.pi, 2) * 0.75
-    assert said["notes"] == ["1 × dwell (G4) left out here, where only moves take time; `rds nc time` counts them"]
+    assert said["notes"] == ["1 × dwell (G4): the axes rest for 1 s in all"]
     table = open_result(tmp_path / "interpolation.csv")
     end = [table[f"{axis}_reference"][-1] for axis in "XYZ"]
     assert end == [60.0, 20.0, -4.0]
     assert said["path_error_mm"] < 1e-6 and said["programmed_length_mm"] > length
     quick = table["X_reference_velocity"][table["segment"] == 1].max()
     assert quick == pytest.approx(13.0, rel=0.02)  # the mini CNC's axes
+
+
+@pytest.mark.parametrize("words", ["", "--acceleration s-shape --acceleration-time 0.1", "-m reference-pulse"])
+def test_dwells_of_a_part_program_take_their_time_at_rest(tmp_path: Path, words: str) -> None:
+    file = tmp_path / "part.ngc"
+    file.write_text("G21 F600\nG4 P0.25\nG1 X10\nG4 P0.5\nG1 Y10\nM0\nX0 Y0\nG4 P1\nM2\n")
+    said = numbers(f"{file} --period 0.01 --out {tmp_path} {words}")
+    assert said["notes"] == [
+        "1 × stop (M0, M1, M60): the axes rest, and it goes on at once",
+        "3 × dwell (G4): the axes rest for 1.75 s in all",
+    ]
+    table = open_result(tmp_path / "interpolation.csv")
+    held = 9 if "s-shape" in words else 0  # samples that the filter adds each time that it comes to rest
+    moving = 100 + held, 100 + held, 142 + held  # 10, 10 and 14.14 mm at 10 mm/s
+    assert said["samples"] == 25 + moving[0] + 50 + moving[1] + moving[2] + 100
+    x, y = table["X_reference"], table["Y_reference"]
+    assert not x[:26].any() and x[26] > 0.0
+    corner = 25 + moving[0]
+    assert (x[corner : corner + 51] == 10.0).all() and not y[: corner + 51].any() and y[corner + 51] > 0.0
+    assert not table["X_reference_velocity"][corner + 1 : corner + 51].any()
+    stop = corner + 50 + moving[1]
+    assert (x[stop], y[stop]) == (10.0, 10.0) and (x[-101:] == 0.0).all()
+
+
+@pytest.mark.parametrize("profile", ["planned", "trapezoid", "blended", "point-to-point"])
+def test_a_part_program_by_a_profile(tmp_path: Path, profile: str) -> None:
+    if profile == "point-to-point":
+        pytest.importorskip("ruckig")
+    file = tmp_path / "part.ngc"
+    file.write_text(PROGRAM)
+    words = f"{file} --profile {profile} --period 0.01 --out {tmp_path / 'out'} --plot"
+    said = numbers(words)
+    assert said["certificate"]["ok"] and said["dwell_s"] == 1.0
+    assert [Path(path).name for path in said["files"]] == ["interpolation.csv", "motion.png", "certificate.png"]
+    table = open_result(tmp_path / "out" / "interpolation.csv")
+    assert len(table) == said["samples"] + 1 and table["time"][-1] == pytest.approx(said["time_s"])
+    assert [table[f"{axis}_reference"][-1] for axis in "XYZ"] == [60.0, 20.0, -4.0]
+    timed = CliRunner().invoke(
+        app, ["nc", "time", str(file), "--profile", profile, "--sample-period", "0.01", "--json"]
+    )
+    assert json.loads(timed.stdout)["samples"] == said["samples"] + 1  # predicted is executed
+    shown = run(words)
+    assert shown.exit_code == 0 and "largest jerk X, of its limit" in shown.stdout
+    assert "Not promised" in shown.stdout if profile in ("trapezoid", "blended") else "Not promised" not in shown.stdout
+
+
+def test_a_profile_takes_the_place_of_an_interpolator(tmp_path: Path) -> None:
+    file = tmp_path / "part.ngc"
+    file.write_text(PROGRAM)
+    for words, message in {
+        "--line 0:5 --feed 600 --profile planned": "--profile is for a part program",
+        f"{file} --profile planned -m tustin": "--method is of interpolators, and --profile takes their place",
+        f"{file} --profile planned --acceleration linear": "--acceleration is of interpolators",
+        f"{file} --profile fast": "profile 'fast' is not one of planned, trapezoid, blended, point-to-point",
+        f"{file}x --profile planned": "there is no such part program",
+        f"{file} --profile planned --period 0": "--period",
+    }.items():
+        done = run(words)
+        assert done.exit_code == 2 and message in " ".join(done.stderr.split()), done.output
 
 
 def test_faults_of_a_part_program_name_their_line(tmp_path: Path) -> None:
