@@ -151,17 +151,19 @@ def _show(found: Design) -> None:
     task = found.task
     title = f"Predicted standard errors [%] of {task.axis.name}, {task.duration:g} s, the best signal of each kind"
     table = Table(title=title, title_justify="left")
-    table.add_column("signal", overflow="fold")
+    table.add_column("signal", no_wrap=True)
     for name in (*task.parameters, "mean"):
         table.add_column(name, justify="right")
     table.add_column(f"travel [{task.axis.unit}]", justify="right")
     for prediction in found.best_of_kinds():
-        words = [f"{key} {value:g}" for key, value in prediction.signal.settings.items() if _is_told(key, value)]
         numbers = [prediction.percent[name] for name in task.parameters] + [prediction.mean_percent]
         low, high = prediction.travel
         row = [f"{value:.2g}" for value in numbers]
-        table.add_row(f"{prediction.signal.kind}: {', '.join(words)}", *row, f"{low:.3g} to {high:.3g}")
+        table.add_row(prediction.signal.kind, *row, f"{low:.3g} to {high:.3g}")
     Console().print(table)
+    for prediction in found.best_of_kinds():
+        words = [f"{key} {value:g}" for key, value in prediction.signal.settings.items() if _is_told(key, value)]
+        typer.echo(f"{prediction.signal.kind}: {', '.join(words)}")
     assumed = ", ".join(f"{name} = {value:g} {task.structure.units[name]}" for name, value in task.values.items())
     typer.echo(
         f"{len(found.ranked)} of {found.tried} signals keep within travel and voltage. Assumed: {assumed}, noise of "

@@ -32,11 +32,14 @@ OPTIONS = {
     ),
     "order": Option("order of the filter, run forward and backward; 4 if not given", at_least=1.0),
     "decimation": Option("one of how many samples is kept; sampling frequency over cut-off if not given", at_least=1.0),
+    "hold": Option(
+        "share of the command before in what acts at a sample: 0.5 for a held command, 0 for a force at that instant",
+        at_least=0.0,
+    ),
     "drop": Option(
         "samples left out at each end; 4.9 sampling frequencies over the cut-off if not given", at_least=0.0
     ),
 }
-ALIGNMENTS = ("hold", "same-instant")
 _JITTER = 0.1  # of a sample period: how far a time may be off the regular grid
 _REST = 2  # decimated samples within which an axis at rest moves no more than one step of its encoder
 _LEAST = 5  # rows for each coefficient
@@ -50,7 +53,7 @@ class Settings:
     order: int
     decimation: int
     drop: int
-    alignment: str
+    hold: float
 
 
 @dataclass(frozen=True)
@@ -68,11 +71,10 @@ class Found:
 
 
 def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Estimate:
-    """The parameters of `structure` by inverse dynamics; `options` are those of `OPTIONS`, and `alignment`.
+    """The parameters of `structure` by inverse dynamics; `options` are those of `OPTIONS`.
 
-    `alignment` says of what time a command is: "hold" (default): it acts from its sample to the next, and at the
-    sample itself the mean of the last two has acted; "same-instant" (default of axis-mass, as its authors have it):
-    it is the force at the sample. InputError where the data hold nothing to estimate from.
+    A central difference at a sample sees the time around it, in which a held command was half the last one and half
+    this one: `hold` is 0.5. The default of axis-mass is 0, as the EMPS's authors have it. InputError where the data hold nothing to estimate from.
     """
     found = regress_logs(logs, structure, options)
     regression, names = found.regression, list(found.form.names)
@@ -103,7 +105,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
             "order": found.settings.order,
             "decimation": found.settings.decimation,
             "dropped_samples": found.settings.drop,
-            "alignment": found.settings.alignment,
+            "hold": found.settings.hold,
             "rows": found.rows,
             "rows_at_rest": found.still,
             "condition": regression.condition,
@@ -149,16 +151,15 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
 
 
 def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Settings:
-    check_known(options, [*OPTIONS, "alignment"], "method inverse-dynamics")
+    check_known(options, OPTIONS, "method inverse-dynamics")
     numbers = {
         name: OPTIONS[name].check(value, name, "inverse-dynamics")
         for name, value in options.items()
-        if name in OPTIONS and value is not None
+        if value is not None
     }
-    usual = "same-instant" if structure.name == "axis-mass" else "hold"
-    alignment = options.get("alignment") or usual
-    if alignment not in ALIGNMENTS:
-        raise InputError(f"inverse-dynamics: alignment = {alignment!r} is not known; known: {', '.join(ALIGNMENTS)}")
+    hold = numbers.get("hold", 0.0 if structure.name == "axis-mass" else 0.5)
+    if hold > 1.0:
+        raise InputError(f"inverse-dynamics: hold = {hold:g} must be at most 1 ({OPTIONS['hold'].meaning})")
     rate = 1.0 / float(np.mean([log.sample_period for log in logs]))
     cutoff = numbers.get("cutoff", rate / 10.0)
     if cutoff >= 0.5 * rate:
@@ -170,7 +171,7 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
         order=int(numbers.get("order", 4)),
         decimation=int(numbers.get("decimation", max(round(rate / cutoff), 1))),
         drop=int(numbers.get("drop", round(4.9 * rate / cutoff))),
-        alignment=alignment,
+        hold=hold,
     )
 
 
@@ -199,8 +200,8 @@ def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[
     velocity = smooth if form.is_rate else np.gradient(smooth, T)
     acceleration = np.gradient(velocity, T)
     force = gain * log.command
-    if settings.alignment == "hold":
-        force = np.concatenate([force[:1], 0.5 * (force[1:] + force[:-1])])
+    if settings.hold > 0.0:
+        force = np.concatenate([force[:1], (1.0 - settings.hold) * force[1:] + settings.hold * force[:-1]])
     inside = slice(settings.drop, len(log) - settings.drop)
     table = np.column_stack([force, form.columns(velocity, acceleration)])[inside]
     rest = np.abs(log.position) <= (log.resolution or 0.0) if form.is_rate else _at_rest(log, settings)

@@ -105,8 +105,8 @@ def test_the_axis_s_parameters_come_out_within_a_per_cent_or_their_error(options
 def test_half_a_sample_of_misalignment_biases_the_time_constant() -> None:
     """A held command acts half a sample late on average: half of 1 ms is 5 % of 10 ms."""
     log = simulated(stairs())
-    late = fit([log], structure("axis"), "inverse-dynamics", {"alignment": "same-instant"})
-    right = fit([log], structure("axis"), "inverse-dynamics", {"alignment": "hold"})
+    late = fit([log], structure("axis"), "inverse-dynamics", {"hold": 0.0})
+    right = fit([log], structure("axis"), "inverse-dynamics", {"hold": 0.5})
     assert late.values()["tau"] / TRUTH["tau"] - 1.0 == pytest.approx(0.05, abs=0.02)
     assert abs(right.values()["tau"] / TRUTH["tau"] - 1.0) < 0.01
 

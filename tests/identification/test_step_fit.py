@@ -14,6 +14,8 @@ from rds.identification.fit import fit
 from rds.identification.log import Log
 from rds.identification.mass_kernel import positions
 from rds.identification.structures import structure
+from rds.machines import load_machine
+from rds.models.machine_axis import MachineAxis, MachineParameters
 
 T = 1e-3  # s
 SPINDLE = {"tau": 0.083, "K": 975.0, "offset": -0.04, "delay": 0.0123}
@@ -51,6 +53,23 @@ def test_a_spindle_comes_back_and_its_intervals_hold() -> None:
         inside = [e.parameters[name].low <= value <= e.parameters[name].high for e in found]
         assert sum(inside) >= 34, name  # of 40; 95 % claimed
         assert np.mean([e.values()[name] for e in found]) == pytest.approx(value, rel=0.002)
+
+
+def test_the_machine_s_own_spindle_comes_out_as_its_machine_file_has_it() -> None:
+    """The mini CNC's: viscous friction b makes tau/(1+b) and K/(1+b) of tau and K, friction F an offset of -F/K."""
+    axis = load_machine("mini-cnc").axis("spindle")
+    own = MachineParameters.from_table(axis.machine)
+    machine, speeds = MachineAxis(own, speed_output=True), []
+    u = np.repeat([0.0, 3.0, 1.0, 5.0, 2.0, 4.0], 700)
+    for k, voltage in enumerate(u.tolist()):
+        speeds.append(machine.advance(k * T))
+        machine.command(voltage, k * T)
+    log = Log("spindle", np.arange(len(u)) * T, u, np.rint(speeds), resolution=axis.resolution)
+    found = fit([log], structure("spindle", ("offset", "delay")), "step").values()
+    assert found["tau"] == pytest.approx(own.tau / (1.0 + own.viscous), rel=1e-3)
+    assert found["K"] == pytest.approx(own.K / (1.0 + own.viscous), rel=1e-3)
+    assert found["offset"] == pytest.approx(-own.friction_plus / own.K, rel=5e-3)
+    assert found["delay"] == pytest.approx(own.delay, abs=2e-5)
 
 
 def test_the_rule_of_63_per_cent_stands_beside_the_fit() -> None:
