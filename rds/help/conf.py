@@ -10,8 +10,8 @@ html_theme = "alabaster"
 html_theme_options = {
     "description": "Rapid development of machine-tool axis control",
     "fixed_sidebar": True,
-    "page_width": "1100px",
-    "sidebar_width": "240px",
+    "page_width": "960px",
+    "sidebar_width": "210px",
     "show_powered_by": False,
     "font_family": "system-ui, 'DejaVu Sans', Arial, sans-serif",
     "head_font_family": "system-ui, 'DejaVu Sans', Arial, sans-serif",
