@@ -122,8 +122,6 @@ def _part(state, tangent, work, p, where, force, duration, stretch):
     state[1] = 0.0 if crosses else final + (v - final) * decay
     if p[BACKLASH] > 0.0:
         _take_along(state, tangent, p, where)
-    else:
-        state[2] = state[0]
     return duration - time
 
 
@@ -169,6 +167,27 @@ def _force(u, p, where, by):
 
 
 @kernel
+def _change_at_sample(state, tangent, work, p, where, before, after):
+    """The voltage changes at the very instant of a sample: with a little more delay, the old one acts on after it."""
+    for i in range(len(where)):
+        if where[i] == DELAY:
+            tangent[1, i] += _acceleration(state[1], _force(before, p, where, work[3]), p)
+            tangent[1, i] -= _acceleration(state[1], _force(after, p, where, work[3]), p)
+
+
+@kernel
+def _acceleration(v, force, p):
+    """v', mm/s²; 0 where the axis sticks."""
+    s = p[STRIBECK]
+    if v == 0.0 and p[MINUS] * (1.0 + s) <= force <= p[PLUS] * (1.0 + s):
+        return 0.0
+    friction = p[PLUS] if v > 0.0 or (v == 0.0 and force > 0.0) else p[MINUS]
+    if s > 0.0:
+        friction *= 1.0 + s * exp(-((v / p[STRIBECK_VELOCITY]) ** 2))
+    return (force - friction - (1.0 + p[VISCOUS]) * v) / p[TAU]
+
+
+@kernel
 def _begin(x0, p, where, state, tangent):
     """The initial state: position behind the play (mm), velocity (mm/s), place of the motor in the play (-1 to 1)."""
     half = 0.5 * p[BACKLASH]
@@ -200,8 +219,8 @@ def move(t, u, x0, p, where, y, by):
     rate = (1.0 + p[VISCOUS]) / p[TAU]
     period, decay, reach = -1.0, 1.0, 0.0  # of the last step that was whole
     acting = 0  # the command that acts now
+    out = 2 if p[BACKLASH] > 0.0 else 0
     for k in range(len(t)):
-        out = 0 if plain else 2
         y[k] = state[out]
         for i in range(n):
             by[k, i] = tangent[out, i]
@@ -210,8 +229,11 @@ def move(t, u, x0, p, where, y, by):
         now, until = t[k], t[k + 1]
         moved = False  # whether `now` is an instant that moves with the delay
         while now < until:
+            before = acting
             while acting + 1 < len(t) and t[acting + 1] + p[DELAY] <= now + _SAME:
                 acting += 1
+            if acting > before and not moved:
+                _change_at_sample(state, tangent, work, p, where, u[before], u[acting])
             end, moves = until, False
             if acting + 1 < len(t) and t[acting + 1] + p[DELAY] < until - _SAME:
                 end, moves = t[acting + 1] + p[DELAY], True
@@ -257,18 +279,3 @@ def move(t, u, x0, p, where, y, by):
                     while left > 0.0:
                         left = _part(state, tangent, work, p, where, force, left, stretch)
             now, moved = end, moves
-
-
-@kernel
-def advance(state, u, duration, p):
-    """Move `state` = [position, velocity, output] on by `duration` s of the acting voltage `u`, in place: no delay."""
-    where = np.zeros(0, np.int64)
-    tangent, work, stretch = np.zeros((3, 0)), np.zeros((4, 0)), np.zeros(0)
-    force = _force(u, p, where, work[3])
-    steps = 1
-    if p[STRIBECK] > 0.0:
-        steps = max(ceil(duration / SUBSTEP - 1e-9), 1)
-    for _ in range(steps):
-        left = duration / steps
-        while left > 0.0:
-            left = _part(state, tangent, work, p, where, force, left, stretch)

@@ -49,16 +49,15 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
             raise InputError(f"structure {structure.name}: {name} is given with the log and cannot be fixed as well")
     held = structure.held(frozenset(fixed)) if structure.held else {}
     holding = {**fixed, **given, **{name: value for name, (value, _) in held.items()}}
+    unknowns = len(structure.parameters) - len(holding) + structure.states * len(logs)
+    if (samples := sum(len(log) for log in logs)) <= unknowns:
+        raise InputError(
+            f"{samples} samples are too few for {unknowns} unknowns (parameters and initial states); give longer logs"
+        )
     unmoved = [name for name in (structure.unmoved(logs) if structure.unmoved else ()) if name not in holding]
     starts = _starts(logs, structure, begun, holding)
     holding |= {name: starts[0][0][name] for name in unmoved}
     problem = Problem(logs, structure, holding, _ticker(options.get("progress"), structure, len(logs)))
-    samples = sum(len(log) for log in logs)
-    if samples <= problem.size:
-        raise InputError(
-            f"{samples} samples are too few for {problem.size} unknowns ({len(problem.names)} parameters and the "
-            "initial states); give longer logs"
-        )
     solution, tried = _search(problem, starts)
     uncertainty = uncertainty_of(problem, solution)
     values = problem.values(solution.point)

@@ -1,0 +1,120 @@
+"""Bad data: what a fit says of them to somebody who might believe it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.identification.axis_structure import make
+from rds.identification.fit import fit
+from rds.identification.log import Log
+from tests.identification.fit_logs import axis_log, mini_cnc
+
+X = mini_cnc("X")
+
+
+def said(log: Log, **options: object) -> str:
+    found = fit([log], make(), options=options)
+    return "\n".join((*found.untold, *found.warnings))
+
+
+def forward(u: np.ndarray) -> Log:
+    t = np.arange(len(u)) * 0.001
+    y = make().respond(t, u, (0.0, 0.0), X) + 0.001 * np.random.default_rng(0).standard_normal(len(u))
+    return Log("forward", t, u, y)
+
+
+def test_good_data_raise_no_doubt_about_the_structure() -> None:
+    text = said(axis_log(X))
+    assert "lacks" not in text and "white" not in text and "hardly" not in text
+
+
+def test_a_reversed_sign_is_suspected() -> None:
+    log = axis_log(X)
+    assert "Is the sign of the command or of the position reversed?" in said(replace(log, position=-log.position))
+
+
+def test_swapped_columns_explain_nothing() -> None:
+    log = axis_log(X)
+    text = said(replace(log, position=log.command, command=log.position, resolution=None))
+    assert "do not use these parameters" in text
+
+
+def test_metres_for_millimetres_are_suspected() -> None:
+    log = axis_log(X)
+    assert "is the position in mm" in said(replace(log, position=log.position / 1000.0, resolution=None))
+
+
+def test_milliseconds_for_seconds_are_suspected() -> None:
+    log = axis_log(X)
+    assert "no time constant" in said(replace(log, time=log.time * 1e6))
+
+
+def test_a_direction_that_never_occurs_is_not_told() -> None:
+    t = np.arange(5000) * 0.001
+    log = forward(2.5 + np.sin(9.0 * t) + np.sin(23.0 * t))
+    found = fit([log], make())
+    assert "friction_minus changes nothing" in found.untold[0] and "never moves backward" in found.untold[0]
+    assert np.isinf(found.parameters["friction_minus"].std_error)
+    assert found.parameters["K"].value == pytest.approx(X["K"], rel=0.01)
+    assert found.to_json()["parameters"]["friction_minus"]["std_error"] is None
+
+
+def test_a_constant_voltage_tells_only_a_combination_of_gain_and_friction() -> None:
+    found = fit([forward(np.full(4000, 3.0))], make())
+    assert any(s.startswith("K and friction_plus cannot be told apart") for s in found.untold), found.untold
+    assert np.isinf(found.parameters["K"].std_error)
+
+
+def test_half_a_log_widens_the_intervals_and_nothing_else() -> None:
+    log = axis_log(X)
+    whole, half = fit([log], make()), fit([log.part(5000, 10000)], make())
+    for name, value in X.items():
+        assert abs(half.parameters[name].value - value) < 4.0 * half.parameters[name].std_error
+    ratio = half.parameters["tau"].std_error / whole.parameters["tau"].std_error
+    assert 1.1 < ratio < 2.2
+
+
+def test_a_structure_that_lacks_something_is_said_to() -> None:
+    values = X | {"stribeck": 0.3, "stribeck_velocity": 0.8, "backlash": 0.02}
+    log = axis_log(values, options=("stribeck", "backlash"), noise=0.0002)
+    text = said(log)
+    assert "the machine does something that structure axis lacks" in text
+    assert "the residuals are not white" in text
+
+
+def test_closed_loop_data_are_flagged() -> None:
+    assert "closed-loop" in said(replace(axis_log(X), closed_loop=True))
+
+
+@pytest.mark.parametrize(
+    "position, command, sentence",
+    [
+        (lambda log: np.full(len(log), 3.0), lambda log: log.command, "never moves"),
+        (
+            lambda log: 3.0 + 0.001 * np.round(np.random.default_rng(0).standard_normal(len(log))),
+            lambda log: log.command,
+            "never moves",
+        ),
+        (lambda log: log.position, lambda log: 0.0 * log.command, "command is 0 throughout"),
+    ],
+)
+def test_data_that_hold_nothing_are_refused(position, command, sentence) -> None:
+    log = axis_log(X)
+    with pytest.raises(InputError, match=sentence):
+        fit([replace(log, position=position(log), command=command(log))], make())
+
+
+def test_too_few_samples_and_no_log_are_refused() -> None:
+    with pytest.raises(InputError, match="too few"):
+        fit([axis_log(X).part(0, 6)], make())
+    with pytest.raises(InputError, match="no log"):
+        fit([], make())
+
+
+def test_a_unit_that_the_structure_does_not_take_is_refused() -> None:
+    with pytest.raises(InputError, match="position is in rev/min"):
+        fit([replace(axis_log(X), units={"position": "rev/min"})], make())
