@@ -34,7 +34,10 @@ ALLOWED: dict[str, set[str]] = {
     "modes": {"core", "interface", "runtime", "bus"},
     "results": {"core", "runtime"},  # see ONLY
     "reports": {"core", "results", "bus"},
-    "identification": {"core", "machines", "results", "bus", "models", "motion"},  # see ONLY
+    "identification": {
+        *("core", "machines", "results", "bus", "models", "motion", "signals"),  # see ONLY
+        *("controllers", "checks"),  # what a model file is for: a design, a check
+    },
     "experiment": {
         *("core", "controllers", "models", "signals", "machines", "runtime", "modes", "results", "bus"),
         "identification",  # model files, and what a validation proves
@@ -55,6 +58,7 @@ ONLY = {
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     ("reports", "bus"): {"rds.bus.frames", "rds.bus.logs"},  # which frames are commands and answers; their logs
     ("identification", "bus"): {"rds.bus", "rds.bus.frames", "rds.bus.decode", "rds.bus.logs"},  # what a log holds
+    ("identification", "controllers"): {"rds.controllers.tracking", "rds.controllers.design"},
     ("motion", "results"): {"rds.results.figure"},  # what all plots share
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record
 }

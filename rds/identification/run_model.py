@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
 from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, load_student
 from rds.core.types import Model, Source
-from rds.identification.model_file import ModelFile, file_sha256
+from rds.identification.model_file import ModelFile, file_sha256, read_model
 from rds.identification.structure import Structure
 from rds.identification.structures import structure
 from rds.models import library_model
+from rds.models.machine_model import MachineAxisMotion
 from rds.models.student import student_model
+
+if TYPE_CHECKING:
+    from rds.checks import FileReport
 
 SPINDLE_UNIT = "rev/min"
 
@@ -41,6 +45,19 @@ def run_model(file: ModelFile, values: Mapping[str, float] | None = None, unit: 
         raise error if error.where else InputError(str(error), file.path) from error
     path = Path(file.path)
     return replace(model, fitted=Source(path.name, str(path.resolve()), file.sha256, file.text))
+
+
+def check_model_file(path: str | Path, sample_period: float = 0.001) -> FileReport:
+    """The check of a model file: that it can be read and used, and that its model keeps its interface."""
+    from rds.checks import FileReport, check_model
+
+    model = replace(run_model(read_model(path)), source=Source(Path(path).name))
+    delay = model.params.get("delay", 0.0) if model.motion is MachineAxisMotion else 0.0
+    if delay:  # the voltages that wait are states, as many as there are samples in the delay
+        model = replace(model, params={**model.params, "delay": 0.0})
+    report = check_model(model, sample_period)
+    notes = (f"checked without its delay of {delay:g} s",) if delay else ()
+    return FileReport(str(path), (replace(report, notes=(*report.notes, *notes)),))
 
 
 def checked_structure(file: ModelFile) -> Structure:
