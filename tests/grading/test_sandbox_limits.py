@@ -28,7 +28,7 @@ ATTACKS = {
     ),
     "work in children": (
         "import os\nfor _ in range(3):\n    if not os.fork():\n        while True: pass\nimport time; time.sleep(60)\n",
-        Limits(cpu_seconds=1.0),
+        Limits(cpu_seconds=0.5, load_seconds=60.0),
         Status.TIMED_OUT,
         "computing time",
     ),

@@ -12,7 +12,11 @@ _LONGEST_STEP = 0.1  # s: a computer that stood still for longer is not the subm
 
 @dataclass
 class Budget:
-    """Times in s, sizes in bytes. Wall time runs only while the submission is the one who has to answer."""
+    """Times in s, sizes in bytes.
+
+    Wall time runs only while the submission has to answer, and could: not while the grader works, nor while others have
+    all processors. So a busy computer changes no verdict.
+    """
 
     limits: Limits
     wall: float = 0.0
@@ -20,8 +24,8 @@ class Budget:
     printed: int = 0
 
     def step(self, seconds: float) -> float:
-        """`seconds` of the submission's turn have passed; how many of them count."""
-        counted = min(seconds, _LONGEST_STEP)
+        """`seconds` more of the submission's turn, less what it waited for a processor; how many of them count."""
+        counted = min(max(seconds, 0.0), _LONGEST_STEP)
         self.wall += counted
         return counted
 

@@ -39,7 +39,7 @@ class Cell:
         self.turn_limit = budget.limits.load_seconds
         self._budget, self._supervisor = budget, supervisor
         self._verdict: tuple[Status, str] | None = None
-        self._cpu, self._turn_seen, self._turn_time = 0.0, 0, 0.0
+        self._cpu, self._computed, self._turn_seen, self._turn_time = 0.0, 0.0, 0, 0.0
         self._baseline = interpreter.resident_bytes
         self.is_closed = False
         self._lock = threading.Lock()  # the supervisor's thread ends cells too
@@ -94,12 +94,12 @@ class Cell:
 
     def inspect(self, seconds: float) -> None:
         """By the supervisor, `seconds` after the last time: count, and end the cell if a limit is exceeded."""
-        turn = self.turn
+        turn, used = self.turn, usage(self._process)
+        computed, self._computed = used.first_seconds - self._computed, used.first_seconds
         if turn != self._turn_seen:
             self._turn_seen, self._turn_time = turn, 0.0
         elif turn % 2:
-            self._turn_time += self._budget.step(seconds)
-        used = usage(self._process)
+            self._turn_time += self._budget.step(computed if used.first_runs else seconds)
         self._cpu = max(self._cpu, used.cpu_seconds)
         memory = used.memory_bytes - used.processes * self._baseline
         fault = self._budget.fault(self._cpu, memory, self._turn_time, self.turn_limit)

@@ -15,6 +15,8 @@ class Usage(NamedTuple):
     cpu_seconds: float
     memory_bytes: int  # resident; what processes share counts for each
     processes: int
+    first_seconds: float  # computing time of the first of them, the one that answers
+    first_runs: bool  # whether that one computes, or would if it had a processor
 
 
 def usage(top: int) -> Usage:
@@ -23,15 +25,16 @@ def usage(top: int) -> Usage:
     Nothing can leave the tree: the orphans of a cell are adopted by its init. CPU time includes that of children that
     were waited for, so that work done by short-lived children adds up.
     """
-    cpu, memory, count = _own_cpu(top, only_children=True), 0, 0
+    cpu, memory, count = _cpu(_fields(top), False, True), 0, 0
     waiting = _children(top)
+    first = _fields(waiting[0]) if waiting else []
     while waiting:
         process = waiting.pop()
         count += 1
-        cpu += _own_cpu(process)
+        cpu += _cpu(_fields(process), True, True)
         memory += _resident(process)
         waiting += _children(process)
-    return Usage(cpu, memory, count)
+    return Usage(cpu, memory, count, _cpu(first, True, False), first[:1] == [b"R"])
 
 
 def _children(process: int) -> list[int]:
@@ -45,12 +48,16 @@ def _children(process: int) -> list[int]:
     return found
 
 
-def _own_cpu(process: int, only_children: bool = False) -> float:
-    fields = _read(f"/proc/{process}/stat").rpartition(b")")[2].split()  # the name may hold anything
+def _fields(process: int) -> list[bytes]:
+    """Of its stat file, from the state on; none if it has ended."""
+    return _read(f"/proc/{process}/stat").rpartition(b")")[2].split()  # the name before may hold anything
+
+
+def _cpu(fields: list[bytes], own: bool, children: bool) -> float:
     if len(fields) < 15:
         return 0.0
     user, system, child_user, child_system = map(int, fields[11:15])
-    return (child_user + child_system + (0 if only_children else user + system)) * _TICK
+    return ((user + system) * own + (child_user + child_system) * children) * _TICK
 
 
 def _resident(process: int) -> int:
