@@ -25,7 +25,7 @@ _G = {
 _M = {
     19: "spindle orientation is outside this dialect; leave it away",
     **dict.fromkeys((48, 49, 50, 51, 52, 53), "overrides are the operator's here; leave it away"),
-    61: "the tool in the spindle is set by T and M6",
+    61: "the number of the tool in the spindle is not set by hand here; write T and M6",
     **dict.fromkeys((62, 63, 64, 65, 66, 67, 68), "inputs and outputs are outside this dialect; leave it away"),
     **dict.fromkeys(
         (70, 71, 72, 73), "saving modal state is outside this dialect; write the modes again where they are needed"
