@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from rds.commands.common import Json, print_json, refusals
+from rds.commands.option_names import named_by_options
 
 if TYPE_CHECKING:
     from rds.core.types import Segment
@@ -59,6 +60,7 @@ def written(
     json: Json = False,
     *,
     make: Callable[[], Made],
+    options: Collection[str] = (),
 ) -> None:
     """Write what `make` makes as a part program, perhaps with a picture (both or none), and tell of it."""
     with refusals():
@@ -69,15 +71,17 @@ def written(
 
         if plot is not None and (plot.suffix.lower() != ".png" or plot.resolve() == out.resolve()):
             raise InputError(f"--plot {plot}: a picture is a PNG file beside the program; end its name in .png")
-        made = make()
+        with named_by_options(options):
+            made = make()
         if made.source is not None and out.exists() and out.samefile(made.source):
             raise InputError("is the file to read from; write the part program to another one", str(out))
         title = f"rds nc make: {made.said}"
         if made.more.get("deviation_mm"):
             title += f"\ndeviation {made.more['deviation_mm']:.4f} mm"
-        text = part_program(
-            made.segments, title, safe_height=safe, spindle=spindle, blend=blend, decimals=decimals
-        ).encode()
+        with named_by_options(options):
+            text = part_program(
+                made.segments, title, safe_height=safe, spindle=spindle, blend=blend, decimals=decimals
+            ).encode()
         writers: dict[Path, Callable[[Any], None]] = {out: lambda stream: stream.write(text)}
         if plot is not None:
             from rds.paths.pictures import picture
@@ -93,18 +97,23 @@ def written(
         _tell(found)
 
 
+_OURS = ("make", "options")  # parameters of `written` that are no options of its commands
+
+
 def maker(make: Callable[..., Made]) -> Callable[..., None]:
     """A command of `make`'s own options and those of `written`."""
     own = inspect.signature(make).parameters
-    shared = {name: p for name, p in inspect.signature(written).parameters.items() if name != "make"}
+    shared = {name: p for name, p in inspect.signature(written).parameters.items() if name not in _OURS}
     hints = get_type_hints(make, include_extras=True) | get_type_hints(
         written, {**globals(), "Made": Any}, include_extras=True
     )
 
+    options = {name.replace("_", "-") for name in (*own, *shared)}
+
     @wraps(make)
     def command(**given: Any) -> None:
         mine = {name: given.pop(name) for name in own}
-        written(**given, make=lambda: make(**mine))
+        written(**given, make=lambda: make(**mine), options=options)
 
     parameters = [p.replace(kind=p.KEYWORD_ONLY, annotation=hints[p.name]) for p in (*own.values(), *shared.values())]
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rds.nc.tools import Tool
 
 TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
+LONGEST_DWELL = 3600.0  # s; chosen: more is a P in milliseconds
 MOST_FAULTS = 1000  # are kept; others are counted
 MOST_WARNINGS = 100  # are kept
 _FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
@@ -189,6 +190,9 @@ class Validator:
         for event in block.events:
             if event.kind == "spindle":
                 self._look_at_spindle(event, block, limits)
+            elif event.kind == "dwell" and event.value > LONGEST_DWELL:
+                message = f"a dwell of {event.value:g} s is longer than {LONGEST_DWELL:g}; P is in seconds here"
+                self._fault(block, event.line, message, "dwell", event.value, "P G4")
             elif event.kind == "tool" and event.value:
                 self._used.setdefault(int(event.value))
         segments = block.segments

@@ -110,6 +110,7 @@ def _times(result: Result, prepared: Prepared, state: np.ndarray) -> dict[str, A
         "executed_s": int(spent.sum()) * prepared.T,
         "moving_s": moving * prepared.T,
         **{name: samples * prepared.T for name, samples in waited.items()},
+        "last_line": int(result["program_line"][-1]),
         "completed": result.meta.get("ending") == "done",
         "done_percent": 100.0 * min(float(result["program_sample"].max() + 1.0) / prepared.program.samples, 1.0),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,7 @@ def prepare(
         if place is None:
             raise InputError(str(validation))
         compiled = open_compiled(place)
+    require_room(least_seconds(compiled.blocks()), machine, T, file)
     return planned(compiled.blocks(), machine, T, file)
 
 
@@ -76,10 +78,7 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
     for block in certified(plan(_kept(blocks, path), limits, T), certificate):
         rows.add(block)
         if rows.count > MOST_SAMPLES:
-            raise InputError(
-                f"takes more than {MOST_SAMPLES * T:.0f} s, too long for one run with samples of {T:g} s; divide it",
-                str(file),
-            )
+            require_room(rows.count * T, machine, T, file)
     if not rows.count:
         raise InputError("nothing in it moves or waits: there is nothing to run", str(file))
     certificate.require(str(file))
@@ -109,6 +108,41 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
     )
     whole = np.concatenate(path) if path else np.zeros(0, SEGMENT)
     return Prepared(file, program, whole, segment, T, tuple(notes), certificate)
+
+
+def least_seconds(blocks: Iterable[PathBlock]) -> float:
+    """What feeds and dwells of a program take without any ramp or rapid, s: it runs for longer."""
+    total = 0.0
+    for block in blocks:
+        feeds = block.segments[~block.segments["rapid"]]
+        total += float((feeds["length"] / feeds["rate"]).sum())
+        total += sum(float(event.value) for event in block.events if event.kind == "dwell")
+    return total
+
+
+def require_room(seconds: float, machine: Machine, T: float, file: Path) -> None:
+    """InputError if a program that runs for `seconds` or more has too many samples for one run, or for the memory."""
+    axes = sum(name in AXES for name in machine.axes)
+    # planned: three tables, gathered and joined; recorded: seven columns for each axis and the spindle, three times
+    bytes_ = seconds / T * 8.0 * (6 * axes + 4 + 3 * (5 + 7 * (axes + 1)))
+    free = _free_memory()
+    if seconds <= MOST_SAMPLES * T and not bytes_ > free:
+        return
+    memory = f"about {bytes_ / 1e9:.2g} GB of memory" + (f" ({free / 1e9:.2g} are free)" if free < inf else "")
+    raise InputError(
+        f"takes at least {seconds:.0f} s ({seconds / 3600.0:.1f} h), and with samples of {T:g} s {memory}; a run may "
+        f"last for {MOST_SAMPLES * T:.0f} s: divide the program, raise its feeds, or take a longer sample_period",
+        str(file),
+    )
+
+
+def _free_memory() -> float:
+    """Bytes that programs may still have; inf where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        return next(float(line.split()[1]) * 1024.0 for line in lines if line.startswith("MemAvailable:"))
+    except (OSError, StopIteration, ValueError):
+        return inf
 
 
 class _Rows:

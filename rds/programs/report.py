@@ -93,7 +93,7 @@ def findings(about: dict[str, Any]) -> list[str]:
     said.append(f"What was sent to the axes is at most {share:.1%} of a limit ({kind} of {axis}).")
     predicted, moving = about["predicted_s"], about["moving_s"]
     if not about["completed"]:
-        said.append(f"The run ended after {about['done_percent']:.1f} % of the program.")
+        said.append(f"The run ended in line {about['last_line']}, after {about['done_percent']:.1f} % of the program.")
     elif about["predicted_samples"] == about["moving_samples"]:
         said.append(f"It moved for {moving:.3f} s, as predicted to the sample.")
     else:

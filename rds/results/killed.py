@@ -18,4 +18,6 @@ def from_record(directory: str | Path) -> Result:
 
     columns, units, meta = read_record(directory)
     meta["notes"] = [f"{note}, no verdict and no simulation" for note in meta["notes"]]
+    if "program_line" in columns and len(columns["program_line"]):
+        meta["notes"].append(f"the part program was in line {columns['program_line'][-1]:.0f}")
     return Result(columns, units, meta)

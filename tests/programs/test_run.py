@@ -156,6 +156,24 @@ def test_words_that_do_not_go_with_a_program_are_refused(part: Path, tmp_path: P
         PartProgram(part, experiment=tmp_path / "e.toml")
 
 
+def test_what_is_too_long_is_told_before_it_is_planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "slow.ngc"
+    file.write_text("G21 G94\nG1 X50 F0.01\nM2\n")
+    monkeypatch.setattr("rds.programs.prepare.plan", lambda *_: pytest.fail("it was planned"))
+    with pytest.raises(rds.InputError, match=r"at least 300000 s \(83\.3 h\), .* about 2\.9e\+02 GB of memory"):
+        PartProgram(file)
+    file.write_text("G21 G94\nG1 X50 F1\nM2\n")
+    monkeypatch.setattr("rds.programs.prepare._free_memory", lambda: 1e9)
+    with pytest.raises(rds.InputError, match=r"at least 3000 s .* about 2\.9 GB of memory \(1 are free\)"):
+        PartProgram(file)
+
+
+def test_a_dwell_of_ages_is_a_fault_of_its_word(tmp_path: Path) -> None:
+    (tmp_path / "p.ngc").write_text("G21\nG4 P1000000000\nM2\n")
+    with pytest.raises(rds.InputError, match=r"p\.ngc:2:4: P1000000000: a dwell of 1e\+09 s is longer than 3600"):
+        PartProgram(tmp_path / "p.ngc")
+
+
 def test_a_current_compiled_program_is_used(part: Path) -> None:
     machine = rds.load_machine("mini-cnc")
     first = prepare(part, machine)

@@ -85,8 +85,6 @@ def test_a_folder_that_cannot_be_is_told_before_anything_runs(
     monkeypatch.chdir(part.parent)
     words = 'axis = "X"\nduration = 1.0\n[reference]\nkind = "constant"\nvalue = 1.0\n[controller]\nname = "p"\n'
     Path("experiment.toml").write_text(words)
-        'axis = "X"\nduration = 1.0\n[reference]\nkind = "constant"\nvalue = 1.0\n[controller]\nname = "p"\n'
-    )
     started: list[object] = []
     monkeypatch.setattr("rds.experiment.experiment.run_plan", lambda *arguments: started.append(arguments))
     done = CliRunner().invoke(app, [*command, "--out", out])

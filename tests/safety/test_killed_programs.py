@@ -1,0 +1,68 @@
+"""A part program is cut off in the middle: by the death of everything on the host, and by that of the machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.results import open_result
+
+from .conftest import Bench, wait_for
+
+pytestmark = pytest.mark.realtime
+
+LINE = 3  # of the program: it lasts
+
+
+ONE = pytest.mark.parametrize("bench", ["rds"], indirect=True)  # what modules do by themselves: in the other files
+
+
+def start(bench: Bench, folder: Path) -> subprocess.Popen[str]:
+    """A run of a program that moves X for half a minute, once it does."""
+    (folder / "part.ngc").write_text("G21 G90\nG1 X1 F600\nX60 F120\nM2\n")
+    (folder / "bus.toml").write_text(f'[bus]\nchannel = "{bench.channel}"\n')
+    words = ["--mode", "implementation", "--controller", str(folder / "bus.toml"), "--out", str(folder / "out")]
+    run = bench.start("-m", "rds.cli", "nc", "run", str(folder / "part.ngc"), *words)
+    bench.wait_until_moving()
+    return run
+
+
+@ONE
+def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -> None:
+    """As if its computer had lost its power: nobody is left to stop the axes but their modules."""
+    bench.serve("X,Y,Z,spindle")
+    run = start(bench, tmp_path)
+    wait_for(lambda: bench.powered())
+    processes = json.loads((tmp_path / "out" / "processes.json").read_text())
+    for pid in (run.pid, processes["recorder"], processes["target"]):
+        os.kill(pid, signal.SIGKILL)
+    bench.stands_without_voltage()
+    left = open_result(tmp_path / "out")
+    assert left.meta["ending"] == "killed"
+    assert f"the part program was in line {LINE}" in left.meta["notes"][-1]
+    assert left["program_sample"][-1] > 0.0
+    assert np.isfinite(left["X_measured"]).all()
+    for name in ("ring", "desk"):
+        Path(processes["desk"]).with_suffix(f".{name}").unlink()
+
+
+@ONE
+def test_a_machine_that_dies(bench: Bench, tmp_path: Path) -> None:
+    server = bench.serve("X,Y,Z,spindle")
+    run = start(bench, tmp_path)
+    server.kill()
+    _, said = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert "machine lost" in said
+    result = open_result(tmp_path / "out" / "result.csv")
+    assert result.meta["ending"] == "machine lost"
+    about = result.meta["program"]
+    assert not about["completed"] and 0.0 < about["done_percent"] < 100.0
+    assert about["last_line"] == result["program_line"][-1] == LINE
+    assert f"in line {LINE}" in (tmp_path / "out" / "program.html").read_text()
