@@ -153,7 +153,7 @@ def _show(found: Design) -> None:
     table = Table(title=title, title_justify="left")
     table.add_column("signal", no_wrap=True)
     for name in (*task.parameters, "mean"):
-        table.add_column(name, justify="right")
+        table.add_column(name.replace("_", " "), justify="right")
     table.add_column(f"travel [{task.axis.unit}]", justify="right")
     for prediction in found.best_of_kinds():
         numbers = [prediction.percent[name] for name in task.parameters] + [prediction.mean_percent]

@@ -74,7 +74,8 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     """The parameters of `structure` by inverse dynamics; `options` are those of `OPTIONS`.
 
     A central difference at a sample sees the time around it, in which a held command was half the last one and half
-    this one: `hold` is 0.5. The default of axis-mass is 0, as the EMPS's authors have it. InputError where the data hold nothing to estimate from.
+    this one: `hold` is 0.5. The default of axis-mass is 0, as the EMPS's authors have it. InputError where the data
+    hold nothing to estimate from.
     """
     found = regress_logs(logs, structure, options)
     regression, names = found.regression, list(found.form.names)
