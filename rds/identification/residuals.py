@@ -177,21 +177,26 @@ def _surrogate(
 
 def _auto(e: np.ndarray, lags: int) -> np.ndarray:
     """Autocorrelation at lags 1 to `lags`; zeros for a residual that is constant."""
-    size = float(e @ e)
+    size = float(np.sum(e**2))
     if not size > 0.0:
         return np.zeros(lags)
-    return np.array([float(e[k:] @ e[:-k]) for k in range(1, lags + 1)]) / size
+    return _products(e, e)[1 : lags + 1] / size
 
 
 def _cross(e: np.ndarray, u: np.ndarray, lags: int) -> np.ndarray:
     """Correlation of the residual with the command `lag` blocks before it, from -lags to lags."""
     u = u - u.mean() if len(u) else u
-    size = float(np.sqrt((e @ e) * (u @ u)))
+    size = float(np.sqrt(np.sum(e**2) * np.sum(u**2)))
     if not size > 0.0:
         return np.zeros(2 * lags + 1)
-    later = [float(e[k:] @ u[: len(u) - k]) for k in range(lags + 1)]
-    earlier = [float(u[k:] @ e[: len(e) - k]) for k in range(lags, 0, -1)]
-    return np.array([*earlier, *later]) / size
+    products = _products(e, u)
+    return np.concatenate([products[len(products) - lags :], products[: lags + 1]]) / size
+
+
+def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The sums over k of a[k + lag] b[k], at index `lag`; negative lags count from the end."""
+    size = 2 ** int(2 * len(a) - 1).bit_length()
+    return np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
 
 
 def _portmanteau(r: np.ndarray, n: int) -> float:
