@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 import signal
 import socket
 import struct
@@ -142,8 +141,7 @@ class Cell:
             return
         self.is_closed = True
         self._cpu = max(self._cpu, usage(self._process).cpu_seconds)
-        self._end()
-        _wait(self._handle, _END)
+        self._end()  # the kernel takes some ms to take the namespaces apart; nothing has to wait for that
         self._supervisor.forget(self)
         self.output.collect()
         self._budget.cpu_before += self._cpu
@@ -201,10 +199,3 @@ def _blame(said: str) -> tuple[Status, str]:
     name = signal.Signals(-code).name if -code in {each.value for each in signal.Signals} else f"signal {-code}"
     hint = "; too deep a recursion, or compiled code gone wrong" if -code == signal.SIGSEGV else ""
     return Status.KILLED, f"its process was ended by {name}{hint}"
-
-
-def _wait(handle: int, seconds: float) -> None:
-    """Until the process behind the pidfd `handle` has ended."""
-    poll = select.poll()
-    poll.register(handle, select.POLLIN)
-    poll.poll(int(seconds * 1000))

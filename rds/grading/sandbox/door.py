@@ -15,6 +15,12 @@ import mmap
 import os
 import platform
 import select
+import struct
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from rds.grading.sandbox.records import Layout
 
 SIZE = 4096  # bytes
 QUESTION, ANSWER = 512, 2048  # where the records are
@@ -45,6 +51,10 @@ def make_bell() -> int:
     return os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
 
 
+class Closed(Exception):
+    """The other side has ended."""
+
+
 class Door:
     """One side of it: the grader's if `asks`. `memory`, `own_bell` and `other_bell` are descriptors.
 
@@ -52,49 +62,83 @@ class Door:
     """
 
     def __init__(self, memory: int, own_bell: int, other_bell: int, sign_of_life: int, asks: bool):
-        self.memory = mmap.mmap(memory, SIZE)
-        self._words = memoryview(self.memory).cast("Q")
+        self._memory = mmap.mmap(memory, SIZE)
+        self._words = memoryview(self._memory).cast("Q")
         self._own, self._other = (_ASKED, _ANSWERED) if asks else (_ANSWERED, _ASKED)
         self._own_bell, self._other_bell = own_bell, other_bell
         self._poll = select.poll()
         self._poll.register(own_bell, select.POLLIN)
         self._poll.register(sign_of_life, 0)  # POLLHUP and POLLERR come unasked
 
-    def post(self, number: int) -> None:
-        """The record is written: say so, and wake the other side if it sleeps."""
-        words = self._words
-        words[self._own] = number
-        if words[self._other + 1]:
-            try:
-                os.eventfd_write(self._other_bell, 1)
-            except BlockingIOError:
-                return  # it has been rung often enough
+    def asker(self, layout: Layout) -> Callable[[int, tuple[float, ...]], tuple[Any, ...]]:
+        """The grader's function: sample number and doubles out, (number, code, doubles) back; `Closed` at the end.
 
-    def wait(self, number: int) -> bool:
-        """Until the other side has posted `number`; False if it has ended."""
-        words, other = self._words, self._other
-        for _ in range(_LOOKS):
-            if words[other] == number:
-                return True
-        return self._sleep(number)
+        Both functions are written out flat: a call within them costs as much as the hand-over itself.
+        """
+        memory, words, pack_into, unpack_from = self._memory, self._words, *_codecs(layout.question, layout.answer)
+        ring, sleep, looks, number = self._ring, self._sleep, range(_LOOKS), 0
+
+        def ask(k: int, values: tuple[float, ...]) -> tuple[Any, ...]:
+            nonlocal number
+            number += 1
+            pack_into(memory, QUESTION, k, *values)
+            words[_ASKED] = number
+            if words[_ANSWERED + 1]:
+                ring()
+            for _ in looks:
+                if words[_ANSWERED] == number:
+                    return unpack_from(memory, ANSWER)
+            sleep(number)
+            return unpack_from(memory, ANSWER)
+
+        return ask
+
+    def answerer(self, layout: Layout) -> tuple[Callable[[], tuple[Any, ...]], Callable[..., None]]:
+        """The submission's functions: one takes the next question, one gives its answer; `Closed` at the end."""
+        memory, words, pack_into, unpack_from = self._memory, self._words, *_codecs(layout.answer, layout.question)
+        ring, sleep, looks, number = self._ring, self._sleep, range(_LOOKS), 0
+
+        def receive() -> tuple[Any, ...]:
+            nonlocal number
+            number += 1
+            for _ in looks:
+                if words[_ASKED] == number:
+                    return unpack_from(memory, QUESTION)
+            sleep(number)
+            return unpack_from(memory, QUESTION)
+
+        def send(*answer: Any) -> None:
+            pack_into(memory, ANSWER, *answer)
+            words[_ANSWERED] = number
+            if words[_ASKED + 1]:
+                ring()
+
+        return receive, send
 
     def close(self) -> None:
         """Let go of the memory."""
         self._words.release()
-        self.memory.close()  # a second time does nothing, for either
+        self._memory.close()  # a second time does nothing, for either
 
-    def _sleep(self, number: int) -> bool:
+    def _ring(self) -> None:
+        with suppress(BlockingIOError):  # it has been rung often enough
+            os.eventfd_write(self._other_bell, 1)
+
+    def _sleep(self, number: int) -> None:
+        """Until the other side has come to `number`; `Closed` if it has ended before."""
         words, asleep = self._words, self._own + 1
         words[asleep] = 1
         try:
             while words[self._other] != number:
                 for descriptor, _ in self._poll.poll(_SLEEP):
-                    if descriptor != self._own_bell:
-                        return bool(words[self._other] == number)
-                    try:
-                        os.eventfd_read(descriptor)
-                    except BlockingIOError:
-                        continue
+                    if descriptor == self._own_bell:
+                        with suppress(BlockingIOError):
+                            os.eventfd_read(descriptor)
+                    elif words[self._other] != number:
+                        raise Closed
         finally:
             words[asleep] = 0
-        return True
+
+
+def _codecs(out: struct.Struct, back: struct.Struct) -> tuple[Callable[..., None], Callable[..., tuple[Any, ...]]]:
+    return out.pack_into, back.unpack_from

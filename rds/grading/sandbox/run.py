@@ -10,16 +10,13 @@ from typing import Any, NoReturn
 from rds.grading.grade import Status
 from rds.grading.sandbox import records
 from rds.grading.sandbox.cell import Cell
-from rds.grading.sandbox.door import ANSWER, QUESTION, Door
+from rds.grading.sandbox.door import Closed, Door
 from rds.grading.sandbox.output import printable
 
 LONGEST_REASON = 600  # characters of what a submission's error says
 
 Sample = tuple[tuple[float, ...], tuple[float, ...]]
 """What was asked and what was answered."""
-
-
-Exchange = Callable[[int, tuple[float, ...]], tuple[Any, ...]]
 
 
 class Run:
@@ -34,8 +31,11 @@ class Run:
         self.has_ended = False
         self._asked: list[tuple[float, ...]] = []
         self._answered: list[tuple[float, ...]] = []
-        self._door = self._open_door() if through_door else None
-        self._exchange = self._pipes() if self._door is None else self._through(self._door)
+        self._door: Door | None = None
+        if through_door:
+            memory, question_bell, answer_bell = cell.door
+            self._door = Door(memory, answer_bell, question_bell, cell.answers, asks=True)
+        self._exchange = self._door.asker(layout) if self._door else self._pipes()
 
     def ask(self, *values: float) -> tuple[float, ...]:
         """The answer to `values`, finite; SubmissionError if there is none, or one to something else."""
@@ -43,7 +43,10 @@ class Run:
         if cell.is_closed:
             raise ValueError("this run has ended; begin another one")
         cell.turn += 1
-        answer = self._exchange(k, values)
+        try:
+            answer = self._exchange(k, values)
+        except Closed:
+            cell.fail()
         if answer[0] != k or answer[1] != records.OK or not all(map(isfinite, answer)):
             self._judge(answer[0], answer[1])
         cell.turn += 1
@@ -53,7 +56,7 @@ class Run:
         self._answered.append(given)
         return given
 
-    def _pipes(self) -> Exchange:
+    def _pipes(self) -> Callable[[int, tuple[float, ...]], tuple[Any, ...]]:
         cell, pack, answer = self.cell, self.layout.question.pack, self.layout.answer
         unpack, size = answer.unpack, answer.size
         questions, answers, write, read = cell.questions, cell.answers, os.write, os.read
@@ -62,29 +65,9 @@ class Run:
             try:
                 write(questions, pack(k, *values))
             except BrokenPipeError:
-                cell.fail()
+                raise Closed from None
             data = read(answers, size)
             return unpack(data if len(data) == size else cell.receive(size, data))
-
-        return exchange
-
-    def _open_door(self) -> Door:
-        memory, question_bell, answer_bell = self.cell.door
-        return Door(memory, answer_bell, question_bell, self.cell.answers, asks=True)
-
-    def _through(self, door: Door) -> Exchange:
-        cell, pack_into, unpack_from = self.cell, self.layout.question.pack_into, self.layout.answer.unpack_from
-        shared, wait, post = door.memory, door.wait, door.post
-        number = 0
-
-        def exchange(k: int, values: tuple[float, ...]) -> tuple[Any, ...]:
-            nonlocal number
-            number += 1
-            pack_into(shared, QUESTION, k, *values)
-            post(number)
-            if not wait(number):
-                cell.fail()
-            return unpack_from(shared, ANSWER)
 
         return exchange
 
@@ -100,7 +83,10 @@ class Run:
     def total(self) -> dict[str, Any]:
         """After the last sample of a counted run: what its counter says."""
         self.cell.turn += 1
-        self._exchange(records.TOTAL, (0.0,) * self.layout.asks)
+        try:
+            self._exchange(records.TOTAL, (0.0,) * self.layout.asks)
+        except Closed:
+            self.cell.fail()
         told = self.cell.frame()
         self.cell.turn += 1
         return told if isinstance(told, dict) else {}

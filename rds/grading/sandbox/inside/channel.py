@@ -7,13 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from rds.grading.sandbox import frames
-from rds.grading.sandbox.door import ANSWER, QUESTION, Door
+from rds.grading.sandbox.door import Closed, Door
 from rds.grading.sandbox.records import Layout
-
-
-class Closed(Exception):
-    """The grader wants nothing more."""
-
 
 Receive = Callable[[], tuple[Any, ...]]
 Send = Callable[..., None]
@@ -31,22 +26,7 @@ class Channel:
         unpack, pack, size = layout.question.unpack, layout.answer.pack, layout.question.size
         if not through_door:
             return lambda: unpack(self.receive(size)), lambda *answer: self.send(pack(*answer))
-        door = Door(*self._door, self.questions, asks=False)
-        memory, unpack_from, pack_into = door.memory, layout.question.unpack_from, layout.answer.pack_into
-        number = 0
-
-        def receive() -> tuple[Any, ...]:
-            nonlocal number
-            number += 1
-            if not door.wait(number):
-                raise Closed
-            return unpack_from(memory, QUESTION)
-
-        def send(*answer: Any) -> None:
-            pack_into(memory, ANSWER, *answer)
-            door.post(number)
-
-        return receive, send
+        return Door(*self._door, self.questions, asks=False).answerer(layout)
 
     def receive(self, count: int) -> bytes:
         """Exactly `count` bytes."""

@@ -16,8 +16,9 @@ from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import ContractError, InputError
 from rds.core.load import StudentFile, load_student
 from rds.core.signature import INTERFACES, form
+from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.inside import runs, walls
-from rds.grading.sandbox.inside.channel import Channel, Closed
+from rds.grading.sandbox.inside.channel import Channel
 from rds.grading.sandbox.inside.counting import counter, work_alone
 from rds.grading.sandbox.inside.plain import NotPlain, plain
 
