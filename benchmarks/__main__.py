@@ -1,6 +1,7 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
-python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [robustness] [--json]
+python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [identification]
+                     [robustness] [--json]
 """
 
 from __future__ import annotations
@@ -13,7 +14,19 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from benchmarks import bus, cia402, desk, imports, machine, nc, realtime, robustness, simulation, timed_bus
+from benchmarks import (
+    bus,
+    cia402,
+    desk,
+    identification,
+    imports,
+    machine,
+    nc,
+    realtime,
+    robustness,
+    simulation,
+    timed_bus,
+)
 from benchmarks.figures import TITLES, Figure
 from rds.console import show_table
 
@@ -26,6 +39,7 @@ SUBJECTS = {
     "cia402": "CiA 402 drives at 1 Mbit/s: our cyclic loop beside the canopen library's",
     "nc": "Part programs: 200,000 lines and arcs, beside rs274 -g",
     "desk": "Live values and part programs in the loop",
+    "identification": "A fit of tau, K, F+ and F- to 10 s at 1 kHz",
     "robustness": "10,000 closed loops with drawn parameters",
 }
 
@@ -79,6 +93,7 @@ def main() -> int:
         "timed-bus": run_timed_bus,
         "cia402": run_cia402,
         "desk": desk.run,
+        "identification": identification.run,
         "robustness": robustness.run,
         "nc": lambda: nc.run(peer_python=options.peer_python),
     }

@@ -15,6 +15,7 @@ from rds.identification.log import Log
 from rds.identification.structure import Structure
 from rds.identification.triangle import triangle_of
 
+_ABOVE = 1e-6  # of the units used: how near a bound that itself is no value may be come
 _STEP = 1e-4  # of a number's size: for differences where a structure has no derivatives of its own
 
 
@@ -54,6 +55,8 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """The lowest and highest of every free number."""
         pairs = [self.structure.bounds(name) for name in self.names]
+        options = [self.structure.parameters[name] for name in self.names]
+        pairs = [(max(low, o.more_than + _ABOVE), high) for (low, high), o in zip(pairs, options, strict=True)]
         states = self.structure.state_bounds or ((-np.inf, np.inf),) * self.structure.states
         low, high = zip(*pairs, *(states * len(self.logs)), strict=True)
         return np.array(low), np.array(high)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from rds.identification.structure import Structure
 
 EVALUATIONS = 150  # at most, and for each parameter beyond four
 MORE = 50
+_SINGULAR = 1e7  # condition number of the scaled derivatives
 # A step that lowers the sum of squares by less than this share of one residual's variance moves no number by more than
 # a hundredth of its standard error.
 _NEGLIGIBLE = 1e-4
@@ -63,18 +65,34 @@ def least_squares(problem: Problem, start: np.ndarray) -> Solution:
     def derivatives(point: np.ndarray) -> np.ndarray:
         return -triangle(point)[:, :-1]
 
-    found = minimize(
-        residuals,
-        start,
-        jac=derivatives,
-        bounds=(low, high),
-        x_scale="jac",
-        ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
-        xtol=1e-9,
-        gtol=1e-12,
-        max_nfev=EVALUATIONS + MORE * max(len(problem.names) - 4, 0),
-    )
-    return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
+    def search(method: Literal["dogbox", "trf"]) -> Solution:
+        found = minimize(
+            residuals,
+            start,
+            jac=derivatives,
+            bounds=(low, high),
+            method=method,
+            x_scale="jac",
+            ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
+            xtol=1e-9,
+            gtol=1e-12,
+            max_nfev=EVALUATIONS + MORE * max(len(problem.names) - 4, 0),
+        )
+        return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
+
+    # The dogleg needs little more than half the free runs of the reflective method, but ends anywhere where a direction
+    # is not told, and may stay at a bound.
+    quick = search("dogbox")
+    if quick.converged and not quick.at_bound.any() and _tells_all(quick.triangle):
+        return quick
+    sure = search("trf")
+    return sure if sure.squares <= quick.squares else quick
+
+
+def _tells_all(triangle: np.ndarray) -> bool:
+    R = triangle[:, :-1]
+    size = np.linalg.norm(R, axis=0)
+    return bool(size.all() and np.linalg.cond(R / size) < _SINGULAR)
 
 
 def first_state(structure: Structure, log: Log) -> tuple[float, ...]:

@@ -30,7 +30,7 @@ _ZERO = 1e-9  # of the units used: what is smaller than any parameter that means
 _PART = 0.05  # of a direction, in numbers scaled by their effect: what takes a smaller part in it is left out
 _SHARE = 0.05  # of a log: the longest block
 _DRAWS = 40  # of the rounding
-_COARSE = 1.0  # encoder steps: noise beyond it makes rounding as good as white
+_COARSE = 0.6  # encoder steps: noise beyond it makes rounding as good as white
 
 
 @dataclass(frozen=True)

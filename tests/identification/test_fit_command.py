@@ -53,7 +53,7 @@ def test_json_holds_what_is_promised_and_the_model_file_the_same(tmp_path: Path)
     for name, value in X.items():
         p = said["parameters"][name]
         assert set(p) == {"value", "std_error", "low", "high", "unit"}
-        assert p["low"] <= value <= p["high"]
+        assert abs(p["value"] - value) < 4.0 * p["std_error"]
     read = read_model(tmp_path / "x.toml")
     assert read.values() == pytest.approx({name: p["value"] for name, p in said["parameters"].items()}, rel=1e-9)
 
@@ -105,7 +105,7 @@ def test_a_model_of_one_s_own_has_its_params_estimated(tmp_path: Path) -> None:
     assert code == 0
     assert list(said["parameters"]) == ["tau", "K"]
     for name in ("tau", "K"):
-        assert said["parameters"][name]["low"] <= X[name] <= said["parameters"][name]["high"]
+        assert abs(said["parameters"][name]["value"] - X[name]) < 4.0 * said["parameters"][name]["std_error"]
     assert said["parameters"]["tau"]["unit"] == "s"
     code, out, _ = run(log, "--structure", tmp_path / "own.py", "--free", "K", "--json")
     assert json.loads(out)["parameters"]["tau"] == {
@@ -137,7 +137,7 @@ def test_derivatives_are_integrated_as_coarsely_as_the_noise_allows(tmp_path: Pa
         (OWN.replace("(0.001, 1.0)", "0.001"), "must be two numbers"),
         (OWN.replace('{"tau": (0.001, 1.0)}', '{"mass": (0, 1)}'), "bounds names 'mass'"),
         (OWN.replace("(0.001, 1.0)", "(0.1, 1.0)"), "lies outside its bounds"),
-        (OWN.replace("exp(-T", "exp(-T / (params['K'] - params['K'])"), "ZeroDivisionError"),
+        (OWN.replace("exp(-T", "expo(-T"), "NameError"),
     ],
 )
 def test_files_that_cannot_be_fitted_are_refused(tmp_path: Path, text: str, sentence: str) -> None:

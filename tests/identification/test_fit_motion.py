@@ -95,7 +95,7 @@ def test_derivatives_are_those_of_the_motion(tau, plus, minus, amplitude, freque
 
         difference = (moved(step) - moved(-step)) / (2 * step)
         size = np.abs(by[:, column]).max()
-        # a difference straddles a kink (the axis starts a sample sooner or later) now and then: then it is no derivative
+        # now and then a difference straddles a kink (the axis starts a sample sooner): then it is no derivative
         rounding = 3e-14 / step  # of positions of some mm, in a difference
         off = np.abs(difference - by[:, column])
         assert np.median(off) <= 1e-5 * size + rounding, name
