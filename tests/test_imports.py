@@ -42,6 +42,11 @@ ALLOWED: dict[str, set[str]] = {
         *("core", "controllers", "models", "signals", "machines", "runtime", "modes", "results", "bus"),
         "identification",  # model files, and what a validation proves
     },
+    "grading": {
+        *("core", "checks", "interface", "models", "controllers", "interpolators", "signals", "machines", "runtime"),
+        *("modes", "motion", "nc", "paths", "programs", "results", "reports", "experiment", "identification"),
+        *("robustness", "spread"),
+    },
     "robustness": {
         *("core", "models", "runtime", "modes", "results", "experiment", "identification", "spread"),
     },

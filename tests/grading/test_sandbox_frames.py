@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import rds
 from rds.grading.grade import Status
 from rds.grading.sandbox import SubmissionError, frames
+from rds.grading.sandbox.bubblewrap import ROOMS
 from rds.grading.sandbox.output import printable
 from rds.grading.sandbox.submission import LARGEST, read_submission
 
@@ -88,3 +92,15 @@ def test_a_name_that_could_mislead_is_replaced(tmp_path: Path) -> None:
     for name in ("line\nbreak.py", "a b.py", "ümläut.py", "-rf.py", "x" * 200 + ".py"):
         (tmp_path / name).write_text("")
         assert read_submission(tmp_path / name).name == "submission.py"
+
+
+def test_all_that_runs_inside_is_visible_inside() -> None:
+    """A room that imports another one would otherwise break every sandbox at once."""
+    script = "import sys, rds.grading.sandbox.inside.warm, rds.grading.sandbox.inside.worker\n"
+    script += "print(*[m.__file__ for n, m in sys.modules.items() if n.partition('.')[0] == 'rds'], sep='\\n')"
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    package = Path(rds.__file__).parent
+    visible = [package / room for room in ROOMS]
+    loaded = [Path(line) for line in said.split("\n") if line]
+    assert len(loaded) > 20
+    assert [str(file) for file in loaded if not any(file.is_relative_to(place) for place in visible)] == []

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import rds
 from rds.grading.sandbox.packages import package_paths
 
 PROGRAM = "bwrap"
@@ -98,5 +97,5 @@ def _links() -> list[str]:
 
 
 def _sources() -> list[Bind]:
-    package = Path(rds.__file__).resolve().parent
+    package = Path(__file__).resolve().parents[2]
     return [Bind(package / name, f"{SOURCES}/rds/{name}") for name in ROOMS]
