@@ -130,8 +130,9 @@ def _fit(
     scale = [T if name == "delay" else abs(value) for name, value in zip(names, start.tolist(), strict=True)]
     found = least_squares(misses, start, "3-point", (low, [np.inf] * len(names)), x_scale=scale)
     lengths = [2 * len(response.frequency) for response in responses]
-    spread = regress(found.jac, -found.fun, lengths)
-    honest = np.linalg.pinv(found.jac.T @ found.jac)  # if the lines' errors are what they say
+    jacobian = np.asarray(found.jac)
+    spread = regress(jacobian, -found.fun, lengths)
+    honest = np.linalg.pinv(jacobian.T @ jacobian)  # if the lines' errors are what they say
     chi = float(np.mean(found.fun**2))
     return found.x, np.where(np.eye(len(names)) > 0, np.maximum(spread.covariance, honest), spread.covariance), chi
 

@@ -12,6 +12,7 @@ the output's power that follows the command linearly; from n averages H has the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -153,7 +154,7 @@ def _welch(u: np.ndarray, y: np.ndarray, T: float) -> FrequencyResponse:
     length = len(u) // _SEGMENTS
     if length < 32:
         raise InputError(f"{len(u)} samples are too few for a frequency response; it takes {32 * _SEGMENTS} or more")
-    settings = {"fs": 1.0 / T, "window": "hann", "nperseg": length, "detrend": "linear"}
+    settings: dict[str, Any] = {"fs": 1.0 / T, "window": "hann", "nperseg": length, "detrend": "linear"}
     frequency, s_uu = welch(u, **settings)
     _, s_yy = welch(y, **settings)
     _, s_uy = csd(u, y, **settings)

@@ -115,8 +115,8 @@ def _solve(
     guesses = [reading.tau for reading in readings if reading.tau > 0.0]
     middle = float(np.median(guesses)) if guesses else 0.1 * longest
     grid = np.unique([*np.geomspace(_LOW_TAU * shortest, _HIGH_TAU * longest, _GRID), middle])
-    starts = [(_linear_part(windows, names, tau, is_rate), tau) for tau in grid]
-    (start, _), _ = min(starts, key=lambda item: item[0][1])
+    starts = [_linear_part(windows, names, float(tau), is_rate) for tau in grid]
+    start, _ = min(starts, key=lambda item: item[1])
     scale = np.maximum(np.abs(start), 1e-3)
     if "delay" in names:
         scale[list(names).index("delay")] = shortest
@@ -126,15 +126,14 @@ def _solve(
 
     low = [1e-3 * shortest if name == "tau" else 0.0 if name == "delay" else -np.inf for name in names]
     high = [0.5 * longest if name == "delay" else np.inf for name in names]
-    found = least_squares(misses, np.clip(start, low, high), "3-point", (low, high), x_scale=scale, diff_step=_STEP)
+    steps = np.full(len(names), _STEP)
+    found = least_squares(misses, np.clip(start, low, high), "3-point", (low, high), x_scale=scale, diff_step=steps)
     lengths = [window.end - window.first for _, window in windows]
-    return dict(zip(names, found.x.tolist(), strict=True)), -found.fun, found.jac, lengths
+    return dict(zip(names, found.x.tolist(), strict=True)), -found.fun, np.asarray(found.jac), lengths
 
 
-def _linear_part(
-    windows: Windows, names: Sequence[str], tau: float, is_rate: bool
-) -> tuple[tuple[np.ndarray, float], float] | tuple[np.ndarray, float]:
-    """With τ given and no delay, each window's final speed by linear least squares, then the rest by regression."""
+def _linear_part(windows: Windows, names: Sequence[str], tau: float, is_rate: bool) -> tuple[np.ndarray, float]:
+    """A point and its sum of squares: with τ given and no delay, each window's final speed by linear least squares, then the rest by regression."""
     finals, rows, cost = [], [], 0.0
     for log, window in windows:
         A, c, y = _window(log, window, tau, 0.0, is_rate)

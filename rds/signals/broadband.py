@@ -74,7 +74,8 @@ def chirp(amplitude: float, lowest: float, highest: float, sweep: float, offset:
     InputError for a value that will not do.
     """
     settings = _checked("chirp", amplitude=amplitude, lowest=lowest, highest=highest, sweep=sweep, offset=offset)
-    return Signal("chirp", partial(_chirp, **settings), None, settings, fastest=settings["highest"])
+    motion: Any = _chirp
+    return Signal("chirp", partial(motion, **settings), None, settings, fastest=settings["highest"])
 
 
 def _checked(kind: str, **given: Any) -> dict[str, float]:
