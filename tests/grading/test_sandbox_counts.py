@@ -83,6 +83,7 @@ def test_models_and_interpolators_are_counted_too(pool: Pool, written: Written) 
         subject.begin_model(T=1e-3)
         for _ in range(10):
             subject.advance(1.0)
+        assert subject.count(5).calls == 5
         first = subject.counts
         assert first.calls == 10
         assert first.events is not None

@@ -157,10 +157,36 @@ class Subject:
 
     @property
     def counts(self) -> Counts:
-        """Of the run that was begun last. The events are counted by running it once more, with the same questions."""
+        """Of the whole run that was begun last; see `count`."""
         if self._counts is None:
-            self._counts = self._count(None)
+            self._counts = self.count()
         return self._counts
+
+    def count(self, most_samples: int | None = None) -> Counts:
+        """The figures of the run that was begun last, in its first `most_samples` samples (all if None).
+
+        The same questions are asked once more, in a fresh cell that counts. The run itself is over after that.
+        """
+        run, order = self._run, self._order
+        if run is None:
+            return Counts(0, refused="no run was begun")
+        generous = replace(
+            self.limits, cpu_seconds=10 * self.limits.cpu_seconds, wall_seconds=10 * self.limits.wall_seconds
+        )
+        first = run.recorded(most_samples)
+        try:
+            cell = self._load(Budget(generous))
+            self._answer(
+                cell, {**order, "counted": True, "through_door": False}, generous.call_seconds, Status.BROKE_CONTRACT
+            )
+            again = Run(cell, run.what, run.layout, run.T)
+            return count_again(first, again)
+        except SubmissionError as error:
+            return Counts(len(first), refused=f"while it was counted: {error.reason}")
+        finally:
+            self._leave()
+            self._printed.pop()  # the same once more
+            self._run, self._order = run, order
 
     @property
     def output(self) -> str:
@@ -232,25 +258,3 @@ class Subject:
             self._cell.close()
             self._printed.append(self._cell.output.text)
             self._cell = None
-
-    def _count(self, most_samples: int | None) -> Counts:
-        run, order = self._run, self._order
-        if run is None:
-            return Counts(0, refused="no run was begun")
-        generous = replace(
-            self.limits, cpu_seconds=10 * self.limits.cpu_seconds, wall_seconds=10 * self.limits.wall_seconds
-        )
-        first = run.recorded(most_samples)
-        try:
-            cell = self._load(Budget(generous))
-            self._answer(
-                cell, {**order, "counted": True, "through_door": False}, generous.call_seconds, Status.BROKE_CONTRACT
-            )
-            again = Run(cell, run.what, run.layout, run.T)
-            return count_again(first, again)
-        except SubmissionError as error:
-            return Counts(len(first), refused=f"while it was counted: {error.reason}")
-        finally:
-            self._leave()
-            self._printed.pop()  # the same once more
-            self._run, self._order = run, order
