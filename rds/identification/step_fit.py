@@ -133,7 +133,7 @@ def _solve(
 
 
 def _linear_part(windows: Windows, names: Sequence[str], tau: float, is_rate: bool) -> tuple[np.ndarray, float]:
-    """A point and its sum of squares: with τ given and no delay, each window's final speed by linear least squares, then the rest by regression."""
+    """A point and its sum of squares: with τ given and no delay, the final speeds by least squares, then the rest."""
     finals, rows, cost = [], [], 0.0
     for log, window in windows:
         A, c, y = _window(log, window, tau, 0.0, is_rate)
