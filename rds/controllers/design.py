@@ -51,17 +51,35 @@ def _pole(pole: Any, owner: str) -> complex:
 
 
 def _place(A: np.ndarray, B: np.ndarray, poles: Sequence[complex]) -> np.ndarray:
-    """K with the eigenvalues of A - B K at `poles`; InputError where python-control cannot place them."""
+    """K with the eigenvalues of A - B K at `poles`; InputError where they cannot be placed."""
+    # place() takes no poles that coincide with one input. For up to two poles the closed form is exact, and every run
+    # of the tracking controller would otherwise wait seconds for python-control to be imported.
+    if B.shape[1] == 1 and (len(poles) <= 2 or len(set(poles)) < len(poles)):
+        return _ackermann(A, B, poles)
     import control
 
-    # Ackermann's formula takes poles that coincide, as place() does not with one input; it is exact for small systems.
-    closed_form = B.shape[1] == 1 and (len(poles) <= 2 or len(set(poles)) < len(poles))
     try:
-        gains = control.acker(A, B, poles) if closed_form else control.place(A, B, poles)
+        gains = control.place(A, B, poles)
         return np.asarray(gains, dtype=float).reshape(B.shape[1], A.shape[0])
     except (ValueError, np.linalg.LinAlgError, control.ControlDimension) as error:
-        shown = ", ".join(f"{pole:g}" for pole in poles)
-        raise InputError(f"design: the poles {shown} cannot be placed: {error}; choose other poles") from error
+        raise _unplaced(poles, str(error)) from error
+
+
+def _ackermann(A: np.ndarray, B: np.ndarray, poles: Sequence[complex]) -> np.ndarray:
+    """K = [0 ... 0 1] [B, AB, A²B, ...]⁻¹ φ(A), φ the polynomial with the roots `poles` (Ackermann 1972)."""
+    n = A.shape[0]
+    powers = [np.linalg.matrix_power(A, i) for i in range(n + 1)]
+    reach = np.hstack([power @ B for power in powers[:n]])
+    if np.linalg.matrix_rank(reach) != n:
+        raise _unplaced(poles, "the system is not reachable")
+    phi = sum(c * power for c, power in zip(np.real(np.poly(poles))[::-1], powers, strict=True))
+    gains: np.ndarray = np.linalg.solve(reach, phi)[-1:]
+    return gains
+
+
+def _unplaced(poles: Sequence[complex], why: str) -> InputError:
+    shown = ", ".join(f"{pole:g}" for pole in poles)
+    return InputError(f"design: the poles {shown} cannot be placed: {why}; choose other poles")
 
 
 def tracking_gains(tau: float, poles: Any) -> tuple[float, float]:

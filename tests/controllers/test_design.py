@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from math import exp, inf
 
 import control
@@ -38,6 +40,18 @@ def test_design_reproduces_table_2(axis):
     for name, value in {"g1": g1, "g2": g2, "L": L, "G": G, "H": H}.items():
         printed, half_a_digit = TABLE_2[axis][name]
         assert value == pytest.approx(printed, rel=0, abs=half_a_digit), name
+
+
+@pytest.mark.parametrize("poles", [[-32 + 24j, -32 - 24j], [-50, -50], [-10, -90]])
+def test_the_closed_form_is_that_of_python_control(poles):
+    A, B = np.array([[0.0, 1.0], [0.0, -1.0 / 9.943e-3]]), np.array([[0.0], [1.0]])
+    assert tracking_gains(9.943e-3, poles) == tuple(np.ravel(control.acker(A, B, poles)))
+
+
+def test_a_run_does_not_wait_for_python_control():
+    script = "import sys; from rds.controllers.design import tracking_gains; tracking_gains(0.01, [-30, -40])"
+    script += "; assert not {'control', 'matplotlib'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 @given(tau=floats(1e-3, 0.5), slow=floats(-400, -1), fast=floats(-400, -1))
