@@ -98,11 +98,11 @@ class Bench:
         with can.Bus(interface="rds", channel=self.channel) as bus:
             yield bus
 
-    def wait_until_moving(self) -> None:
+    def wait_until_moving(self, patience: float = PATIENCE) -> None:
         """Listen until axis X has moved on by a few counts under command."""
         identifier = self.node + (0x180 if self.dialect == "cia402" else frames.ANSWER)
         place = slice(2, 6) if self.dialect == "cia402" else slice(0, 4)
-        first, deadline = None, time.monotonic() + PATIENCE
+        first, deadline = None, time.monotonic() + patience
         with self.bus() as bus:
             while time.monotonic() < deadline:
                 message = bus.recv(0.5)

@@ -17,7 +17,7 @@ from .conftest import Bench, wait_for
 
 pytestmark = pytest.mark.realtime
 
-LINE = 3  # of the program: it lasts
+LINE = 2  # of the program: it lasts
 
 
 ONE = pytest.mark.parametrize("bench", ["rds"], indirect=True)  # what modules do by themselves: in the other files
@@ -25,11 +25,11 @@ ONE = pytest.mark.parametrize("bench", ["rds"], indirect=True)  # what modules d
 
 def start(bench: Bench, folder: Path) -> subprocess.Popen[str]:
     """A run of a program that moves X for half a minute, once it does."""
-    (folder / "part.ngc").write_text("G21 G90\nG1 X1 F600\nX60 F120\nM2\n")
+    (folder / "part.ngc").write_text("G21 G90\nG1 X60 F120\nM2\n")
     (folder / "bus.toml").write_text(f'[bus]\nchannel = "{bench.channel}"\n')
     words = ["--mode", "implementation", "--controller", str(folder / "bus.toml"), "--out", str(folder / "out")]
     run = bench.start("-m", "rds.cli", "nc", "run", str(folder / "part.ngc"), *words)
-    bench.wait_until_moving()
+    bench.wait_until_moving(60.0)  # it is checked and planned first
     return run
 
 
