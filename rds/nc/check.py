@@ -25,6 +25,7 @@ from rds.results.atomic import write_files
 
 Item = MotionBlock | Call
 Progress = Callable[[int, int], None]
+_LONGEST_NAME = 200  # bytes, of a subroutine that may have a file
 _CALLS = re.compile(rb"(?:o|gr)\s*(?:<\s*([^>\n]+?)\s*>|(\d+))", re.IGNORECASE)
 
 
@@ -156,7 +157,8 @@ def _called(path: Path) -> set[str]:
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror}); check the path", str(path)) from error
     given = {name.decode("utf-8", "replace") for name in names}
-    return {name for name in given | {name.lower() for name in given} if "/" not in name and "\0" not in name}
+    wanted = given | {name.lower() for name in given}
+    return {name for name in wanted if "/" not in name and name.isprintable() and len(name.encode()) <= _LONGEST_NAME}
 
 
 def followed(items: Iterable[Item], program: Path, progress: Progress | None) -> Iterator[Item]:

@@ -19,7 +19,7 @@ from rds.nc.expressions import Fault
 from rds.nc.owords import Word, nested, read_gr, read_word, spelled
 from rds.nc.parameters import Parameters
 from rds.nc.source import Place, Source, open_file
-from rds.nc.words import column_of, line_number, tidy
+from rds.nc.words import column_of, line_number, recoded, tidy
 
 _ENDS = {"sub": "ENDSUB", "if": "ENDIF", "while": "ENDWHILE", "do": "WHILE [...]", "repeat": "ENDREPEAT"}
 _FILE_NAME = re.compile(r"[^/\\\x00]+")
@@ -126,7 +126,7 @@ class Control:
         raw = source.read()
         text = tidy(raw)
         column = column_of(raw, max(text.find("o", line_number(text)[2]), 0)) + place.column
-        return ProgramError(message, file=source.name, line=place.line, column=column, word=word)
+        return ProgramError(recoded(message), file=source.name, line=place.line, column=column, word=recoded(word))
 
     def _skip_to(self, name: str) -> None:
         self.skipping = name
@@ -246,9 +246,9 @@ class Control:
     def _file(self, word: Word) -> Source | None:
         """The file beside the program that is named like the subroutine."""
         folder: Path | None = self._main.folder
-        if folder is None or not _FILE_NAME.fullmatch(word.name) or len(word.name) > 100:
+        if folder is None or not _FILE_NAME.fullmatch(word.name) or len(word.name.encode()) > 200:
             return None
-        path = folder / f"{word.name}.ngc"
+        path = folder / f"{recoded(word.name)}.ngc"
         if not path.is_file():
             return None
         found = open_file(path, str(path), semicolons=self._dialect.program_numbers)

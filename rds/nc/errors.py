@@ -17,10 +17,10 @@ class ProgramError(InputError):
         self.file = file
         self.line = line
         self.column = column
-        self.word = word
-        self.reason = message
+        self.word = printable(word)
+        self.reason = printable(message)
         place = f"{file or 'program'}:{line}:{column}" if column else f"{file or 'program'}:{line}"
-        super().__init__(f"{word}: {message}" if word else message, where=place)
+        super().__init__(f"{self.word}: {self.reason}" if word else self.reason, where=printable(place))
 
     def at(self, file: str, line: int, column: int = 0, word: str = "") -> ProgramError:
         """The same fault with a place; what is known already stays."""
@@ -31,6 +31,16 @@ class ProgramError(InputError):
 
     def __reduce__(self) -> tuple:  # an exception with keyword arguments crosses processes only so
         return _again, (self.reason, self.file, self.line, self.column, self.word)
+
+
+def printable(text: str) -> str:
+    r"""The text with what a terminal would obey or not show (escape characters, say) spelled out, as \x1b."""
+    if text.isprintable():
+        return text
+    return "".join(
+        character if character.isprintable() else character.encode("unicode_escape", "backslashreplace").decode("ascii")
+        for character in text
+    )
 
 
 def _again(reason: str, file: str, line: int, column: int, word: str) -> ProgramError:

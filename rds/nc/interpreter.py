@@ -25,7 +25,7 @@ from rds.nc.source import LONGEST, open_source
 from rds.nc.state import NO_MOTION, State
 from rds.nc.stream import Stream
 from rds.nc.tools import Tool, ToolTable, read_tools
-from rds.nc.words import column_of, fill, line_number, place_of, read_plain, read_words, tidy, word_at
+from rds.nc.words import column_of, fill, line_number, place_of, read_plain, read_words, recoded, tidy, word_at
 
 if TYPE_CHECKING:
     from rds.nc.compensation_moves import Stretch
@@ -318,4 +318,4 @@ class Interpreter:
         elif at >= 0 and text:
             column = column_of(raw, at) + source.column
             word = word_at(text, at).encode("latin-1").decode("utf-8", "replace")
-        return ProgramError(fault.message, file=source.name, line=source.line, column=column, word=word)
+        return ProgramError(recoded(fault.message), file=source.name, line=source.line, column=column, word=word)

@@ -190,9 +190,9 @@ class Validator:
         for event in block.events:
             if event.kind == "spindle":
                 self._look_at_spindle(event, block, limits)
-            elif event.kind == "dwell" and event.value > LONGEST_DWELL:
+            elif event.kind == "dwell" and float(event.value) > LONGEST_DWELL:
                 message = f"a dwell of {event.value:g} s is longer than {LONGEST_DWELL:g}; P is in seconds here"
-                self._fault(block, event.line, message, "dwell", event.value, "P G4")
+                self._fault(block, event.line, message, "dwell", float(event.value), "P G4")
             elif event.kind == "tool" and event.value:
                 self._used.setdefault(int(event.value))
         segments = block.segments

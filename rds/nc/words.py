@@ -45,6 +45,14 @@ def columns(raw: bytes) -> list[int]:
     return found
 
 
+def recoded(text: str) -> str:
+    """Text of a program, which is read byte by byte, as it was meant: UTF-8, where it is that."""
+    try:
+        return text.encode("latin-1").decode("utf-8")
+    except UnicodeError:
+        return text
+
+
 def column_of(raw: bytes, at: int) -> int:
     """Which character of the line (from 1) character `at` of tidy(raw) is; one after the last where `at` is its end."""
     places = columns(raw)

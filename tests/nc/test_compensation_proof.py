@@ -210,9 +210,9 @@ def test_the_picture_shows_plane_and_deviations_with_units(tmp_path: Path) -> No
     proof = Proof("part.ngc", (proved(Case("XY", LEFT, 3.0, (-30.0, 10.0, 0.0), PART)),))
     figure = proof.plot()
     plane, whole, alone = figure.axes
-    assert (plane.get_xlabel(), plane.get_ylabel()) == ("X / mm", "Y / mm")
-    assert whole.get_ylabel() == "edge to contour / mm"
-    assert alone.get_ylabel() == "edge to contour / nm"
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("X [mm]", "Y [mm]")
+    assert whole.get_ylabel() == "edge to contour [mm]"
+    assert alone.get_ylabel() == "edge to contour [nm]"
     assert "no gouge" in figure.get_suptitle()
     figure.savefig(tmp_path / "proof.png")
     assert (tmp_path / "proof.png").stat().st_size > 10_000

@@ -79,6 +79,8 @@ FAULTS = [
     ("o1 while [0]\nM2", 1, 1, "O1 WHILE", "write O1 ENDWHILE"),
     ("o1 repeat [0]\nM2", 1, 1, "O1 REPEAT", "write O1 ENDREPEAT"),
     ("o1 do\no1 break\nM2", 1, 1, "O1 DO", "write O1 WHILE [...]"),
+    ("G0 \x1b[31mX1\nM2", 1, 4, "\\x1b", "words are a letter and a number"),
+    ("o<\x07" + 90 * "π" + "> call\nM2", 1, 1, "O<\\x07" + 90 * "π" + "> CALL", "is not defined in part.ngc"),
     ("G0 X[SQRT[-1]]\nM2", 1, 6, "SQRT", "a number from 0 is asked for, and got -1"),
     ("G0 X[1 + LN[0]]\nM2", 1, 10, "LN", "a positive number is asked for, and got 0"),
     ("G0 XACOS[2]\nM2", 1, 5, "ACOS", "a number from -1 to 1 is asked for, and got 2"),

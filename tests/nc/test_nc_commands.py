@@ -117,6 +117,17 @@ def test_check_warns_of_what_is_allowed_and_hardly_meant(folder: Path, program: 
     assert found["ok"] and len(found["warnings"]) == count
 
 
+def test_check_of_a_file_that_is_no_program(folder: Path) -> None:
+    """Long names between < and >, control characters, lines without end: a fault by line, and nothing to obey."""
+    noise = bytes(range(256)) * 40
+    Path("noise.ngc").write_bytes(
+        b"\x7fELF\x02 o<" + noise.replace(b"\n", b"").replace(b">", b"")[:4000] + b"> call\n" + noise
+    )
+    done = nc("check", "noise.ngc")
+    assert done.exit_code == 1 and done.stdout.startswith("noise.ngc:1")
+    assert done.stdout.replace("\n", "").isprintable()
+
+
 def test_a_program_is_given_more_rounds(folder: Path) -> None:
     (folder / "rounds.ngc").write_text("o1 while [#1 lt 50]\n#1=[#1+1]\no1 endwhile\nM2\n", encoding="utf-8")
     done = nc("check", "rounds.ngc", "--max-jumps", "49")
