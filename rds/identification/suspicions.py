@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -103,7 +104,8 @@ def _residuals(problem: Problem, solution: Solution, number: int) -> list[str]:
 
 def _named(problem: Problem) -> str:
     options = problem.structure.options
-    return f"{problem.structure.name} with {', '.join(options)}" if options else problem.structure.name
+    name = Path(problem.structure.name).name
+    return f"{name} with {', '.join(options)}" if options else name
 
 
 def _autocorrelation(error: np.ndarray) -> dict[int, float]:
