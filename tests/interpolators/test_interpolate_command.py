@@ -228,7 +228,7 @@ def test_the_commands_of_the_document(tmp_path: Path, monkeypatch: pytest.Monkey
     Path("my_interpolator.py").write_text(GOOD)
     text = (ROOT / "docs" / "interpolation.md").read_text(encoding="utf-8")
     commands = re.findall(r"^rds interpolate (.*?)(?:   .*)?$", text, re.MULTILINE)
-    assert len(commands) == 4
+    assert len(commands) == 5
     for command in commands:
         assert run(command).exit_code == 0, command
     code = re.search(r"```python\n(.*?)```", text, re.DOTALL)
