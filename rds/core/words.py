@@ -153,7 +153,10 @@ class Words:
         values = self.any(key, [])
         if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
             raise self.fault(key, f"must be tables, each under `[[{key}]]`")
-        return [self.table_of(key, value) for value in values]
+        owner = self._owner(key)
+        name = f"{owner.name}.{key}" if owner.name else key
+        texts = _texts_of(owner._text, name, len(values))
+        return [Words(value, text, owner.path, name) for value, text in zip(values, texts, strict=True)]
 
     def table_of(self, key: str, table: dict[str, Any]) -> Words:
         """A table that stands for the value of `key`."""
@@ -175,6 +178,17 @@ class Words:
 def _near(word: Any, known: Sequence[str]) -> str:
     close = get_close_matches(str(word), known, n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
+
+
+def _texts_of(text: str, name: str, count: int) -> list[str]:
+    """For each table of a list, the text with the lines of the others blank: a key is then found in its own table."""
+    lines = text.splitlines()
+    header = re.compile(rf"\s*\[\[\s*{re.escape(name)}\s*\]\]")
+    starts = [number for number, line in enumerate(lines) if header.match(line)]
+    if not starts or len(starts) != count:
+        return [text] * count  # written as an array in one line
+    ends = [*starts[1:], len(lines)]
+    return ["\n" * start + "\n".join(lines[start:end]) for start, end in zip(starts, ends, strict=True)]
 
 
 def _line_of(text: str, table: str, key: str | None) -> int | None:

@@ -60,9 +60,7 @@ class Grade:
     seed: int = 0  # of this student's plants
     late_days: float = 0.0
     notes: tuple[str, ...] = ()  # such as what it printed, capped
-    details: Mapping[str, Any] = field(
-        default_factory=dict
-    )  # per case: its columns' file, budget figures
+    details: Mapping[str, Any] = field(default_factory=dict)  # per case: its columns' file, budget figures
 
     def to_json(self) -> dict[str, Any]:
         """In JSON's own types, whole: `from_json` gives the same grade back."""

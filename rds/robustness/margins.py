@@ -95,7 +95,7 @@ def loop_margins(law: LinearLaw, models: Sequence[Model], T: float) -> np.ndarra
     for begin in range(0, len(known), 500):
         some = slice(begin, begin + 500)
         stable = rows[known[some], 3] < 1.0
-        found = _margins(w, _loop(law, axes[some], w, T))
+        found = margins_of(w, _loop(law, axes[some], w, T))
         rows[known[some], :3] = np.where(stable[:, None], found, np.nan)
     return rows
 
@@ -133,7 +133,7 @@ def _loop(law: LinearLaw, axes: np.ndarray, w: np.ndarray, T: float) -> np.ndarr
     return -(solved @ law.C + law.D) * plant
 
 
-def _margins(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
+def margins_of(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
     """Gain margin (dB), phase margin (°) and modulus margin of loops given on a grid, by interpolation."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size, phase = np.log(np.abs(loop)), np.unwrap(np.angle(loop), axis=1)

@@ -1,0 +1,218 @@
+"""A controller's case: axes that follow a reference or a part program, as in an experiment file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.core.types import Controller
+from rds.core.words import Words
+from rds.experiment.resolve import PERIODS, resolve
+from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
+from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
+from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
+from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
+from rds.grading.linear import PULSE, LinearLoop, linear_loop
+from rds.interface import encoder
+from rds.machines import Axis, Machine, load_machine
+from rds.models import library_model
+from rds.programs.judge import judged
+from rds.programs.prepare import SPINDLE_UNIT, Prepared, prepare
+from rds.robustness.draws import Spread
+from rds.robustness.figures import voltage_limits
+from rds.robustness.uncertain import Uncertain, uncertain
+from rds.runtime.plan import Plan
+
+_NOT_HERE = ("mode", "controller", "bus", "timing", "compiled", "signal")
+_STANDS_IN = Controller(lambda t, r, y, state, params: (0.0, state))
+
+
+@dataclass(frozen=True)
+class ControlCase:
+    """A plan with everything but the submission; the plants of each run are drawn from a student's seed."""
+
+    common: Common
+    plan: Plan
+    periods: dict[str, float | None]
+    plants: tuple[Uncertain, ...]
+    driven: tuple[str, ...]  # the axes that the submission drives
+    is_coupled: bool
+    params: dict[str, Any]
+    disturbance: Disturbance | None
+    noise: float  # of the same unit as the axes
+    prepared: Prepared | None
+    files: tuple[str, ...]
+
+    name = property(lambda self: self.common.name)
+    title = property(lambda self: self.common.title)
+    is_visible = property(lambda self: self.common.is_visible)
+    runs = property(lambda self: self.common.runs)
+
+    @property
+    def unit(self) -> str:
+        """Of the axes."""
+        return self.plan.axes[0].axis.unit
+
+    @property
+    def can_be_linearized(self) -> bool:
+        """Whether there is one axis, with a model whose linear part is known, and no program."""
+        return len(self.plan.axes) == 1 and self.prepared is None and linear_model(self.plants[0].base) is not None
+
+    def run(self, submitted: Submitted, seed: int, number: int, needs: Iterable[str] = ()) -> CaseRun:
+        """The closed loop of run `number`; the linearized loop takes three more runs of the same motion."""
+        plan, subjects = self.plan, self._begin(submitted)
+        models = [drawn_model(plant, seed, number) for plant in self.plants]
+        actual: list[list[float]] = [[] for _ in models]
+        voltage = None if self.disturbance is None else self.disturbance.voltage
+        moved = [
+            disturbed(
+                model,
+                voltage,
+                noise_of(self.noise, plan.samples, seed, self.name, number, axis),
+                actual[axis].append if self.noise else None,
+            )
+            for axis, model in enumerate(models)
+        ]
+        meta = {"period": self.periods, "voltage_range": plan.machine.converter.range}
+        done = run_loop(with_parts(plan, self._laws(subjects), moved), meta)
+        counts = subjects[0].counts if COUNTS in needs else None
+        result = done.result if self.prepared is None else judged(done.result, self.prepared)
+        if self.noise:
+            result = self._with_actual(result, actual)
+        low, high, _ = voltage_limits(plan)
+        facts = {"limits": (low, high), "unit": self.unit, "noisy": bool(self.noise)}
+        if self.disturbance is not None:
+            facts |= {"disturbed_from": self.disturbance.start, "disturbed_until": self.disturbance.end}
+        linear = self._linear(submitted, models) if LINEAR in needs else None
+        return CaseRun(self.name, number, result, done.fault, counts, linear, facts)
+
+    def _begin(self, submitted: Submitted) -> list[Answers]:
+        names = self.driven
+        groups = [list(names)] if self.is_coupled or len(names) == 1 else [[name] for name in names]
+        subjects = [submitted.subject(number) for number in range(len(groups))]
+        for subject, axes in zip(subjects, groups, strict=True):
+            subject.begin_control(self.params, None, self.plan.T, tuple(axes))
+        return subjects
+
+    def _laws(self, subjects: list[Answers]) -> list[Controller | None]:
+        if self.is_coupled:
+            return [asked(subjects[0], True)] * len(self.plan.axes)
+        of = {name: asked(subject, False) for name, subject in zip(self.driven, subjects, strict=True)}
+        return [of.get(name) for name in self.plan.names]
+
+    def _with_actual(self, result: Any, actual: list[list[float]]) -> Any:
+        columns, units = dict(result.columns), dict(result.units)
+        for axis, positions in zip(self.plan.axes, actual, strict=True):
+            name, measure = axis.axis.name, encoder(axis.axis.resolution, quantization=self.plan.quantization)
+            values = positions[: len(result)]
+            columns[f"{name}_actual"] = np.array(values if measure is None else [measure(p) for p in values])
+            units[f"{name}_actual"] = axis.axis.unit
+        return type(result)(columns, units, result.meta)
+
+    def _linear(self, submitted: Submitted, models: list[Any]) -> LinearLoop | str:
+        model, samples = linear_model(models[0]), self.plan.samples
+        assert model is not None  # by `can_be_linearized`, which the assignment has checked
+        at = samples // 10
+        runs: list[LoopRun] = []
+        for size in (0.0, PULSE, -2.0 * PULSE):
+            pulse = np.zeros(samples)
+            pulse[at] = size
+            laws = self._laws(self._begin(submitted))
+            runs.append(run_loop(with_parts(self.plan, laws, [disturbed(model, pulse, None)], ideal=True), {}))
+        if fault := next((run.fault for run in runs if run.fault), ""):
+            return f"the linearized loop is not stable: {fault}"
+        name = self.plan.names[0]
+        moves = [(run.result[f"{name}_command"][at:], run.result[f"{name}_measured"][at:]) for run in runs]
+        return linear_loop(moves, self.plan.T)
+
+
+def read(words: Words, folder: Path, machine: str) -> ControlCase:
+    """A table `[[case]]` of a controller's assignment. InputError with its place for what will not do."""
+    words = as_own_file(words, {"machine": machine})
+    common = read_common(words)
+    for key in _NOT_HERE:
+        if key in words.table:
+            raise InputError(f"{key} has no place in a case: it is a simulation of the submission", words.place(key))
+    own = inside(words, "machine", folder) if str(words.any("machine")).endswith(".toml") else None
+    rig = load_machine(str(folder / own) if own else str(words.text("machine")))
+    prepared, files = _program(words, folder, rig)
+    is_coupled = words.flag("coupled", False)
+    noise = words.number("noise", 0.0, "the axis's unit, as a standard deviation", 0.0, 1e9)
+    words.choice("plant", "model", ("model", "machine"))
+    given = words.inner("params")
+    for key in ("vary", "disturbance"):
+        words.inner(key)
+    files += tuple(_named_files(words, folder))
+    words.table["controller"] = replace(_STANDS_IN, coupled=is_coupled)
+    plan, known = resolve(words, folder, None, None if prepared is None else prepared.program)
+    plan, plants = plants_of(plan, words)
+    if len({axis.axis.unit for axis in plan.axes}) > 1:
+        raise InputError("its axes have different units; grade them in cases of their own", words.place("axes"))
+    return ControlCase(
+        common,
+        plan,
+        known["period"],
+        plants,
+        tuple(plan.names),
+        is_coupled,
+        dict(given.table) if given else {},
+        read_disturbance(words.inner("disturbance"), plan.T, plan.samples),
+        noise,
+        prepared,
+        (*files, *([own] if own else [])),
+    )
+
+
+def _program(words: Words, folder: Path, machine: Machine) -> tuple[Prepared | None, tuple[str, ...]]:
+    """The part program's motion, planned here; its spindle stands still."""
+    name = inside(words, "program", folder)
+    if name is None:
+        return None, ()
+    T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
+    prepared = prepare(folder / name, machine, None, T)
+    return replace(prepared, program=replace(prepared.program, spindle=None)), (name,)
+
+
+def _named_files(words: Words, folder: Path) -> list[str]:
+    """The files of references and models; InputError for one outside the assignment."""
+    tables = [words]
+    overrides = words.inner("axis") if isinstance(words.any("axis"), dict) else None
+    if overrides is not None:
+        tables += [inner for name in overrides.table if (inner := overrides.inner(name)) is not None]
+    parts = [part for table in tables for key in ("reference", "model") if (part := table.inner(key))]
+    return [file for part in parts if (file := inside(part, "file", folder))]
+
+
+def plants_of(plan: Plan, words: Words) -> tuple[Plan, tuple[Uncertain, ...]]:
+    """The plan with the plants that `plant` names, and what each of them may be by `[case.vary]`."""
+    axes = tuple(replace(axis, model=_plant(axis, words)) for axis in plan.axes)
+    return replace(plan, axes=axes), tuple(_uncertain(axis, words) for axis in axes)
+
+
+def _plant(axis: Any, words: Words) -> Any:
+    if words.any("plant", "model") == "model":
+        return axis.model
+    if "model" in words.table:
+        raise InputError(
+            '[case.model] and plant = "machine" both say what the plant is; give one', words.place("plant")
+        )
+    own: Axis = axis.axis
+    if not own.machine or own.unit == SPINDLE_UNIT:
+        raise words.fault("plant", f"will not do: the machine's file says nothing of axis {own.name}'s own motion")
+    return library_model("machine-axis", **own.machine)
+
+
+def _uncertain(axis: Any, words: Words) -> Uncertain:
+    numbers = {k: float(v) for k, v in axis.model.params.items() if isinstance(v, int | float)}
+    ranges = read_spread(words, numbers)
+    if ranges:
+        found = uncertain(axis, ranges)
+        for low in (found.spread.low, found.spread.high):  # both ends are possible, or the file says so now
+            found.drawn(low)
+        return found
+    return Uncertain(axis.axis.name, Spread((), np.empty(0), {}), axis.model)

@@ -1,0 +1,69 @@
+"""One closed loop in the grader's process: the loop, laws and interface of every simulation, a submission as the law.
+
+The submission gets t, the reference and the measured position of one sample, and gives a voltage; the rest stays here.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import ContractError
+from rds.core.types import Controller, Ending, Model, Source
+from rds.grading.cases.case import Answers
+from rds.modes import load_mode
+from rds.results import Result
+from rds.runtime.plan import Plan
+from rds.runtime.record import table
+
+SUBMISSION = Source("submission")
+
+
+@dataclass(frozen=True)
+class LoopRun:
+    """The samples of a run as a result's table; `fault` says why there are no more, empty if all were taken."""
+
+    result: Result
+    fault: str
+
+
+def asked(answers: Answers, coupled: bool) -> Controller:
+    """A controller whose answers are those of a submission whose run has begun."""
+    control = answers.control
+    return Controller(lambda t, r, y, state, params: (control(t, r, y), state), source=SUBMISSION, coupled=coupled)
+
+
+def with_parts(
+    plan: Plan, controllers: Sequence[Controller | None], models: Sequence[Model], ideal: bool = False
+) -> Plan:
+    """The plan with these controllers (None: its own) and models; `ideal` without saturation and quantization."""
+    axes = tuple(
+        replace(axis, controller=controller or axis.controller, model=model)
+        for axis, controller, model in zip(plan.axes, controllers, models, strict=True)
+    )
+    return replace(
+        plan, axes=axes, saturation=plan.saturation and not ideal, quantization=plan.quantization and not ideal
+    )
+
+
+def run_loop(plan: Plan, meta: dict[str, Any]) -> LoopRun:
+    """Run a plan in virtual time. SubmissionError comes through; an axis that runs away ends the run."""
+    mode = load_mode("simulation")
+    columns, units = plan.columns(mode.followed)
+    recorded = array("d")
+    loop = replace(mode.build(plan, None), record=recorded.extend)
+    if plan.program is None:
+        loop.heed = None  # nobody changes anything while it runs
+    fault, ending = "", Ending.FAULT
+    try:
+        ending = loop.run() or Ending.DONE
+    except ContractError as error:  # of the encoder, about a position that is no number
+        fault = f"at t = {loop.k * plan.T:.3f} s {str(error).partition(';')[0]}: the loop is not stable"
+    values = np.frombuffer(recorded).reshape(-1, len(columns))
+    made, of = table(columns, units, values, plan.T)
+    about = {"axes": plan.names, "sample_period": plan.T, "mode": "simulation", "ending": str(ending), **meta}
+    return LoopRun(Result(made, of, about), fault)

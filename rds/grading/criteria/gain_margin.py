@@ -1,0 +1,17 @@
+"""The gain margin of the linearized loop, measured from outside; see `rds.grading.linear`."""
+
+from __future__ import annotations
+
+from rds.grading.cases.case import LINEAR, CaseRun
+from rds.grading.criteria.measuring import Options, linear_of
+
+MEANING = "the gain margin"
+UNIT = "dB"
+MORE_IS_WORSE = False
+FOR = ("controller",)
+NEEDS = (LINEAR,)
+
+
+def measure(run: CaseRun, options: Options) -> float:
+    """In dB; a loop that no gain makes unstable has 1000."""
+    return min(float(linear_of(run).margins[0]), 1000.0)

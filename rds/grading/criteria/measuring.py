@@ -1,0 +1,126 @@
+"""What the criteria share: samples that count, errors of the axis itself, steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import RdsError
+from rds.core.options import Option
+from rds.grading.cases.case import CaseRun
+from rds.results.metrics import error_metrics, settled, tracking_error
+
+Options = Mapping[str, Any]
+
+WINDOW = {
+    "from": Option("s, the first sample that counts", at_least=0.0),
+    "until": Option("s, the end of what counts", more_than=0.0),
+}
+"""Which samples count. Without them all do but the first period of a periodic reference, as in every result."""
+
+
+class NotMeasured(RdsError):
+    """There is no value, for the reason in the message: no points."""
+
+
+def over_axes(run: CaseRun, of: Callable[[str], float], worst: Callable[..., float] = max) -> float:
+    """The worst of the axes."""
+    return float(worst(of(axis) for axis in run.result.axes))
+
+
+def used(run: CaseRun, axis: str, options: Options) -> slice | np.ndarray:
+    """The samples that count; NotMeasured where there are none."""
+    if "from" not in options and "until" not in options:
+        return settled(run.result, axis)
+    time, half = run.result["time"], run.result.sample_period / 2
+    chosen = (time >= options.get("from", 0.0) - half) & (time < options.get("until", np.inf) - half)
+    if not chosen.any():
+        raise NotMeasured("no sample of the run lies between `from` and `until`")
+    return chosen
+
+
+def actual(run: CaseRun, axis: str) -> np.ndarray:
+    """Where the axis was by its encoder, without the noise of the case."""
+    name = f"{axis}_actual"
+    return run.result[name] if name in run.result else run.result[f"{axis}_measured"]
+
+
+def error_of(run: CaseRun, axis: str) -> np.ndarray:
+    """Reference - position at every sample, as every result has it; of the axis itself where the case has noise."""
+    if f"{axis}_actual" in run.result:
+        return np.asarray(run.result[f"{axis}_reference"] - actual(run, axis))
+    error = tracking_error(run.result, axis)
+    if error is None:
+        raise NotMeasured(f"axis {axis} has no reference")
+    return error
+
+
+def error_metric(run: CaseRun, name: str, options: Options) -> float:
+    """One of the metrics of a tracking error, the worst of the axes."""
+
+    def of(axis: str) -> float:
+        value = error_metrics(error_of(run, axis)[used(run, axis, options)])[name]
+        if value is None:
+            raise NotMeasured("there is no finite error to measure")
+        return value
+
+    return over_axes(run, of)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A response to a step from `start` to `final`: times from the step on (s), and the share of it that is done."""
+
+    time: np.ndarray
+    share: np.ndarray
+    size: float  # of the step, in the axis's unit
+    final: float
+
+
+STEP = {
+    "from": Option("s, when the reference steps", at_least=0.0),
+    "until": Option("s, the end of the response", more_than=0.0),
+}
+
+
+def step_of(run: CaseRun, axis: str, options: Options) -> Step:
+    """The response from `from` (default 0) to `until` (default: the end) to the step that the reference makes there.
+
+    It starts where the axis is and goes where the reference is at the end; NotMeasured if that is no step.
+    """
+    result, half = run.result, run.result.sample_period / 2
+    time = result["time"]
+    begin = options.get("from", 0.0)
+    chosen = np.flatnonzero((time >= begin - half) & (time < options.get("until", np.inf) - half))
+    if len(chosen) < 2:
+        raise NotMeasured("the response has no samples")
+    reference = result[f"{axis}_reference"][chosen]
+    position = actual(run, axis)[chosen]
+    final, size = float(reference[-1]), float(reference[-1] - position[0])
+    if np.ptp(reference[1:]) > 1e-9 * max(1.0, abs(final)):
+        raise NotMeasured(f"the reference of axis {axis} is no step: it changes again during the response")
+    if size == 0.0:
+        raise NotMeasured(f"axis {axis} has no step to make: it is where the reference is")
+    return Step(time[chosen] - begin, (position - position[0]) / size, abs(size), final)
+
+
+def crossing(step: Step, level: float) -> float:
+    """When the response first reaches this share of the step, s, on the line between two samples."""
+    reached = np.flatnonzero(step.share >= level)
+    if not len(reached):
+        raise NotMeasured(f"the response never reaches {100 * level:g} % of the step")
+    k = int(reached[0])
+    if k == 0:
+        return float(step.time[0])
+    a, b = step.share[k - 1], step.share[k]
+    return float(step.time[k - 1] + (level - a) / (b - a) * (step.time[k] - step.time[k - 1]))
+
+
+def linear_of(run: CaseRun) -> Any:
+    """The linearized loop; NotMeasured with the reason why there is none."""
+    if run.linear is None or isinstance(run.linear, str):
+        raise NotMeasured(run.linear or "the loop was not linearized")
+    return run.linear

@@ -1,0 +1,17 @@
+"""The phase margin of the linearized loop, measured from outside; see `rds.grading.linear`."""
+
+from __future__ import annotations
+
+from rds.grading.cases.case import LINEAR, CaseRun
+from rds.grading.criteria.measuring import Options, linear_of
+
+MEANING = "the phase margin"
+UNIT = "°"
+MORE_IS_WORSE = False
+FOR = ("controller",)
+NEEDS = (LINEAR,)
+
+
+def measure(run: CaseRun, options: Options) -> float:
+    """In degrees; a loop whose gain is never 1 has 180."""
+    return min(float(linear_of(run).margins[1]), 180.0)

@@ -1,0 +1,17 @@
+"""The closed loop's slowest pole: the largest |z| of the linearized, sampled loop; see `rds.grading.linear`."""
+
+from __future__ import annotations
+
+from rds.grading.cases.case import LINEAR, CaseRun
+from rds.grading.criteria.measuring import Options, linear_of
+
+MEANING = "the largest pole |z| of the closed loop"
+UNIT = "1"
+MORE_IS_WORSE = True
+FOR = ("controller",)
+NEEDS = (LINEAR,)
+
+
+def measure(run: CaseRun, options: Options) -> float:
+    """Without a unit: a mode falls to |z| of itself in each sample."""
+    return float(abs(linear_of(run).poles[0]))

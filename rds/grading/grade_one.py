@@ -1,0 +1,237 @@
+"""One submission graded: every case run in the sandbox, every criterion measured here.
+
+from rds.grading.grade_one import grade
+
+with Pool() as pool:
+    print(grade(assignment, "submission.py", "ada", pool).score)
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+from rds.grading.assignment import Assignment
+from rds.grading.cases.case import Answers, Case, CaseRun
+from rds.grading.criteria.measuring import NotMeasured
+from rds.grading.criterion import Criterion
+from rds.grading.grade import CriterionScore, Grade, Status
+from rds.grading.late import days_late
+from rds.grading.sandbox.errors import SubmissionError
+from rds.grading.sandbox.limits import Limits
+from rds.grading.unit_tests import share_passed
+
+_LONGEST_OUTPUT = 4000  # characters of what it printed, in the notes
+
+
+class Opener(Protocol):
+    """What opens submissions: `sandbox.Pool`, or a stand-in that says what it is."""
+
+    def open(self, path: str | Path, limits: Limits | None, kind: str) -> Any:
+        """A context manager with the methods of `sandbox.Subject`."""
+
+
+@dataclass(frozen=True)
+class Graded:
+    """A grade with the runs that it rests on, in the order of cases; of a case that failed there are none."""
+
+    grade: Grade
+    runs: tuple[CaseRun, ...]
+
+
+class Opened:
+    """A submission whose subjects are loaded when they are first asked for, and ended with it."""
+
+    def __init__(self, path: Path, assignment: Assignment, pool: Opener):
+        self._path, self._assignment, self._pool = path, assignment, pool
+        self._stack = ExitStack()
+        self._subjects: dict[tuple[str, int], Any] = {}
+
+    def subject(self, number: int = 0) -> Answers:
+        """The submission, loaded; further numbers are further processes of it."""
+        return self._get(self._assignment.kind, number)
+
+    def functions(self) -> Answers:
+        """The submission as a module of functions."""
+        return self._get("functions", 0)
+
+    def _get(self, kind: str, number: int) -> Any:
+        if (kind, number) not in self._subjects:
+            made = self._stack.enter_context(self._pool.open(self._path, self._assignment.limits, kind))
+            self._subjects[kind, number] = made
+        return self._subjects[kind, number]
+
+    @property
+    def output(self) -> str:
+        """What it has printed, in all its processes."""
+        return "".join(subject.output for subject in self._subjects.values())
+
+    def close(self) -> None:
+        """End its processes."""
+        self._stack.close()
+
+
+def grade(
+    assignment: Assignment,
+    path: str | Path,
+    student: str,
+    pool: Opener,
+    *,
+    submitted: datetime | None = None,
+    seed: int | None = None,
+) -> Grade:
+    """The grade of the file at `path`; see `grade_with_runs`."""
+    return grade_with_runs(assignment, path, student, pool, submitted=submitted, seed=seed).grade
+
+
+def grade_with_runs(
+    assignment: Assignment,
+    path: str | Path,
+    student: str,
+    pool: Opener,
+    *,
+    submitted: datetime | None = None,
+    seed: int | None = None,
+    criteria: Sequence[Criterion] | None = None,
+) -> Graded:
+    """Run the submission on every case that `criteria` (default: all) need, and score them.
+
+    `seed` stands in for the student's own. What a submission does wrong is in the grade. A case in which it breaks its
+    interface earns nothing, and the others go on; after a limit or a kill nothing more is run. Raises SandboxError
+    where the computer fails: that is to be graded again.
+    """
+    path = Path(path)
+    seed = assignment.seed(student) if seed is None else seed
+    work = _Work(assignment, list(assignment.criteria if criteria is None else criteria), seed)
+    opened = Opened(path, assignment, pool)
+    try:
+        work.go(opened)
+        output = opened.output
+    finally:
+        opened.close()
+    scores = tuple(work.score(criterion) for criterion in work.criteria)
+    before = _rounded(sum(score.score for score in scores))
+    days = days_late(assignment.due, submitted)
+    lost = assignment.late.lost(days)
+    notes = list(work.notes)
+    if lost:
+        notes.append(f"Late by {days:.2f} days: {100 * lost:.3g} % of the points are lost.")
+    if output:
+        more = "\n…" if len(output) > _LONGEST_OUTPUT else ""
+        notes.append(f"It printed:\n{output[:_LONGEST_OUTPUT]}{more}")
+    made = Grade(
+        student=student,
+        status=work.status,
+        reason=work.reason,
+        score=_rounded(before * (1.0 - lost)),
+        max_score=_rounded(sum(score.max_score for score in scores)),
+        before_penalty=before,
+        criteria=scores,
+        sha256=_sha256(path) if work.was_opened else "",
+        seed=seed,
+        late_days=days,
+        notes=tuple(notes),
+        details={"assignment": assignment.sha256, "late_share": lost, "cases": work.details},
+    )
+    return Graded(made, tuple(work.runs))
+
+
+class _Work:
+    """What has been run and measured of one submission."""
+
+    def __init__(self, assignment: Assignment, criteria: list[Criterion], seed: int):
+        self.assignment, self.criteria, self.seed = assignment, criteria, seed
+        self.status, self.reason = Status.OK, ""
+        self.notes: list[str] = []
+        self.details: dict[str, Any] = {}
+        self.runs: list[CaseRun] = []
+        self.was_opened = True
+        self._failed: dict[str, str] = {}  # by case: why
+        self._tested: dict[str, float] = {}  # by criterion: the value of unit tests
+        self._stopped = ""
+
+    def go(self, opened: Opened) -> None:
+        """Run all cases that the criteria need, and the unit tests."""
+        wanted = [case for case in self.assignment.cases if any(case.name in c.cases for c in self.criteria)]
+        if wanted:
+            try:
+                opened.subject()
+            except SubmissionError as error:
+                self._blame(error, "")
+                return
+        for case in wanted:
+            try:
+                self._run(case, opened)
+            except SubmissionError as error:
+                self._failed[case.name] = error.reason
+                if self._blame(error, f"case {case.title}: "):
+                    return
+        for criterion in (each for each in self.criteria if each.tests):
+            try:
+                self._tested[criterion.name] = share_passed(criterion.tests, opened)
+            except SubmissionError as error:
+                if self._blame(error, f"{criterion.title}: "):
+                    return
+
+    def _run(self, case: Case, opened: Opened) -> None:
+        needs = {need for criterion in self.criteria if case.name in criterion.cases for need in criterion.needs}
+        for number in range(case.runs):
+            run = case.run(opened, self.seed, number, needs)
+            self.runs.append(run)
+            about = self.details.setdefault(case.name, {"runs": 0, "samples": 0, "faults": []})
+            about["runs"] += 1
+            about["samples"] += len(run.result)
+            if run.fault:
+                about["faults"].append(run.fault)
+            if run.counts is not None:
+                counts = {"calls": run.counts.calls, "events": run.counts.events, "refused": run.counts.refused}
+                about.setdefault("counts", []).append(counts)
+
+    def _blame(self, error: SubmissionError, place: str) -> bool:
+        """Record the first thing that went wrong; whether nothing more can be run."""
+        if self.status is Status.OK:
+            self.status, self.reason = error.status, f"{place}{error.reason}"
+        if error.status in (Status.MISSING, Status.REFUSED):
+            self.was_opened = False
+        if error.status is not Status.BROKE_CONTRACT:
+            self._stopped = error.reason
+        return bool(self._stopped)
+
+    def score(self, criterion: Criterion) -> CriterionScore:
+        """The worst of all runs of all its cases."""
+        if criterion.tests:
+            value = self._tested.get(criterion.name)
+            if value is None:
+                return criterion.nothing(self._stopped or self.reason)
+            return criterion.score(float(f"{value:.9g}"), "")
+        worst: tuple[float, str] | None = None
+        for name in criterion.cases:
+            case = self.assignment.case(name)
+            runs = [run for run in self.runs if run.case == name]
+            if name in self._failed or len(runs) < case.runs:
+                return criterion.nothing(self._failed.get(name) or self._stopped or self.reason, name)
+            for run in runs:
+                try:
+                    value = criterion.measure(run)
+                except NotMeasured as error:
+                    return criterion.nothing(str(error), name)
+                if worst is None or criterion.worse(value, worst[0]):
+                    worst = value, name
+        assert worst is not None  # every criterion has a case, every case a run
+        return criterion.score(*worst)
+
+
+def _rounded(points: float) -> float:
+    return float(f"{points:.9g}")
+
+
+def _sha256(path: Path) -> str:
+    with suppress(OSError):
+        if path.is_file():
+            return hashlib.sha256(path.read_bytes()).hexdigest()
+    return ""
