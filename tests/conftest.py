@@ -59,7 +59,8 @@ def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     rings = set(_rings())
     yield tmp_path
     for process, command in _processes(runtime).items():
-        if "rds.bus.hub" in command:  # it would stay some seconds for the next run: no need to wait for that
+        # they would stay some seconds, for the next run or a host that comes back: no need to wait for that
+        if "rds.bus.hub" in command or "--exit-with-stdin" in command:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGTERM)
     deadline = time.monotonic() + LINGER

@@ -108,7 +108,7 @@ def test_without_anybody_s_doing_it_is_the_plan() -> None:
     assert (ran.ending, ran.reason) == (Ending.DONE, "")
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     overrides=st.lists(st.tuples(st.floats(0.0, 4.0), st.floats(0.05, 2.0)), max_size=6),
     holds=st.lists(st.tuples(st.floats(0.0, 4.0), st.floats(0.01, 0.5)), max_size=3),

@@ -12,6 +12,8 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from documents import blocks
@@ -19,6 +21,7 @@ from typer.testing import CliRunner
 
 from rds.cli import app
 from rds.commands.keys import Keys
+from rds.commands.nc_run import _press
 from rds.programs.judge import WAITS
 from rds.runtime.execution import State
 from rds.runtime.program import COLUMNS, program_channels
@@ -95,13 +98,53 @@ def test_a_folder_that_cannot_be_is_told_before_anything_runs(
 
 def test_what_is_replaced_is_told(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(part.parent)
-    command = ["nc", "run", "part.ngc", "--out", "out", "--override", "90"]
-    assert "replaces" not in CliRunner().invoke(app, command).stderr
-    assert Path("out/program-changed-while-it-ran.csv").is_file()
-    again = CliRunner().invoke(app, command[:-2])
-    assert "out: replaces the results of an earlier run there" in again.stderr
-    assert not Path("out/program-changed-while-it-ran.csv").exists()
-    assert not Path("out/changes.csv").exists()
+    earlier = [Path("out") / name for name in ("changes.csv", "program-changed-while-it-ran.csv")]
+    Path("out").mkdir()
+    for file in (*earlier, Path("out/result.csv"), Path("out/program.txt")):
+        file.write_text("of an earlier run")
+    done = CliRunner().invoke(app, ["nc", "run", "part.ngc", "--out", "out"])
+    assert done.exit_code == 0, done.output
+    assert "out: replaces the results of an earlier run there" in done.stderr
+    assert not any(file.exists() for file in earlier)
+    assert Path("out/program.txt").exists()  # none of ours
+
+
+class Running:
+    """A run as the keys see it."""
+
+    def __init__(self, state: State):
+        self.desk = {"hold": 0.0, "override": 1.95}
+        self.did: list[str] = []
+        self.state = state
+
+    def status(self) -> Any:
+        return SimpleNamespace(state=self.state)
+
+    def override(self, share: float) -> None:
+        self.did.append(f"override {share:g}")
+
+    def __getattr__(self, verb: str) -> Any:
+        return lambda: self.did.append(verb)
+
+
+@pytest.mark.parametrize(
+    ("key", "state", "does"),
+    [
+        (" ", State.RUNS, ["hold"]),
+        (" ", State.HELD, ["resume"]),
+        (" ", State.STOP, ["resume"]),
+        (" ", State.TOOL, ["resume"]),
+        ("+", State.RUNS, ["override 2"]),
+        ("-", State.RUNS, ["override 1.85"]),
+        ("h", State.HELD, ["home"]),
+        ("q", State.RUNS, ["stop"]),
+        ("x", State.RUNS, []),
+    ],
+)
+def test_what_a_key_does(key: str, state: State, does: list[str]) -> None:
+    running: Any = Running(state)
+    _press(key, running)
+    assert running.did == does
 
 
 def test_keys_come_one_by_one() -> None:
