@@ -12,9 +12,9 @@ from rds.session.equipment import Equipment
 NAME = "equipment-control"
 TITLE = "Equipment control"
 SUMMARY = "Let a controller follow a reference: simulated, against the clock, or on the machine"
-HELP = "experiments"
+HELP = "equipment"
 
 
 def build(shell: Any) -> widgets.Widget:
     """The panel."""
-    return EquipmentView(shell, Equipment(shell.session, "control"), "reference").widget
+    return EquipmentView(shell, Equipment(shell.session, "control")).widget

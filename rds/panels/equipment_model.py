@@ -12,9 +12,9 @@ from rds.session.equipment import Equipment
 NAME = "equipment-model"
 TITLE = "Equipment model"
 SUMMARY = "Send a voltage to a model, to the machine or to both, and compare what they do"
-HELP = "experiments"
+HELP = "equipment"
 
 
 def build(shell: Any) -> widgets.Widget:
     """The panel."""
-    return EquipmentView(shell, Equipment(shell.session, "model"), "voltage signal").widget
+    return EquipmentView(shell, Equipment(shell.session, "model")).widget

@@ -2,127 +2,203 @@
 
 from __future__ import annotations
 
-from html import escape
+from collections.abc import Callable
 from typing import Any
 
 import ipywidgets as widgets
 
 from rds.core.errors import RdsError
-from rds.panels.kit.field import FieldView
-from rds.panels.kit.figure import FigureView
+from rds.panels.earlier_runs import EarlierRuns
+from rds.panels.equipment_settings import EquipmentSettings
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
-from rds.panels.strip import StripChart
+from rds.panels.live_view import LiveView
+from rds.panels.result_view import ResultView
+from rds.panels.what_runs import WhatRuns
 from rds.results import Result
-from rds.session.equipment import USER, Equipment
+from rds.session.equipment import Equipment
 from rds.session.equipment_run import EquipmentRun
 
-_FILES = {"shape_file": "shape", "model_file": "model", "controller_file": "controller"}  # shown for what is the user's
+TABS = ("Live", "Results", "Timing", "What runs", "Earlier runs")
+LIVE, RESULTS, TIMING, WHAT, EARLIER = range(len(TABS))
 
 
 class EquipmentView:
     """The widgets over one `Equipment`."""
 
-    def __init__(self, shell: Any, equipment: Equipment, drive: str):
+    def __init__(self, shell: Any, equipment: Equipment):
         self.shell, self.equipment = shell, equipment
         self.run: EquipmentRun | None = None
-        self._fields = {name: FieldView(equipment.choices, name) for name in equipment.choices.fields}
-        self._settings = widgets.VBox([])
-        self._settings.add_class("rds-side")
-        self.run_button = widgets.Button(description="Run", button_style="primary", tooltip="Run with these settings")
-        self.run_button.on_click(lambda _: self.start())
+        self.settings = EquipmentSettings(equipment)
         self.bar = WorkBar(shell.ticker)
         self.notice = Notice()
-        self.strip = StripChart()
-        self.strip.layout.display = "none"
-        self.table = widgets.HTML()
-        self.figure = FigureView()
-        row = widgets.HBox([self.run_button, self.bar])
+        self.live = LiveView(shell, equipment.machine)
+        self.results = ResultView(shell)
+        self.what = WhatRuns(equipment)
+        self.earlier = EarlierRuns(shell, self._reopened)
+        self.run_button = _button("Run", "Run with these settings; files are checked first", self.start, "primary")
+        self._buttons = [
+            self.run_button,
+            _button("Build", "Check your files in a process of their own; faults show at their lines", self.build),
+            _button("View model", "What will run, as a block diagram; your files; the experiment's file", self.view),
+            _button("Load", "Make everything ready and look for the machine, without running", self.load),
+        ]
+        row = widgets.HBox(self._buttons)
         row.add_class("rds-row")
-        main = widgets.VBox([row, self.notice, self.strip, self.table, self.figure])
+        self.tabs = widgets.Tab(
+            [self.live.widget, self.results.widget, self.results.timing, self.what.widget, self.earlier.widget],
+            titles=TABS,
+        )
+        self.tabs.add_class("rds-tabs")
+        self.tabs.observe(self._turned, "selected_index")
+        main = widgets.VBox([row, self.bar, self.notice, self.tabs])
         main.add_class("rds-main")
-        self.widget = widgets.HBox([self._settings, main])
+        self.widget = widgets.HBox([self.settings.widget, main])
         self.widget.add_class("rds-columns")
-        self._traces: list[tuple[str, str]] = []
-        self._end: Any = None
-        equipment.choices.watch(lambda name: self._arrange())
-        self._arrange()
+        self._shown: Result | None = None
 
     def start(self) -> None:
         """What the run button does."""
+
+        def begin() -> None:
+            self.run = self.equipment.run().start()
+            self._shown = None
+            self.tabs.selected_index = LIVE
+            self.results.clear()
+            self.live.follow(self.run)
+            self._follow(self.run, self._ended)
+            self._end_look = self.shell.ticker.add(self._look)
+
+        self._try(begin)
+
+    def build(self) -> None:
+        """What the build button does."""
+
+        def begin() -> None:
+            if not self.equipment.files():
+                self.notice.say("nothing of yours is chosen: what will run is the library's own, and is built", "good")
+                return
+            task = self.equipment.build()
+            self._follow(task, lambda: self._built(task))
+
+        self._try(begin)
+
+    def load(self) -> None:
+        """What the load button does."""
+
+        def begin() -> None:
+            task = self.equipment.load()
+            self._follow(task, lambda: self._said(task))
+
+        self._try(begin)
+
+    def view(self) -> None:
+        """What the view button does."""
+        self.tabs.selected_index = WHAT
+
+    def _try(self, begin: Callable[[], None]) -> None:
         if self.bar.busy:
             return
-        if refused := [view.field.label for view in self._shown() if view.refused]:
+        if refused := self.settings.refused:
             self.notice.say(f"first mend what is refused on the left: {', '.join(refused)}", "error")
             return
+        self.notice.clear()
         try:
-            self.run = EquipmentRun(self.equipment.session, self.equipment.table())
-            self.run.start()
+            begin()
         except RdsError as error:
             self.notice.say(str(error), "error")
+
+    def _follow(self, work: Any, ended: Callable[[], None]) -> None:
+        self._enable(False)
+
+        def over() -> None:
+            self._enable(True)
+            ended()
+
+        self.bar.follow(work, over)
+
+    def _enable(self, on: bool) -> None:
+        for button in self._buttons:
+            button.disabled = not on
+
+    def _built(self, task: Any) -> None:
+        if task.error is not None:
+            self.notice.say(str(task.error), "error")
             return
-        self.notice.clear()
-        self.table.value = ""
-        self.figure.clear()
-        self.run_button.disabled = True
-        self._traces = []
-        self.bar.follow(self.run, self._ended)
-        self._end = self.shell.ticker.add(self._look)
+        self.what.show_checked(task.result)
+        bad = [each for each in task.result if not each.ok]
+        self.notice.say("\n".join(each.sentence for each in bad or task.result), "error" if bad else "good")
+        self.tabs.selected_index = WHAT
+
+    def _said(self, task: Any) -> None:
+        if task.error is not None:
+            self.notice.say(str(task.error), "error")
+        elif task.result:
+            self.notice.say(task.result, "warning" if "; but" in task.result else "good")
 
     def _look(self) -> None:
         """Ten times a second while it runs."""
         run = self.run
-        if run is None:
-            return
-        if not self._traces and (traces := run.traces()):
-            self._traces = traces
-            self.strip.layout.display = ""
-            self.strip.begin(traces)
-        if self._traces and len(rows := run.new_rows()):
-            self.strip.add(rows)
+        assert run is not None
+        self.live.look()
+        if run.result is not None and self._shown is None:
+            self._show(run.result)
 
     def _ended(self) -> None:
         self._look()
-        if self._end is not None:
-            self._end()
-        self.run_button.disabled = False
+        self._end_look()
+        self.live.ended()
         run = self.run
         assert run is not None
-        if run.error is not None:
+        if run.stopped_early:
+            self.notice.say("stopped before it began; nothing was recorded", "warning")
+        elif run.error is not None:
             self.notice.say(str(run.error), "error")
-        if run.result is not None:
-            self._show(run.result)
+            if run.result is None:  # its file may be at fault
+                self.what.show_checked(self.equipment.builds.latest())
+        else:
+            self.results.saved(run.folder)
+        self.earlier.refresh()
 
     def _show(self, result: Result) -> None:
-        from rds.results import html
+        """The loop is over; its files are still being written."""
+        self._shown = result
+        self.results.show(result, self.run.folder if self.run else self.equipment.session.folder)
+        self.notice.say(*_verdict(result))
+        self.tabs.selected_index = RESULTS
 
-        reason = result.meta.get("verdict_reason")
-        if result.meta.get("ending") != "done":
-            self.notice.say(f"ended early ({result.meta['ending']}): {result.meta.get('ending_reason')}", "warning")
-        elif result.verdict:
-            kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
-            self.notice.say(f"timing {result.verdict}: {reason}", kind)
+    def _reopened(self, results: list[Result], names: list[str]) -> None:
+        if len(results) == 1:
+            self.results.show(results[0], self.equipment.session.folder / "runs" / names[0])
+            self.results.saved(self.equipment.session.folder / "runs" / names[0])
+            self.notice.say(f"{names[0]}: {_verdict(results[0])[0]}", _verdict(results[0])[1])
         else:
-            self.notice.say(f"done: {len(result)} samples", "good")
-        columns, rows = html.metrics_rows(result)
-        folder = self.run.folder if self.run else ""
-        self.table.value = html.table(columns, rows) + f"<p>saved in {escape(str(folder))}</p>"
-        self.figure.show(result.plot())
+            self.results.overlay(results, names)
+            self.notice.say(f"{len(results)} runs over each other")
+        self.tabs.selected_index = RESULTS
 
-    def _shown(self) -> list[FieldView]:
-        chosen = self.equipment.choices
-        names = [name for name in chosen.fields if name not in _FILES or chosen[_FILES[name]] == USER]
-        if chosen["shape"] == USER:
-            names = [name for name in names if name not in ("amplitude", "frequency", "offset")]
-        return [self._view(name) for name in names]
+    def _turned(self, change: Any) -> None:
+        """Tabs that cost something are filled when they are looked at."""
+        if change["new"] == TIMING:
+            self.results.draw_timing()
+        elif change["new"] == WHAT:
+            self.what.refresh()
+        elif change["new"] == EARLIER:
+            self.earlier.refresh()
 
-    def _view(self, name: str) -> FieldView:
-        if name not in self._fields:
-            self._fields[name] = FieldView(self.equipment.choices, name)
-        return self._fields[name]
 
-    def _arrange(self) -> None:
-        """Show the fields that matter for what is chosen."""
-        for name in [name for name in self._fields if name not in self.equipment.choices]:
-            self._fields.pop(name).close()
-        self._settings.children = self._shown()
+def _verdict(result: Result) -> tuple[str, str]:
+    """What to say of a result in one line, and how."""
+    ending = result.meta.get("ending")
+    if ending not in (None, "done"):
+        return f"ended early ({ending}): {result.meta.get('ending_reason')}", "warning"
+    if result.verdict:
+        kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
+        return f"timing {result.verdict}: {result.meta.get('verdict_reason')}", kind
+    return f"done: {len(result)} samples", "good"
+
+
+def _button(text: str, tip: str, act: Callable[[], None], style: str = "") -> widgets.Button:
+    button = widgets.Button(description=text, tooltip=tip, button_style=style)
+    button.on_click(lambda _: act())
+    return button

@@ -16,11 +16,30 @@ HELP = "readme"
 
 
 def build(shell: Any) -> widgets.Widget:
-    """A card for each panel."""
+    """The shortest way to a first experiment, and a card for each panel."""
     cards = [_card(shell, name) for name in PANELS.names() if name != NAME]
     grid = widgets.Box(cards)
     grid.add_class("rds-cards")
-    return widgets.VBox([grid])
+    return widgets.VBox([_first(shell), grid])
+
+
+def _first(shell: Any) -> widgets.Widget:
+    """What somebody who knows nothing of it does first."""
+    button = widgets.Button(
+        description="Track a sine", button_style="primary", tooltip="Choose a first experiment for you; then press Run"
+    )
+
+    def begin(_: Any) -> None:
+        from rds.session.equipment import Equipment
+
+        Equipment(shell.session, "control").first_sine()
+        shell.open("equipment-control")
+
+    button.on_click(begin)
+    text = widgets.HTML("<p>New here? Let the X axis follow a sine: press this, then Run. The result follows.</p>")
+    first = widgets.HBox([button, text])
+    first.add_class("rds-first")
+    return first
 
 
 def _card(shell: Any, name: str) -> widgets.VBox:

@@ -36,6 +36,8 @@ class StripChart(anywidget.AnyWidget):
     traces: Any = traitlets.List([]).tag(sync=True)
     window = traitlets.Float(5.0).tag(sync=True)  # s that are shown
     height = traitlets.Int(260).tag(sync=True)  # px
+    tells = traitlets.Bool(False).tag(sync=True)  # whether the page says in `shown` which time it shows
+    shown = traitlets.Float(0.0).tag(sync=True)  # s, the right edge
 
     def __init__(self, **options: Any):
         super().__init__(_esm=_module(), _style=(_STATIC / "uPlot.min.css").read_text(encoding="utf-8"), **options)
@@ -44,9 +46,15 @@ class StripChart(anywidget.AnyWidget):
         self.on_msg(self._asked)
 
     def begin(self, traces: Sequence[tuple[str, str]]) -> None:
-        """Empty, with these traces: (name, unit) each."""
+        """Empty, with these traces: (name, unit) each. Traces of a unit share an axis, but errors have their own."""
         self.traces = [
-            {"name": name, "unit": unit, "color": COLORS[i % len(COLORS)], "dash": [6, 4] if i == 0 else []}
+            {
+                "name": name.replace("_", " "),
+                "unit": unit,
+                "scale": f"{unit} of error" if name.endswith("_error") else unit,
+                "color": COLORS[i % len(COLORS)],
+                "dash": [6, 4] if i == 0 else [],
+            }
             for i, (name, unit) in enumerate(traces)
         ]
         self._rows = np.empty((0, len(traces) + 1))
@@ -59,6 +67,11 @@ class StripChart(anywidget.AnyWidget):
         if len(chosen):
             self._rows = np.concatenate((self._rows, chosen))[-KEPT:]
             self._deliver(chosen)
+
+    def at(self, time: float) -> np.ndarray:
+        """The row that was sent last before `time` (s); empty where there is none."""
+        index = int(np.searchsorted(self._rows[:, 0], time + 1e-9)) - 1
+        return self._rows[index] if index >= 0 else np.empty(0)
 
     def _thinned(self, rows: np.ndarray) -> np.ndarray:
         keep = []

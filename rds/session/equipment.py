@@ -5,36 +5,33 @@ The experiment is the same table that a TOML file would hold: what a panel runs,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.experiment.experiment import Experiment
 from rds.machines import Axis, Machine, load_machine
+from rds.session.build import Builds, Checked
 from rds.session.choices import Choices
-from rds.session.fields import Choice, Field, Number, Text
+from rds.session.equipment_fields import (
+    POLE,
+    PREFIX,
+    USER,
+    controllers,
+    first_fields,
+    parameter_fields,
+    sizes,
+    tracking_options,
+)
+from rds.session.equipment_run import EquipmentRun
+from rds.session.fields import Choice, Field
+from rds.session.formula import formula_file
+from rds.session.machine_there import machine_sentence
 from rds.session.session import Session
+from rds.session.task import Task
 
-USER = "user"  # the choice of something that the student wrote
-MODES = {
-    "model": {
-        "simulation": "Simulation",
-        "system-test": "System test",
-        "model-validation": "Model validation",
-    },
-    "control": {"simulation": "Simulation", "emulation": "Emulation", "implementation": "Implementation"},
-}
-SHAPES = {"square": "Square", "triangle": "Triangle", "sinusoid": "Sinusoid", USER: "User-defined"}
-CONTROLLERS = {
-    "p": "Proportional",
-    "pid": "PID",
-    "modified-pid": "Modified PID",
-    "tracking": "General tracking",
-    USER: "User-defined",
-}
-_SPINDLE = "rev/min"
-# first values that every axis of the mini CNC can follow: (amplitude, frequency) by what is driven
-_FIRST = {"V": (2.0, 1.0), "mm": (5.0, 0.2), "°": (20.0, 0.2), _SPINDLE: (200.0, 0.5)}
+FIRST_SINE = {"system": "X", "mode": "simulation", "shape": "sinusoid", "model": "default", "controller": "tracking"}
 
 
 @dataclass
@@ -43,10 +40,11 @@ class Equipment:
 
     session: Session
     kind: str
+    builds: Builds = field(default_factory=Builds)
 
     def __post_init__(self) -> None:
         self.machine: Machine = load_machine(self.session.machine)
-        self.choices: Choices = self.session.choices(f"equipment {self.kind}", self._fields())
+        self.choices: Choices = self.session.choices(f"equipment {self.kind}", first_fields(self.kind, self.machine))
         self._fit_system()
         self.choices.watch(self._chosen)
 
@@ -56,17 +54,31 @@ class Equipment:
         return self.machine.axes[self.choices["system"]]
 
     @property
-    def unit(self) -> str:
-        """The unit of the amplitude: V of a voltage signal, else the axis's own."""
-        return "V" if self.kind == "model" else self.axis.unit
-
-    @property
     def parameters(self) -> list[str]:
         """The names of the controller's parameters among the choices."""
-        return [name for name in self.choices.fields if name.startswith("controller.")]
+        return [name for name in self.choices.fields if name.startswith(PREFIX)]
+
+    @property
+    def shown(self) -> list[str]:
+        """The names of the choices that matter for what is chosen, in order."""
+        chosen = self.choices
+        idle = {name for name, owner in _FILES.items() if owner in chosen and chosen[owner] != USER}
+        if chosen["shape"] == USER:
+            idle |= {"amplitude", "frequency", "offset"}
+        if chosen["mode"] == "system-test":  # the machine alone
+            idle |= {"model", "model_file"}
+        return [name for name in chosen.fields if name not in idle]
+
+    def first_sine(self) -> None:
+        """The choices of a first experiment: a sine on X under the tracking controller, in simulation."""
+        for name, value in FIRST_SINE.items():
+            if name in self.choices and _option(self.choices.fields[name], value):
+                self.choices.set(name, value)
+        for name in ("amplitude", "frequency", "offset", "duration", "sample_period", *self.parameters):
+            self.choices.set(name, self.choices.fields[name].default)
 
     def table(self) -> dict[str, Any]:
-        """The experiment, as the table of a TOML file."""
+        """The experiment, as the table of a TOML file. InputError where a file is not named, or will not do."""
         chosen = self.choices
         table: dict[str, Any] = {
             "machine": self.session.machine,
@@ -78,92 +90,87 @@ class Equipment:
         }
         if self.kind == "control":
             table["controller"] = self._controller()
-        if chosen["model"] == USER:
+        if "model_file" in self.shown:
             table["model"] = {"file": self._file("model_file", "model")}
         if self.session.bus:
             table["bus"] = dict(self.session.bus)
         return table
 
+    def words(self) -> dict[str, str]:
+        """What was chosen, for people: the controller and the model by name or file."""
+        chosen, said = self.choices, {}
+        for name in ("controller", "model"):
+            if name in chosen:
+                own = chosen[name] == USER
+                said[name] = str(chosen[f"{name}_file"] if own else _option(chosen.fields[name], chosen[name]))
+        return said
+
+    def files(self) -> list[tuple[str, Path]]:
+        """What the student's files stand for, and where they are; InputError where one is not named."""
+        found = []
+        for name, role in _ROLES.items():
+            if name in self.shown and (name != "shape_file" or self._is_file()):
+                found.append((role, self.session.folder / self._file(name, role)))
+        return found
+
+    def build(self) -> Task[list[Checked]]:
+        """Begin to check the student's files; InputError where one is not named."""
+        files, T = self.files(), self.choices["sample_period"]
+
+        def work(task: Task[list[Checked]]) -> list[Checked]:
+            checked = []
+            for number, (role, path) in enumerate(files):
+                task.advance(number, len(files), f"checking {path.name}")
+                checked.append(self.builds.check(role, path, T))
+            return checked
+
+        return self.session.work("build", work)
+
+    def load(self) -> Task[str]:
+        """Begin to make everything ready for a run, without running: a sentence about the samples and the machine."""
+        files, T, table = self.files(), self.choices["sample_period"], self.table()
+
+        def work(task: Task[str]) -> str:
+            task.note = "checking your files"
+            self.builds.require(files, T)
+            task.note = "loading"
+            plan = Experiment.from_table(table, self.session.folder).plan()
+            return f"loaded: {plan.samples} samples, {plan.T * 1e3:g} ms each; {machine_sentence(plan)}"
+
+        return self.session.work("load", work)
+
+    def run(self) -> EquipmentRun:
+        """The run of what is chosen, to be started. Its files are checked first, where that was not done yet."""
+        files, T, table = self.files(), self.choices["sample_period"], self.table()
+        return EquipmentRun(self.session, table, prepare=lambda: self.builds.require(files, T))
+
     def _shape(self) -> dict[str, Any]:
         chosen = self.choices
         if chosen["shape"] == USER:
-            return {"kind": "user", "file": self._file("shape_file", "signal")}
+            given = self._file("shape_file", "signal, or a formula of t")
+            if not self._is_file():
+                given = formula_file(self.session.folder, given, chosen["duration"], chosen["sample_period"])
+            return {"kind": "user", "file": given}
         shape = {"kind": chosen["shape"], "amplitude": chosen["amplitude"], "frequency": chosen["frequency"]}
         return shape | ({"offset": chosen["offset"]} if chosen["offset"] else {})
+
+    def _is_file(self) -> bool:
+        return str(self.choices["shape_file"]).strip().lower().endswith(".csv")
 
     def _controller(self) -> dict[str, Any]:
         chosen = self.choices
         if chosen["controller"] == USER:
             return {"file": self._file("controller_file", "controller")}
-        given = {name.removeprefix("controller."): chosen[name] for name in self.parameters}
+        if POLE in chosen:
+            return {"name": chosen["controller"]} | tracking_options(chosen.values())
+        given = {name.removeprefix(PREFIX): chosen[name] for name in self.parameters}
         return {"name": chosen["controller"]} | {name: value for name, value in given.items() if value is not None}
 
     def _file(self, name: str, what: str) -> str:
-        if not self.choices[name]:
+        given = str(self.choices[name]).strip()
+        if not given:
             raise InputError(f"name the file of your {what} (in {self.session.folder})")
-        return str(self.choices[name])
-
-    def _fields(self) -> Iterable[Field]:
-        systems = {
-            name: "Spindle" if axis.unit == _SPINDLE else f"{name} axis" for name, axis in self.machine.axes.items()
-        }
-        what = "voltage signal" if self.kind == "model" else "reference"
-        yield Choice("system", "System", "which axis of the machine, or its spindle", next(iter(systems)), systems)
-        yield Choice(
-            "mode", "Mode", "what runs: a model, the real-time loop, or the machine", "simulation", MODES[self.kind]
-        )
-        yield Choice("shape", what.capitalize(), f"the form of the {what}", "sinusoid", SHAPES)
-        yield Text(
-            "shape_file",
-            f"File of the {what}",
-            f"a CSV file with columns of time [s] and value [{'V' if self.kind == 'model' else 'mm'}]",
-            "",
-            "signal.csv",
-        )
-        yield from self._sizes()
-        yield Choice(
-            "model",
-            "Model",
-            "what stands for the machine in simulation, and beside it",
-            "default",
-            {"default": "Default", USER: "User-defined"},
-        )
-        yield Text(
-            "model_file",
-            "File of the model",
-            "a Python file with derivatives() or advance(), or a model file of `rds fit`",
-            "",
-            "my_model.py",
-        )
-        if self.kind == "control":
-            yield Choice("controller", "Controller", "the law that answers with a voltage", "tracking", CONTROLLERS)
-            yield Text(
-                "controller_file", "File of the controller", "a Python file with control()", "", "my_controller.py"
-            )
-        yield Number("duration", "Final time", "how long it runs", 10.0, unit="s", above=0.0, high=3600.0)
-        yield Number(
-            "sample_period",
-            "Sample period",
-            "time from one sample to the next",
-            self.machine.sample_period,
-            unit="s",
-            low=1e-4,
-            high=1.0,
-        )
-
-    def _sizes(self, axis: Axis | None = None) -> Iterable[Field]:
-        """Amplitude, frequency and offset, with the range and the first value that the system allows."""
-        if self.kind == "model":
-            unit, high, reach = "V", *([self.machine.converter.range] * 2)
-        else:
-            axis = axis or next(iter(self.machine.axes.values()))
-            unit, (low, top) = axis.unit, axis.travel
-            reach = max(abs(low), abs(top))
-            high = top if unit == _SPINDLE else (top - low) / 2.0
-        amplitude, frequency = _FIRST.get(unit, (1.0, 0.2))
-        yield Number("amplitude", "Amplitude", "middle to peak", min(amplitude, high), unit=unit, low=0.0, high=high)
-        yield Number("frequency", "Frequency", "periods per second", frequency, unit="Hz", above=0.0, high=1000.0)
-        yield Number("offset", "Offset", "middle of the signal", 0.0, unit=unit, low=-reach, high=reach)
+        return given
 
     def _chosen(self, name: str) -> None:
         if name in ("system", "controller"):
@@ -171,29 +178,21 @@ class Equipment:
 
     def _fit_system(self) -> None:
         """What the chosen system and controller allow."""
-        self.choices.replace(each for each in self._sizes(self.axis) if each != self.choices.fields[each.name])
+        fields = self.choices.fields
+        fitting = sizes(self.kind, self.machine, self.axis)
+        self.choices.replace(each for each in fitting if each != fields[each.name])
         if self.kind == "control":
-            wanted = {each.name: each for each in self._parameter_fields()}
+            if (fitting_laws := controllers(self.axis)) != fields["controller"]:
+                self.choices.replace([fitting_laws])
+            wanted = {each.name: each for each in parameter_fields(self.choices["controller"], self.axis)}
             self.choices.remove([name for name in self.parameters if name not in wanted])
-            self.choices.replace(each for name, each in wanted.items() if self.choices.fields.get(name) != each)
+            self.choices.replace(each for name, each in wanted.items() if fields.get(name) != each)
 
-    def _parameter_fields(self) -> Iterable[Field]:
-        from rds.controllers import controller_module
 
-        if self.choices["controller"] == USER:
-            return
-        options: Any = controller_module(self.choices["controller"]).OPTIONS
-        if not isinstance(options, Mapping):
-            return  # the tracking controller's poles have a panel of their own
-        for name, option in options.items():
-            meaning, _, unit = option.meaning.partition(", ")
-            yield Number(
-                f"controller.{name}",
-                f"{name} ({meaning})",
-                f"{option.meaning}; empty: tuned from the axis's data",
-                None,
-                unit=unit.partition(";")[0].replace("mm", self.axis.unit),
-                low=option.at_least,
-                above=option.more_than,
-                optional=True,
-            )
+_FILES = {"shape_file": "shape", "model_file": "model", "controller_file": "controller"}  # shown for what is the user's
+_ROLES = {"shape_file": "signal", "model_file": "model", "controller_file": "controller"}
+
+
+def _option(field: Field, value: str) -> str:
+    """The words that stand for a choice; none where it cannot be chosen."""
+    return field.options.get(value, "") if isinstance(field, Choice) else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,27 +16,37 @@ from rds.experiment.report import save_with_report
 from rds.experiment.run import Run
 from rds.modes import load_mode
 from rds.results import Result
+from rds.runtime.plan import Plan
 from rds.session.session import RUNS, Session
-from rds.session.task import Task
+from rds.session.task import Stopped, Task
 
-LOOKS = 0.05  # s between looks whether it is over
+_KINDS = ("reference", "measured", "modelled", "voltage")
 
 
 class EquipmentRun:
-    """One run of `table`, the words of an experiment. `start()` returns at once.
+    """One run of `table`, the words of an experiment. `start()` returns at once, whatever has to be loaded first.
 
-    It is work that a progress bar can follow: share, seconds_left, note, done, stop(). InputError at once for what
-    will not do; an error of the run is in `error` when it is over.
+    It is work that a progress bar can follow: share, seconds_left, note, done, stop(). What goes wrong is in `error`
+    when it is over. `prepare()` is called first, beside the page (a check of the student's files).
     """
 
-    def __init__(self, session: Session, table: dict[str, Any], title: str | None = None):
-        self.session = session
-        self.experiment = Experiment.from_table(table, session.folder)
-        self.plan = self.experiment.plan()
-        self.real_time = load_mode(self.plan.mode).real_time
-        self.folder: Path = session.folder / RUNS / _name(self.plan.names, self.plan.mode)
-        self.title = title or f"{', '.join(self.plan.names)}, {self.plan.mode}"
+    def __init__(
+        self,
+        session: Session,
+        table: dict[str, Any],
+        title: str | None = None,
+        prepare: Callable[[], None] | None = None,
+    ):
+        mode = str(table.get("mode", "simulation"))
+        self.session, self.table = session, table
+        self.real_time = load_mode(mode).real_time
+        names = [str(table["axis"])] if "axis" in table else [str(name) for name in table.get("axes", [])]
+        self.folder: Path = session.folder / RUNS / _name(names, mode)
+        self.title = title or f"{', '.join(names)}, {mode}"
         self.files: dict[str, Path] = {}
+        self.plan: Plan | None = None
+        self.result: Result | None = None  # as soon as the loop is over; its files come later
+        self._prepare = prepare
         self._run: Run | None = None
         self._task: Task[Result] | None = None
         self._seen = 0
@@ -45,24 +55,39 @@ class EquipmentRun:
         """Begin; InputError if the machine is in use."""
         if self.real_time:
             self.session.take_machine(self.title, self)
-        try:
-            self._run = self.experiment.start(out=self.folder)
-            self._task = self.session.work(self.title, self._follow, self._run.stop)
-        except BaseException:
-            self.session.give_machine_back(self)
-            raise
+        self._task = self.session.work(self.title, self._work, self._stop_loop)
         return self
 
-    def _follow(self, task: Task[Result]) -> Result:
-        run = self._run
-        assert run is not None
+    def _work(self, task: Task[Result]) -> Result:
         try:
-            result = run.wait(lambda taken, of: task.advance(taken, of, "running" if self.real_time else "simulating"))
-            task.note = "saving"
-            self.files = save_with_report(result, self.folder, self.title)
-            return result
+            if self._prepare is not None:
+                self._tell(task, "checking your files")
+                self._prepare()
+            self._tell(task, "loading")
+            experiment = Experiment.from_table(self.table, self.session.folder)
+            self.plan = experiment.plan()
+            self._tell(task, "starting the loop" if self.real_time else "simulating")
+            run = experiment.start(out=self.folder)
+            self._run = run
+            if task.stopping:
+                run.stop()
+            self.result = run.wait(
+                lambda taken, of: task.advance(taken, of, "running" if self.real_time else "simulating")
+            )
         finally:
             self.session.give_machine_back(self)
+        task.note = "saving tables, pictures and the report"
+        self.files = save_with_report(self.result, self.folder, self.title)
+        return self.result
+
+    def _tell(self, task: Task[Result], note: str) -> None:
+        if task.stopping:
+            raise Stopped
+        task.note = note
+
+    def _stop_loop(self) -> None:
+        if self._run is not None:
+            self._run.stop()
 
     # what a progress bar follows
 
@@ -96,45 +121,58 @@ class EquipmentRun:
         return self._task is None or self._task.wait(timeout)
 
     @property
-    def result(self) -> Result | None:
-        """What it left; None while it runs, or if it failed."""
-        return self._task.result if self._task else None
+    def error(self) -> BaseException | None:
+        """Why it failed; None where it was only stopped."""
+        return None if self._task is None or self._task.stopped else self._task.error
 
     @property
-    def error(self) -> BaseException | None:
-        """Why it failed."""
-        return self._task.error if self._task else None
+    def stopped_early(self) -> bool:
+        """Whether it was stopped before its loop began."""
+        return self._task is not None and self._task.stopped
 
     # what happens meanwhile
 
     def traces(self) -> list[tuple[str, str]]:
-        """The names and units of what `new_rows` gives beside the time."""
-        if self._run is None or not self._run.columns:
-            return []
-        return [(name, self._run.units.get(name, "")) for name in self._shown()]
+        """The names and units of what `new_rows` gives beside the time; none before the loop has begun."""
+        columns, units = self._columns()
+        found = [(name, units.get(name, "")) for name in _shown(columns)]
+        return found + [(f"{axis}_error", units.get(f"{axis}_measured", "")) for axis in _followed(columns)]
 
     def new_rows(self) -> np.ndarray:
         """Rows recorded since it was last asked: time in s, then one column per trace."""
+        columns, _ = self._columns()
+        rows = self._new(columns)
+        if not len(rows):
+            return np.empty((0, 1 + len(self.traces())))
+        of = dict(zip(columns, rows.T, strict=True))
+        errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in _followed(columns)]
+        return np.column_stack([of["time"], *(of[name] for name in _shown(columns)), *errors])
+
+    def _columns(self) -> tuple[list[str], Mapping[str, str]]:
+        if self.result is not None:
+            return list(self.result.columns), self.result.units
         if self._run is None or not self._run.columns:
-            return np.empty((0, 1))
+            return [], {}
+        return ["time", *self._run.columns[1:]], self._run.units
+
+    def _new(self, columns: Sequence[str]) -> np.ndarray:
+        """Rows of `columns` that were not asked for yet."""
+        if self.result is not None:
+            seen, self._seen = self._seen, len(self.result)
+            return np.column_stack([self.result[name][seen:] for name in columns])
+        if self._run is None or not columns:
+            return np.empty((0, 0))
         first, rows = self._run.read(self._seen)
         self._seen = first + len(rows)
-        columns = self._run.columns
-        chosen = [columns.index(name) for name in self._shown()]
-        times = np.arange(first, first + len(rows)) * self.plan.T
-        return np.column_stack([times, rows[:, chosen]]) if len(rows) else np.empty((0, 1 + len(chosen)))
-
-    def _shown(self) -> Sequence[str]:
-        assert self._run is not None
-        wanted = [
-            f"{axis}_{kind}" for axis in self.plan.names for kind in ("reference", "measured", "modelled", "voltage")
-        ]
-        return [name for name in wanted if name in self._run.columns]
+        # the record counts samples, in its first column
+        return np.column_stack([rows[:, 0] * self._run.plan.T, rows[:, 1:]])
 
     @property
     def live_values(self) -> dict[str, Any]:
-        """The channels whose values can be changed now, by name."""
-        return dict(self._run.desk.channels) if self._run is not None else {}
+        """The controller's channels, whose values can be changed now, by name; none when the run is over."""
+        if self._run is None or self._run.done:
+            return {}
+        return {name: channel for name, channel in self._run.desk.channels.items() if "." in name}
 
     def change(self, name: str, value: float) -> None:
         """Change a live value from the next sample on; InputError where that will not do, or when it is over."""
@@ -144,8 +182,22 @@ class EquipmentRun:
 
     @property
     def changes(self) -> list[Any]:
-        """The changes that the loop has taken, as (time in s, name, value)."""
+        """The changes that the loop has taken: time in s, name, old value, new value each."""
         return list(self._run.changes) if self._run is not None else []
+
+
+def _shown(columns: Sequence[str]) -> list[str]:
+    """The columns that a strip shows: of each axis its motion, and its voltage."""
+    return [name for kind in _KINDS for name in columns if name.endswith(f"_{kind}")]
+
+
+def _followed(columns: Sequence[str]) -> list[str]:
+    """The axes that follow a reference."""
+    return [
+        name.removesuffix("_reference")
+        for name in columns
+        if name.endswith("_reference") and f"{name.removesuffix('_reference')}_measured" in columns
+    ]
 
 
 def _name(axes: Sequence[str], mode: str) -> str:

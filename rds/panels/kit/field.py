@@ -20,6 +20,7 @@ class FieldView(widgets.VBox):
     def __init__(self, choices: Choices, name: str, *, buttons: bool | None = None, disabled: bool = False):
         super().__init__()
         self.add_class("rds-field")
+        self.add_class(f"rds-field-{type(choices.fields[name]).__name__.lower()}")
         self._choices, self._name = choices, name
         self._buttons = buttons
         self._refusal = widgets.HTML("")

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
+from html import escape
 from typing import Any
 
 import ipywidgets as widgets
+
+from rds.core.errors import RdsError
+from rds.panels.kit.ticker import Ticker
+from rds.session.session import Session
 
 DPI = 88  # of a figure 10 inches wide: as wide as a panel on a screen of 1280
 
@@ -17,6 +24,7 @@ class FigureView(widgets.VBox):
         self.add_class("rds-figure")
         self.figure: Any = None
         self._canvas: Any = None
+        self._waiting: Any = None
 
     def show(self, figure: Any, caption: str = "") -> None:
         """Show a matplotlib figure that belongs to no pyplot; `caption` is read out in its place."""
@@ -27,8 +35,30 @@ class FigureView(widgets.VBox):
         words = [widgets.HTML(f"<p>{caption}</p>")] if caption else []
         self.children = [self._canvas, *words]
 
+    def draw(self, session: Session, ticker: Ticker, make: Callable[[], Any], caption: str = "") -> None:
+        """Show the figure that `make()` gives, which is called beside the page: drawing takes seconds."""
+        self.clear()
+        self.children = [widgets.HTML('<p role="status">drawing …</p>')]
+        task = self._waiting = session.work("a plot", lambda task: make())
+
+        def look() -> None:
+            if not task.done:
+                return
+            end()
+            if self._waiting is not task:  # something else is wanted by now
+                return
+            if task.error is not None:
+                if not isinstance(task.error, RdsError):
+                    logging.getLogger(__name__).error("a plot could not be drawn", exc_info=task.error)
+                self.children = [widgets.HTML(f'<p role="alert">✖ no plot: {escape(str(task.error))}</p>')]
+                return
+            self.show(task.result, caption)
+
+        end = ticker.add(look)
+
     def clear(self) -> None:
         """Nothing to show."""
+        self._waiting = None
         self.children = []
         if self._canvas is not None:
             self._canvas.close()

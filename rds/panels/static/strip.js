@@ -53,21 +53,30 @@ function render({ model, el }) {
     const traces = model.get("traces");
     if (columns.length !== traces.length + 1) columns = [[], ...traces.map(() => [])];
     const text = ink("--rds-text", "#222"), grid = { stroke: ink("--rds-grid", "#ddd"), width: 1 };
-    const units = [...new Set(traces.map((trace) => trace.unit))];
+    const scaled = (trace) => trace.scale || trace.unit;
+    const units = [...new Set(traces.map(scaled))];
     const scales = { x: { time: false, range: () => [end - model.get("window"), end] } };
     units.forEach((unit) => { scales[unit] = { auto: true }; });
     const axes = [{ stroke: text, grid, label: "time [s]", labelSize: 20, size: 34 }];
     units.forEach((unit, i) => axes.push({
       scale: unit, stroke: text, grid: i ? { show: false } : grid, side: i ? 1 : 3, size: 58, labelSize: 18,
-      label: traces.filter((trace) => trace.unit === unit).map((trace) => trace.name).join(", ") + ` [${unit}]`,
+      label: axisLabel(traces.filter((trace) => scaled(trace) === unit)),
     }));
     const series = [{ label: "time [s]", value: (u, v) => (v == null ? "–" : v.toFixed(3)) }];
     traces.forEach((trace) => series.push({
       label: `${trace.name} [${trace.unit}]`, stroke: trace.color, width: trace.width || 1.6, dash: trace.dash || [],
-      scale: trace.unit, points: { show: false }, value: (u, v) => (v == null ? "–" : v.toPrecision(5)),
+      scale: scaled(trace), points: { show: false }, value: (u, v) => (v == null ? "–" : v.toPrecision(5)),
     }));
     plot = new uPlot({ width: Math.max(box.clientWidth, 320), height: model.get("height"), scales, axes, series,
       cursor: { drag: { x: false, y: false } }, legend: { live: true } }, shown(), box);
+  }
+
+  // the legend names each trace; an axis names one trace, or what several have in common
+  function axisLabel(traces) {
+    const unit = ` [${traces[0].unit}]`;
+    if (traces.length === 1) return traces[0].name + unit;
+    const first = traces[0].name.split(" ")[0];
+    return (traces.every((trace) => trace.name.split(" ")[0] === first) ? first : "") + unit;
   }
 
   // only what is in the window is handed to the chart
@@ -89,6 +98,7 @@ function render({ model, el }) {
     clock.textContent = `${end.toFixed(2)} s, ${state}`;
     el.dataset.samples = columns.length ? columns[0].length : 0;
     el.dataset.state = state;
+    if (model.get("tells") && model.get("shown") !== end) { model.set("shown", end); model.save_changes(); }
   }
 
   const timer = setInterval(() => {

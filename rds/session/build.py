@@ -1,0 +1,136 @@
+"""Build: the student's files of an experiment, checked in a process of their own, with each fault at its line."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Lock
+
+from rds.core.errors import InputError
+
+LARGEST = 1 << 20  # bytes of a file that is shown and checked
+_LINE = re.compile(r"(?:, line |:)(\d+)")
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What was found: `line` of the file (None: of the whole file), and the sentence."""
+
+    line: int | None
+    text: str
+    fault: bool = True  # else a warning
+
+
+@dataclass(frozen=True)
+class Checked:
+    """One file: what it stands for ("controller", "model", "signal"), its text, and what was found in it."""
+
+    role: str
+    path: Path
+    text: str
+    marks: tuple[Mark, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether it will do; warnings do not count."""
+        return not any(mark.fault for mark in self.marks)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one line."""
+        first = next((mark for mark in self.marks if mark.fault), None)
+        if first is None:
+            return f"{self.path.name}: the {self.role} keeps its interface"
+        return f"{self.path.name}{f', line {first.line}' if first.line else ''}: {first.text}"
+
+
+@dataclass
+class Builds:
+    """Files that were checked. One that has not changed since is not checked again."""
+
+    _kept: dict[tuple[str, Path, float], tuple[str, Checked]] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    def check(self, role: str, path: Path, T: float) -> Checked:
+        """Check the file at `path`, which stands for `role`, for a loop of `T` s. Takes seconds the first time."""
+        data = _read(path)
+        if isinstance(data, str):
+            return Checked(role, path, "", (Mark(None, data),))
+        digest, key = hashlib.sha256(data).hexdigest(), (role, path, T)
+        with self._lock:
+            before = self._kept.get(key)
+        if before is not None and before[0] == digest:
+            return before[1]
+        checked = _checked(role, path, data.decode("utf-8", "replace"), T)
+        with self._lock:
+            self._kept[key] = digest, checked
+        return checked
+
+    def latest(self) -> list[Checked]:
+        """What was found in each file that was checked, as it was then."""
+        with self._lock:
+            return [checked for _, checked in self._kept.values()]
+
+    def require(self, files: Iterable[tuple[str, Path]], T: float) -> None:
+        """InputError naming the first file that will not do."""
+        for role, path in files:
+            checked = self.check(role, path, T)
+            if not checked.ok:
+                raise InputError(checked.sentence)
+
+
+def _checked(role: str, path: Path, text: str, T: float) -> Checked:
+    try:
+        if role == "signal":
+            from rds.signals.rows import read_rows
+
+            read_rows(path)
+            return Checked(role, path, text)
+        if role == "model" and path.suffix == ".toml":
+            from rds.identification.model_file import read_model
+
+            read_model(path)
+            return Checked(role, path, text)
+        return _python(role, path, text, T)
+    except InputError as error:
+        return Checked(role, path, text, (_mark(str(error).removeprefix(f"{path}:").strip(), path, error.where),))
+
+
+def _python(role: str, path: Path, text: str, T: float) -> Checked:
+    from rds.checks import check_file
+
+    report = check_file(path, T)
+    marks, notes = [], []
+    for each in report.reports:
+        if each.interface in (role, "file"):
+            marks += [_mark(str(fault), path) for fault in each.faults]
+            marks += [_mark(str(warning), path, fault=False) for warning in each.warnings]
+            notes += [*each.notes, *([f"time per call: {each.timing}"] if each.timing else [])]
+    marks += [_mark(str(warning), path, fault=False) for warning in report.warnings]
+    if role not in report.interfaces and not marks:
+        what = " and ".join(report.interfaces)
+        marks.append(Mark(None, f"it holds a {what}, not a {role}; name the file of your {role}"))
+    return Checked(role, path, text, tuple(marks), tuple(notes))
+
+
+def _mark(text: str, path: Path, where: str | None = None, fault: bool = True) -> Mark:
+    """The line that a message names, of this file."""
+    name = re.escape(path.name)
+    found = re.search(f"{name}{_LINE.pattern}", where or "") or re.search(f"{name}{_LINE.pattern}", text)
+    return Mark(int(found.group(1)) if found else None, text, fault)
+
+
+def _read(path: Path) -> bytes | str:
+    """The content, or the sentence why there is none."""
+    if not path.is_file():
+        return f"there is no such file in {path.parent}; save your file there, or name another"
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST + 1)
+    except OSError as error:
+        return f"it cannot be read: {error.strerror}"
+    return data if len(data) <= LARGEST else f"it is larger than {LARGEST >> 20} MB; that is no file to run"
