@@ -21,6 +21,7 @@ from rds.commands import (
     excite,
     fault,
     fit,
+    grade,
     interpolate,
     modules,
     nc,
@@ -59,6 +60,7 @@ app.command()(docs.docs)
 app.command()(interpolate.interpolate)
 app.command()(robustness.robustness)
 app.add_typer(design.app, name="design")
+app.add_typer(grade.app, name="grade")
 machine_app.command("from")(design.machine_from)
 
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]

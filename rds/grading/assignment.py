@@ -146,6 +146,13 @@ def _criteria(words: Words, kind: str, cases: Mapping[str, Case]) -> tuple[Crite
         found[criterion.name] = criterion
     if not found:
         raise InputError("it has no criterion; add [[criterion]] with name, kind, case, points, full, none", words.path)
+    for table, criterion in zip(words.tables("criterion"), found.values(), strict=True):
+        for name in criterion.requires:
+            if name not in found:
+                known = ", ".join(found)
+                raise table.fault("requires", f"names {name!r}, which is no criterion; there are {known}")
+            if found[name].requires:
+                raise table.fault("requires", f"names {name!r}, which itself requires another; name that one")
     used = {name for criterion in found.values() for name in criterion.cases}
     for table, name in zip(words.tables("case"), cases, strict=True):
         if name not in used:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from types import ModuleType
 from typing import Any
@@ -35,6 +35,7 @@ class Criterion:
     is_visible: bool
     options: Mapping[str, Any]
     tests: tuple[UnitTest, ...] = ()
+    requires: tuple[str, ...] = ()  # criteria without whose points this one earns none
 
     @property
     def module(self) -> ModuleType:
@@ -67,6 +68,11 @@ class Criterion:
     def nothing(self, why: str, case: str = "") -> CriterionScore:
         """No value, no points."""
         return self._scored(0.0, None, Band.NONE, f"{self.meaning} could not be measured: {why.rstrip('.')}.", case)
+
+    def without(self, score: CriterionScore, title: str) -> CriterionScore:
+        """The same value without points, because the criterion called `title` earned none."""
+        said = f"{score.sentence.rstrip('.')}; it counts only where points are earned for {title}."
+        return replace(score, score=0.0, band=Band.NONE, sentence=said)
 
     @property
     def meaning(self) -> str:
@@ -128,6 +134,7 @@ def read_criterion(words: Words, kind_of_submission: str, cases: Mapping[str, Ca
         words.flag("visible", True),
         _options(words, module),
         tests,
+        _requires(words, name),
     )
     words.done()
     return criterion
@@ -201,6 +208,16 @@ def _options(words: Words, module: ModuleType) -> dict[str, Any]:
         if key not in found:
             raise InputError(f"{key} is missing; give it: {known[key].meaning}", words.place())
     return found
+
+
+def _requires(words: Words, name: str) -> tuple[str, ...]:
+    given = words.any("requires", [])
+    given = [given] if isinstance(given, str) else given
+    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        raise words.fault("requires", "must be a list of the names of criteria")
+    if name in given:
+        raise words.fault("requires", "names the criterion itself")
+    return tuple(given)
 
 
 def _number(value: float, unit: str) -> str:

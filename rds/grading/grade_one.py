@@ -20,7 +20,7 @@ from rds.grading.assignment import Assignment
 from rds.grading.cases.case import Answers, Case, CaseRun
 from rds.grading.criteria.measuring import NotMeasured
 from rds.grading.criterion import Criterion
-from rds.grading.grade import CriterionScore, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.late import days_late
 from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.sandbox.limits import Limits
@@ -30,7 +30,11 @@ _LONGEST_OUTPUT = 4000  # characters of what it printed, in the notes
 
 
 class Opener(Protocol):
-    """What opens submissions: `sandbox.Pool`, or a stand-in that says what it is."""
+    """What opens submissions: `sandbox.Pool`, or what takes its place for one's own file."""
+
+    @property
+    def counts_work(self) -> bool:
+        """Whether its subjects' `counts` hold events."""
 
     def open(self, path: str | Path, limits: Limits | None, kind: str) -> Any:
         """A context manager with the methods of `sandbox.Subject`."""
@@ -114,7 +118,7 @@ def grade_with_runs(
         output = opened.output
     finally:
         opened.close()
-    scores = tuple(work.score(criterion) for criterion in work.criteria)
+    scores = work.scores()
     before = _rounded(sum(score.score for score in scores))
     days = days_late(assignment.due, submitted)
     lost = assignment.late.lost(days)
@@ -202,7 +206,16 @@ class _Work:
             self._stopped = error.reason
         return bool(self._stopped)
 
-    def score(self, criterion: Criterion) -> CriterionScore:
+    def scores(self) -> tuple[CriterionScore, ...]:
+        """Of all criteria, in their order."""
+        found = {criterion.name: self._score(criterion) for criterion in self.criteria}
+        for criterion in self.criteria:
+            missed = [name for name in criterion.requires if name in found and found[name].band is Band.NONE]
+            if missed and found[criterion.name].band is not Band.NONE:
+                found[criterion.name] = criterion.without(found[criterion.name], found[missed[0]].title)
+        return tuple(found.values())
+
+    def _score(self, criterion: Criterion) -> CriterionScore:
         """The worst of all runs of all its cases."""
         if criterion.tests:
             value = self._tested.get(criterion.name)

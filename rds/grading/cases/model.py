@@ -102,7 +102,7 @@ def read(words: Words, folder: Path, machine: str) -> ModelCase:
 
 
 def _of_log(words: Words, common: Common, params: dict[str, Any], folder: Path, log: str) -> ModelCase:
-    from rds.identification.read_log import read_log
+    from rds.logs.read_log import read_log
 
     mapping, axis = inside(words, "map", folder), words.text("axis")
     words.any("machine")

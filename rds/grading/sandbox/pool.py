@@ -46,6 +46,8 @@ class Pool:
             self.close()
             raise
 
+    counts_work = True
+
     def open(self, path: str | Path, limits: Limits | None = None, kind: str = "controller") -> Subject:
         """The submission at `path`, loaded in a fresh cell: a context manager that ends its processes.
 
