@@ -1,0 +1,88 @@
+"""The files below a folder. No link is followed, and nothing but regular files is ever opened."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+from rds.core.errors import InputError
+from rds.grading.intake.items import CODE, DEEPEST, MOST_FILES, Item, Refusal, faulty, is_clutter
+
+_KINDS = {
+    stat.S_IFLNK: "a link",
+    stat.S_IFIFO: "a pipe (FIFO)",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def files_below(folder: Path) -> tuple[list[Item], list[str]]:
+    """All files below `folder` in the order of their names, and the names of the folders just below it."""
+    found: list[Item] = []
+    for item in _walk(folder, ()):
+        found.append(item)
+        if len(found) > MOST_FILES:
+            raise InputError(f"holds more than {MOST_FILES} files; name the folder of the submissions", str(folder))
+    with os.scandir(folder) as entries:
+        folders = sorted(entry.name for entry in entries if entry.is_dir(follow_symlinks=False))
+    return found, [name for name in folders if not is_clutter((name,)) and not _looks_like_code(name)]
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """At most `most` bytes of a regular file; Refusal for anything else."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except (OSError, ValueError) as error:
+        said = error.strerror if isinstance(error, OSError) else str(error)
+        raise Refusal(f"it cannot be opened: {said}") from None
+    with os.fdopen(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise Refusal("it is not a regular file; hand in one Python file or notebook")
+        try:
+            data = file.read(most + 1)
+        except OSError as error:
+            raise Refusal(f"it cannot be read: {error.strerror}") from None
+    if len(data) > most:
+        raise Refusal(f"it has more than {most} bytes; keep data out of it")
+    return data
+
+
+def _walk(folder: Path, parts: tuple[str, ...]) -> Iterator[Item]:
+    try:
+        with os.scandir(folder) as entries:
+            names = sorted(entries, key=lambda entry: os.fsencode(entry.name))
+    except OSError as error:
+        if not parts:
+            raise InputError(f"cannot be read: {error.strerror}; check the path", str(folder)) from error
+        yield faulty(parts, f"its folder cannot be opened: {error.strerror}")
+        return
+    for entry in names:
+        inner = (*parts, entry.name)
+        if is_clutter(inner):
+            continue
+        try:
+            about = entry.stat(follow_symlinks=False)
+        except OSError as error:
+            yield faulty(inner, f"it cannot be looked at: {error.strerror}")
+            continue
+        if stat.S_ISDIR(about.st_mode):
+            if _looks_like_code(entry.name):
+                yield faulty(inner, "it is a folder that is called like a file; hand in one Python file or notebook")
+            elif len(inner) > DEEPEST:
+                yield faulty(inner, f"it lies more than {DEEPEST} folders deep")
+            else:
+                yield from _walk(Path(entry.path), inner)
+        elif stat.S_ISREG(about.st_mode):
+            yield Item(inner, partial(read_regular, Path(entry.path)), datetime.fromtimestamp(about.st_mtime))
+        else:
+            kind = _KINDS.get(stat.S_IFMT(about.st_mode), "no regular file")
+            yield faulty(inner, f"it is {kind}; hand in one Python file or notebook")
+
+
+def _looks_like_code(name: str) -> bool:
+    return name.lower().endswith(CODE)

@@ -1,0 +1,67 @@
+"""What a Gradescope export says of its submissions: `submission_metadata.yml`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib import import_module
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.grading.intake.names import shown
+
+METADATA = "submission_metadata.yml"
+
+
+@dataclass(frozen=True)
+class Submitter:
+    """Who handed a submission in, and when. A group is known by its first member; `source` names all."""
+
+    student: str
+    time: datetime | None
+    source: dict[str, Any] = field(default_factory=dict)
+
+
+def read_metadata(data: bytes) -> dict[str, Submitter]:
+    """Of each folder of an export its submitter. InputError if it is not what Gradescope writes."""
+    try:
+        yaml = import_module("yaml")  # which has no types of its own
+    except ImportError as error:
+        raise InputError("reading it needs PyYAML (pip install pyyaml)", METADATA) from error
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    try:
+        whole = yaml.load(data, Loader=loader)  # a safe loader: plain values only
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise InputError(f"is not YAML: {str(error).splitlines()[0]}; export it once more", METADATA) from error
+    if not isinstance(whole, Mapping):
+        raise InputError("is no table of submissions; export it once more", METADATA)
+    return {str(folder): _submitter(str(folder), about) for folder, about in whole.items()}
+
+
+def _submitter(folder: str, about: Any) -> Submitter:
+    people = about.get(":submitters") if isinstance(about, Mapping) else None
+    if not isinstance(people, list) or not people or not all(isinstance(each, Mapping) for each in people):
+        raise InputError(f"{shown(folder)} has no :submitters; export it once more", METADATA)
+    members = [{key: _text(each.get(f":{key}")) for key in ("name", "sid", "email")} for each in people]
+    first = members[0]
+    student = first["sid"] or first["email"] or first["name"] or folder
+    source: dict[str, Any] = {**first, "submission": shown(folder)}
+    if len(members) > 1:
+        source["members"] = members
+    return Submitter(student, _time(about.get(":created_at")), source)
+
+
+def _text(value: Any) -> str:
+    return "" if value is None else shown(str(value))
+
+
+def _time(value: Any) -> datetime | None:
+    if isinstance(value, str):
+        try:
+            value = datetime.fromisoformat(value)
+        except ValueError:
+            return None
+    if not isinstance(value, datetime):
+        return None
+    return value if value.tzinfo else value.replace(tzinfo=UTC)

@@ -1,0 +1,63 @@
+"""One file of many that were handed in, wherever it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+
+CODE = (".py", ".ipynb")
+ARCHIVE = ".zip"
+MOST_FILES = 200_000
+DEEPEST = 12  # folders in folders
+
+# what computers leave beside the files of their users
+_CLUTTER = {"__MACOSX", "__pycache__", ".DS_Store", ".ipynb_checkpoints", ".git", "Thumbs.db", "desktop.ini"}
+
+
+class Refusal(Exception):
+    """Why a file is not opened: a sentence for its author."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """A file as it was found; nothing of it has been read.
+
+    `parts` are the names of its folders and its own, below the place that was searched. `read(most)` gives its bytes,
+    Refusal if there are more than `most`, or none can be had. `fault` says why it is not to be read at all. `time` is
+    what the place says of when it came there, without a time zone where none is known.
+    """
+
+    parts: tuple[str, ...]
+    read: Callable[[int], bytes]
+    time: datetime | None = None
+    fault: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its own name."""
+        return self.parts[-1]
+
+    @property
+    def is_code(self) -> bool:
+        """Whether its name says that it is Python, or a notebook."""
+        return self.name.lower().endswith(CODE)
+
+    @property
+    def is_archive(self) -> bool:
+        """Whether its name says that it is a zip."""
+        return self.name.lower().endswith(ARCHIVE)
+
+
+def is_clutter(parts: tuple[str, ...]) -> bool:
+    """Whether no person made this file."""
+    return not _CLUTTER.isdisjoint(parts) or parts[-1].startswith("._")
+
+
+def faulty(parts: tuple[str, ...], fault: str) -> Item:
+    """An item that is not to be read."""
+
+    def refuse(most: int) -> bytes:
+        raise Refusal(fault)
+
+    return Item(parts, refuse, fault=fault)

@@ -1,0 +1,209 @@
+"""Which student a file belongs to, from where it lies: a function of paths alone.
+
+submitted/ada/ps1/controller.py                          nbgrader
+Ada Lovelace_12345_assignsubmission_file_/controller.py  Moodle, also without the folder
+lovelaceada_LATE_12345_67890_controller-1.py             Canvas
+submission_12345/controller.py, submission_metadata.yml  Gradescope
+ada/controller.py, ada.py                                a folder, or a file, of each student
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.grading.intake.gradescope import METADATA, Submitter, read_metadata
+from rds.grading.intake.items import Item
+from rds.grading.intake.names import shown
+
+TIMES = "timestamps.csv"  # of the instructor, at the top
+STAMP = "timestamp.txt"  # of nbgrader, beside a submission
+_METADATA_LARGEST = 64 << 20  # bytes; Gradescope's holds all earlier results
+
+_MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?:file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL)
+_CANVAS = re.compile(r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<id>\d+)_(?P<number>\d+)_(?P<file>.+)", re.DOTALL)
+
+
+@dataclass
+class Heap:
+    """All files of one student. `source` is what the export says of the student, for the gradebook's sake."""
+
+    student: str
+    items: list[Item] = field(default_factory=list)
+    source: dict[str, Any] = field(default_factory=dict)
+    has_times: bool = False  # whether the items' times are when they were handed in
+    stamp: Item | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Layout:
+    """The heaps, in the order of the students' names, and what belongs to nobody."""
+
+    name: str
+    heaps: list[Heap]
+    times: Item | None = None
+    ignored: tuple[str, ...] = ()
+
+
+def sorted_out(items: Sequence[Item], folders: Sequence[str], assignments: Sequence[str], zipped: bool) -> Layout:
+    """The files as heaps of students. `assignments` are names by which nbgrader may know the assignment.
+
+    `zipped`: whether they are in an export, whose times are the learning platform's. InputError if there are several
+    assignments and none has such a name.
+    """
+    items, folders = _without_root(items, folders)
+    times = next((item for item in items if item.parts == (TIMES,)), None)
+    items = [item for item in items if item is not times]
+    sheaf = _Sheaf(zipped)
+    metadata = next((item for item in items if item.parts == (METADATA,)), None)
+    if metadata is not None:
+        submitters = read_metadata(metadata.read(_METADATA_LARGEST))
+        for item in items:
+            if item is not metadata:
+                sheaf.gradescope(item, submitters)
+        for name in folders:
+            sheaf.heap_of_gradescope(name, submitters)
+        return sheaf.layout("gradescope", times)
+    if _mostly(items, lambda item: _MOODLE.fullmatch(item.parts[0])):
+        for item in items:
+            sheaf.moodle(item)
+        for name in folders:
+            sheaf.heap_of_moodle(name)
+        return sheaf.layout("moodle", times)
+    if _mostly(items, lambda item: len(item.parts) == 1 and _CANVAS.fullmatch(item.name)):
+        for item in items:
+            sheaf.canvas(item)
+        return sheaf.layout("canvas", times)
+    if _is_nbgrader(items, assignments):
+        name = _assignment(items, assignments)
+        for item in items:
+            sheaf.nbgrader(item, name)
+        for student in folders:
+            sheaf.heap(student)
+        return sheaf.layout("nbgrader", times)
+    for item in items:
+        sheaf.plain(item)
+    for student in folders:
+        sheaf.heap(student)
+    return sheaf.layout("folders and files", times)
+
+
+class _Sheaf:
+    """Heaps being made."""
+
+    def __init__(self, zipped: bool):
+        self._zipped = zipped
+        self._heaps: dict[str, Heap] = {}
+        self._ignored: list[str] = []
+
+    def layout(self, name: str, times: Item | None) -> Layout:
+        heaps = sorted(self._heaps.values(), key=lambda heap: heap.student)
+        return Layout(name, heaps, times, tuple(self._ignored))
+
+    def heap(self, student: str, **source: Any) -> Heap:
+        student = shown(student)
+        return self._heaps.setdefault(student, Heap(student, source=source))
+
+    def plain(self, item: Item) -> None:
+        """A file in a student's folder, or one that is called like its student."""
+        if len(item.parts) > 1:
+            self.heap(item.parts[0]).items.append(replace(item, parts=item.parts[1:]))
+        elif item.is_code or item.is_archive or item.fault:
+            stem = item.name[: item.name.rindex(".")] if item.is_code or item.is_archive else item.name
+            self.heap(stem or item.name).items.append(item)
+        else:
+            self._ignored.append(shown(item.name))
+
+    def nbgrader(self, item: Item, assignment: str) -> None:
+        """submitted/<student>/<assignment>/…"""
+        if len(item.parts) < 3 or item.parts[1] != assignment:
+            if len(item.parts) == 1:
+                self._ignored.append(shown(item.name))
+            return
+        heap = self.heap(item.parts[0], platform="nbgrader", assignment=shown(assignment))
+        heap.source.update(platform="nbgrader", assignment=shown(assignment))
+        inner = replace(item, parts=item.parts[2:])
+        if inner.parts == (STAMP,):
+            heap.stamp = inner
+        else:
+            heap.items.append(inner)
+
+    def heap_of_moodle(self, name: str) -> Heap:
+        found = _MOODLE.fullmatch(name)
+        if found is None:
+            return self.heap(name)
+        heap = self.heap(f"{found['name']}_{found['id']}", platform="moodle", name=shown(found["name"]), id=found["id"])
+        heap.has_times = self._zipped
+        return heap
+
+    def moodle(self, item: Item) -> None:
+        found, inside = _MOODLE.fullmatch(item.parts[0]), len(item.parts) > 1
+        if not inside and not (found and found["file"]):
+            self.plain(item)
+            return
+        parts = item.parts[1:] if inside else (str(found["file"]),)  # type: ignore[index]
+        self.heap_of_moodle(item.parts[0]).items.append(replace(item, parts=parts))
+
+    def canvas(self, item: Item) -> None:
+        found = _CANVAS.fullmatch(item.name) if len(item.parts) == 1 else None
+        if found is None:
+            self.plain(item)
+            return
+        heap = self.heap(f"{found['name']}_{found['id']}", platform="canvas", name=shown(found["name"]), id=found["id"])
+        if found["late"] and not heap.notes:
+            heap.notes.append(f"Canvas marks it as late, and not by how much; {TIMES} beside the files can say when")
+        heap.items.append(replace(item, parts=(found["file"],)))
+
+    def heap_of_gradescope(self, folder: str, submitters: dict[str, Submitter]) -> Heap:
+        who = submitters.get(folder)
+        if who is None:
+            return self.heap(folder)
+        return self.heap(who.student, platform="gradescope", **who.source)
+
+    def gradescope(self, item: Item, submitters: dict[str, Submitter]) -> None:
+        if len(item.parts) == 1:
+            self.plain(item)
+            return
+        who = submitters.get(item.parts[0])
+        heap = self.heap_of_gradescope(item.parts[0], submitters)
+        heap.has_times |= who is not None
+        when = None if who is None else who.time
+        heap.items.append(replace(item, parts=item.parts[1:], time=when))
+
+
+def _without_root(items: Sequence[Item], folders: Sequence[str]) -> tuple[list[Item], list[str]]:
+    """Without the one folder around everything that exports and courses have."""
+    while len(folders) == 1 and all(len(item.parts) > 1 for item in items):
+        if not re.fullmatch(r"assignment_\d+_export|submitted|submissions", folders[0]):
+            break
+        items = [replace(item, parts=item.parts[1:]) for item in items]
+        folders = sorted({item.parts[0] for item in items if len(item.parts) > 1})
+    return list(items), list(folders)
+
+
+def _mostly(items: Sequence[Item], fits: Any) -> bool:
+    """Of the files that may be submissions more than half; one with a strange name changes nothing."""
+    counted = [item for item in items if item.is_code or item.is_archive]
+    return 2 * sum(1 for item in counted if fits(item)) > len(counted)
+
+
+def _is_nbgrader(items: Sequence[Item], assignments: Sequence[str]) -> bool:
+    deep = [item for item in items if len(item.parts) >= 3]
+    return any(item.parts[2] == STAMP or item.parts[1] in assignments for item in deep)
+
+
+def _assignment(items: Sequence[Item], assignments: Sequence[str]) -> str:
+    names = sorted({item.parts[1] for item in items if len(item.parts) >= 3})
+    for name in assignments:
+        if name in names:
+            return name
+    if len(names) == 1:
+        return names[0]
+    raise InputError(
+        f"the submissions are of several assignments ({', '.join(map(shown, names[:8]))}); give the folder of the "
+        "assignment the name of one of them"
+    )

@@ -1,0 +1,42 @@
+"""Names that others chose: made printable, and made safe as names of folders."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+
+_PLAIN = re.compile(r"[a-z0-9][a-z0-9_-]{0,59}")
+_RESERVED = re.compile(r"con|prn|aux|nul|com\d|lpt\d")  # that Windows keeps for devices
+_LONGEST = 200  # characters of an identifier that is shown
+
+
+def shown(name: str) -> str:
+    """`name` in printable characters on one line; different names stay different.
+
+    What is not printable (control characters, marks that turn the direction of writing, bytes that are no text) is
+    written as Python writes it, and so is the backslash itself.
+    """
+    text = "".join(each if each.isprintable() and each != "\\" else _escaped(each) for each in name)
+    if len(text) <= _LONGEST:
+        return text
+    return f"{text[: _LONGEST - 20]}…{_digest(name)}"
+
+
+def safe_id(student: str) -> str:
+    """A name of a folder for `student`, on any file system: the same each time, and another for every student.
+
+    Short lower-case names are themselves; others are made of what they hold of that, with `~` and 16 hex digits of
+    their hash behind. No name that is itself holds a `~`.
+    """
+    if _PLAIN.fullmatch(student) and not _RESERVED.fullmatch(student):
+        return student
+    kept = re.sub(r"[^a-z0-9_]+", "-", student.lower()).strip("-")[:40]
+    return f"{kept}~{_digest(student)}"
+
+
+def _escaped(character: str) -> str:
+    return character.encode("unicode_escape", "surrogatepass").decode("ascii")
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:16]

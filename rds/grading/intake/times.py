@@ -1,0 +1,65 @@
+"""When something was handed in, as far as anybody who is to be believed says so."""
+
+from __future__ import annotations
+
+import csv
+import io
+from datetime import UTC, datetime, tzinfo
+from zoneinfo import ZoneInfo
+
+from rds.core.errors import InputError
+from rds.grading.intake.items import Refusal
+from rds.grading.intake.layouts import STAMP, TIMES, Heap, Layout
+
+_LARGEST = 4 << 20  # bytes
+
+
+def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
+    """Of each student the time in the instructor's `timestamps.csv`: columns student and timestamp (ISO 8601).
+
+    A time without a zone is one of `zone`. InputError, with the line, for what is no such table, or names nobody.
+    """
+    if layout.times is None:
+        return {}
+    try:
+        text = layout.times.read(_LARGEST).decode("utf-8-sig")
+    except (Refusal, UnicodeDecodeError) as error:
+        raise InputError(f"cannot be read: {error}; save it as UTF-8", TIMES) from error
+    reader = csv.DictReader(io.StringIO(text))
+    if not {"student", "timestamp"} <= set(reader.fieldnames or ()):
+        raise InputError("must have the columns student and timestamp", f"{TIMES}: line 1")
+    known, found = {heap.student for heap in layout.heaps}, {}
+    for row in reader:
+        place, student = f"{TIMES}: line {reader.line_num}", (row["student"] or "").strip()
+        if student not in known:
+            raise InputError(f"student {student!r} handed nothing in; correct the name, or remove the line", place)
+        try:
+            when = datetime.fromisoformat((row["timestamp"] or "").strip())
+        except ValueError:
+            told = row["timestamp"]
+            raise InputError(f"timestamp = {told!r} is no time; as in 2026-11-30T23:59:00+01:00", place) from None
+        found[student] = when if when.tzinfo else when.replace(tzinfo=zone or UTC)
+    return found
+
+
+def stamped_time(heap: Heap) -> datetime | None:
+    """nbgrader's own `timestamp.txt`: date, time and the zone's name. None, with a note, if it cannot be understood."""
+    if heap.stamp is None:
+        return None
+    try:
+        text = heap.stamp.read(_LARGEST).decode().strip()
+        date, clock, *zone = text.split()
+        when = datetime.fromisoformat(f"{date} {clock}")
+        if when.tzinfo is None:
+            when = when.replace(tzinfo=UTC if not zone or zone[0] in ("UTC", "GMT") else ZoneInfo(zone[0]))
+        return when
+    except (Refusal, UnicodeDecodeError, ValueError, KeyError, OSError):
+        heap.notes.append(f"its {STAMP} cannot be understood, and so is taken for nothing")
+        return None
+
+
+def with_zone(when: datetime | None, zone: tzinfo | None) -> datetime | None:
+    """A time that says no zone is one of `zone`; of this computer's if that is None too."""
+    if when is None or when.tzinfo is not None:
+        return when
+    return when.replace(tzinfo=zone) if zone else when.astimezone()
