@@ -27,6 +27,7 @@ READERS: Mapping[str, str] = {
     "functions": "",
 }
 SELF_CHECKS = ("visible", "blind", "off")
+FEEDBACKS = ("visible", "all")
 _LEAST_SECRET = 8  # characters
 
 
@@ -49,6 +50,7 @@ class Assignment:
     due: datetime | None
     secret: str
     self_check: str
+    feedback: str  # what a feedback page shows: what is visible, or what is hidden as well
     limits: Limits
     late: Late
     cases: tuple[Case, ...]
@@ -107,6 +109,7 @@ def read_assignment(path: str | Path) -> Assignment:
         due=_due(words),
         secret=_secret(words),
         self_check=words.choice("self_check", "visible", SELF_CHECKS),
+        feedback=words.choice("feedback", "visible", FEEDBACKS),
         limits=_limits(words.inner("limits")),
         late=read_late(words.inner("late")),
         cases=tuple(cases.values()),

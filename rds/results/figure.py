@@ -11,22 +11,30 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
+from rds.results.colours import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DPI = 128
 WIDTH = 10.0  # inches: 1280 pixels
 
-BLACK, ORANGE, SKY, GREEN, BLUE, VERMILLION, PURPLE = (
-    "#000000",
-    "#E69F00",
-    "#56B4E9",
-    "#009E73",
-    "#0072B2",
-    "#D55E00",
-    "#CC79A7",
-)
-GREY = "#8A8A8A"
+__all__ = [
+    "BLACK",
+    "BLUE",
+    "CYCLE",
+    "GREEN",
+    "GREY",
+    "ORANGE",
+    "PURPLE",
+    "SKY",
+    "VERMILLION",
+    "Picture",
+    "dress",
+    "legend",
+    "quantity",
+]
+
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 
 RESPONSES: dict[str, dict[str, Any]] = {

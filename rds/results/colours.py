@@ -1,0 +1,14 @@
+"""Colours of all pictures: those of Okabe and Ito, "Color Universal Design" (2008), told apart with any colour vision."""
+
+from __future__ import annotations
+
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILLION, PURPLE = (
+    "#000000",
+    "#E69F00",
+    "#56B4E9",
+    "#009E73",
+    "#0072B2",
+    "#D55E00",
+    "#CC79A7",
+)
+GREY = "#8A8A8A"
