@@ -21,9 +21,9 @@ _STATES = {State.WHOLE: "", State.GOES_ON: ", goes on", State.CUT_SHORT: ", cut 
 
 
 class EarlierRuns:
-    """The list. `opened(results, names)` is called with what was chosen."""
+    """The list. `opened(results, folders, short names)` is called with what was chosen."""
 
-    def __init__(self, shell: Any, opened: Callable[[list[Result], list[str]], None]):
+    def __init__(self, shell: Any, opened: Callable[[list[Result], list[str], list[str]], None]):
         self._session, self._opened = shell.session, opened
         self._runs: list[KeptRun] = []
         self.list = widgets.SelectMultiple(
@@ -73,17 +73,27 @@ class EarlierRuns:
             return results
 
         task = self._session.work("open", work)
-        self.bar.follow(task, lambda: self._over(task, [run.name for run in chosen]))
+        self.bar.follow(task, lambda: self._over(task, [run.name for run in chosen], _short(chosen)))
 
-    def _over(self, task: Task[list[Result]], names: list[str]) -> None:
+    def _over(self, task: Task[list[Result]], names: list[str], short: list[str]) -> None:
         if task.error is not None or task.result is None:
             if not task.stopped:
                 self.notice.say(str(task.error), "error")
             return
         try:
-            self._opened(task.result, names)
+            self._opened(task.result, names, short)
         except InputError as error:
             self.notice.say(str(error), "error")
+
+
+def _short(runs: list[KeptRun]) -> list[str]:
+    """Names for a legend: time of day, axes and mode; with the end of the folder's name where that is not enough."""
+    names = []
+    for run in runs:
+        parts = run.name.split("-")
+        clock = parts[1] if len(parts) > 3 and parts[1].isdigit() and len(parts[1]) == 6 else ""
+        names.append(f"{clock[:2]}:{clock[2:4]}:{clock[4:]} {' '.join(parts[2:-1])}" if clock else run.name)
+    return names if len(set(names)) == len(names) else [run.name for run in runs]
 
 
 def _label(run: KeptRun) -> str:

@@ -63,7 +63,7 @@ class EquipmentSettings:
     def _fold(self, parts: list[widgets.Widget]) -> None:
         names = self._equipment.parameters
         _fill(self._parameters, [self._view(name) for name in names])
-        title = f"Parameters of the controller ({len(names)})"
+        title = f"Parameters ({len(names)})"
         if self._folded.titles != (title,):
             self._folded.titles = (title,)
         parts.append(self._folded)

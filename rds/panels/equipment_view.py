@@ -167,13 +167,13 @@ class EquipmentView:
         self.notice.say(*_verdict(result))
         self.tabs.selected_index = RESULTS
 
-    def _reopened(self, results: list[Result], names: list[str]) -> None:
+    def _reopened(self, results: list[Result], names: list[str], short: list[str]) -> None:
         if len(results) == 1:
             self.results.show(results[0], self.equipment.session.folder / "runs" / names[0])
             self.results.saved(self.equipment.session.folder / "runs" / names[0])
             self.notice.say(f"{names[0]}: {_verdict(results[0])[0]}", _verdict(results[0])[1])
         else:
-            self.results.overlay(results, names)
+            self.results.overlay(results, short)
             self.notice.say(f"{len(results)} runs over each other")
         self.tabs.selected_index = RESULTS
 

@@ -31,7 +31,7 @@ class LiveView:
         self.show_machine = widgets.ToggleButton(
             description="Show the machine", tooltip="Axes and spindle in motion, as the strip shows them"
         )
-        self.show_machine.layout.width = "auto"
+        self.show_machine.layout = {"width": "auto", "align_self": "flex-start"}
         self.show_machine.observe(lambda change: self._toggle(change["new"]), "value")
         self.picture = widgets.VBox([])
         self._view: Any = None  # the machine's picture, once somebody wants it
@@ -45,6 +45,7 @@ class LiveView:
         self._run, self._traces, self._said = run, [], 0
         self.hint.value = "<p>The loop is being started; the first samples come in a moment.</p>"
         self._changes.value = ""
+        self.strip.layout.display = "none"
         self._clear_values()
 
     def look(self) -> None:

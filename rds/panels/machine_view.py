@@ -32,7 +32,7 @@ class MachineView:
         self._time, self._turned = 0.0, 0.0
         size = float(max(self._high - self._low))
         self._plot = k3d.plot(
-            height=340, camera_auto_fit=False, menu_visibility=False, axes=["X [mm]", "Y [mm]", "Z [mm]"]
+            height=340, camera_auto_fit=False, menu_visibility=False, grid_visible=False, axes=["X", "Y", "Z"]
         )
         self._plot += _box_lines(self._low, self._high)
         self._table = _solid((0.5 * size, 0.5 * size, 0.04 * size), _TABLE)
@@ -41,7 +41,7 @@ class MachineView:
         for part in (self._table, self._head, self._tool):
             self._plot += part
         self._size = size
-        self._plot.camera = [1.3 * size, -1.5 * size, 1.0 * size, 0, 0, 0, 0, 0, 1]
+        self._plot.camera = [1.0 * size, -1.25 * size, 0.8 * size, 0, 0, 0, 0, 0, 1]
         self.words = widgets.HTML()
         self.widget = widgets.VBox([self._plot, self.words])
         self._move({})
@@ -76,9 +76,8 @@ class MachineView:
         self._head.model_matrix = _placed(0.0, 0.0, z + 0.31 * self._size)
         self._tool.model_matrix = _placed(0.0, 0.0, z + 0.08 * self._size, self._turned)
         said = ", ".join(f"{name} {value:.3f}" for name, value in where.items())
-        self.words.value = (
-            f"<p>at {self._time:.2f} s: {said} (mm; spindle in rev/min, drawn {_SLOWER:g} times slower)</p>"
-        )
+        unit = f"mm; spindle in rev/min, drawn {_SLOWER:g} times slower" if self._spindle in where else "mm"
+        self.words.value = f"<p>at {self._time:.2f} s: {said} [{unit}]</p>" if said else "<p>nothing has moved yet</p>"
 
 
 def _placed(x: float, y: float, z: float, turned: float = 0.0) -> np.ndarray:

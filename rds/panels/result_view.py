@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -48,11 +48,8 @@ class ResultView:
         """Show it; `folder` is where its files are, or will be."""
         self.clear()
         self.result, self._folder = result, folder
-        columns, rows = html.metrics_rows(result)
-        fit = html.notes_list(html.all_notes(result))
-        self.numbers.value = (
-            (html.table(columns, rows) if rows else "") + fit + changes_table(result.meta.get("changes") or [])
-        )
+        notes = html.notes_list(html.all_notes(result))
+        self.numbers.value = _metrics({"": result}) + notes + changes_table(result.meta.get("changes") or [])
         self.figure.draw(self._session, self._shell.ticker, result.plot)
         self.where.value = "<p>its files are being written …</p>"
         self._validate(result)
@@ -67,11 +64,7 @@ class ResultView:
         from rds.results.plots_overlay import modes
 
         self.clear()
-        parts = []
-        for result, name in zip(results, names, strict=True):
-            columns, rows = html.metrics_rows(result)
-            parts.append(html.table(columns, rows, name) if rows else "")
-        self.numbers.value = f'<div class="rds-side-by-side">{"".join(parts)}</div>'
+        self.numbers.value = _metrics(dict(zip(names, results, strict=True)))
         self.figure.draw(self._session, self._shell.ticker, lambda: modes(results, names))
 
     def clear(self) -> None:
@@ -107,7 +100,7 @@ class ResultView:
 
     def _validate(self, result: Result) -> None:
         if result.validation:
-            from rds.identification.validation_report import fragment
+            from rds.validation.report import fragment
 
             parts = [fragment(found, pictures=False) for found in result.validation.values()]
             self.validation.value = f"<h3>Does the model hold?</h3>{''.join(parts)}"
@@ -162,6 +155,20 @@ class ResultView:
 
 
 _STAGE_NAMES = ("lateness", "io", "compute", "model")
+
+
+def _metrics(results: Mapping[str, Result]) -> str:
+    """The metrics as a table: a row per run and axis, a column per metric and unit."""
+    cells: dict[tuple[str, str], dict[str, Any]] = {}
+    for name, result in results.items():
+        axes, metrics = html.metrics_rows(result)
+        for title, *values in metrics:
+            for axis, value in zip(axes[1:], values, strict=True):
+                if value is not None:
+                    cells.setdefault((name, axis), {})[title] = value
+    columns = list(dict.fromkeys(title for row in cells.values() for title in row))
+    rows = [[f"{name} {axis}".strip(), *(row.get(title) for title in columns)] for (name, axis), row in cells.items()]
+    return html.table(["", *columns], rows) if rows else ""
 
 
 def _refuse(text: str) -> None:

@@ -97,7 +97,7 @@ def _checked(role: str, path: Path, text: str, T: float) -> Checked:
             return Checked(role, path, text)
         return _python(role, path, text, T)
     except InputError as error:
-        return Checked(role, path, text, (_mark(str(error).removeprefix(f"{path}:").strip(), path, error.where),))
+        return Checked(role, path, text, (_mark(str(error).removeprefix(f"{path}:").strip(), path, text, error.where),))
 
 
 def _python(role: str, path: Path, text: str, T: float) -> Checked:
@@ -107,21 +107,31 @@ def _python(role: str, path: Path, text: str, T: float) -> Checked:
     marks, notes = [], []
     for each in report.reports:
         if each.interface in (role, "file"):
-            marks += [_mark(str(fault), path) for fault in each.faults]
-            marks += [_mark(str(warning), path, fault=False) for warning in each.warnings]
+            marks += [_mark(str(fault), path, text) for fault in each.faults]
+            marks += [_mark(str(warning), path, text, fault=False) for warning in each.warnings]
             notes += [*each.notes, *([f"time per call: {each.timing}"] if each.timing else [])]
-    marks += [_mark(str(warning), path, fault=False) for warning in report.warnings]
+    marks += [_mark(str(warning), path, text, fault=False) for warning in report.warnings]
     if role not in report.interfaces and not marks:
         what = " and ".join(report.interfaces)
         marks.append(Mark(None, f"it holds a {what}, not a {role}; name the file of your {role}"))
     return Checked(role, path, text, tuple(marks), tuple(notes))
 
 
-def _mark(text: str, path: Path, where: str | None = None, fault: bool = True) -> Mark:
+def _mark(text: str, path: Path, source: str, where: str | None = None, fault: bool = True) -> Mark:
     """The line that a message names, of this file."""
     name = re.escape(path.name)
     found = re.search(f"{name}{_LINE.pattern}", where or "") or re.search(f"{name}{_LINE.pattern}", text)
-    return Mark(int(found.group(1)) if found else None, text, fault)
+    return Mark(int(found.group(1)) if found else _line_of(text, source), text, fault)
+
+
+def _line_of(message: str, source: str) -> int | None:
+    """The line of what a message speaks of without a line: a global, else a function."""
+    for told, written in ((r"global `(\w+)`", r"\s*global\b.*\b{}\b"), (r"\b(\w+)\(\)", r"\s*def {}\b")):
+        for name in re.findall(told, message):
+            for number, line in enumerate(source.splitlines(), start=1):
+                if re.match(written.format(name), line):
+                    return number
+    return None
 
 
 def _read(path: Path) -> bytes | str:

@@ -169,8 +169,8 @@ class EquipmentRun:
 
     @property
     def live_values(self) -> dict[str, Any]:
-        """The controller's channels, whose values can be changed now, by name; none when the run is over."""
-        if self._run is None or self._run.done:
+        """The controller's channels, whose values can be changed now, by name; none before and after the loop."""
+        if self._run is None or self._run.done or not self._run.columns:
             return {}
         return {name: channel for name, channel in self._run.desk.channels.items() if "." in name}
 

@@ -6,16 +6,18 @@ from html import escape
 
 from rds.session.diagram import Block, Diagram, Link
 
-_WIDTH, _GAP, _ROW, _TOP = 150, 44, 104, 12  # px
+_WIDTH, _GAP, _ROW, _TOP = 130, 56, 104, 12  # px
 _LINE = 16  # px of text
 _HEIGHT = 84
+_MARGIN = 24  # to the right of the last block, for the feedback
+_LONGEST = 20  # characters of a line
 
 
 def diagram_svg(diagram: Diagram) -> str:
     """The diagram as an SVG element that is as wide as its place, with its sentence for who cannot see it."""
     columns = 1 + max(block.column for block in diagram.blocks)
     rows = 1 + max(block.row for block in diagram.blocks)
-    width = columns * (_WIDTH + _GAP) - _GAP + 8
+    width = columns * (_WIDTH + _GAP) - _GAP + 4 + _MARGIN
     height = _TOP + rows * _ROW + (34 if any(link.back for link in diagram.links) else 0)
     at = {block.name: block for block in diagram.blocks}
     drawn = [_link(link, at[link.start], at[link.end], rows) for link in diagram.links]
@@ -43,13 +45,14 @@ def _block(block: Block) -> str:
     middle = x + _WIDTH / 2
     texts = [_text(middle, y + 20, block.title, 'font-weight="600"')]
     texts += [
-        _text(middle, y + 20 + _LINE * (i + 1), line, 'fill="var(--rds-quiet)"') for i, line in enumerate(block.lines)
+        _text(middle, y + 20 + _LINE * (i + 1), line, 'font-size="12" fill="var(--rds-quiet)"')
+        for i, line in enumerate(block.lines)
     ]
     return box + "".join(texts)
 
 
 def _text(x: float, y: float, text: str, style: str) -> str:
-    short = text if len(text) <= 22 else f"{text[:21]}…"
+    short = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
     return f'<text x="{x:g}" y="{y:g}" text-anchor="middle" {style}>{escape(short)}<title>{escape(text)}</title></text>'
 
 
@@ -58,9 +61,8 @@ def _link(link: Link, start: Block, end: Block, rows: int) -> str:
     if link.back:
         low = _TOP + rows * _ROW + 6
         # a little to the right of the middle, where nothing of a second row ends
-        # a little to the right of the middle, where nothing of a second row ends
-        right, left = x0 + _WIDTH - 14, x1 + _WIDTH / 2
-        path = f"M{right} {y0 + _HEIGHT}V{low}H{left:g}V{y1 + _HEIGHT}"
+        right, left = x0 + _WIDTH + _MARGIN - 6, x1 + _WIDTH / 2  # around what stands under the block
+        path = f"M{x0 + _WIDTH} {y0 + _HEIGHT / 2:g}H{right}V{low}H{left:g}V{y1 + _HEIGHT}"
         label = _text((right + left) / 2, low + 16, link.label, "")
     elif start.row == end.row:
         middle = y0 + _HEIGHT / 2

@@ -13,15 +13,18 @@ from rds.core.errors import RdsError
 from rds.panels.kit.ticker import Ticker
 from rds.session.session import Session
 
-DPI = 88  # of a figure 10 inches wide: as wide as a panel on a screen of 1280
+DPI = 88
+WIDTH = 8.2  # inches: as wide as what is beside the settings on a screen of 1280
 
 
 class FigureView(widgets.VBox):
     """Empty until `show(figure)`; the figure before is closed."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: float = WIDTH) -> None:
+        """`width` in inches of DPI pixels: wider figures are made narrower."""
         super().__init__([])
         self.add_class("rds-figure")
+        self._width = width
         self.figure: Any = None
         self._canvas: Any = None
         self._waiting: Any = None
@@ -30,10 +33,13 @@ class FigureView(widgets.VBox):
         """Show a matplotlib figure that belongs to no pyplot; `caption` is read out in its place."""
         self.clear()
         figure.set_dpi(DPI)
+        if figure.get_figwidth() > self._width:
+            figure.set_figwidth(self._width)
         self.figure = figure
         self._canvas = _canvas(figure)
         words = [widgets.HTML(f"<p>{caption}</p>")] if caption else []
-        self.children = [self._canvas, *words]
+        # in a box of its own, because a closed canvas does not leave a page by itself
+        self.children = [widgets.VBox([self._canvas, *words])]
 
     def draw(self, session: Session, ticker: Ticker, make: Callable[[], Any], caption: str = "") -> None:
         """Show the figure that `make()` gives, which is called beside the page: drawing takes seconds."""
@@ -75,6 +81,7 @@ def _canvas(figure: Any) -> widgets.DOMWidget:
     canvas.header_visible = False
     canvas.footer_visible = True
     canvas.toolbar_visible = True
+    canvas.toolbar_position = "top"
     canvas.resizable = False
     canvas.draw_idle()
     return canvas
