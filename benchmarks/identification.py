@@ -16,7 +16,7 @@ from benchmarks.figures import Figure, interleaved, ratios
 from rds.identification.axis_structure import make
 from rds.identification.estimate import Estimate
 from rds.identification.fit import fit
-from rds.identification.log import Log
+from rds.logs.log import Log
 from rds.machines import load_machine
 from rds.models.linear_axis import coefficients, respond
 

@@ -23,8 +23,8 @@ LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it 
 
 # The folders whose tests start no loop, hub or machine: they may run side by side. All others run one by one.
 TOGETHER = {
-    *("checks", "controllers", "core", "experiment", "interface", "interpolators", "models", "motion", "nc", "paths"),
-    *("reports", "results", "session", "signals"),
+    *("checks", "controllers", "core", "experiment", "identification", "interface", "interpolators", "logs", "models"),
+    *("motion", "nc", "paths", "reports", "results", "session", "signals", "validation"),
 }
 
 

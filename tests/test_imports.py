@@ -34,21 +34,24 @@ ALLOWED: dict[str, set[str]] = {
     "modes": {"core", "interface", "runtime", "bus"},
     "results": {"core", "runtime"},  # see ONLY
     "reports": {"core", "results", "bus"},
+    "logs": {"core", "machines", "results", "bus", "motion"},  # see ONLY
     "identification": {
-        *("core", "machines", "results", "bus", "models", "motion", "signals"),  # see ONLY
+        *("core", "machines", "results", "models", "motion", "signals", "logs"),
         *("controllers", "checks"),  # what a model file is for: a design, a check
     },
+    "validation": {"core", "results", "models", "logs", "identification"},
     "experiment": {
         *("core", "controllers", "models", "signals", "machines", "runtime", "modes", "results", "bus"),
-        "identification",  # model files, and what a validation proves
+        *("logs", "identification", "validation"),  # model files, and what a validation proves
     },
     "grading": {
         *("core", "checks", "interface", "models", "controllers", "interpolators", "signals", "machines", "runtime"),
         *("modes", "motion", "nc", "paths", "programs", "results", "reports", "experiment", "identification"),
+        *("logs", "validation"),
         *("robustness", "spread"),
     },
     "robustness": {
-        *("core", "models", "runtime", "modes", "results", "experiment", "identification", "spread"),
+        *("core", "models", "controllers", "runtime", "modes", "results", "experiment", "identification", "spread"),
     },
 }
 # Of some rooms, only these modules.
@@ -62,7 +65,7 @@ ONLY = {
     ("paths", "results"): {"rds.results.figure"},  # pictures
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     ("reports", "bus"): {"rds.bus.frames", "rds.bus.logs"},  # which frames are commands and answers; their logs
-    ("identification", "bus"): {"rds.bus", "rds.bus.frames", "rds.bus.decode", "rds.bus.logs"},  # what a log holds
+    ("logs", "bus"): {"rds.bus", "rds.bus.frames", "rds.bus.decode", "rds.bus.logs"},  # what a log holds
     ("identification", "controllers"): {"rds.controllers.tracking", "rds.controllers.design"},
     ("motion", "results"): {"rds.results.figure"},  # what all plots share
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record

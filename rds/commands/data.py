@@ -10,7 +10,7 @@ import typer
 from rds.commands.common import Json, print_json, progress_bars, refusals, stdout_kept
 
 if TYPE_CHECKING:
-    from rds.identification.describe import Description
+    from rds.logs.describe import Description
 
 app = typer.Typer(no_args_is_help=True, help="Logged data: what a file holds, and whether it can be believed.")
 
@@ -35,7 +35,7 @@ def describe(
     """Columns with units, range and step; the sample period; and all that makes an estimate from it doubtful."""
     with refusals(), stdout_kept(json):
         from rds.core.errors import InputError
-        from rds.identification.describe import describe as described
+        from rds.logs.describe import describe as described
 
         if plot is not None and plot.suffix.lower() != ".png":
             raise InputError(f"--plot {str(plot)!r} must end in .png")
@@ -62,9 +62,9 @@ def describe(
 def _write_map(file: Path) -> Path:
     """The draft beside the data; never over a map that is there."""
     from rds.core.errors import InputError
-    from rds.identification.guess import draft, map_path
-    from rds.identification.read_log import is_own
-    from rds.identification.tables import read_table
+    from rds.logs.guess import draft, map_path
+    from rds.logs.read_log import is_own
+    from rds.logs.tables import read_table
     from rds.results.atomic import write_whole
 
     path = map_path(file)
@@ -78,7 +78,7 @@ def _write_map(file: Path) -> Path:
 
 def _save_plot(found: Description, path: Path) -> list[Path]:
     """The overview as a picture; none where there is no log to show."""
-    from rds.identification.describe_plot import overview
+    from rds.logs.describe_plot import overview
     from rds.results.atomic import write_whole
 
     if not found.logs:

@@ -11,9 +11,9 @@ from rds.commands.common import Json, print_json, progress_bars, refusals, stdou
 
 if TYPE_CHECKING:
     from rds.identification.estimate import Estimate
-    from rds.identification.log import Log
     from rds.identification.structure import Structure
-    from rds.identification.validate import Validation
+    from rds.logs.log import Log
+    from rds.validation.validate import Validation
 
 FITTED_SHARE = 0.6  # of each log, with --split; the rest validates
 
@@ -150,7 +150,7 @@ def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
 
 
 def _validated(estimate: Estimate, rest: list[Log]) -> Validation:
-    from rds.identification.validate import validate
+    from rds.validation.validate import validate
 
     return validate(estimate, rest)
 

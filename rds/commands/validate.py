@@ -10,8 +10,8 @@ import typer
 from rds.commands.common import Json, print_json, progress_bars, refusals, stdout_kept
 
 if TYPE_CHECKING:
-    from rds.identification.log import Log
-    from rds.identification.validate import Validation
+    from rds.logs.log import Log
+    from rds.validation.validate import Validation
 
 
 def validate(
@@ -33,8 +33,8 @@ def validate(
 ) -> None:
     """Validate a model on logs. Exit code 0: valid, or valid for what it says; 1: not valid, or cannot tell."""
     with refusals(), stdout_kept(json):
-        from rds.identification.validate import validate as validate_model
-        from rds.identification.verdict import Bands
+        from rds.validation.validate import validate as validate_model
+        from rds.validation.verdict import Bands
 
         bands = Bands.read(_bands(band or []))
         with progress_bars() as bar:
@@ -71,7 +71,7 @@ def _bands(given: list[str]) -> dict[str, float]:
 def _logs(path: Path, map_: Path | None, axis: str | None, progress: object) -> list[Log]:
     """The logs in a file, of one axis."""
     from rds.core.errors import InputError
-    from rds.identification.read_log import read_log
+    from rds.logs.read_log import read_log
 
     found = read_log(path, map_, progress)  # type: ignore[arg-type]
     axes = list(dict.fromkeys(name for log in found if (name := _axis(log))))

@@ -49,7 +49,7 @@ def _validations(result: Result) -> list[str]:
     """What the run proved of its models, as HTML: a section per axis."""
     if not result.validation:
         return []
-    from rds.identification.validation_report import section
+    from rds.validation.report import section
 
     return [section(f"Validation of the model of {axis}", found) for axis, found in result.validation.items()]
 

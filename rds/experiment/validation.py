@@ -10,7 +10,7 @@ from rds.results import Result
 from rds.runtime.plan import Plan
 
 if TYPE_CHECKING:
-    from rds.identification.validate import Validation
+    from rds.validation.validate import Validation
 
 
 def validated(plan: Plan, result: Result) -> Result:
@@ -18,8 +18,8 @@ def validated(plan: Plan, result: Result) -> Result:
 
     An axis whose run is too short, or whose model fails on its log, gets a note instead.
     """
-    from rds.identification.result_log import logs_of_result
-    from rds.identification.validate import validate
+    from rds.logs.result_log import logs_of_result
+    from rds.validation.validate import validate
 
     found: dict[str, Validation] = {}
     logs = logs_of_result(result, "this run", "", "")
@@ -37,7 +37,7 @@ def validated(plan: Plan, result: Result) -> Result:
 
 def _candidate(model: Model, unit: str) -> Any:
     """The model with the record of its fit, where it came from a model file."""
-    from rds.identification.candidate import as_candidate, of_model
+    from rds.validation.candidate import as_candidate, of_model
 
     if model.fitted is not None and model.fitted.path is not None:
         return as_candidate(model.fitted.path)

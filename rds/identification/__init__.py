@@ -1,1 +1,1 @@
-"""Logged data in; parameters, validation and verdicts out."""
+"""Model structures, and their parameters from logs: estimates with their uncertainty, model files, designs."""

@@ -21,8 +21,8 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.options import Option
 from rds.identification import mass_kernel
-from rds.identification.log import Log
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 OPTIONS = ("per-direction",)
 _MM = 1000.0  # mm in a metre

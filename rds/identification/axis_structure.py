@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from rds.core.options import Option
-from rds.identification.log import Log
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 OPTIONS = ("viscous", "stribeck", "offset", "dead-zone", "delay", "backlash")
 

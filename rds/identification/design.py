@@ -6,7 +6,7 @@ the rest are not in its law; `design_notes` says which of them the model has, an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,14 +36,21 @@ class Linear:
     tau: float
     K: float
     left_out: tuple[str, ...]
-    name: str  # of the model file
+    name: str  # of the model file, or of the machine's axis
 
 
-def linear_axis_of(model: ModelFile | str | Path) -> Linear:
+def left_out_of(params: Mapping[str, Any]) -> tuple[str, ...]:
+    """Sentences on what an axis with these parameters has, and a design by τ and K does not know of."""
+    return tuple(sentence for name, sentence in LEFT_OUT.items() if params.get(name))
+
+
+def linear_axis_of(model: Linear | ModelFile | str | Path) -> Linear:
     """The linear part of the axis that a model file describes; InputError where it has none that can be tracked with.
 
-    A student's structure needs parameters `tau` (s) and `K` ((mm/s)/V) with that meaning.
+    A student's structure needs parameters `tau` (s) and `K` ((mm/s)/V) with that meaning. What is linear stays.
     """
+    if isinstance(model, Linear):
+        return model
     file = model if isinstance(model, ModelFile) else read_model(model)
     made = run_model(file)
     if file.structure == "spindle":
@@ -53,14 +60,14 @@ def linear_axis_of(model: ModelFile | str | Path) -> Linear:
     if not {"tau", "K"} <= set(made.params):
         raise InputError("the design needs tau (s) and K ((mm/s)/V), which this model does not have", file.path)
     params = linear_part(made.params) if made.motion is MachineAxisMotion else made.params
-    left_out = [sentence for name, sentence in LEFT_OUT.items() if made.params.get(name)]
+    left_out = [*left_out_of(made.params)]
     if file.is_student:
         left_out.append(f"whatever {Path(file.structure).name} has beside tau and K")
     return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), Path(file.path).name)
 
 
 def design_tracking(
-    model: ModelFile | str | Path,
+    model: Linear | ModelFile | str | Path,
     *,
     sample_period: float = 0.001,
     poles: Sequence[Any] = tracking.POLES,
@@ -78,7 +85,7 @@ def design_tracking(
 
 
 def tracking_system(
-    model: ModelFile | str | Path,
+    model: Linear | ModelFile | str | Path,
     *,
     sample_period: float | None = None,
     poles: Sequence[Any] = tracking.POLES,
@@ -91,7 +98,7 @@ def tracking_system(
     return tracking_controller_system(axis.tau, axis.K, [*poles], observer_pole, sample_period)
 
 
-def write_tracking(path: str | Path, model: ModelFile | str | Path, **options: Any) -> Path:
+def write_tracking(path: str | Path, model: Linear | ModelFile | str | Path, **options: Any) -> Path:
     """Write the controller of `design_tracking(model, **options)` as a file of the user's own, to read and change."""
     path = Path(path)
     if path.suffix != ".py":

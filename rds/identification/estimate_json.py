@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from math import hypot
+from math import hypot, isfinite
 from pathlib import Path
 from typing import Any
 
 from rds.identification.estimate import Errors, Estimate
-from rds.identification.validation_json import finite
 
 Rows = list[list[Any]]
 
@@ -42,6 +41,15 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
             "warnings": list(estimate.warnings),
         }
     )
+
+
+def finite(value: Any) -> Any:
+    """The value with null for every number that is not finite."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def parameter_rows(estimate: Estimate) -> tuple[list[str], Rows]:

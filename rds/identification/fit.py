@@ -12,8 +12,8 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.registry import Registry
 from rds.identification.estimate import Estimate
-from rds.identification.log import Log
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 SPEED = "rev/min"  # of a structure whose output is a speed
 
@@ -54,8 +54,7 @@ def voltage_error_percent(logs: Sequence[Log], structure: Structure, estimate: E
 
     None where the logs hold too little motion to say.
     """
-    from rds.identification.assessment import smoothed_velocity
-    from rds.identification.needed_voltage import needed_voltage
+    from rds.identification.needed_voltage import needed_voltage, smoothed_velocity
     from rds.identification.residuals import bandwidth, block_length
 
     values, is_rate = estimate.values(), structure.output_unit == SPEED

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from rds.identification.estimate import Estimate
 from rds.identification.estimate_json import correlation_rows, described, error_rows, note, parameter_rows, to_json
-from rds.identification.log import Log
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 from rds.results.atomic import write_files
 from rds.results.html import notes_list, table
 from rds.results.report import page

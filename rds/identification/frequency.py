@@ -23,10 +23,10 @@ from rds.core.errors import InputError
 from rds.core.options import Option, check_known
 from rds.identification.estimate import Estimate
 from rds.identification.frequency_response import FrequencyResponse, frequency_response, output_rate
-from rds.identification.log import Log
 from rds.identification.made_estimate import made_estimate
 from rds.identification.regression import regress
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 STRUCTURES: Mapping[str, tuple[str, ...]] = {"spindle": ("delay",), "axis": ("delay",)}  # and their options
 OPTIONS = {"period": Option("period of a command that repeats, s; found in the data if not given", more_than=0.0)}

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.identification.log import Log
+from rds.logs.log import Log
 
 _REPEATS = 1e-6  # of the command's range: how exactly a period comes back
 _EXCITED = 0.01  # of the largest amplitude: which lines count as excited

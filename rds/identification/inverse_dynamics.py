@@ -20,11 +20,11 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.options import Option, check_known
 from rds.identification.estimate import Estimate
-from rds.identification.log import Log
 from rds.identification.made_estimate import made_estimate
 from rds.identification.motion_form import MotionForm, motion_form
 from rds.identification.regression import Regression, regress
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 OPTIONS = {
     "cutoff": Option(

@@ -12,11 +12,11 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.identification.estimate import Errors, Estimate, Parameter
+from rds.identification.fitted_stretch import fitted_stretch
 from rds.identification.initial_state import estimate_start
 from rds.identification.kstep import ahead, errors_of
-from rds.identification.log import Gravity, Log
-from rds.identification.same_data import fitted_stretch
 from rds.identification.structure import Structure
+from rds.logs.log import Gravity, Log
 
 _START = 1000  # samples from which a log's initial state is estimated
 _UNTOLD = 0.5  # standard error over value from which a parameter that cannot be zero is not told

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rds.identification.log import Log
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 _BLOCKS = 400  # at most; of a longer log, blocks spread evenly
 _ROUNDS = 12
@@ -141,3 +141,14 @@ def _steady(structure: Structure, values: Mapping[str, float], voltage: float, i
         if abs(v[-1] - v[-len(v) // 10]) <= 1e-3 * abs(v[-1]):
             return float(v[-1])
     return None
+
+
+def smoothed_velocity(log: Log, window: int, is_rate: bool) -> np.ndarray:
+    """The log's velocity at each sample by local quadratics over about `window` samples; a speed is its own."""
+    from scipy.signal import savgol_filter
+
+    if is_rate:
+        return log.position
+    length = max(2 * (window // 2) + 1, 5)
+    length = min(length, len(log) - (1 - len(log) % 2))
+    return savgol_filter(log.position, length, 2, deriv=1) / savgol_filter(log.time, length, 2, deriv=1)

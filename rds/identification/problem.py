@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from rds.identification.log import Log
 from rds.identification.structure import Structure
 from rds.identification.triangle import triangle_of
+from rds.logs.log import Log
 
 _ABOVE = 1e-6  # of the units used: how near a bound that itself is no value may be come
 _STEP = 1e-4  # of a number's size: for differences where a structure has no derivatives of its own

@@ -19,7 +19,6 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.identification.estimate import Estimate
-from rds.identification.log import Log
 from rds.identification.made_estimate import made_estimate
 from rds.identification.problem import Problem
 from rds.identification.smoothing import encoder_step, motion_of
@@ -28,6 +27,7 @@ from rds.identification.structure import Structure
 from rds.identification.suspicions import suspicions
 from rds.identification.uncertainty import uncertainty_of
 from rds.identification.untold import untold_by
+from rds.logs.log import Log
 
 OPTIONS = ("fixed", "start", "progress")
 _ENOUGH = 2.0  # times the noise: with residuals that small, no other start can do much better

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rds.identification.log import Log
+from rds.logs.log import Log
 
 _LONGEST = 0.05  # of a log: the widest difference that a velocity is taken over
 _SLOW = 0.03  # of the highest speed: slower is taken for rest

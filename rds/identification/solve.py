@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.identification.log import Log
 from rds.identification.problem import Problem
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 EVALUATIONS = 150  # at most, and for each parameter beyond four
 MORE = 50

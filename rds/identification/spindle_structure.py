@@ -16,8 +16,8 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.options import Option
 from rds.identification import spindle_kernel
-from rds.identification.log import Log
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 OPTIONS = ("offset", "delay")
 

@@ -1,6 +1,6 @@
 """Values to begin a fit of the axis with, from the data alone.
 
-Where the sign of the velocity is known (from the smoothed position), the axis is linear: with the time constant τ given,
+Where the sign of the velocity is known (from the smoothed position), the axis is linear. With τ given,
 
     y = y₀ + v₀ τ (1 - e^(-t/τ)) + K·P[m u] - F₊·P[s₊] - F₋·P[s₋],      P = 1 / (p (τ p + 1)),    p = d/dt
 
@@ -17,8 +17,8 @@ from math import exp, expm1
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.identification.log import Log
 from rds.identification.smoothing import Motion, motion_of
+from rds.logs.log import Log
 from rds.motion.compiling import kernel
 
 GRID = 13  # time constants that are tried

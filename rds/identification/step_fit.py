@@ -20,11 +20,11 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.identification.estimate import Estimate
-from rds.identification.log import Log
 from rds.identification.made_estimate import made_estimate
 from rds.identification.regression import regress
 from rds.identification.steps import Reading, Window, find_windows, read_step
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 STRUCTURES: Mapping[str, tuple[str, ...]] = {"spindle": ("offset", "delay"), "axis": ("delay",)}  # and their options
 _LOW_TAU, _HIGH_TAU = 0.2, 10.0  # sample periods, times the longest step: where τ is looked for

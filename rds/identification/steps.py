@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rds.identification.log import Log
+from rds.logs.log import Log
 
 _SAME = 0.01  # of the command's range: what counts as a constant voltage
 _SHORTEST = 12  # samples

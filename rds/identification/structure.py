@@ -12,7 +12,7 @@ import numpy as np
 from rds.core.options import Option
 
 if TYPE_CHECKING:
-    from rds.identification.log import Log
+    from rds.logs.log import Log
 
 
 class Response(Protocol):

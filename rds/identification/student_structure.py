@@ -24,10 +24,11 @@ from rds.core.errors import InputError
 from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, load_student
 from rds.core.options import Option
-from rds.identification.log import Log
+from rds.identification.model_structure import structure_of_model
 from rds.identification.smoothing import motion_of
 from rds.identification.solve import first_state
 from rds.identification.structure import Structure
+from rds.logs.log import Log
 
 _COARSER = (1, 2, 5)  # Runge-Kutta steps in a sample, beside those of a run
 _TRIED = 2000  # samples that this is tried on
@@ -59,10 +60,8 @@ def _structure(student: StudentFile, path: str | Path, substeps: int) -> Structu
     states = len(model.initial_state)
 
     def respond(t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]) -> np.ndarray:
-        from rds.identification.candidate import of_model
-
         try:
-            return of_model(student_model(student, values, substeps)).structure.respond(t, u, x0, {})
+            return structure_of_model(student_model(student, values, substeps)).respond(t, u, x0, {})
         except InputError:
             raise
         except STUDENT_ERRORS as error:

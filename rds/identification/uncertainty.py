@@ -17,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rds.identification.log import Log
 from rds.identification.problem import Problem
 from rds.identification.residuals import effective_samples
 from rds.identification.solve import Solution
 from rds.identification.triangle import triangle_of
+from rds.logs.log import Log
 
 _RANK = 1e-7  # of the largest singular value of the scaled derivatives: below it, a direction is not told
 _ROUGH_RANK = 1e-5  # where the derivatives are differences

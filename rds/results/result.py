@@ -38,7 +38,7 @@ class Result:
     converter) are used where they are there.
 
     `validation` is what a run in the mode model-validation proved of its models, per axis (an
-    `rds.identification.validate.Validation`); it is not saved, but its numbers are, in `meta["validation"]`.
+    `rds.validation.validate.Validation`); it is not saved, but its numbers are, in `meta["validation"]`.
 
     Raises InputError for columns of different lengths, other than real numbers, or not finite, for a time that
     does not increase, and for a meta that lacks its needed keys. Only a `..._command` column may hold NaN or

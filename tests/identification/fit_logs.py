@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rds.identification.axis_structure import make
-from rds.identification.log import Log
+from rds.logs.log import Log
 from rds.machines import load_machine
 
 RESOLUTION = 0.001  # mm

@@ -15,8 +15,8 @@ from rds.core.errors import InputError
 from rds.identification.excitation import Design, Prediction, Task, design, make_task, predict
 from rds.identification.excitation_plot import excitation_picture
 from rds.identification.fit import fit
-from rds.identification.log import Log
 from rds.identification.structures import structure
+from rds.logs.log import Log
 from rds.machines import load_machine
 from rds.signals import make_signal, sample_voltage
 

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from rds.cli import app
 from rds.core.errors import InputError
 from rds.identification.fit import fit
-from rds.identification.log import Log
 from rds.identification.model_file import read_model
 from rds.identification.structures import structure
+from rds.logs.log import Log
 from tests.identification.fit_logs import axis_log, mini_cnc
 
 X = mini_cnc("X")

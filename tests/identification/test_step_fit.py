@@ -11,9 +11,9 @@ from hypothesis.strategies import floats
 
 from rds.core.errors import InputError
 from rds.identification.fit import fit
-from rds.identification.log import Log
 from rds.identification.mass_kernel import positions
 from rds.identification.structures import structure
+from rds.logs.log import Log
 from rds.machines import load_machine
 from rds.models.machine_axis import MachineAxis, MachineParameters
 

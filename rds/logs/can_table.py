@@ -1,0 +1,126 @@
+"""A bus log as columns: each signal of each message, with the times at which it was received.
+
+A DBC file says what its messages are; their signals are called `Message.Signal`. Without one, our own are known:
+the cyclic messages (command.slot_0 ..., answer_2.position) and those of the distributed modules.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import can
+import numpy as np
+
+from rds.bus import frames
+from rds.bus.decode import load_dbc, own_dbc
+from rds.bus.logs import LogFile
+from rds.core.errors import InputError, MachineError
+from rds.logs.log import Finding, Gravity
+from rds.logs.table import Column, Table
+
+Progress = Callable[[int, int], None]
+Signal = tuple[str, str | None, float]
+
+
+def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = None) -> Table:
+    """All signals of a log in one of python-can's formats. InputError for a damaged log, or one without a known signal.
+
+    Times are those that the recorder gave each frame, from the first frame on.
+    """
+    databases = [load_dbc(file) for file in dbc]
+    own = own_dbc() if not databases else None  # another bus may use the same identifiers for something else
+    if own is not None:
+        databases.append(load_dbc(own))
+    times: dict[str, array[float]] = {}
+    values: dict[str, array[float]] = {}
+    units: dict[str, str | None] = {}
+    unknown: dict[int, int] = {}
+    misfits = number = 0
+    start: float | None = None
+    size = path.stat().st_size if path.is_file() else 0
+    log = LogFile(path)
+    for number, message in enumerate(log, 1):
+        if progress is not None and number % 4096 == 0:
+            progress(
+                min(number * 40, size), size
+            )  # a frame takes about 40 bytes: the readers do not tell where they are
+        if message.is_error_frame or message.is_remote_frame:
+            continue
+        start = message.timestamp if start is None else start
+        try:
+            signals = list(_signals(message, databases, cyclic=not dbc))
+        except ValueError:
+            misfits += 1
+            continue
+        if not signals:
+            unknown[message.arbitration_id] = unknown.get(message.arbitration_id, 0) + 1
+        for name, unit, value in signals:
+            if name not in times:
+                times[name], values[name], units[name] = array("d"), array("d"), unit
+            times[name].append(message.timestamp - start)
+            values[name].append(value)
+    if not times:
+        seen = ", ".join(f"{identifier:#x}" for identifier in sorted(unknown)[:8]) or "none"
+        raise InputError(
+            f"none of its {number} frames is known (unknown identifiers: {seen}; {misfits} frames do not fit their "
+            f"description); give the DBC file that describes them: "
+            f'dbc = "axes.dbc" under [bus] in {path.name}.map.toml',
+            str(path),
+        )
+    findings = []
+    if unknown:
+        findings.append(Finding("frames", f"{sum(unknown.values())} frames of {len(unknown)} identifiers are unknown"))
+    if misfits:
+        what = f"{misfits} frames do not fit the description of their message, and were left out"
+        findings.append(Finding("frames", what, Gravity.WARNING))
+    if log.skipped:
+        findings.append(Finding("frames", f"{log.skipped} lines describe no frame"))
+    columns = {
+        name: Column(name, units[name], np.frombuffer(values[name]).copy(), np.frombuffer(times[name]).copy())
+        for name in sorted(times)
+    }
+    return Table(path, "can", columns, findings=tuple(findings))
+
+
+def _signals(message: can.Message, databases: Sequence[Any], cyclic: bool) -> Iterator[Signal]:
+    """The numbers in a frame, with unit; none for an unknown one. ValueError for one that does not fit."""
+    own = None if message.is_extended_id or not cyclic else _cyclic(message.arbitration_id, bytes(message.data))
+    if own is not None:
+        yield from own
+        return
+    for database in databases:
+        try:
+            description = database.get_message_by_frame_id(
+                message.arbitration_id, force_extended_id=message.is_extended_id
+            )
+        except KeyError:
+            continue
+        if bool(description.is_extended_frame) != message.is_extended_id:
+            continue
+        try:
+            decoded = description.decode(bytes(message.data), decode_choices=False)
+        except Exception as error:  # cantools raises errors of bitstruct, its own and plain ones
+            raise ValueError(str(error)) from error
+        units = {signal.name: signal.unit for signal in description.signals}
+        for name, value in decoded.items():
+            if isinstance(value, int | float):
+                yield f"{description.name}.{name}", units.get(name) or None, float(value)
+        return
+
+
+def _cyclic(identifier: int, data: bytes) -> list[Signal] | None:
+    try:
+        if identifier == frames.COMMAND:
+            volts = frames.decode_voltages(identifier, data)
+            return [(f"command.slot_{i}", "V", value) for i, value in enumerate(volts)]
+        if identifier - frames.ANSWER in frames.NODES:
+            answer = frames.decode_answer(identifier, data)
+            if answer.kind == frames.Kind.ANSWER:
+                return [(f"answer_{identifier - frames.ANSWER}.position", "counts", float(answer.counts))]
+            return []
+    except MachineError:
+        return None
+    return None

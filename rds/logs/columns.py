@@ -1,0 +1,91 @@
+"""Columns as quantities: units converted explicitly, counts by the resolution, with what was found on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.logs.log import Finding, Gravity
+from rds.logs.map import DIMENSIONS, ColumnMap, TimeMap
+from rds.logs.steps import BEYOND_MEASURE
+from rds.logs.table import Column, Table
+from rds.logs.units import base, check_unit, dimension, factor, plain
+
+_LATE = 1e7  # s: times beyond are dates, whose digits a float64 keeps to 1 µs only: they are counted from the first
+
+
+def column_time(table: Table, about: TimeMap) -> np.ndarray:
+    """The time of each row in s. InputError where nothing tells it, or its unit."""
+    if about.rate is not None:
+        return np.arange(table.rows) / about.rate
+    if about.column is None:
+        if table.format == "can":
+            return np.empty(0)  # each signal has its own
+        raise InputError(
+            'nothing tells the time of the rows; give column = "..." and unit under [time], or rate (Hz) where they '
+            "are equally spaced",
+            about.place or str(table.path),
+        )
+    column = table.column(about.column, about.place)
+    unit = _unit(column, about.unit, "time", about.place)
+    _check_size(column.values, f"time ({column.name!r})", about.place)
+    values = (
+        column.time if column.time is not None else (about.scale * column.values + about.offset) * factor(unit, "s")
+    )
+    if len(values) and abs(values[0]) > _LATE:
+        values = values - values[0]
+    return values
+
+
+def quantity(
+    column: Column, about: ColumnMap, name: str, resolution: float | None, target: str | None
+) -> tuple[np.ndarray, str, list[Finding]]:
+    """A column's values in the base unit of what it measures, that unit, and findings.
+
+    `resolution` is in `target` (mm, deg, rev/min) per count. InputError for an unknown unit, one that this quantity
+    cannot have, or counts without a resolution.
+    """
+    unit = _unit(column, about.unit, name, about.place)
+    of = check_unit(unit, DIMENSIONS[name], f"{name} ({column.name!r})")
+    findings = []
+    if about.unit is not None and column.unit is not None and plain(about.unit) != plain(column.unit):
+        what = (
+            f"the file says that {column.name!r} is in {column.unit}, the map says {about.unit}: the map was followed"
+        )
+        findings.append(Finding("units", what, Gravity.WARNING))
+    values = column.values
+    _check_size(values, f"{name} ({column.name!r})", about.place)
+    if about.scale != 1.0 or about.offset != 0.0 or about.sign != 1:
+        values = about.sign * (about.scale * values + about.offset)
+    if of in ("counts", "count speed"):
+        if resolution is None:
+            raise InputError(
+                f"{name} ({column.name!r}) is in encoder counts; give resolution (mm per count) or counts_per_unit for "
+                'the axis, or a machine that has it, as in machine = "mini-cnc"',
+                about.place,
+            )
+        unit = (target or "mm") + ("/s" if of == "count speed" else "")
+        return values * resolution, unit, findings
+    unit_out = base(of)
+    if of == "angular speed" and name == "velocity" and target == "deg":
+        unit_out = "deg/s"
+    times = factor(unit, unit_out)
+    return (values if times == 1.0 else values * times), unit_out, findings
+
+
+def _check_size(values: np.ndarray, what: str, place: str) -> None:
+    with np.errstate(invalid="ignore"):
+        far = np.abs(values) > BEYOND_MEASURE
+    far &= np.isfinite(values)  # what is not finite is a blank, and told as such
+    if far.any():
+        k = int(np.argmax(far))
+        raise InputError(f"{what} holds {values[k]:g} in row {k}, beyond what is measured ({BEYOND_MEASURE:g})", place)
+
+
+def _unit(column: Column, stated: str | None, name: str, place: str) -> str:
+    unit = stated or column.unit
+    if unit is None:
+        raise InputError(f'nothing gives the unit of {column.name!r} ({name}); give it, as in unit = "mm"', place)
+    if dimension(unit) is None or name == "time":
+        check_unit(unit, DIMENSIONS[name], f"{name} ({column.name!r})")
+    return unit

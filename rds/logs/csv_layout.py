@@ -1,0 +1,191 @@
+"""How a text table is laid out: encoding, delimiter, decimal sign, where its data begin, headings and units.
+
+Recorders write preambles, comments, a row of units, `;` with decimal commas, a mark before the first byte. The layout
+is that under which most lines read as rows of numbers.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rds.core.errors import InputError
+from rds.logs.units import dimension
+from rds.results.units import split_heading
+
+HEAD = 1 << 16  # bytes looked at
+COMMENTS = ("#", "%", "//", "!")
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
+BLANKS = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf"))
+_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a reader must know of a text table; `first` is the line, from 0, of the first row of data."""
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    first: int
+    names: tuple[str, ...]
+    units: tuple[str | None, ...]
+    words: frozenset[int]  # columns whose cells are no numbers
+    dates: frozenset[int]  # columns of dates and times of day
+    announced: int | None = None  # samples, where a comment says how many there should be
+
+
+def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
+    """The layout of a text file; what is given is not guessed. InputError where there is no table of numbers."""
+    lines, encoding = _head(path)
+    choices = [delimiter] if delimiter else [*DELIMITERS.values()]
+    best: tuple[float, int, str, str, int] | None = None
+    for mark in choices:
+        for point in [decimal] if decimal else [".", ","]:
+            if mark == point:
+                continue
+            first, width, score = _data(lines, mark, point)
+            # more numbers is better; then the delimiter that comes first in the table, then the decimal point
+            if score and (best is None or score > best[0]):
+                best = (score, width, mark, point, first)
+    if best is None:
+        shown = next((line for line in lines if line.strip()), "")
+        raise InputError(
+            f"no lines of numbers were found in it (it begins {shown[:60]!r}); it needs columns of numbers, separated "
+            f"by commas, semicolons, tabs, bars or spaces",
+            str(path),
+        )
+    _, width, mark, point, first = best
+    names, units = _headings(lines, first, mark, point, width)
+    body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
+    dates = frozenset(i for i in range(width) if any(_DATE.fullmatch(row[i]) for row in body[:1]))
+    words = frozenset(
+        i
+        for i in range(width)
+        if i not in dates
+        and body
+        and not any(is_number(row[i], point) for row in body)
+        and any(row[i].lower() not in BLANKS for row in body)
+    )
+    return Layout(encoding, mark, point, first, names, units, words, dates, _announced(lines[:first]))
+
+
+def split(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, without blanks around them."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell is a number; neither NaN nor infinity is."""
+    if decimal != ".":
+        if "." in cell:
+            return False
+        cell = cell.replace(decimal, ".")
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return cell.lower() not in BLANKS and "_" not in cell
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a remark, and not a row."""
+    return line.lstrip().startswith(COMMENTS)
+
+
+def _head(path: Path) -> tuple[list[str], str]:
+    with open(path, "rb") as stream:
+        data = stream.read(HEAD)
+        whole = not stream.read(1)
+    if not data.strip():
+        raise InputError("it is empty; record it again or take another copy", str(path))
+    for mark, name in ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+        if data.startswith(mark):
+            raise InputError(f"it is text in {name}; save it as CSV (UTF-8)", str(path))
+    if b"\0" in data:
+        raise InputError("it is not text (it has null bytes); is its ending right?", str(path))
+    encoding = "utf-8"
+    try:
+        text = codecs.getincrementaldecoder("utf-8")().decode(data, whole)
+    except UnicodeDecodeError:
+        encoding, text = "cp1252", data.decode("cp1252", errors="replace")
+    lines = text.removeprefix("\ufeff").splitlines()
+    return (lines if whole or len(lines) < 2 else lines[:-1]), encoding
+
+
+def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int, float]:
+    """First line and width of the rows of numbers, and how many numbers they have (0: none).
+
+    The rows have the width that most have, and numbers where nearly all of them do: a line of a preamble such as
+    `gain;2.5` is none of them.
+    """
+    rows: dict[int, list[tuple[int, list[bool]]]] = {}  # by width: line, and which cells are a number or blank
+    numbers: dict[int, int] = {}
+    for number, line in enumerate(lines):
+        if line.strip() and not is_comment(line):
+            cells = split(line, delimiter)
+            kinds = [is_number(cell, decimal) or bool(_DATE.fullmatch(cell)) for cell in cells]
+            blanks = sum(cell.lower() in BLANKS for cell in cells)
+            if any(kinds) and sum(kinds) + blanks >= len(cells) / 2:
+                fits = [kind or cell.lower() in BLANKS for kind, cell in zip(kinds, cells, strict=True)]
+                rows.setdefault(len(cells), []).append((number, fits))
+                numbers[len(cells)] = numbers.get(len(cells), 0) + sum(kinds)
+    if not rows:
+        return 0, 0, 0.0
+    width = max(rows, key=lambda w: (len(rows[w]), -rows[w][0][0]))
+    found = rows[width]
+    usual = [sum(fits[i] for _, fits in found) > 0.9 * len(found) - 1 for i in range(width)]
+    first = next((n for n, fits in found if all(f or not u for f, u in zip(fits, usual, strict=True))), found[0][0])
+    return first, width, float(numbers[width])
+
+
+def _headings(
+    lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int
+) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
+    """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
+    above = [line for line in lines[:first] if line.strip()][-2:]
+    rows = [_heading_cells(line, delimiter, width) for line in above]
+    units: list[str | None] = [None] * width
+    heads = rows[-1] if rows else None
+    if heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None:
+        units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
+        heads = rows[-2]
+    if heads is None or any(is_number(cell, decimal) for cell in heads):
+        return tuple(f"column {i + 1}" for i in range(width)), tuple(units)
+    names = []
+    for i, cell in enumerate(heads):
+        name, unit = split_heading(cell.strip('"'))
+        names.append(name or f"column {i + 1}")
+        units[i] = unit if unit is not None else units[i]
+    return tuple(names), tuple(units)
+
+
+def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:
+    text = line.lstrip()
+    for mark in COMMENTS:
+        text = text.removeprefix(mark)
+    cells = split(text, delimiter)
+    if delimiter == " " and len(cells) != width:  # `time [s]  position [mm]`
+        cells = [cell.strip() for cell in re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", text)]
+    return cells if len(cells) == width else None
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    given = [cell.strip("[]() ") for cell in cells if cell.strip("[]()- ")]
+    return bool(given) and all(dimension(cell) is not None for cell in given)
+
+
+def _announced(lines: Sequence[str]) -> int | None:
+    for line in lines:
+        found = re.search(r"\b(?:samples|rows|points|records)\b\W{0,3}(\d+)", line, re.IGNORECASE)
+        if found:
+            return int(found[1])
+    return None

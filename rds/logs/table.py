@@ -1,0 +1,62 @@
+"""A file of logged data as columns of numbers, before anybody has said what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.core.options import check_known
+from rds.logs.log import Finding
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: float64, with NaN where the file has no number.
+
+    `unit` is None where the file gives none. `time` (s) is there where the column has times of its own (a signal on
+    a bus). `text` is the first cell that is no number, with its row, in a column that holds words.
+    """
+
+    name: str
+    unit: str | None
+    values: np.ndarray
+    time: np.ndarray | None = None
+    text: tuple[int, str] | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """What a file holds. `constants` are single numbers beside the columns, as MAT files have them."""
+
+    path: Path
+    format: str  # csv, mat, parquet, can
+    columns: Mapping[str, Column]
+    constants: Mapping[str, float] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()  # about the file itself: cut, comments inside, encoding
+    sha256: str = ""
+
+    @property
+    def rows(self) -> int:
+        """The length of the columns; of a bus log, of the longest."""
+        return max((len(column.values) for column in self.columns.values()), default=0)
+
+    def column(self, name: str, place: str) -> Column:
+        """The column called `name`; InputError at `place`, with the names there are, for another or one of words."""
+        if name not in self.columns:
+            try:
+                check_known([name], self.columns, self.path.name)
+            except InputError as error:
+                raise InputError(str(error).replace("option", "column", 1), place) from None
+        found = self.columns[name]
+        if found.text is not None:
+            row, cell = found.text
+            raise InputError(
+                f"column {name!r} holds {cell!r:.60} in its data row {row + 1}; every cell must be a "
+                "number: repair it or choose another column",
+                str(self.path),
+            )
+        return found

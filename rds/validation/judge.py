@@ -1,0 +1,389 @@
+"""From what was measured of a model to the verdict. Each rule is a function that gives reasons or none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import sqrt
+
+import numpy as np
+
+from rds.logs.log import Gravity
+from rds.validation.assessment import Assessment, Range
+from rds.validation.candidate import Candidate
+from rds.validation.verdict import Bands, Reason, Side, Verdict, Word
+
+_FACTORS = {  # of measured over modelled, and what makes it
+    -1.0: "the sign of the position or of the command is reversed",
+    1000.0: "the position is in a unit 1000 times smaller than stated (µm for mm, mm for m), or the command in mV",
+    0.001: "the position is in a unit 1000 times larger than stated (m for mm, mm for µm)",
+    25.4: "the position is in mm where inches are stated",
+    1.0 / 25.4: "the position is in inches where mm are stated",
+    60.0: "the speed is per minute where it is stated per second",
+    1.0 / 60.0: "the speed is per second where it is stated per minute",
+}
+_BLOCKS = 50  # with fewer, the residual tests find nothing
+_NEAR = 0.15  # how near to such a factor is suspicious
+_FEW = 0.1  # share of lags beyond the plain band that is still called white
+_IDENTICAL = 1e-9  # RMSE over the motion: only the model's own output comes so near
+
+
+def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
+    """The verdict on `candidate` by its assessment on one log."""
+    reasons = [
+        *_data(a, bands),
+        *_unstable(candidate, a),
+        *_free_run(a, bands),
+        *_scale(a, bands),
+        *_ahead(a, bands),
+        *_voltage(a, bands),
+        *_residuals(a, bands),
+        *_overfit(candidate, a, bands),
+        *_extent(a, bands),
+    ]
+    word, purpose = _conclude(a, reasons, bands)
+    return Verdict(word, _sentence(candidate, a, word, purpose, reasons), tuple(reasons), purpose)
+
+
+def _data(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    log, resolution = a.log, a.log.resolution or 0.0
+    if a.overlap.share > bands.seen:
+        yield Reason(
+            Side.UNTOLD,
+            "same-data",
+            f"{100 * a.overlap.share:.0f} % of the log was seen by the fit ({a.overlap.how}): how well the model "
+            "repeats it says nothing of other data; validate on another log",
+        )
+    elif not a.overlap.known:
+        yield Reason(Side.NOTE, "provenance", f"{a.overlap.how}; make sure that they are others")
+    if a.motion == 0.0:
+        yield Reason(Side.UNTOLD, "no-motion", f"the axis never moves ({a.measured[0]:.6g} {a.unit} throughout)")
+    elif a.motion < bands.least_steps * resolution:
+        steps = a.motion / resolution
+        yield Reason(
+            Side.UNTOLD,
+            "no-motion",
+            f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of its encoder; {bands.least_steps:.0f} are "
+            "needed to tell a model from none",
+        )
+    elif a.changes < bands.least_changes:
+        yield Reason(
+            Side.UNTOLD,
+            "short",
+            f"in {a.time[-1] - a.time[0]:.3g} s the velocity changes between fast and slow, or forward and back, "
+            f"{a.changes} times; {bands.least_changes:.0f} are needed to see any dynamics",
+        )
+    if float(log.command.min()) == float(log.command.max()):
+        yield Reason(
+            Side.UNTOLD, "no-excitation", f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics"
+        )
+    for finding in log.findings:
+        if finding.gravity is not Gravity.NOTE:
+            yield Reason(Side.NOTE, f"data-{finding.kind}", finding.what)
+    yield from _too_good(a, bands)
+
+
+def _too_good(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.free_run is None or a.motion == 0.0:
+        return
+    if a.free_run.rmse <= _IDENTICAL * a.motion:
+        yield Reason(
+            Side.UNTOLD,
+            "own-output",
+            f"the model repeats the log to {a.free_run.rmse:.1g} {a.unit}: the log is this model's own output",
+        )
+    elif a.log.resolution and a.free_run.rmse < bands.floor * a.log.resolution / sqrt(12.0):
+        yield Reason(
+            Side.UNTOLD,
+            "too-good",
+            f"the RMSE of {a.free_run.rmse:.2g} {a.unit} is below the encoder's own rounding "
+            f"({a.log.resolution / sqrt(12.0):.2g} {a.unit}): the log is not what this encoder measured, or the "
+            "stated resolution is wrong",
+        )
+
+
+def _unstable(candidate: Candidate, a: Assessment) -> Iterator[Reason]:
+    if a.unstable_at is None:
+        return
+    if a.log.closed_loop:
+        yield Reason(
+            Side.UNTOLD,
+            "unstable",
+            f"the free run is unstable from {a.unstable_at:.4g} s on, which in a closed loop may be the axis's own way",
+        )
+    else:
+        yield Reason(
+            Side.AGAINST,
+            "unstable",
+            f"the free run is unstable from {a.unstable_at:.4g} s on; the axis stays within {a.motion:.4g} {a.unit}",
+        )
+
+
+def _passes(a: Assessment, bands: Bands) -> tuple[bool, bool]:
+    """Whether the free run's position and velocity are within the band."""
+    position = a.free_run is not None and a.free_run.fit_percent >= bands.fit_percent
+    velocity = a.velocity is not None and a.velocity.fit_percent >= bands.fit_percent
+    return position, velocity if a.velocity is not None else position
+
+
+def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.free_run is None or a.motion == 0.0:
+        return
+    e = a.free_run
+    position, velocity = _passes(a, bands)
+    what = "speed" if a.velocity is None else "position"
+    yield Reason(
+        Side.FOR if position else Side.AGAINST,
+        "free-run",
+        f"free run, {what}: fit {e.fit_percent:.2f} %, RMSE {e.rmse:.4g} {e.unit}, at most {e.maximum:.4g} {e.unit}",
+    )
+    if a.velocity is None:
+        return
+    v = a.velocity
+    yield Reason(
+        Side.FOR if velocity else Side.AGAINST,
+        "free-run-velocity",
+        f"free run, velocity: fit {v.fit_percent:.2f} %, RMSE {v.rmse:.4g} {v.unit}, at most {v.maximum:.4g} {v.unit}",
+    )
+    if velocity and not position and a.drift is not None:
+        yield Reason(
+            Side.AGAINST,
+            "drift",
+            f"the position drifts from the model's by {a.drift:.3g} {a.unit}/s: the error of the velocity adds up",
+        )
+
+
+def _scale(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.gain is None or all(_passes(a, bands)):
+        return
+    for factor, meaning in _FACTORS.items():
+        if abs(a.gain / factor - 1.0) < _NEAR:
+            text = f"the measured velocity is {a.gain:.4g} times the model's: {meaning}"
+            yield Reason(Side.AGAINST, "sign" if factor < 0.0 else "unit", text)
+            return
+    if a.gain < 0.0:
+        text = f"the measured velocity is {a.gain:.4g} times the model's: it moves the other way"
+        yield Reason(Side.AGAINST, "sign", text)
+
+
+def _skilled(a: Assessment, bands: Bands) -> list[int]:
+    """The horizons, in samples, at which the model predicts clearly better than no model."""
+    return [k for k, e in a.ahead.items() if k in a.naive and e.rmse < bands.skill * a.naive[k].rmse]
+
+
+def _foreseen(a: Assessment, bands: Bands) -> list[int]:
+    """Those of them at which it foretells the way to the band of the fit, as a free run must."""
+    share = 1.0 - bands.fit_percent / 100.0
+    way = {k: float(np.sqrt(np.mean((a.measured[k:] - a.measured[:-k]) ** 2))) for k in _skilled(a, bands)}
+    return [k for k in way if a.ahead[k].rmse <= share * way[k]]
+
+
+def _ahead(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if not a.ahead or a.motion == 0.0:
+        return
+    skilled = _skilled(a, bands)
+    said = ", ".join(
+        f"{k}: {e.rmse:.3g} ({a.naive[k].rmse:.3g} without a model)" for k, e in a.ahead.items() if k in a.naive
+    )
+    unskilled = [str(k) for k in a.ahead if k not in skilled]
+    text = f"RMSE of predictions so many samples ahead, {a.unit}: {said}"
+    if unskilled:
+        text += f"; {', '.join(unskilled)} ahead, the model is worth little more than none, whatever its fit"
+    yield Reason(Side.NOTE if skilled else Side.AGAINST, "ahead", text)
+
+
+def _voltage(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.voltage is None or a.motion == 0.0:
+        return
+    percent = a.voltage.relative_percent
+    if percent is None:
+        yield Reason(
+            Side.NOTE,
+            "voltage",
+            f"no voltage error: {len(a.voltage.extra)} blocks of steady direction are too few, or the model does not "
+            "answer to voltage there",
+        )
+        return
+    unit = a.ranges["command"].unit
+    yield Reason(
+        Side.FOR if percent <= bands.voltage_percent else Side.AGAINST,
+        "voltage",
+        f"the voltage that the model needs for the measured motion differs by {percent:.2f} % "
+        f"(RMS {a.voltage.rmse:.3g} {unit}) from the one given",
+    )
+
+
+def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    tests = a.tests
+    if tests is None or tests.blocks < _BLOCKS or a.motion == 0.0:
+        return
+    r, lag = tests.auto.largest
+    numbers = (
+        f"p = {tests.p_white:.3f}, {tests.blocks} means over {tests.block * a.log.sample_period * 1e3:.3g} ms; largest "
+        f"autocorrelation {r:.2f} after {lag:.3g} s"
+    )
+    if tests.p_white <= bands.significance:
+        yield Reason(Side.AGAINST, "whiteness", f"the residual is not white ({numbers})")
+    elif tests.auto.outside > _FEW:
+        yield Reason(
+            Side.FOR,
+            "whiteness",
+            "the residual is not white, but no less so than the encoder's rounding and the uncertainty of the "
+            f"parameters make it ({numbers})",
+        )
+    else:
+        yield Reason(Side.FOR, "whiteness", f"the residual is white ({numbers})")
+    if a.log.closed_loop:
+        yield Reason(
+            Side.NOTE,
+            "closed-loop",
+            "the log is of a closed loop: the command answers the axis, so a correlation of residual and command "
+            "proves nothing either way",
+        )
+        return
+    free = tests.p_command > bands.significance
+    c, lag = tests.cross.largest
+    yield Reason(
+        Side.FOR if free else Side.AGAINST,
+        "command",
+        f"the residual is {'independent of' if free else 'correlated with'} the command "
+        f"(p = {tests.p_command:.3f}; largest correlation {c:.2f} at {lag:.3g} s)",
+    )
+
+
+def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reason]:
+    known = [e.rmse for e in candidate.fit_errors() if e.rmse > 0.0 and e.unit == a.unit]
+    if a.free_run is None or not known or a.overlap.share > bands.seen:
+        return
+    own = max(known)
+    own = max(own, (a.log.resolution or 0.0) / sqrt(12.0))
+    ratio = a.free_run.rmse / own
+    if ratio > bands.worse:
+        yield Reason(
+            Side.AGAINST,
+            "overfitted",
+            f"the RMSE is {ratio:.1f} times that on the fit's own data ({own:.3g} {a.unit}): the fit followed what was "
+            "particular to them, or the axis has changed",
+        )
+
+
+def _extent(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    for name, found in a.ranges.items():
+        if found.fitted is None:
+            continue
+        here, fitted = _size(found.here), _size(found.fitted)
+        if here > bands.beyond * fitted:
+            yield Reason(
+                Side.NOTE,
+                "extrapolation",
+                f"{name} up to {here:.3g} {found.unit} here, and up to {fitted:.3g} {found.unit} in the fit's data: "
+                "beyond that the model extrapolates",
+            )
+
+
+def _size(ends: tuple[float, float]) -> float:
+    return max(abs(ends[0]), abs(ends[1]))
+
+
+def _conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
+    untold = {reason.kind for reason in reasons if reason.side is Side.UNTOLD}
+    if untold - {"same-data"}:
+        return Word.UNTOLD, ""
+    word, purpose = _from_errors(a, reasons, bands)
+    # what fails even on its own data has failed; what passes there has shown nothing
+    return (Word.UNTOLD, "") if untold and word is not Word.NOT else (word, purpose)
+
+
+def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
+    against = {reason.kind for reason in reasons if reason.side is Side.AGAINST}
+    position, velocity = _passes(a, bands)
+    if {"unstable", "sign", "unit"} & against:
+        return Word.NOT, ""
+    if not position and not velocity:
+        if a.log.closed_loop and "voltage" not in against and a.voltage and a.voltage.relative_percent is not None:
+            return Word.UNTOLD, ""
+        foreseen = _foreseen(a, bands)
+        if foreseen and "voltage" not in against:
+            return Word.PARTLY, f"predicting {_and([str(k) for k in foreseen])} samples ahead"
+        return Word.NOT, ""
+    purposes = []
+    rate = "speed" if a.velocity is None else "velocity"
+    if a.velocity is None or not position:
+        purposes.append(f"simulating the {rate}")
+    elif not velocity:
+        purposes.append("simulating the position")
+    else:
+        purposes.append("simulating position and velocity")
+    limits = list(_limits(a, bands))
+    short = not (position and velocity)
+    if short or limits or against & {"whiteness", "command", "voltage", "overfitted", "ahead"} or a.log.closed_loop:
+        return Word.PARTLY, " ".join([*purposes, *limits])
+    return Word.VALID, ""
+
+
+def _limits(a: Assessment, bands: Bands) -> Iterator[str]:
+    """What the log did not try of that which the model claims."""
+    speed: Range = a.ranges["velocity"]
+    low, high = speed.here
+    still = 0.05 * _size(speed.here)
+    if a.velocity is not None and (high <= still or low >= -still):
+        yield "in one direction"
+    if speed.fitted is not None and _size(speed.here) < bands.covered * _size(speed.fitted):
+        yield f"up to {_size(speed.here):.3g} {speed.unit}"
+    elif any(
+        found.fitted is not None and _size(found.here) > bands.beyond * _size(found.fitted)
+        for found in a.ranges.values()
+    ):
+        yield f"up to the {_size(speed.here):.3g} {speed.unit} tried here"
+    if a.log.closed_loop:
+        yield "in a closed loop such as this"
+
+
+def _sentence(candidate: Candidate, a: Assessment, word: Word, purpose: str, reasons: list[Reason]) -> str:
+    name, log = candidate.name, f"{a.log.name} ({_tried(a)})"
+    if word is Word.UNTOLD:
+        why = [reason.what for reason in reasons if reason.side is Side.UNTOLD]
+        if not why:
+            why = [
+                "in a closed loop, the free run drifts away while the voltage it needs is right: only a log without "
+                "feedback tells which is at fault"
+            ]
+        return f"Cannot tell whether {name} is valid, from {log}: {'; '.join(why)}."
+    against = [reason.what for reason in reasons if reason.side is Side.AGAINST]
+    speaks = [reason.what for reason in reasons if reason.side is Side.FOR]
+    if word is Word.NOT:
+        return f"{name} is not valid for {log}: {'; '.join(against)}."
+    if word is Word.VALID:
+        return f"{name} is valid for {log}: {'; '.join(speaks)}."
+    but = f"; but {'; '.join(against)}" if against else ""
+    return f"{name} is valid for {purpose} only, by {log}: {'; '.join(speaks) or 'see the predictions'}{but}."
+
+
+def _tried(a: Assessment) -> str:
+    """How fast and at which voltages the log went: what a verdict by it speaks of."""
+    speed, command = a.ranges["velocity"], a.ranges["command"]
+    return f"up to {_size(speed.here):.3g} {speed.unit} and {_size(command.here):.3g} {command.unit}"
+
+
+def _and(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def overall(verdicts: dict[str, Verdict]) -> Verdict:
+    """The verdict over several logs: not valid if any says so; else the narrowest of those that can tell."""
+    if len(verdicts) == 1:
+        return next(iter(verdicts.values()))
+    for word in (Word.NOT, Word.PARTLY, Word.VALID, Word.UNTOLD):
+        chosen = {name: verdict for name, verdict in verdicts.items() if verdict.word is word}
+        if chosen:
+            break
+    others = {name: verdict for name, verdict in verdicts.items() if name not in chosen}
+    purposes = list(dict.fromkeys(verdict.purpose for verdict in chosen.values() if verdict.purpose))
+    sentence = " ".join(verdict.sentence for verdict in chosen.values())
+    if others:
+        sentence += " Beside that: " + ", ".join(f"{name}: {verdict.word}" for name, verdict in others.items()) + "."
+    reasons = tuple(
+        Reason(reason.side, reason.kind, f"{name}: {reason.what}")
+        for name, verdict in verdicts.items()
+        for reason in verdict.reasons
+    )
+    return Verdict(word, sentence, reasons, "; ".join(purposes))

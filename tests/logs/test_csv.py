@@ -1,0 +1,150 @@
+"""Text tables: every layout gives the same numbers, and every damage its sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.logs.csv_table import read_csv
+from rds.logs.read_log import read_log
+from tests.logs.data_files import axis, headed, write
+
+LAYOUTS = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), (" ", ".")]
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    values=st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=3, max_size=30),
+    layout=st.sampled_from(LAYOUTS),
+    mark=st.booleans(),
+    remark=st.booleans(),
+    units=st.booleans(),
+    end=st.sampled_from(["\n", "\r\n"]),
+)
+def test_every_layout_gives_the_numbers_back(
+    tmp_path: Path,
+    values: list[tuple[float, ...]],
+    layout: tuple[str, str],
+    mark: bool,
+    remark: bool,
+    units: bool,
+    end: str,
+) -> None:
+    delimiter, decimal = layout
+    lines = ["# recorder: A", "# channel 1; 2, 3"] if remark else []
+    lines.append(delimiter.join(("time", "command", "position")))
+    if units:
+        lines.append(delimiter.join(("[ms]", "[V]", "[mm]")))
+    lines += [delimiter.join(repr(v).replace(".", decimal) for v in row) for row in values]
+    path = tmp_path / "log.csv"
+    path.write_bytes((b"\xef\xbb\xbf" if mark else b"") + (end.join(lines) + end).encode())
+    table = read_csv(path)
+    assert list(table.columns) == ["time", "command", "position"]
+    assert [column.unit for column in table.columns.values()] == (["ms", "V", "mm"] if units else [None] * 3)
+    got = np.column_stack([column.values for column in table.columns.values()])
+    assert np.array_equal(got, np.array(values))
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        ("pos [mm]", "pos", "mm"),
+        ("pos (µm)", "pos", "µm"),
+        ("pos_mm", "pos_mm", "mm"),
+        ("Weg [mm]", "Weg", "mm"),
+        ("plain", "plain", None),
+        ("x_in", "x_in", None),
+    ],
+)
+def test_headings(tmp_path: Path, heading: str, name: str, unit: str | None) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(f"time [s],{heading}\n0,1.5\n1,2.5\n", encoding="utf-8")
+    column = list(read_csv(path).columns.values())[1]
+    assert (column.name, column.unit, column.values.tolist()) == (name, unit, [1.5, 2.5])
+
+
+def test_a_preamble_and_remarks_between_rows_and_a_windows_code_page(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    text = "Gerät;7\nVerstärkung;2,5\n\nZeit [s];Weg [µm];\n0,0;1,0;\n# Pause\n0,1;2,0;\n0,2;3,0;\n"
+    path.write_bytes(text.encode("cp1252"))
+    table = read_csv(path)
+    assert {c.name: (c.unit, c.values.tolist()) for c in table.columns.values()} == {
+        "Zeit": ("s", [0.0, 0.1, 0.2]),
+        "Weg": ("µm", [1.0, 2.0, 3.0]),
+    }
+    assert [f.kind for f in table.findings] == ["encoding", "comments"]
+
+
+def test_words_are_kept_apart_and_named_where_a_number_should_be(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "time [s],state,u [V],y [mm]\n" + "".join(f"{i},RUN,1,{'oops' if i == 700 else i}\n" for i in range(900))
+    )
+    table = read_csv(path)
+    assert table.columns["state"].text == (0, "RUN")
+    assert table.columns["y"].text == (700, "oops")
+    assert table.columns["u"].values.sum() == 900.0
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "it is empty"),
+        ("  \n\n", "it is empty"),
+        ("just,words\nno,numbers\n", "no lines of numbers"),
+        ("a,b\n1,2\n3\n5,6\n", r"line 3: it has 1 cells"),
+        ("a,b\n1,2\n3,4\n5,6,7\n8,9\n", r"line 4: it has 3 cells"),
+        ("a,a\n1,2\n3,4\n", "two columns are headed 'a'"),
+        ("a,b\0\n1,2\n", "null bytes"),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        read_csv(path)
+
+
+def test_utf_16_is_refused_with_a_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text("a,b\n1,2\n", encoding="utf-16")
+    with pytest.raises(InputError, match=r"utf-16; save it as CSV \(UTF-8\)"):
+        read_csv(path)
+
+
+def test_half_a_file_loses_its_cut_line_and_says_so(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", headed(axis()))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2 - (whole[: len(whole) // 2][::-1].index(b"\n")) + 3])  # 3 bytes of a line
+    (log,) = read_log(path)
+    cut = next(f for f in log.findings if f.kind == "cut")
+    assert "ends in the middle of a line" in cut.what and cut.gravity == "warning"
+    assert len(log) == whole[: len(whole) // 2].count(b"\n") - 1
+
+
+@pytest.mark.parametrize("heading", ["# samples: 8000", "# 1 kHz, samples = 8000"])
+def test_fewer_samples_than_announced(tmp_path: Path, heading: str) -> None:
+    path = write(tmp_path / "log.csv", headed(axis()))
+    path.write_text(heading + "\n" + path.read_text())
+    (log,) = read_log(path)
+    cut = next(f for f in log.findings if f.kind == "cut")
+    assert cut.what.startswith("the file announces 8000 samples, and there are 4000: 50 % are missing")
+    assert cut.gravity == "fault"
+
+
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.binary(max_size=400) | st.text(alphabet='0123456789.,;\t \n#ab-"[]', max_size=200).map(str.encode))
+def test_no_bytes_make_a_traceback(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(data)
+    try:
+        table = read_csv(path)
+    except InputError as error:
+        assert str(error)
+    else:
+        assert all(len(column.values) == table.rows for column in table.columns.values())

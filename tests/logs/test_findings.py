@@ -1,0 +1,251 @@
+"""Each kind of bad data gets its sentence; good data get none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.logs.log import Finding, Log
+from rds.logs.read_log import read_log
+from rds.logs.steps import step_of
+from rds.logs.time_base import time_base
+from tests.logs.data_files import MAP, axis, headed, write
+
+Columns = dict[str, np.ndarray]
+
+
+def read(folder: Path, columns: Columns, extra: str = "", axis_lines: str = "") -> Log:
+    path = write(folder / "log.csv", columns)
+    (folder / "log.csv.map.toml").write_text(extra + MAP + axis_lines)
+    (log,) = read_log(path)
+    return log
+
+
+def grave(log: Log) -> dict[str, Finding]:
+    return {f.kind: f for f in log.findings if f.gravity != "note"}
+
+
+def test_a_good_log_has_nothing_grave(tmp_path: Path) -> None:
+    log = read(tmp_path, axis(), 'machine = "mini-cnc"\n', "closed_loop = false\n")
+    assert grave(log) == {}
+    assert log.resolution == 0.001 and log.voltage_range == (-10.0, 10.0) and log.closed_loop is False
+    assert log.sample_period == pytest.approx(1e-3, rel=1e-12)
+
+
+def changed(**change: Callable[[np.ndarray], np.ndarray]) -> Columns:
+    return {name: change.get(name, lambda v: v)(values) for name, values in axis().items()}
+
+
+def swapped() -> Columns:
+    made = axis()
+    return made | {"voltage": made["position"], "position": made["voltage"]}
+
+
+BAD: list[tuple[Columns, str, str, str]] = [
+    (changed(voltage=np.zeros_like), "excitation", "fault", "the command is 0 V throughout"),
+    (changed(position=np.zeros_like), "excitation", "fault", "the axis hardly moves: 0 mm"),
+    (changed(position=lambda p: np.round(p / 1000, 3)), "excitation", "fault", "the axis hardly moves"),
+    (changed(position=np.negative), "sign", "fault", "moves against its command"),
+    (swapped(), "columns", "fault", "they are swapped"),
+    (changed(position=lambda p: p * 1000), "units", "fault", "its unit is wrong"),
+    (changed(voltage=lambda u: u * 1000), "units", "fault", "the converter gives 10 V at most"),
+    (
+        changed(voltage=lambda u: 3.0 * np.sign(u)),
+        "excitation",
+        "warning",
+        "the gain K and the friction cannot be told",
+    ),
+    (changed(voltage=lambda u: np.clip(u * 3, -10, 10)), "saturation", "warning", "at its limits"),
+    (changed(position=lambda p: p + 80.0), "saturation", "warning", "reaches the end of the travel"),
+    (changed(position=lambda p: np.round(p / 0.01) * 0.01), "quantization", "warning", "10 of the stated resolution"),
+]
+
+
+@pytest.mark.parametrize(
+    ("columns", "kind", "gravity", "sentence"), BAD, ids=[f"{b[1]}-{i}" for i, b in enumerate(BAD)]
+)
+def test_bad_data_are_told(tmp_path: Path, columns: Columns, kind: str, gravity: str, sentence: str) -> None:
+    found = [f for f in read(tmp_path, columns, 'machine = "mini-cnc"\n').findings if f.kind == kind]
+    assert any(re.search(sentence, f.what) and f.gravity == gravity for f in found), found
+
+
+def test_an_axis_that_goes_one_way_does_not_tell_the_other_friction(tmp_path: Path) -> None:
+    made = axis()
+    up = np.maximum.accumulate(made["position"])
+    log = read(tmp_path, made | {"voltage": np.abs(made["voltage"]), "position": up})
+    assert any("never moves in the negative direction" in f.what and "F-" in f.what for f in log.findings)
+
+
+def test_metres_without_a_machine_are_told_by_their_steps(tmp_path: Path) -> None:
+    made = axis(resolution=5e-5)
+    log = read(tmp_path, made | {"position": made["position"] / 1000})  # m, and the map says mm
+    assert "finer than encoders are: check the unit" in grave(log)["units"].what
+
+
+def test_times_in_ms_taken_for_s(tmp_path: Path) -> None:
+    made = axis()
+    log = read(tmp_path, made | {"time": made["time"] * 1000})
+    assert "is the time in ms?" in grave(log)["units"].what
+
+
+def test_a_closed_loop_shows_itself(tmp_path: Path) -> None:
+    t = np.arange(4000) * 1e-3
+    r = 5 * np.sin(2 * np.pi * t)
+    x = v = 0.0
+    u, y = np.empty_like(t), np.empty_like(t)
+    for i in range(len(t)):
+        y[i] = round(x, 3)
+        u[i] = 10.0 * (r[i] - y[i]) + 0.567 * 10 * np.pi * np.cos(2 * np.pi * t[i])
+        v += 0.1 * (1.764 * u[i] - v)
+        x += 1e-3 * v
+    columns = {"time": t, "voltage": u, "position": y, "ref": r}
+    log = read(tmp_path, columns, axis_lines='reference = { column = "ref", unit = "mm" }\n')
+    assert log.closed_loop is True and "closed-loop" in grave(log)
+    open_loop = {**axis(), "ref": axis()["position"] * 0 + r}
+    log = read(tmp_path, open_loop, axis_lines='reference = { column = "ref", unit = "mm" }\n')
+    assert log.closed_loop is None and "closed-loop" not in grave(log)
+
+
+# --- time
+
+
+def test_times_that_are_not_exactly_regular_are_used_as_they_are(tmp_path: Path) -> None:
+    made = axis()
+    random = np.random.default_rng(0)
+    made["time"] = made["time"] + random.uniform(-0.04, 0.04, len(made["time"])) * 1e-3
+    log = read(tmp_path, made)
+    assert np.allclose(log.time, made["time"], rtol=1e-11)
+    jitter = next(f for f in log.findings if f.kind == "jitter")
+    assert "used as they are" in jitter.what
+
+
+@pytest.mark.parametrize("at", [1, 1234, 3998])
+def test_beyond_the_limit_the_first_sample_is_named(tmp_path: Path, at: int) -> None:
+    made = axis()
+    made["time"][at] += 0.15e-3
+    with pytest.raises(InputError, match=rf"beyond the limit of 10 % first at sample {at} "):
+        read(tmp_path, made)
+    assert len(read(tmp_path, made, "jitter_limit = 0.2\n")) == 4000
+
+
+def test_gaps_duplicates_and_blanks(tmp_path: Path) -> None:
+    made = {name: np.delete(values, slice(1000, 1010)) for name, values in axis().items()}
+    with pytest.raises(InputError, match="1 gap, 10 samples missing; the first before sample 1000"):
+        read(tmp_path, made)
+    (tmp_path / "log.csv.map.toml").write_text('gaps = "split"\n' + MAP)
+    first, second = read_log(tmp_path / "log.csv")
+    assert (len(first), len(second), second.name) == (1000, 2990, "log part 2")
+    assert "gap" in grave(read(tmp_path, made, 'gaps = "keep"\n'))
+
+    made = {name: np.insert(values, 500, values[500]) for name, values in axis().items()}
+    with pytest.raises(InputError, match="1 samples have the time of the one before, the first is sample 501"):
+        read(tmp_path, made)
+    log = read(tmp_path, made, 'duplicates = "drop"\n')
+    assert len(log) == 4000 and grave(log)["duplicate"].sample == 501
+
+    made = axis()
+    made["position"][[0, 7]] = np.nan
+    with pytest.raises(InputError, match="position has no number in 2 of 4000 samples, first in sample 0"):
+        read(tmp_path, made)
+    log = read(tmp_path, made, 'blanks = "drop"\ngaps = "keep"\n')
+    assert len(log) == 3998 and grave(log)["blanks"].sample == 0
+
+    made = axis()
+    made["time"][2000:] -= 1.0
+    with pytest.raises(InputError, match=r"time goes back at sample 2000, from 1\.999 to 1 s"):
+        read(tmp_path, made)
+
+
+@given(
+    steps=st.lists(st.floats(0.91e-3, 1.09e-3), min_size=15, max_size=60),
+    holes=st.sets(st.integers(2, 50), max_size=4),
+)
+def test_stretches_hold_all_samples_but_the_lone_ones(steps: list[float], holes: set[int]) -> None:
+    steps = [1e-3 if i % 3 else s for i, s in enumerate(steps)]  # the median stays 1 ms
+    for at in holes:
+        if at < len(steps):
+            steps[at] += 0.05
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    base = time_base(time, 0.5, "refuse", "split", "log")
+    assert all(0 <= a < b <= len(time) and b - a >= 2 for a, b in base.stretches)
+    for first, end in base.stretches:
+        assert np.diff(time[first:end]).max() < 1.5 * base.period
+    used = sum(b - a for a, b in base.stretches)
+    assert used >= len(time) - 1 - len(holes)
+
+
+# --- steps
+
+
+@given(
+    exponent=st.integers(-7, 1),
+    mantissa=st.floats(1.0, 9.99),
+    seed=st.integers(0, 1000),
+    offset=st.floats(-100.0, 100.0),
+)
+def test_the_step_of_an_encoder_is_found(exponent: int, mantissa: float, seed: int, offset: float) -> None:
+    step = mantissa * 10.0**exponent
+    counts = np.cumsum(np.random.default_rng(seed).integers(-9, 10, 2000))
+    found = step_of(counts * step + offset * step)
+    assert found == pytest.approx(step, rel=1e-6)
+
+
+@given(seed=st.integers(0, 1000), scale=st.floats(1e-6, 1e6))
+def test_noise_has_no_step(seed: int, scale: float) -> None:
+    assert step_of(scale * np.random.default_rng(seed).normal(size=3000)) is None
+
+
+def test_headed_and_mapped_logs_agree(tmp_path: Path) -> None:
+    (tmp_path / "mapped").mkdir()
+    (guessed,) = read_log(write(tmp_path / "log.csv", headed(axis())))
+    mapped = read(tmp_path / "mapped", axis())
+    assert np.array_equal(guessed.position, mapped.position) and np.array_equal(guessed.time, mapped.time)
+
+
+# --- files at the edge
+
+
+def rows(time: str, command: str, position: str, count: int = 200) -> str:
+    """A table by a format of each cell; `i` is the row."""
+    body = "".join(f"{time},{command},{position}\n".format(i=i, j=i % 7, k=i % 3) for i in range(count))
+    return "time [s],u [V],y [mm]\n" + body
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (rows("{i}", "{j}", "{k}", 0), "no lines of numbers"),
+        (rows("{i}", "{j}", "{k}", 1), r"'time' does not increase from row to row \(1 rows\)"),
+        (rows("1", "{j}", "{k}"), r"'time' does not increase from row to row \(200 rows\)"),
+        (rows("{i}", "{j}", "nan"), "position has no number in 200 of 200 samples"),
+        (rows("{i}", "{j}", "inf"), "position has no number in 200 of 200 samples"),
+        (rows("{i}", "{j}e300", "{k}"), r"command \('u'\) holds 1e\+300 in row 1, beyond what is measured"),
+        (rows("{i}e-3", "{j}", "{k}").replace("9e-3", "9e300"), "beyond what is measured|goes back"),
+    ],
+)
+def test_files_at_the_edge_are_refused_in_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        read_log(path)
+
+
+@pytest.mark.parametrize("ending", [".mat", ".parquet", ".blf", ".asc", ".log", ".trc", ".csv"])
+@settings(max_examples=8)
+@given(data=st.binary(max_size=300), whole=st.booleans())
+def test_rubbish_of_every_ending_is_refused_in_a_sentence(
+    tmp_path_factory: pytest.TempPathFactory, ending: str, data: bytes, whole: bool
+) -> None:
+    begin = {".mat": b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM", ".parquet": b"PAR1", ".blf": b"LOGG"}
+    path = tmp_path_factory.mktemp("rubbish") / f"log{ending}"
+    path.write_bytes((begin.get(ending, b"") if whole else b"") + data)
+    with pytest.raises(InputError) as refusal:
+        read_log(path)
+    assert str(refusal.value).startswith(str(path))

@@ -1,0 +1,231 @@
+"""MAT, Parquet, bus logs and our own results: the same numbers by every way; and the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rds.bus import frames
+from rds.bus.logs import LogWriter
+from rds.cli import app
+from rds.core.errors import InputError
+from rds.logs.describe import describe
+from rds.logs.read_log import read_log
+from rds.results import Result
+from tests.logs.data_files import MAP, axis, headed, write
+
+EMPS = Path(__file__).resolve().parents[3] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
+THESIS = EMPS.parents[1]
+DBC = """VERSION ""
+BU_: host axis
+BO_ 256 Drive: 8 host
+ SG_ Voltage : 0|16@1- (0.001,0) [-10|10] "V" axis
+BO_ 257 Encoder: 8 axis
+ SG_ Position : 0|32@1- (0.001,0) [0|0] "mm" host
+"""
+
+
+def rds(*arguments: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    return done.exit_code, done.stdout, done.stderr
+
+
+def test_mat_vectors_structs_matrices_and_constants(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    made = axis()
+    both = np.column_stack([made["voltage"], made["position"]])
+    savemat(
+        tmp_path / "log.mat", {"run": {"time": made["time"]}, "data": both, "gtau": 35.0, "who": "me", "other": [1, 2]}
+    )
+    text = MAP.replace('"time"', '"run.time"').replace('"voltage"', '"data_1"').replace('"position"', '"data_2"')
+    (tmp_path / "log.mat.map.toml").write_text(text + 'force_gain = "gtau"\n')
+    (log,) = read_log(tmp_path / "log.mat")
+    assert np.array_equal(log.position, made["position"]) and np.array_equal(log.command, made["voltage"])
+    assert log.force_gain == 35.0
+    assert {f.what for f in log.findings if f.kind == "columns"} == {
+        "left out, as they do not have 4000 values like the others: other (2)",
+        "left out, as they hold no real numbers: who",
+    }
+
+
+def test_mat_of_version_7_3_and_damaged_ones_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(400))
+    with pytest.raises(InputError, match=r"version 7\.3; save it with -v7"):
+        read_log(path)
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"\x0f\x00\x00\x00\xff\xff\x00\x00rubbish")
+    with pytest.raises(InputError, match="not a MAT file, or is truncated"):
+        read_log(path)
+
+
+def test_parquet_with_units_in_its_fields(tmp_path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    made = axis()
+    units = {"time": "s", "voltage": "V", "position": "mm"}
+    fields = [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in units.items()]
+    table = pa.table([pa.array(made[name]) for name in units], schema=pa.schema(fields))
+    parquet.write_table(table, tmp_path / "log.parquet")
+    (log,) = read_log(tmp_path / "log.parquet")
+    assert np.array_equal(log.position, made["position"])
+
+
+@pytest.mark.parametrize("ending", [".asc", ".blf", ".log", ".trc", ".log.gz", ".csv"])
+def test_bus_logs_with_a_dbc(tmp_path: Path, ending: str) -> None:
+    made = axis(600)
+    path = tmp_path / f"bus{ending}"
+    writer = LogWriter(path)
+    for t, u, y in zip(made["time"], made["voltage"], made["position"], strict=True):
+        drive = round(u * 1000).to_bytes(2, "little", signed=True) + bytes(6)
+        encoder = round(y * 1000).to_bytes(4, "little", signed=True) + bytes(4)
+        for offset, identifier, data in ((0.0, 256, drive), (2e-4, 257, encoder)):
+            stamp = float(1000.0 + t + offset)
+            writer.write(can.Message(timestamp=stamp, arbitration_id=identifier, data=data, is_extended_id=False))
+    writer.close()
+    (tmp_path / "axis.dbc").write_text(DBC)
+    (tmp_path / f"bus{ending}.map.toml").write_text("""
+[bus]
+dbc = "axis.dbc"
+[axis.X]
+command = "Drive.Voltage"
+position = "Encoder.Position"
+""")
+    (log,) = read_log(path)
+    assert len(log) == 600
+    assert np.allclose(log.position, made["position"], atol=1e-9) and np.allclose(
+        log.command, made["voltage"], atol=1e-9
+    )
+    assert np.allclose(np.diff(log.time), 1e-3, atol=3e-6)
+    assert log.clocks[0].source.startswith("times of receipt by the recorder of the bus")
+    assert any("the last received value is held: it is 0.0002 s old" in f.what for f in log.findings)
+
+
+def test_our_own_frames_need_no_dbc(tmp_path: Path) -> None:
+    made = axis(600)
+    path = tmp_path / "own.blf"
+    writer = LogWriter(path)
+    for k, (u, y) in enumerate(zip(made["voltage"], made["position"], strict=True)):
+        answer = frames.encode_answer(frames.Answer(round(y * 1000), 1, frames.Kind.ANSWER, k))
+        for offset, identifier, data in ((0.0, 0x010, frames.encode_voltages([u])), (1e-4, 0x022, answer)):
+            stamp = 1.0 + k * 1e-3 + offset
+            writer.write(can.Message(timestamp=stamp, arbitration_id=identifier, data=data, is_extended_id=False))
+    writer.close()
+    text = '[axis.X]\ncommand = "command.slot_0"\nposition = "answer_2.position"\n'
+    (tmp_path / "own.blf.map.toml").write_text('machine = "mini-cnc"\n' + text)
+    (log,) = read_log(path)
+    assert np.allclose(log.position, made["position"], atol=1e-9)
+    assert np.allclose(log.command, made["voltage"], atol=10.0 / 16384.0)
+
+
+def test_frames_that_nothing_knows(tmp_path: Path) -> None:
+    path = tmp_path / "bus.blf"
+    writer = LogWriter(path)
+    writer.write(can.Message(timestamp=1.0, arbitration_id=0x7F3, data=b"abc", is_extended_id=False))
+    writer.close()
+    with pytest.raises(
+        InputError, match=r"none of its 1 frames is known \(unknown identifiers: 0x7f3; .*give the DBC file"
+    ):
+        read_log(path)
+
+
+@pytest.mark.parametrize("ending", ["", ".csv", ".mat", ".parquet"])
+def test_our_own_results_explain_themselves(tmp_path: Path, ending: str) -> None:
+    made = axis(1000)
+    columns = {"time": made["time"], "X_voltage": made["voltage"], "X_measured": made["position"]}
+    meta = {"axes": ["X"], "sample_period": 1e-3, "mode": "system-test", "machine": "mini-cnc", "voltage_range": 10.0}
+    where = Result(columns, {}, meta).save(tmp_path / f"run{ending}")
+    (log,) = read_log(where)
+    assert np.array_equal(log.position, made["position"]) and np.array_equal(log.command, made["voltage"])
+    assert (log.closed_loop, log.resolution, log.voltage_range) == (False, 0.001, (-10.0, 10.0))
+    assert len(log.sha256) == 64
+
+
+# --- the command
+
+
+def test_describe_as_json_with_a_picture(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", headed(axis()))
+    code, out, _ = rds("data", "describe", path, "--json", "--plot", tmp_path / "log.png")
+    about = json.loads(out)
+    assert code == 0 and about["usable"] and about["map"] == "guessed"
+    assert (tmp_path / "log.png").read_bytes().startswith(b"\x89PNG")
+    position = about["columns"][2]
+    assert (position["name"], position["unit"], position["values"], position["missing"]) == ("position", "mm", 4000, 0)
+    assert position["step"] == 0.001 and position["low"] == axis()["position"].min()
+    (log,) = about["logs"]
+    assert log["samples"] == 4000 and log["quantities"]["command"] == {"unit": "V", "low": -4.0, "high": 4.0}
+
+
+def test_describe_without_a_map_drafts_one_and_says_that_it_is_a_draft(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", axis())
+    code, out, _ = rds("data", "describe", path)
+    assert code == 1 and "nothing gives its unit" in out and "[axis.axis.position]" in out
+    code, out, err = rds("data", "describe", path, "--write-map")
+    assert code == 0 and "is a draft: check every line" in err
+    assert rds("data", "describe", path)[0] == 0
+    code, _, err = rds("data", "describe", path, "--write-map")
+    assert code == 2 and "exists already" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nope.csv"], "there is no such file"),
+        (["log.xyz"], "no log of the ending '.xyz'"),
+        (["log.csv", "--plot", "x.pdf"], "must end in .png"),
+        (["log.csv", "--map", "nope.toml"], "nope.toml: cannot be read"),
+        (["empty"], "holds no result"),
+    ],
+)
+def test_what_describe_refuses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], sentence: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "log.csv", headed(axis(300)))
+    (tmp_path / "log.xyz").write_text("1,2\n")
+    (tmp_path / "empty").mkdir()
+    code, out, err = rds("data", "describe", *arguments)
+    assert (code, out) == (2, "") and sentence in err and "Traceback" not in err
+
+
+@pytest.mark.skipif(not EMPS.is_file(), reason="the EMPS data are not here")
+def test_the_emps_data(tmp_path: Path) -> None:
+    map_file = tmp_path / "emps.toml"
+    map_file.write_text("""
+[time]
+column = "t"
+unit = "s"
+[axis.EMPS]
+command = { column = "vir", unit = "V" }
+position = { column = "qm", unit = "m" }
+reference = { column = "qg", unit = "m" }
+force_gain = "gtau"
+""")
+    (log,) = read_log(EMPS, map_file)
+    assert len(log) == 24841 and log.force_gain == pytest.approx(35.15065188)
+    assert log.position.max() == pytest.approx(246.37775)  # mm
+    assert log.resolution == pytest.approx(5e-5)  # mm
+    assert log.closed_loop is True  # found in the data
+    assert [f.kind for f in log.findings if f.gravity != "note"] == ["closed-loop"]
+
+
+@pytest.mark.skipif(not THESIS.is_dir(), reason="the thesis's data are not here")
+@pytest.mark.parametrize(
+    ("stem", "report"),
+    [("encoder_counts", "accuracy"), ("move_times", "moves"), ("current", "current"), ("vibration", "vibration")],
+)
+def test_readings_that_are_no_time_series_are_sent_to_their_report(stem: str, report: str) -> None:
+    files = sorted(THESIS.glob(f"oacs_{stem}*.csv"))
+    assert files
+    for file in files:
+        found = describe(file)
+        assert not found.usable and not found.draft
+        (fault,) = [f.what for f in found.findings if f.gravity == "fault"]
+        assert fault.startswith("it is no log over time: ") and f"`rds report {report}`" in fault

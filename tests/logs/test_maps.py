@@ -1,0 +1,140 @@
+"""Maps: every key has its effect or is refused with file and line; a guess is never made in doubt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.logs.guess import draft, guess
+from rds.logs.map import LogMap
+from rds.logs.read_log import read_log
+from rds.logs.tables import read_table
+from tests.logs.data_files import MAP, axis, write
+
+
+def saved(folder: Path, text: str) -> Path:
+    path = folder / "m.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "sentence"),
+    [
+        ("speed = 1\n" + MAP, 1, "unknown key 'speed'"),
+        (MAP.replace('column = "time"', 'colum = "time"'), 3, "unknown key 'colum'"),
+        (MAP.replace('unit = "mm"', 'unit = "parsec"'), 7, "unit 'parsec' of position is unknown; known units: m, cm"),
+        (MAP.replace('unit = "V"', 'unit = "mm"'), 6, "command is in 'mm', which measures length"),
+        (MAP.replace('unit = "s"', 'unit = "V"'), 4, "time is in 'V', which measures voltage"),
+        (MAP.replace('unit = "mm"', "sign = 2"), 7, "sign = 2 must be 1 or -1"),
+        (MAP.replace('unit = "mm"', "scale = 0.0"), 7, "must not be 0"),
+        (MAP + "resolution = -1.0\n", 8, "resolution = -1.0 must be from"),
+        (MAP + 'machine_axis = "X"\n', 8, "add machine ="),
+        (MAP + "voltage_range = [10, -10]\n", 8, "the lowest first"),
+        (MAP + "voltage_range = []\n", 8, "must be [lowest, highest] in V, or one number"),
+        (MAP.replace('"voltage"', '"position"'), 6, "command and position are both 'position'"),
+        (MAP + "force_gain = 0.0\n", 8, "make no force"),
+        (MAP + 'closed_loop = "yes"\n', 8, "must be true or false"),
+        ('gaps = "fill"\n' + MAP, 1, "known: refuse, split, keep"),
+        ("jitter_limit = 2.0\n" + MAP, 1, "from 0 to 0.5"),
+        ('machine = "mini-cnx"\n' + MAP, 1, "there is no machine 'mini-cnx'"),
+        (MAP.replace("[axis.X]", "[axes.X]"), None, "no [axis.NAME] table"),
+        (MAP.replace("command = ", "comand = "), 5, "axis X needs command"),
+        (MAP.replace('unit = "mm"', "second = true"), 7, "there is no [second] table"),
+        (MAP + '[second]\nfile = "b.csv"\n', 8, "nothing says how the two clocks agree"),
+        ("a = [", None, "not valid TOML"),
+    ],
+)
+def test_maps_that_are_refused(tmp_path: Path, text: str, line: int | None, sentence: str) -> None:
+    path = saved(tmp_path, text)
+    with pytest.raises(InputError) as refusal:
+        LogMap.read(path)
+    assert sentence in str(refusal.value)
+    assert str(refusal.value).startswith(f"{path}, line {line}: " if line else str(path))
+
+
+def test_scale_offset_sign_and_unit(tmp_path: Path) -> None:
+    made = axis()
+    path = write(
+        tmp_path / "log.csv", made | {"voltage": made["voltage"] * 200 + 7, "position": -made["position"] / 1000}
+    )
+    text = MAP.replace('"voltage", unit = "V"', '"voltage", unit = "mV", scale = 5.0, offset = -35.0')
+    text = text.replace('"position", unit = "mm"', '"position", unit = "m", sign = -1')
+    (log,) = read_log(path, saved(tmp_path, text))
+    assert np.allclose(log.command, made["voltage"], atol=1e-9)
+    assert np.allclose(log.position, made["position"], atol=1e-9)
+
+
+@pytest.mark.parametrize("how", ["resolution = 0.002", "counts_per_unit = 500.0", 'machine = "m"'])
+def test_encoder_counts_by_the_resolution(tmp_path: Path, how: str) -> None:
+    made = axis(resolution=0.002)
+    path = write(tmp_path / "log.csv", made | {"position": np.rint(made["position"] / 0.002)})
+    text = MAP.replace('unit = "mm"', 'unit = "counts"')
+    with pytest.raises(InputError, match="in encoder counts; give resolution"):
+        read_log(path, saved(tmp_path, text))
+    if how.startswith("machine"):
+        (tmp_path / "my.toml").write_text(
+            "sample_period = 0.001\n[axis.X]\nnode = 2\ntravel = [-75, 75]\nresolution = 0.002\n"
+        )
+        text = 'machine = "my.toml"\n' + text
+    else:
+        text += how
+    (log,) = read_log(path, saved(tmp_path, text))
+    assert np.allclose(log.position, made["position"], atol=1e-12) and log.resolution == pytest.approx(0.002)
+
+
+def test_a_rate_in_place_of_a_column_of_time(tmp_path: Path) -> None:
+    made = axis()
+    made.pop("time")
+    text = MAP.replace('column = "time"\nunit = "s"', "rate = 1000.0")
+    (log,) = read_log(write(tmp_path / "log.csv", made), saved(tmp_path, text))
+    assert np.array_equal(log.time, np.arange(4000) / 1000.0)
+
+
+def test_a_column_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", axis())
+    text = saved(tmp_path, MAP.replace('"voltage"', '"voltag"'))
+    with pytest.raises(InputError, match=r"m.toml, line 6: .*no column 'voltag'.*time, voltage, position.*'voltage'\?"):
+        read_log(path, text)
+
+
+def test_samples_that_should_be_there(tmp_path: Path) -> None:
+    (log,) = read_log(write(tmp_path / "log.csv", axis()), saved(tmp_path, "samples = 5000\n" + MAP))
+    assert any(f.kind == "cut" and "the map announces 5000 samples" in f.what for f in log.findings)
+
+
+@pytest.mark.parametrize(
+    ("headings", "doubt"),
+    [
+        (("time", "voltage", "position"), "'time' may be the time, but nothing gives its unit"),
+        (("time [s]", "voltage", "position"), "no column tells by its unit that it is the command"),
+        (("time [s]", "a [V]", "b [V]", "pos [mm]"), r"a \[V\], b \[V\] could each be the command"),
+        (("time [s]", "u [V]", "left [mm]", "right [mm]"), r"left \[mm\], right \[mm\] could each be the position"),
+        (("time [s]", "clock [ms]", "u [V]", "y [mm]"), None),
+        (("time [s]", "u [V]", "y [counts]"), "in encoder counts; give the resolution"),
+    ],
+)
+def test_what_is_in_doubt_is_not_guessed(tmp_path: Path, headings: tuple[str, ...], doubt: str | None) -> None:
+    made = axis(400)
+    values = [made["time"], made["voltage"], made["position"] + 1, made["position"]]
+    if "clock [ms]" in headings:
+        values = [made["time"], made["time"], made["voltage"], made["position"]]
+    elif len(headings) == 4 and headings[2].endswith("[V]"):
+        values = [made["time"], made["voltage"], made["voltage"], made["position"]]
+    path = write(tmp_path / "log.csv", dict(zip(headings, values, strict=False)))
+    if doubt is None:
+        assert guess(read_table(path)).map is not None  # only one of the two is called time
+        return
+    with pytest.raises(InputError, match=doubt) as refusal:
+        read_log(path)
+    assert "save them as log.csv.map.toml beside it" in str(refusal.value)
+
+
+def test_the_draft_is_a_map_that_can_be_pasted(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", axis())
+    (tmp_path / "log.csv.map.toml").write_text(draft(read_table(path)))
+    (log,) = read_log(path)
+    assert np.allclose(log.position, axis()["position"], atol=1e-11)

@@ -1,0 +1,225 @@
+"""Verdicts: what is right passes, and what misleads is caught and named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.core.types import Model, Source
+from rds.identification.estimate import Errors
+from rds.identification.fitted_stretch import fitted_stretch
+from rds.logs.log import Finding, Gravity
+from rds.validation.validate import Validation, validate
+from rds.validation.verdict import Bands, Word
+from tests.validation.validation_logs import T, X, candidate, log, moved, square
+
+FRESH = square(8.0, 3.0, 0.7)
+
+
+def kinds(validation: Validation, side: str) -> set[str]:
+    return {reason.kind for reason in validation.verdict.reasons if reason.side == side}
+
+
+def test_the_true_model_is_valid_on_data_of_another_signal() -> None:
+    fit_data = log(square(6.0, 2.5, 1.0), name="fit")
+    # its errors are those that such data leave; the values are the true ones
+    made = candidate(share=1e-4, fitted_on=(fitted_stretch(fit_data),))
+    found = validate(made, log(FRESH, name="fresh"), bands=Bands(beyond=2.0))
+    assert found.verdict.word is Word.VALID, found.verdict.sentence
+    assert found.exit_code == 0
+    a = found.assessments["fresh"]
+    assert a.free_run is not None and a.free_run.fit_percent > 99.9
+    assert a.free_run.rmse < 0.5e-3  # mm: half a step of the encoder
+    assert a.voltage is not None and a.voltage.relative_percent is not None and a.voltage.relative_percent < 3.0
+    assert found.verdict.sentence.startswith("model is valid for fresh (up to ")
+
+
+def test_a_gain_that_is_a_per_cent_off_simulates_but_leaves_a_residual_that_follows_the_command() -> None:
+    found = validate(candidate(X | {"K": 1.78}), log(FRESH))
+    assert found.verdict.word is Word.PARTLY
+    assert {"whiteness", "command"} <= kinds(found, "against")
+    assert "simulating position and velocity" in found.verdict.purpose
+
+
+def test_a_model_that_repeats_the_last_measurement_is_not_valid_however_good_one_sample_ahead() -> None:
+    still = candidate(X | {"K": 1e-9})
+    found = validate(still, log(FRESH))
+    a = found.assessments["log"]
+    assert a.ahead[1].fit_percent > 99.0  # this is what misleads
+    assert a.free_run is not None and a.free_run.fit_percent < 5.0
+    assert a.ahead[1].rmse > a.naive[1].rmse
+    assert found.verdict.word is Word.NOT
+    assert {"free-run", "free-run-velocity", "ahead"} <= kinds(found, "against")
+    assert found.exit_code == 1
+
+
+def test_a_position_that_drifts_leaves_a_model_for_velocities_only() -> None:
+    found = validate(candidate(X | {"friction_plus": 0.45}), log(FRESH))
+    a = found.assessments["log"]
+    assert found.verdict.word is Word.PARTLY and found.verdict.purpose == "simulating the velocity"
+    assert "drift" in kinds(found, "against")
+    # the forward half of the time is too fast by the friction's error
+    assert a.drift == pytest.approx(-0.089 / 2, rel=0.25)  # mm/s
+
+
+@pytest.mark.parametrize(
+    ("factor", "kind", "word"),
+    [
+        (-1.0, "sign", "reversed"),
+        (1000.0, "unit", "1000 times smaller"),
+        (1e-3, "unit", "1000 times larger"),
+        (25.4, "unit", "inches"),
+    ],
+)
+def test_a_wrong_sign_or_unit_is_named(factor: float, kind: str, word: str) -> None:
+    y = factor * moved(FRESH, step=None)
+    found = validate(candidate(), log(FRESH, y, resolution=None))
+    assert found.verdict.word is Word.NOT
+    (reason,) = [r for r in found.verdict.reasons if r.kind == kind]
+    assert word in reason.what
+    assert found.assessments["log"].gain == pytest.approx(factor, rel=0.03)
+
+
+def test_an_axis_that_never_moves_gives_no_verdict_and_no_fit() -> None:
+    u = np.full(4000, 0.1)  # V: friction holds it
+    found = validate(candidate(), log(u))
+    assert found.verdict.word is Word.UNTOLD
+    assert kinds(found, "cannot tell") == {"no-motion", "no-excitation"}
+    numbers = found.to_json()["logs"]["log"]
+    assert numbers["free_run"]["fit_percent"] is None  # not 0, not 100, and no NaN in JSON
+    assert found.exit_code == 1
+
+
+def test_a_few_steps_of_the_encoder_are_too_few() -> None:
+    u = 0.38 * np.sign(np.sin(2 * np.pi * 2.0 * np.arange(4000) * T))
+    y = moved(u)
+    assert np.ptp(y) > 0 and np.ptp(np.rint(y / 0.05)) < 20
+    found = validate(candidate(), log(u, np.rint(y / 0.05) * 0.05, resolution=0.05))
+    assert found.verdict.word is Word.UNTOLD and kinds(found, "cannot tell") == {"no-motion"}
+
+
+def test_a_short_log_is_too_short() -> None:
+    found = validate(candidate(), log(square(0.5)))
+    assert found.verdict.word is Word.UNTOLD and "short" in kinds(found, "cannot tell")
+
+
+def test_the_fit_s_own_data_prove_nothing_and_are_known_by_file_and_by_content() -> None:
+    first = log(FRESH, sha256="ab" * 32)
+    seen = candidate(fitted_on=(fitted_stretch(first),))
+    renamed = log(FRESH, name="copy", sha256="cd" * 32)
+    shifted = replace(log(FRESH, moved(FRESH) + 12.5, name="shifted"), sha256="")
+    for data in (first, renamed, shifted, first.part(2000, 6000), renamed.part(1000, 8000)):
+        found = validate(seen, data)
+        assert found.verdict.word is Word.UNTOLD, data.name
+        assert kinds(found, "cannot tell") == {"same-data"}
+        assert "validate on another log" in found.verdict.sentence
+    other = validate(seen, log(square(8.0, 2.0, 0.9), sha256="ef" * 32))
+    assert "same-data" not in kinds(other, "cannot tell")
+
+
+def test_the_rest_of_a_file_of_which_a_part_was_fitted_is_new() -> None:
+    whole = log(FRESH, sha256="ab" * 32)
+    half = candidate(share=1e-4, fitted_on=(fitted_stretch(whole.part(0, 4000)),))
+    rest = validate(half, whole.part(4000, 8000)).assessments["log"]
+    assert rest.overlap.share == 0.0 and rest.overlap.known
+    assert validate(half, whole.part(2000, 6000)).assessments["log"].overlap.share == pytest.approx(0.5, abs=0.15)
+
+
+def test_a_model_that_fails_on_its_own_data_has_failed() -> None:
+    data = log(FRESH, sha256="ab" * 32)
+    found = validate(candidate(X | {"K": -1.7}, fitted_on=(fitted_stretch(data),)), data)
+    assert found.verdict.word is Word.NOT and "same-data" in kinds(found, "cannot tell")
+
+
+def test_the_model_s_own_output_is_no_measurement() -> None:
+    found = validate(candidate(), log(FRESH, moved(FRESH, step=None), resolution=None))
+    assert found.verdict.word is Word.UNTOLD and kinds(found, "cannot tell") == {"own-output"}
+
+
+def test_an_error_below_the_encoder_s_rounding_is_too_good() -> None:
+    found = validate(candidate(), log(FRESH, moved(FRESH, step=1e-4), resolution=1e-3))
+    assert found.verdict.word is Word.UNTOLD and kinds(found, "cannot tell") == {"too-good"}
+
+
+def test_an_error_that_grows_on_new_data_is_overfitting() -> None:
+    record = fitted_stretch(log(square(6.0), name="fit")) | {"free_run": Errors(99.9, 0.002, 0.01, "mm")}
+    found = validate(candidate(X | {"K": 1.80}, fitted_on=(record,)), log(FRESH))
+    (reason,) = [r for r in found.verdict.reasons if r.kind == "overfitted"]
+    own = found.assessments["log"].free_run
+    assert own is not None and f"{own.rmse / 0.002:.1f} times" in reason.what
+    assert found.verdict.word is not Word.VALID
+
+
+def test_speeds_and_voltages_beyond_the_fit_s_are_said() -> None:
+    slow = fitted_stretch(log(square(6.0, 1.0), name="slow"))
+    found = validate(candidate(share=1e-4, fitted_on=(slow,)), log(FRESH))
+    said = [r.what for r in found.verdict.reasons if r.kind == "extrapolation"]
+    assert len(said) == 2 and said[0].startswith("command up to") and said[1].startswith("velocity up to")
+    fast = fitted_stretch(log(square(6.0, 8.0), name="fast"))
+    narrow = validate(candidate(share=1e-4, fitted_on=(fast,)), log(FRESH))
+    assert narrow.verdict.word is Word.PARTLY and "up to" in narrow.verdict.purpose
+
+
+def test_motion_one_way_speaks_for_one_way() -> None:
+    u = 3.0 + np.sin(2 * np.pi * 1.3 * np.arange(8000) * T)
+    found = validate(candidate(), log(u))
+    assert found.verdict.word is Word.PARTLY and "in one direction" in found.verdict.purpose
+
+
+def _unstable(x, u, T, params):  # type: ignore[no-untyped-def]
+    return [x[0] + T * x[1], 1.1 * x[1] + u]
+
+
+@pytest.mark.parametrize(("closed", "word"), [(False, Word.NOT), (True, Word.UNTOLD)])
+def test_an_unstable_free_run_has_its_instant(closed: bool, word: Word) -> None:
+    model = Model(_unstable, (0.0, 0.0), {}, source=Source("wild"))
+    found = validate(model, log(FRESH, closed_loop=closed))
+    a = found.assessments["log"]
+    assert found.verdict.word is word
+    assert a.unstable_at is not None and 5.0 < a.unstable_at < 8.0  # 1.1^k passes 1e308 near k = 7400
+    assert a.free_run is None and found.to_json()["logs"]["log"]["free_run"] is None
+
+
+def test_a_closed_loop_is_valid_for_a_closed_loop() -> None:
+    found = validate(candidate(), log(FRESH, closed_loop=True))
+    assert found.verdict.word is Word.PARTLY and "closed loop" in found.verdict.purpose
+    assert "command" not in kinds(found, "for") | kinds(found, "against")
+
+
+def test_findings_about_the_data_are_handed_on() -> None:
+    data = replace(log(FRESH), findings=(Finding("gap", "3 samples are missing at 2 s", Gravity.WARNING),))
+    assert "3 samples are missing at 2 s" in {r.what for r in validate(candidate(), data).verdict.reasons}
+
+
+def test_several_logs_have_the_verdict_of_the_worst() -> None:
+    good, bad = log(FRESH, name="good"), log(FRESH, -moved(FRESH), name="bad")
+    found = validate(candidate(), [good, bad])
+    assert found.verdicts["good"].word is Word.VALID and found.verdicts["bad"].word is Word.NOT
+    assert found.verdict.word is Word.NOT and "good: valid" in found.verdict.sentence
+
+
+def test_bands_move_the_verdict_and_unknown_ones_are_refused() -> None:
+    strict = validate(candidate(X | {"K": 1.85}), log(FRESH), bands=Bands(fit_percent=99.0))
+    mild = validate(candidate(X | {"K": 1.85}), log(FRESH), bands=Bands(fit_percent=50.0))
+    assert strict.verdict.word is Word.NOT and mild.verdict.word is Word.PARTLY
+    with pytest.raises(InputError, match="there is no band 'fit'; the bands are fit_percent"):
+        Bands.read({"fit": 90.0})
+    with pytest.raises(InputError, match="band skill = -1 must be a number of 0 or more"):
+        Bands(skill=-1)
+
+
+def test_units_that_differ_are_refused() -> None:
+    with pytest.raises(InputError, match="the position is in rev/min and the model model answers in mm"):
+        validate(candidate(), log(FRESH, units={"position": "rev/min"}))
+
+
+def test_no_log_and_too_short_a_log_are_refused() -> None:
+    with pytest.raises(InputError, match="there is no log to validate on"):
+        validate(candidate(), [])
+    with pytest.raises(InputError, match="the log has 15 samples, and its initial state takes 10"):
+        validate(candidate(), log(FRESH[:15]))
+    with pytest.raises(InputError, match="initial_samples = 3 must be at least 10"):
+        validate(candidate(), log(FRESH), initial_samples=3)
