@@ -94,7 +94,8 @@ def _legend(panels: Sequence[Panel]) -> str:
     for label, curve in curves.items():
         parts.append(
             f'<line x1="{x:g}" x2="{x + 22:g}" y1="10" y2="10" stroke="{curve.colour}" '
-            f'stroke-width="{max(curve.width, 2):g}"{_dashes(curve, 1)}/><text x="{x + 27:g}" y="14">{escape(label)}</text>'
+            f'stroke-width="{max(curve.width, 2):g}"{_dashes(curve, 1)}/>'
+            f'<text x="{x + 27:g}" y="14">{escape(label)}</text>'
         )
         x += 50 + 6.2 * len(label)
     return "".join(parts)
@@ -140,7 +141,8 @@ def _panel(panel: Panel, top: int, height: int) -> tuple[str, bool]:
                 f'<path d="M0 {at:.0f}h{10 * width}" stroke="{_TEXT}" stroke-width="8" stroke-dasharray="20 40"/>'
             )
             parts.append(
-                f'<text x="{10 * width - 20}" y="{at - 30:.0f}" text-anchor="end" font-size="100">{escape(label)}</text>'
+                f'<text x="{10 * width - 20}" y="{at - 30:.0f}" text-anchor="end" '
+                f'font-size="100">{escape(label)}</text>'
             )
     return "".join(parts) + "</svg>", is_cut
 

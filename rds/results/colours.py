@@ -1,4 +1,7 @@
-"""Colours of all pictures: those of Okabe and Ito, "Color Universal Design" (2008), told apart with any colour vision."""
+"""Colours of all pictures: those of Okabe and Ito, "Color Universal Design" (2008).
+
+They are told apart with any kind of colour vision.
+"""
 
 from __future__ import annotations
 

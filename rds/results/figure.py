@@ -1,8 +1,4 @@
-"""What all plots share: a figure that needs no display and no pyplot, colours, axis labels.
-
-The colours are those of Okabe and Ito, "Color Universal Design" (2008): told apart with any kind of colour
-vision; line styles differ as well.
-"""
+"""What all plots share: a figure that needs no display and no pyplot, axis labels, line styles beside the colours."""
 
 from __future__ import annotations
 
