@@ -22,6 +22,7 @@ from rds.spread.outcome import Failure, Outcome
 from rds.spread.pipe import receive, send
 
 # Several processes share the processors already: threads of a matrix library would only get in each other's way.
+NUMBER = "RDS_WORKER"  # in its environment, which of its kind a process is
 _ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -34,7 +35,7 @@ def on_processes(
         todo.put(index)
     done: queue.SimpleQueue[Outcome | BaseException] = queue.SimpleQueue()
     start = pickle.dumps(list(sys.path)), portable(function)
-    workers = [_Worker(start, items, todo, done, retries, time_limit) for _ in range(jobs)]
+    workers = [_Worker(number, start, items, todo, done, retries, time_limit) for number in range(jobs)]
     try:
         for worker in workers:
             worker.thread.start()
@@ -48,6 +49,12 @@ def on_processes(
             worker.end()
 
 
+def worker_number() -> int | None:
+    """In a local worker its number, from 0: a process that takes the place of another has the same. Else None."""
+    number = os.environ.get(NUMBER, "")
+    return int(number) if number.isdecimal() else None
+
+
 def _next(done: queue.SimpleQueue[Any]) -> Any:
     while True:  # a wait without end would not hear of Ctrl-C on every system
         with contextlib.suppress(queue.Empty):
@@ -59,6 +66,7 @@ class _Worker:
 
     def __init__(
         self,
+        number: int,
         start: tuple[bytes, bytes],
         items: Sequence[Any],
         todo: queue.SimpleQueue[int | None],
@@ -66,7 +74,7 @@ class _Worker:
         retries: int,
         time_limit: float | None,
     ):
-        self._start, self._items, self._todo, self._done = start, items, todo, done
+        self._number, self._start, self._items, self._todo, self._done = number, start, items, todo, done
         self._tries, self._time_limit = retries + 1, time_limit
         self._process: subprocess.Popen[bytes] | None = None
         self._ending = False
@@ -149,7 +157,7 @@ class _Worker:
                     [sys.executable, "-P", "-m", "rds.spread.worker"],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
-                    env=os.environ | _ONE_THREAD,
+                    env=os.environ | _ONE_THREAD | {NUMBER: str(self._number)},
                     start_new_session=True,
                 )
                 assert self._process.stdin is not None

@@ -31,8 +31,9 @@ def spread(
     retries: int = RETRIES,
     time_limit: float | None = None,
     progress: Progress | None = None,
+    in_order: bool = True,
 ) -> Iterator[Outcome]:
-    """The outcomes of `function(item)`, in the order of the items, as they become known.
+    """The outcomes of `function(item)` as they become known: by rising index, or as they come if not `in_order`.
 
     Runs in `jobs` fresh local processes (default: one for each processor), or on the workers of the dask `scheduler`
     ("tcp://host:8786"), which need the same rds installed. The function and the items are pickled (by cloudpickle:
@@ -64,7 +65,16 @@ def spread(
         from rds.spread.local import on_processes
 
         found = on_processes(function, todo, min(jobs or processors(), max(len(todo), 1)), retries, time_limit)
-    return _in_order(found, len(todo), progress)
+    return (_in_order if in_order else _as_they_come)(found, len(todo), progress)
+
+
+def _as_they_come(found: Iterator[Outcome], count: int, progress: Progress | None) -> Iterator[Outcome]:
+    """Each outcome at once, so that what is known can be kept."""
+    with closing(found):  # type: ignore[type-var]  # both are generators
+        for done, outcome in enumerate(found, 1):
+            yield outcome
+            if progress:
+                progress(done, count)
 
 
 def _in_order(found: Iterator[Outcome], count: int, progress: Progress | None) -> Iterator[Outcome]:

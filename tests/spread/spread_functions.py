@@ -55,3 +55,18 @@ def process(x: int) -> int:
     """The number of its process, once it has taken some time."""
     time.sleep(0.05)
     return os.getpid()
+
+
+def slow_first(x: int) -> int:
+    """Number 0 takes a second, the others nothing."""
+    if x == 0:
+        time.sleep(1.0)
+    return x
+
+
+def number_of_worker(x: int) -> int | None:
+    """Which worker it is, once it has taken some time."""
+    from rds.spread import worker_number
+
+    time.sleep(0.05)
+    return worker_number()

@@ -132,3 +132,13 @@ def test_nothing_to_do() -> None:
 def test_what_will_not_do_is_said_at_once(options: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=re.escape(said)):
         spread(spread_functions.square, [1], **options)
+
+
+def test_as_they_come_nothing_waits_for_the_slowest(where: dict[str, object]) -> None:
+    found = [outcome.index for outcome in spread(spread_functions.slow_first, range(20), in_order=False, **where)]
+    assert sorted(found) == list(range(20))
+    assert found[-1] == 0
+
+
+def test_local_workers_know_their_number() -> None:
+    assert {o.value for o in spread(spread_functions.number_of_worker, range(20), jobs=2)} == {0, 1}
