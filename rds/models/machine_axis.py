@@ -118,6 +118,10 @@ class MachineAxis:
     def cut(self, at: float) -> None:
         """Zero volts from the instant `at` on, without delay; commands that wait are dropped."""
         self.advance(at)
+        self._release()
+
+    def _release(self) -> None:
+        """Zero volts from now on, and nothing that the amplifier adds to them."""
         self._commands.clear()
         self._voltage = self._pull = 0.0
 

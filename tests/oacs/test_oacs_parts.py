@@ -7,12 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.bus.oacs import pid
+from rds.bus.oacs.module_data import machine_parameters, read_modules
 from rds.bus.oacs.pid import Memory, Tuning
+from rds.bus.oacs.plant import Plant
 from rds.bus.oacs.quadrature import Counter, Interrupts, decode, highest_rate, levels
 from rds.bus.oacs.sensors import gravities, motor_current, vibrating
 from rds.bus.oacs.switches import Debouncer, LimitSwitch
 from rds.bus.oacs.words import DUTY, Parameter, Select
 from rds.core.errors import InputError
+from rds.machines import load_machine
 
 SLOW = Interrupts(0.2e-3, 4e-3, 48e-3)  # the A axis's board
 
@@ -180,3 +183,18 @@ def test_current_falls_from_start_to_run() -> None:
     assert motor_current(12.0, 0.0, 4.8, 2.6, 12.0, 130.0) == pytest.approx(4.8)
     assert motor_current(12.0, 130.0, 4.8, 2.6, 12.0, 130.0) == pytest.approx(2.6)
     assert motor_current(0.0, 0.0, 4.8, 2.6, 12.0, 130.0) == 0.0
+
+
+# --- the axis
+
+
+def test_an_axis_that_is_cut_comes_to_rest() -> None:
+    machine = load_machine("mrmt-oacs")
+    axis = machine.axis("X")
+    plant = Plant(machine_parameters(axis), read_modules(machine)["X"], 0.0)
+    plant.command(10.0, 0.0)
+    plant.advance(2.0)
+    assert plant.velocity > 1.0  # mm/s
+    plant.cut(2.0)
+    plant.advance(4.0)
+    assert plant.velocity == 0.0 and plant.voltage == 0.0

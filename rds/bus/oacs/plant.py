@@ -102,8 +102,7 @@ class Plant(MachineAxis):
     def cut(self, at: float) -> None:
         """Zero volts from the instant `at` on."""
         self.advance(at)
-        self._commands.clear()
-        self._voltage = 0.0
+        self._release()
 
     def look(self, at: float) -> None:
         """Look at the switches at this instant, after something was done to their wires."""
