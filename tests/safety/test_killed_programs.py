@@ -38,7 +38,7 @@ def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -
     """As if its computer had lost its power: nobody is left to stop the axes but their modules."""
     bench.serve("X,Y,Z,spindle")
     run = start(bench, tmp_path)
-    wait_for(lambda: bench.powered())
+    wait_for(lambda: (tmp_path / "out" / "record.rds").exists() and bench.powered())
     processes = json.loads((tmp_path / "out" / "processes.json").read_text())
     for pid in (run.pid, processes["recorder"], processes["target"]):
         os.kill(pid, signal.SIGKILL)
