@@ -91,16 +91,21 @@ def _retuned(
     return make(axis_model, T, converter_range, gains=gains, observer_pole=pole).params
 
 
-def _check_sampled(axis: AxisData, g1: float, g2: float, owner: str) -> None:
-    """InputError if poles that are stable in continuous time make the sampled loop unstable (Jury's criterion).
+def is_sampled_stable(tau: Any, K: Any, T: float, g1: Any, g2: Any) -> Any:
+    """Whether the loop sampled every `T` s is stable with these gains (Jury's criterion); arrays answer as arrays.
 
     The observer of the held axis separates: the loop's poles are its own F and those of the state feedback.
     """
-    a12, a22, b1, b2 = observer.held_axis(axis.tau, axis.K, axis.T)
-    kx, kv = axis.tau / axis.K * g1, axis.tau / axis.K * g2
+    a12, a22, b1, b2 = observer.held_axis(tau, K, T)
+    kx, kv = tau / K * g1, tau / K * g2
     trace = 1.0 - b1 * kx + a22 - b2 * kv
     determinant = (1.0 - b1 * kx) * (a22 - b2 * kv) + b2 * kx * (a12 - b1 * kv)
-    if not (abs(determinant) < 1.0 and abs(trace) < 1.0 + determinant):
+    return (abs(determinant) < 1.0) & (abs(trace) < 1.0 + determinant)
+
+
+def _check_sampled(axis: AxisData, g1: float, g2: float, owner: str) -> None:
+    """InputError if poles that are stable in continuous time make the sampled loop unstable."""
+    if not is_sampled_stable(axis.tau, axis.K, axis.T, g1, g2):
         raise InputError(
             f"{owner}: with T = {axis.T:g} s these poles make the sampled loop unstable; "
             f"choose slower poles or a shorter sample period"

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.errors import InputError
 from rds.core.types import Controller, Model, Reference
 from rds.models.machine_model import MachineAxisMotion, linear_part, split_delay
 
@@ -98,6 +99,37 @@ def loop_margins(law: LinearLaw, models: Sequence[Model], T: float) -> np.ndarra
         found = margins_of(w, _loop(law, axes[some], w, T))
         rows[known[some], :3] = np.where(stable[:, None], found, np.nan)
     return rows
+
+
+def open_loop(law: LinearLaw, model: Model, T: float, w: np.ndarray) -> np.ndarray:
+    """-C(z) P(z) of one loop at the frequencies `w` (rad/s), complex: what Bode and Nyquist draw.
+
+    Raises InputError for a model that has no linear axis in it.
+    """
+    return _loop(law, np.array([_known(model, T)]), w, T)[0]
+
+
+def closed_poles(law: LinearLaw, models: Sequence[Model], T: float) -> np.ndarray:
+    """The poles z of each sampled loop: (models, poles), as many as the loop with the longest delay has, else NaN.
+
+    Raises InputError for a model that has no linear axis in it, or a delay of more than `_LARGEST_DELAY` samples.
+    """
+    axes = np.array([_known(model, T) for model in models])
+    if axes[:, 2].max() > _LARGEST_DELAY:
+        raise InputError(f"a delay of more than {_LARGEST_DELAY} samples of {T:g} s is too long for its poles")
+    found = np.full((len(axes), 3 + int(axes[:, 2].max()) + len(law.B)), np.nan, dtype=complex)
+    for whole in np.unique(axes[:, 2]):
+        chosen = axes[:, 2] == whole
+        poles = np.linalg.eigvals(_closed(law, axes[chosen], int(whole), T))
+        found[chosen, : poles.shape[1]] = poles
+    return found
+
+
+def _known(model: Model, T: float) -> tuple[float, float, int, float]:
+    part = _axis(model, T)
+    if part is None:
+        raise InputError(f"the model {model.source.name!r} has no linear axis whose loop could be shown")
+    return part
 
 
 def _axis(model: Model, T: float) -> tuple[float, float, int, float] | None:
