@@ -56,7 +56,7 @@ def _range(low: float, high: float) -> tuple[float, float]:
 def _mark(value: float, first: float, last: float, scale: float) -> str:
     """A needle at the value; an arrow at the end of the bar beyond which it lies."""
     if first <= value <= last:
-        at = (value - first) * scale
+        at = min(max((value - first) * scale, 5.0), _WIDTH - 5.0)
         return (
             f'<path class="value" d="M{at:.1f} {_TOP + _BAR + 2}V{_TOP - 2}l-4 -7h8z" '
             'stroke-width="2" stroke-linejoin="round"/>'

@@ -39,13 +39,17 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves with one pair of axes; `levels` are lines across (y, label). A path has the same scale on both axes."""
+    """Curves with one pair of axes; `levels` are lines across (y, label). A path has the same scale on both axes.
+
+    Curves are cut beyond `most` to either side of zero; without it, far from those that are expected.
+    """
 
     curves: Sequence[Curve]
     y: str
     x: str = "time [s]"
     levels: Sequence[tuple[float, str]] = ()
     is_path: bool = False
+    most: float | None = None
 
 
 @dataclass(frozen=True)
@@ -154,9 +158,14 @@ def _ranges(panel: Panel) -> tuple[tuple[float, float], tuple[float, float], boo
     ranges = []
     for (low, high), values in ((x, [c.x for c in panel.curves]), (y, [c.y for c in panel.curves])):
         lowest, highest = _extent(values)
-        room = _FAR * (high - low) or _FAR * max(abs(high), 1e-9)
-        is_cut |= lowest < low - room or highest > high + room
-        ranges.append(_with_margin(max(lowest, low - room), min(highest, high + room)))
+        if panel.most is None:
+            room = _FAR * (high - low) or _FAR * max(abs(high), 1e-9)
+            low, high = low - room, high + room
+        else:
+            low, high = -panel.most, panel.most
+        if values[0] is not panel.curves[0].x or panel.is_path:
+            is_cut |= lowest < low or highest > high
+        ranges.append(_with_margin(max(lowest, low), min(highest, high)))
     if not panel.is_path:  # time has no margin
         low, high = _extent([c.x for c in panel.curves])
         ranges[0] = (low, high if high > low else low + 1.0)

@@ -31,7 +31,7 @@ _WHAT_IT_MEANS = {
 }
 
 _STYLE = f"""<style>
-.total {{ font-size: 2rem; font-weight: 700; font-variant-numeric: tabular-nums; }}
+.total {{ font-size: 2rem; margin: .3rem 0; line-height: 1.2; font-weight: 700; font-variant-numeric: tabular-nums; }}
 .criterion {{ border-top: 1px solid var(--line); padding: .7rem 0; display: grid; gap: .1rem 1.6rem;
   grid-template-columns: minmax(0, 1fr) minmax(0, 340px); }}
 .criterion h3 {{ margin: 0; font-size: 1rem; }} .criterion p {{ margin: .15rem 0; }}

@@ -92,7 +92,8 @@ def _control_panels(run: CaseRun, beside: Result | None, axes: Sequence[str]) ->
         if own is None:
             continue
         unit = result.units.get(f"{axis}_measured", "")
-        panels.append(Panel(_two(result, own, beside, other), heading(f"{axis} error", unit)))
+        most = _most_error(result, f"{axis}_reference")
+        panels.append(Panel(_two(result, own, beside, other), heading(f"{axis} error", unit), most=most))
     limits = run.fact("limits")
     levels = [(float(each), "limit") for each in limits or () if np.isfinite(each)]
     for axis in axes:
@@ -100,6 +101,12 @@ def _control_panels(run: CaseRun, beside: Result | None, axes: Sequence[str]) ->
         if name in result:
             panels.append(Panel(_pair(result, beside, name), heading(f"{axis} voltage", "V"), levels=levels))
     return panels
+
+
+def _most_error(result: Result, name: str) -> float | None:
+    """Larger errors than what there is to follow say no more than that it was not followed."""
+    values = result[name][np.isfinite(result[name])]
+    return 2.0 * float(np.abs(values).max(initial=0.0)) or None
 
 
 def _model_panels(result: Result, beside: Result | None, axis: str) -> list[Panel]:
@@ -110,7 +117,11 @@ def _model_panels(result: Result, beside: Result | None, axis: str) -> list[Pane
     voltage = Curve("", result["time"], result[f"{axis}_voltage"], VERMILLION, expected=True)
     return [
         Panel([data, *_pair(result, beside, f"{axis}_modelled")], _label(result, axis, "measured")),
-        Panel(_two(result, own, beside, other), heading("measured − modelled", unit)),
+        Panel(
+            _two(result, own, beside, other),
+            heading("measured − modelled", unit),
+            most=_most_error(result, f"{axis}_measured"),
+        ),
         Panel([voltage], heading("voltage", "V")),
     ]
 

@@ -1,0 +1,99 @@
+"""The grades in a batch's folder, read back: what gradebooks and the class's page are made from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.grading.grade import Grade, Status
+
+RECORD, STUDENTS, GRADE, FEEDBACK = "batch.json", "students", "grade.json", "feedback.html"
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The grades of a batch in the order of the students' identifiers; `folders` are theirs, by identifier."""
+
+    folder: Path
+    title: str
+    grades: tuple[Grade, ...]
+    folders: Mapping[str, Path]
+    record: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def max_score(self) -> float:
+        """Points in all."""
+        return max((grade.max_score for grade in self.grades), default=0.0)
+
+    @property
+    def to_hand_on(self) -> tuple[Grade, ...]:
+        """The grades that a gradebook may get: all but those that the grader could not make."""
+        return tuple(grade for grade in self.grades if grade.status is not Status.GRADER_ERROR)
+
+    @property
+    def not_graded(self) -> tuple[str, ...]:
+        """Students whose submission is still to be graded, or to be graded again."""
+        failed = {grade.student for grade in self.grades if grade.status is Status.GRADER_ERROR}
+        known = {grade.student for grade in self.grades}
+        return tuple(sorted(failed | (set(self.record.get("handed_in", ())) - known)))
+
+    def time(self, student: str) -> datetime | None:
+        """When the student handed in, where that is known."""
+        return as_time(self.record.get("times", {}).get(student))
+
+    @property
+    def due(self) -> datetime | None:
+        """When the assignment was due, where the record says so."""
+        return as_time(self.record.get("due"))
+
+
+def as_time(text: Any) -> datetime | None:
+    """A time written by `isoformat`; None for anything else."""
+    try:
+        return datetime.fromisoformat(text) if isinstance(text, str) else None
+    except ValueError:
+        return None
+
+
+def read_finished(folder: str | Path) -> Finished:
+    """The grades in OUT, the folder of `rds grade run`. InputError for a folder that is none, or a damaged file."""
+    folder = Path(folder)
+    record = _json(folder / RECORD)
+    if not isinstance(record, dict):
+        raise InputError("is no record of a batch; name the folder that `rds grade run -o` made", str(folder / RECORD))
+    found: dict[str, tuple[Grade, Path]] = {}
+    places = sorted((folder / STUDENTS).glob(f"*/{GRADE}"))
+    for path in places:
+        try:
+            grade = Grade.from_json(_json(path))
+        except (TypeError, KeyError, ValueError, AttributeError) as error:
+            said = f"is not a grade ({type(error).__name__}: {error}); grade this student again with --resume"
+            raise InputError(said, str(path)) from error
+        if grade.student in found:
+            raise InputError(f"is a second grade of {grade.student!r}; remove one of them", str(path))
+        found[grade.student] = grade, path.parent
+    if not found:
+        raise InputError("holds no grade yet; run `rds grade run` first", str(folder))
+    names = sorted(found)
+    return Finished(
+        folder,
+        str(record.get("title") or folder.name),
+        tuple(found[name][0] for name in names),
+        {name: found[name][1] for name in names},
+        record,
+    )
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_bytes())
+    except OSError as error:
+        said = f"cannot be read: {error.strerror}; name the folder that `rds grade run -o` made"
+        raise InputError(said, str(path)) from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is damaged ({error}); grade again with --resume", str(path)) from error
