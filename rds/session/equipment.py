@@ -55,8 +55,10 @@ class Equipment:
 
     @property
     def parameters(self) -> list[str]:
-        """The names of the controller's parameters among the choices."""
-        return [name for name in self.choices.fields if name.startswith(PREFIX)]
+        """The names of the controller's parameters among the choices, in the library's order."""
+        if self.kind == "model":
+            return []
+        return [each.name for each in parameter_fields(self.choices["controller"], self.axis)]
 
     @property
     def shown(self) -> list[str]:
@@ -185,7 +187,7 @@ class Equipment:
             if (fitting_laws := controllers(self.axis)) != fields["controller"]:
                 self.choices.replace([fitting_laws])
             wanted = {each.name: each for each in parameter_fields(self.choices["controller"], self.axis)}
-            self.choices.remove([name for name in self.parameters if name not in wanted])
+            self.choices.remove([name for name in fields if name.startswith(PREFIX) and name not in wanted])
             self.choices.replace(each for name, each in wanted.items() if fields.get(name) != each)
 
 

@@ -71,9 +71,9 @@ class EquipmentRun:
             self._run = run
             if task.stopping:
                 run.stop()
-            self.result = run.wait(
-                lambda taken, of: task.advance(taken, of, "running" if self.real_time else "simulating")
-            )
+            running = "running" if self.real_time else "simulating"
+            # before the first sample the loop is still being started, and its note stays
+            self.result = run.wait(lambda taken, of: task.advance(taken, of, running if taken else ""))
         finally:
             self.session.give_machine_back(self)
         task.note = "saving tables, pictures and the report"

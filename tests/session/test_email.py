@@ -1,0 +1,121 @@
+"""E-mail of results: against a real SMTP server on loopback, and every way in which that fails."""
+
+from __future__ import annotations
+
+import email
+import socket
+from collections.abc import Iterator
+from email.policy import default
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rds.core.errors import InputError, MachineError
+from rds.session.email import Server, mail_server, send_files
+
+aiosmtpd_controller = pytest.importorskip(
+    "aiosmtpd.controller", reason="aiosmtpd is not installed: pip install rds[dev]"
+)
+
+
+class Box:
+    """Keeps what it is handed; refuses one address."""
+
+    def __init__(self) -> None:
+        self.mails: list[Any] = []
+
+    async def handle_RCPT(self, server: Any, session: Any, envelope: Any, address: str, options: Any) -> str:
+        if address.startswith("nobody@"):
+            return "550 there is no such user"
+        envelope.rcpt_tos.append(address)
+        return "250 OK"
+
+    async def handle_DATA(self, server: Any, session: Any, envelope: Any) -> str:
+        self.mails.append(envelope)
+        return "250 taken"
+
+
+@pytest.fixture
+def box() -> Iterator[tuple[Box, Server]]:
+    handler = Box()
+    controller = aiosmtpd_controller.Controller(handler, hostname="127.0.0.1", port=free_port())
+    controller.start()
+    yield handler, Server("127.0.0.1", controller.port, "lab@example.edu", "none")
+    controller.stop()
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+def test_files_arrive_as_they_were(box: tuple[Box, Server], tmp_path: Path) -> None:
+    handler, server = box
+    data = bytes(range(256)) * 40
+    (tmp_path / "result.csv").write_bytes(b"time,X\n0,1\n")
+    (tmp_path / "result.mat").write_bytes(data)
+    files = [tmp_path / "result.csv", tmp_path / "result.mat"]
+    said = send_files(server, "me@example.edu, you@example.edu", "RDS: a\nrun", "Hello.\n", files)
+    assert said == "sent to me@example.edu, you@example.edu: result.csv, result.mat"
+    (mail,) = handler.mails
+    assert mail.rcpt_tos == ["me@example.edu", "you@example.edu"]
+    message = email.message_from_bytes(mail.content, policy=default)
+    assert message["Subject"] == "RDS: a run" and message["From"] == "lab@example.edu"
+    found = {part.get_filename(): part.get_payload(decode=True) for part in message.iter_attachments()}
+    assert found["result.mat"] == data and found["result.csv"].replace(b"\r\n", b"\n") == b"time,X\n0,1\n"
+
+
+@pytest.mark.parametrize(
+    ("to", "security", "reason"),
+    [("nobody@example.edu", "none", "550 there is no such user"), ("me@example.edu", "starttls", "STARTTLS")],
+)
+def test_a_refusal_says_why_and_where_the_files_are(
+    box: tuple[Box, Server], tmp_path: Path, to: str, security: str, reason: str
+) -> None:
+    handler, server = box
+    (tmp_path / "result.csv").write_text("kept")
+    with pytest.raises(MachineError) as caught:
+        send_files(Server(server.host, server.port, server.sender, security), to, "s", "t", [tmp_path / "result.csv"])
+    assert reason in str(caught.value) and f"the files are kept in {tmp_path}" in str(caught.value)
+    assert (tmp_path / "result.csv").read_text() == "kept" and not handler.mails
+
+
+def test_no_server_there_says_so(tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match="nothing listens there"):
+        send_files(Server("127.0.0.1", free_port(), "lab@example.edu", "none"), "me@example.edu", "s", "t", [])
+
+
+@pytest.mark.parametrize("to", ["", "me", "me@a b", "a@b\nBcc: c@d", " , "])
+def test_an_address_that_is_none_is_refused(to: str) -> None:
+    with pytest.raises(InputError, match=r"no e-mail address|whom to send"):
+        send_files(Server("127.0.0.1", 1, "lab@example.edu"), to, "s", "t", [])
+
+
+def test_the_server_comes_from_the_folder_and_the_environment(tmp_path: Path) -> None:
+    (tmp_path / "email.toml").write_text(
+        'host = "a.edu"\nsender = "lab@a.edu"\nport = 2525\nsecurity = "none"\nuser = "lab"\n'
+    )
+    server = mail_server(tmp_path, {"RDS_SMTP_HOST": "b.edu", "RDS_SMTP_PASSWORD": "secret"})
+    assert server == Server("b.edu", 2525, "lab@a.edu", "none", "lab", "secret")
+
+
+@pytest.mark.parametrize(
+    ("text", "environment", "reason"),
+    [
+        ("", {}, "no mail server is set up: host is missing"),
+        ('host = "a"\n', {}, "sender is missing"),
+        ('host = "a"\nsender = "l@a"\npassword = "p"\n', {}, "no key 'password'"),
+        ('host = "a"\nsender = "l@a"\nsecurity = "ssl"\n', {}, "must be one of starttls, tls, none"),
+        ('host = "a"\nsender = "l@a"\n', {"RDS_SMTP_PORT": "many"}, "whole number from 1 to 65535"),
+        ('host = "a"\nsender = "l@a"\nuser = "u"\n', {}, "set RDS_SMTP_PASSWORD"),
+        ('host = "a"\nsender = "la"\n', {}, "no e-mail address"),
+        ("host = \n", {}, "email.toml"),
+    ],
+)
+def test_a_wrong_set_up_is_told(tmp_path: Path, text: str, environment: dict[str, str], reason: str) -> None:
+    if text:
+        (tmp_path / "email.toml").write_text(text)
+    with pytest.raises(InputError, match=reason):
+        mail_server(tmp_path, environment)

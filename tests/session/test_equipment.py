@@ -1,0 +1,142 @@
+"""The choices of the equipment panels, and the experiments that they say."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rds
+from rds.core.errors import InputError
+from rds.panels.kit.diagram import diagram_svg
+from rds.session import Session
+from rds.session.as_file import as_python, as_toml, write_toml
+from rds.session.diagram import diagram
+from rds.session.equipment import Equipment
+
+CONTROLLER = """params = {"Kp": 20.0}
+
+
+def control(t, r, y, state, params):
+    return params["Kp"] * (r.position - y), state
+"""
+
+
+def choose(equipment: Equipment, **values: Any) -> Equipment:
+    for name, value in values.items():
+        equipment.choices.set(name.replace("__", "."), value)
+    return equipment
+
+
+def test_the_first_sine_is_a_sine_on_x_whatever_was_chosen(tmp_path: Path) -> None:
+    equipment = Equipment(Session(tmp_path), "control")
+    first = equipment.table()
+    choose(equipment, system="spindle", mode="implementation", shape="square", duration=2.0)
+    choose(equipment, controller="pid", controller__Pgain=3.0)
+    equipment.first_sine()
+    assert equipment.table() == first
+    assert first["axis"] == "X" and first["reference"] == {"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.2}
+
+
+def test_a_spindle_is_not_offered_what_it_cannot_have(tmp_path: Path) -> None:
+    equipment = Equipment(Session(tmp_path), "control")
+    choose(equipment, system="spindle")
+    assert "tracking" not in equipment.choices.fields["controller"].options
+    assert equipment.table()["controller"] == {"name": "pid"}
+    assert equipment.choices.fields["amplitude"].unit == "rev/min"
+    choose(equipment, system="X", controller="tracking")
+    assert equipment.parameters == ["controller.pole", "controller.pole_imaginary", "controller.observer_pole"]
+
+
+def test_a_system_test_has_no_model_to_choose(tmp_path: Path) -> None:
+    equipment = Equipment(Session(tmp_path), "model")
+    choose(equipment, mode="system-test", model="user")
+    assert "model" not in equipment.shown and "model" not in equipment.table()
+    choose(equipment, mode="simulation")
+    assert "model_file" in equipment.shown
+    with pytest.raises(InputError, match="name the file of your model"):
+        equipment.table()
+
+
+def test_parameters_are_those_of_the_library_with_their_units(tmp_path: Path) -> None:
+    from rds.controllers import controller_module
+
+    equipment = Equipment(Session(tmp_path), "control")
+    for name in ("p", "pid", "modified-pid"):
+        choose(equipment, controller=name)
+        assert equipment.parameters == [f"controller.{option}" for option in controller_module(name).OPTIONS]
+    assert equipment.choices.fields["controller.Pgain"].unit == "V/mm"
+    with pytest.raises(InputError, match=r"Pgain.* must be at least 0 V/mm, not -1"):
+        equipment.choices.set("controller.Pgain", "-1")
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        ("control", {}),
+        ("control", {"controller": "pid", "controller__Pgain": 12.5, "system": "Y", "shape": "triangle"}),
+        ("control", {"controller": "tracking", "controller__pole": -20.0, "controller__pole_imaginary": 0.0}),
+        ("control", {"controller": "user", "controller_file": "mine.py", "offset": 1.0}),
+        ("control", {"shape": "user", "shape_file": "2*sin(t)+t"}),
+        ("model", {"shape": "user", "shape_file": "3*(t > 0.1)", "system": "spindle"}),
+        ("model", {"shape": "square", "amplitude": 1.5, "sample_period": 0.002}),
+    ],
+)
+def test_file_and_python_are_the_panels_run_sample_for_sample(tmp_path: Path, kind: str, values: Any) -> None:
+    (tmp_path / "mine.py").write_text(CONTROLLER)
+    equipment = choose(Equipment(Session(tmp_path), kind), duration=0.4, **values)
+    run = equipment.run().start()
+    assert run.wait(60) and run.error is None and run.result is not None
+    table = equipment.table()
+    assert tomllib.loads(as_toml(table)) == table
+    from_file = rds.Experiment.from_toml(write_toml(table, tmp_path / "again.toml")).run()
+    namespace: dict[str, Any] = {}
+    text = as_python(table).replace("print(result.metrics)", "").replace('"mine.py"', repr(str(tmp_path / "mine.py")))
+    exec(text.replace('"signals/', f'"{tmp_path}/signals/'), namespace)
+    for again in (from_file, namespace["result"]):
+        for name in run.result.columns:
+            assert np.array_equal(run.result[name], again[name]), name
+
+
+def test_the_file_does_not_replace_another(tmp_path: Path) -> None:
+    table = Equipment(Session(tmp_path), "control").table()
+    write_toml(table, tmp_path / "a.toml")
+    with pytest.raises(InputError, match="there is such a file already"):
+        write_toml(table, tmp_path / "a.toml")
+    with pytest.raises(InputError, match=r"ends with \.toml"):
+        write_toml(table, tmp_path / "a.py")
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode", "blocks"),
+    [
+        ("control", "simulation", {"source", "controller", "converter", "model", "encoder"}),
+        ("control", "emulation", {"source", "controller", "converter", "model", "encoder", "drivers"}),
+        ("control", "implementation", {"source", "controller", "converter", "machine", "encoder", "model", "beside"}),
+        ("model", "simulation", {"source", "converter", "model", "encoder", "record"}),
+        ("model", "system-test", {"source", "converter", "machine", "encoder", "record"}),
+        (
+            "model",
+            "model-validation",
+            {"source", "converter", "machine", "encoder", "record", "model", "beside"},
+        ),
+    ],
+)
+def test_the_diagram_shows_the_parts_of_each_mode(tmp_path: Path, kind: str, mode: str, blocks: set[str]) -> None:
+    equipment = choose(Equipment(Session(tmp_path), kind), mode=mode)
+    drawn = diagram(equipment.table(), equipment.machine, equipment.words())
+    assert {block.name for block in drawn.blocks} == blocks
+    assert len({(block.row, block.column) for block in drawn.blocks}) == len(blocks)  # none over another
+    assert any(link.back for link in drawn.links) == (kind == "control")
+    assert all({link.start, link.end} <= blocks for link in drawn.links)
+    svg = diagram_svg(drawn)
+    assert svg.count("<rect") == len(blocks) and 'aria-label="' in svg
+
+
+def test_names_of_the_users_cannot_break_the_drawing(tmp_path: Path) -> None:
+    equipment = choose(Equipment(Session(tmp_path), "control"), controller="user", controller_file='<b>"&.py')
+    svg = diagram_svg(diagram(equipment.table(), equipment.machine, equipment.words()))
+    assert "<b>" not in svg and "&lt;b&gt;" in svg

@@ -1,0 +1,109 @@
+"""Runs of the equipment panels: what they show, what can be changed, how they end."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.results import open_result
+from rds.session import Session
+from rds.session.equipment import Equipment
+from rds.session.live_values import LiveValues
+from rds.session.save_as import save_as
+
+
+def test_a_simulation_leaves_its_files_and_its_traces(tmp_path: Path) -> None:
+    session = Session(tmp_path)
+    equipment = Equipment(session, "control")
+    equipment.choices.set("duration", 0.5)
+    run = equipment.run().start()
+    assert run.wait(60) and run.result is not None
+    rows, names = run.new_rows(), [name for name, _ in run.traces()]
+    assert names == ["X_reference", "X_measured", "X_voltage", "X_error"]
+    assert np.array_equal(rows[:, 0], run.result["time"]) and np.array_equal(rows[:, 2], run.result["X_measured"])
+    assert np.array_equal(rows[:, 4], run.result["X_reference"] - run.result["X_measured"])
+    assert len(run.new_rows()) == 0
+    assert {"report", "csv", "mat", "parquet"} <= set(run.files)
+    assert [kept.folder for kept in session.runs()] == [run.folder]
+
+
+def test_a_students_fault_is_told_before_anything_runs(tmp_path: Path) -> None:
+    (tmp_path / "bad.py").write_text("def control(t, r, y, state, params):\n    return r.positoin, state\n")
+    equipment = Equipment(Session(tmp_path), "control")
+    equipment.choices.set("controller", "user")
+    with pytest.raises(InputError, match="name the file of your controller"):
+        equipment.run()
+    equipment.choices.set("controller_file", "bad.py")
+    run = equipment.run().start()
+    assert run.wait(60) and run.result is None
+    assert str(run.error).startswith("bad.py, line 2: ") and "positoin" in str(run.error)
+    assert not (tmp_path / "runs").exists()
+
+
+def test_load_says_what_is_ready(tmp_path: Path) -> None:
+    equipment = Equipment(Session(tmp_path), "control")
+    task = equipment.load()
+    assert task.wait(60) and task.result == "loaded: 10000 samples, 1 ms each; no machine is needed"
+
+
+def test_a_result_is_saved_where_one_wants_it_and_replaces_nothing(tmp_path: Path) -> None:
+    equipment = Equipment(Session(tmp_path), "model")
+    equipment.choices.set("duration", 0.1)
+    run = equipment.run().start()
+    assert run.wait(60) and run.result is not None
+    for kind in ("csv", "mat", "parquet"):
+        path = save_as(run.result, tmp_path, f"mine/first.{kind}")
+        assert np.array_equal(open_result(path)["X_measured"], run.result["X_measured"])
+        with pytest.raises(InputError, match="there is such a file already"):
+            save_as(run.result, tmp_path, f"mine/first.{kind}")
+    for name, reason in (("", "say where to"), ("a.xls", "must end with"), ("a", "must end with")):
+        with pytest.raises(InputError, match=reason):
+            save_as(run.result, tmp_path, name)
+
+
+@pytest.mark.realtime
+def test_a_gain_is_changed_while_it_runs_and_recorded_with_its_time(alone: Path) -> None:
+    session = Session(alone)
+    equipment = Equipment(session, "control")
+    for name, value in (("mode", "emulation"), ("controller", "p"), ("duration", 60.0)):
+        equipment.choices.set(name, value)
+    run = equipment.run().start()
+    assert not run.live_values
+    with pytest.raises(InputError, match="in use on this page"):
+        equipment.run().start()
+    end = time.monotonic() + 60
+    while not len(run.new_rows()) and time.monotonic() < end:
+        time.sleep(0.02)
+    values = LiveValues(run)
+    before = values["X.Pgain"]
+    with pytest.raises(InputError, match=r"Pgain.* must be at least 0"):
+        values.set("X.Pgain", "-1")
+    assert values["X.Pgain"] == before
+    values.set("X.Pgain", "7,5")
+    while not run.changes and time.monotonic() < end:
+        time.sleep(0.02)
+    run.stop()
+    assert run.wait(60) and run.result is not None
+    (when, *change), (stopped, *stop) = run.result.meta["changes"]
+    assert change == ["X.Pgain", before, 7.5] and 0.0 < when <= stopped < 60.0 and stop == ["stop", 0.0, 1.0]
+    assert len(run.result) < 60_000 and run.result.meta["ending"] == "stopped"
+    assert not run.live_values and session.machine_user is None
+    with pytest.raises(InputError, match="is over"):
+        values.set("X.Pgain", 8.0)
+    text = (run.folder / "changes.csv").read_text()
+    assert "X.Pgain" in text
+
+
+@pytest.mark.realtime
+def test_a_run_that_is_stopped_at_once_gives_the_machine_back(alone: Path) -> None:
+    session = Session(alone)
+    equipment = Equipment(session, "model")
+    equipment.choices.set("mode", "system-test")
+    run = equipment.run().start()
+    run.stop()
+    assert run.wait(60) and session.machine_user is None
+    assert run.stopped_early or (run.result is not None and run.result.meta["ending"] == "stopped")
