@@ -1,0 +1,123 @@
+"""From what was handed in to what is to be graded: files copied, notebooks converted, the rest with its reason."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rds.grading.assignment import Assignment
+from rds.grading.grade import Grade, Status
+from rds.grading.intake import HandedIn, Intake
+from rds.grading.intake.items import Refusal
+from rds.grading.intake.names import safe_id
+from rds.grading.intake.notebooks import INTERFACE, Converted, converted
+from rds.grading.late import days_late
+from rds.grading.sandbox.submission import LARGEST
+from rds.results.atomic import write_whole
+from rds.spread import spread
+
+CODE = "submission.py"
+_PATIENCE = 30.0  # s for a notebook
+
+
+@dataclass
+class Queued:
+    """One row of the batch. `grade` is there at once where there is nothing to grade."""
+
+    row: HandedIn
+    folder: Path
+    code: bytes | None = None
+    sha256: str = ""
+    notes: tuple[str, ...] = ()
+    grade: Grade | None = None
+    about: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def mark(self) -> str:
+        """What was handed in, for comparison: the hash of the Python, or why there is none."""
+        return self.sha256 or (f"{self.grade.status}: {self.grade.reason}" if self.grade else "")
+
+
+def queued(assignment: Assignment, intake: Intake, students: Path, jobs: int | None) -> list[Queued]:
+    """All rows; nothing is written yet. Code is held here, at most half a MiB of each."""
+    rows = [Queued(row, students / safe_id(row.student), notes=row.notes, about=_about(row)) for row in intake.rows]
+    notebooks = []
+    for each in rows:
+        if each.row.status is not None:
+            each.grade = ungraded(assignment, each, each.row.status, each.row.reason)
+            continue
+        try:
+            data = each.row.read()
+        except Refusal as error:
+            each.grade = ungraded(assignment, each, Status.REFUSED, str(error))
+            continue
+        each.code = data
+        if each.row.is_notebook:
+            notebooks.append(each)
+    if notebooks:
+        _convert(assignment, notebooks, jobs)
+    for each in rows:
+        if each.code is not None:
+            each.sha256 = hashlib.sha256(each.code).hexdigest()
+    return rows
+
+
+def keep(rows: list[Queued]) -> None:
+    """The code of all rows in their folders, where it is not there already."""
+    for each in rows:
+        if each.code is not None:
+            path = each.folder / CODE
+            if not path.is_file() or path.read_bytes() != each.code:
+                write_whole(path, each.code)
+
+
+def ungraded(assignment: Assignment, each: Queued, status: Status, reason: str) -> Grade:
+    """No points, by the submission's doing; or, with a grader error, no score at all."""
+    row = each.row
+    scores = tuple(criterion.nothing(reason) for criterion in assignment.criteria)
+    return Grade(
+        student=row.student,
+        status=status,
+        reason=reason,
+        score=0.0,
+        max_score=assignment.max_score,
+        before_penalty=0.0,
+        criteria=scores,
+        sha256=each.sha256,
+        seed=assignment.seed(row.student),
+        late_days=days_late(assignment.due, row.time),
+        notes=each.notes,
+        details={"assignment": assignment.sha256, **each.about},
+    )
+
+
+def _convert(assignment: Assignment, notebooks: list[Queued], jobs: int | None) -> None:
+    """In processes of their own: what somebody wrote to crash a parser does not crash the batch."""
+    tests = {test.function for criterion in assignment.criteria for test in criterion.tests}
+    work = [(each.code or b"", (*INTERFACE, *sorted(tests))) for each in notebooks]
+    for each, outcome in zip(
+        notebooks, spread(_converted, work, jobs=jobs, retries=0, time_limit=_PATIENCE), strict=True
+    ):
+        found = outcome.value if outcome.ok else f"the notebook cannot be read: {outcome.reason}"
+        if isinstance(found, Converted) and len(found.code) > LARGEST:
+            found = f"its code has more than {LARGEST} bytes; keep data out of it"
+        if isinstance(found, Converted):
+            each.code, each.notes = found.code, (*each.notes, *found.notes)
+            continue
+        each.code = None
+        each.grade = ungraded(assignment, each, Status.REFUSED, str(found))
+
+
+def _converted(work: tuple[bytes, tuple[str, ...]]) -> Converted | str:
+    try:
+        return converted(*work)
+    except Refusal as error:
+        return str(error)
+
+
+def _about(row: HandedIn) -> dict[str, Any]:
+    """For the gradebook: which file, when, and what the export says of the student."""
+    handed_in = None if row.time is None else row.time.isoformat()
+    return {"file": row.name, "handed_in": handed_in, "source": row.source}

@@ -1,0 +1,176 @@
+"""A batch from beginning to end, or from where it was ended."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.grading.assignment import Assignment, read_assignment
+from rds.grading.batch.outcome import BatchOutcome
+from rds.grading.batch.queue import CODE, Queued, keep, queued, ungraded
+from rds.grading.batch.record import FILE, check_same, read_record, record_of
+from rds.grading.batch.work import FEEDBACK, Answer, Task, graded, setup_of
+from rds.grading.feedback import feedback_page
+from rds.grading.grade import Grade, Status
+from rds.grading.intake import collect
+from rds.grading.journal import FILE as JOURNAL
+from rds.grading.journal import Journal
+from rds.grading.sandbox import available
+from rds.results.atomic import write_files
+from rds.spread import Outcome, processors, spread
+from rds.spread.spread import Progress
+
+STUDENTS = "students"
+_PATIENCE = 600.0  # s for one submission beyond all that it may take: then it is the grader that hangs
+
+
+def run_batch(
+    assignment: str | Path,
+    submissions: str | Path,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    announce: Callable[[str], None] | None = None,
+) -> BatchOutcome:
+    """Grade all `submissions` (a folder or an exported zip) by the assignment in a folder, into the folder `out`.
+
+    Each finished submission is in the journal of `out` before the next is: `resume` goes on after a kill at any point,
+    with the same scores. `jobs` local processes (default: one for each processor), or the workers of a dask
+    `scheduler`. What a submission does is in its row. Raises InputError for what will not do, with nothing graded;
+    also where the sandbox does not hold.
+    """
+    began = time.monotonic()
+    say = announce or (lambda text: None)
+    out = Path(out)
+    if scheduler is None and (fault := available()):
+        raise InputError(fault)
+    _check_free(out, resume)
+    read = read_assignment(assignment)
+    names = (read.title, read.folder.resolve().name)
+    intake = collect(submissions, read.files, names, read.due.tzinfo if read.due else None)
+    rows = queued(read, intake, out / STUDENTS, jobs if scheduler is None else None)
+    record = record_of(
+        read,
+        {each.row.student: each.mark for each in rows},
+        {each.row.student: each.row.time.isoformat() for each in rows if each.row.time},
+        intake.layout,
+    )
+    if (out / FILE).exists():
+        check_same(read_record(out), record, out)
+    record.write(out)
+    notes = [f"not a submission, and left alone: {name}" for name in intake.ignored]
+    with Journal(out / JOURNAL) as journal:
+        if journal.was_torn:
+            say("the last line of the journal was only half written, and was cut off: that submission is graded again")
+        keep(rows)
+        batch = _Batch(read, rows, journal)
+        todo = batch.todo()
+        if len(todo) < len(rows):
+            say(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
+        batch.go(todo, jobs, scheduler, progress)
+        outcome = BatchOutcome(out, batch.grades(), len(todo), time.monotonic() - began, tuple(notes))
+    return outcome
+
+
+def _check_free(out: Path, resume: bool) -> None:
+    """InputError where `out` is in use for something else."""
+    if not out.exists() or (resume and (out / FILE).exists()):
+        return
+    if not out.is_dir():
+        raise InputError("is not a folder; name another place", str(out))
+    if (out / FILE).exists():
+        raise InputError("holds a batch already; go on with it by --resume, or name a new folder", str(out))
+    if any(not path.name.startswith(".") for path in out.iterdir()):
+        raise InputError("is not empty, and holds no batch; name a new folder", str(out))
+
+
+class _Batch:
+    """Rows, and what the journal says of them."""
+
+    def __init__(self, assignment: Assignment, rows: Sequence[Queued], journal: Journal):
+        self._assignment, self._journal = assignment, journal
+        self._rows = {each.row.student: each for each in rows}
+        self._grades = {row["student"]: Grade.from_json(row["grade"]) for row in journal.rows}
+
+    def todo(self) -> list[Queued]:
+        """What has no grade yet, or none but by our fault."""
+        return [each for each in self._rows.values() if not self._is_done(each)]
+
+    def grades(self) -> dict[str, Grade]:
+        """By student, in the order of their names."""
+        return {student: self._grades[student] for student in sorted(self._rows)}
+
+    def go(self, todo: Sequence[Queued], jobs: int | None, scheduler: str | None, progress: Progress | None) -> None:
+        """Grade all of `todo`; what fails by our fault once more, and then it is listed."""
+        for each in todo:
+            if each.grade is not None:
+                self._finish(each, each.grade, {})
+        real = [each for each in todo if each.grade is None]
+        failed = self._round(real, jobs, scheduler, progress)
+        again = self._round([each for each, _ in failed], jobs, scheduler, None)
+        for each, reason in again:
+            self._finish(each, ungraded(self._assignment, each, Status.GRADER_ERROR, reason), {})
+
+    def _is_done(self, each: Queued) -> bool:
+        grade = self._grades.get(each.row.student)
+        return grade is not None and grade.status is not Status.GRADER_ERROR
+
+    def _round(
+        self, rows: Sequence[Queued], jobs: int | None, scheduler: str | None, progress: Progress | None
+    ) -> list[tuple[Queued, str]]:
+        """One try for each of `rows`; those that failed, with the reason."""
+        if not rows:
+            return []
+        shared = scheduler is None
+        count = min(jobs or processors(), len(rows)) if shared else None
+        work = partial(graded, setup_of(self._assignment, count, shared))
+        tasks = [self._task(each, shared) for each in rows]
+        limit = _PATIENCE + 20.0 * self._assignment.limits.wall_seconds if shared else None
+        failed = []
+        for outcome in spread(
+            work, tasks, jobs=jobs, scheduler=scheduler, progress=progress, in_order=False, time_limit=limit
+        ):
+            each = rows[outcome.index]
+            answer = _answer(outcome)
+            if answer is None:
+                failed.append((each, outcome.reason))
+            else:
+                self._finish(each, Grade.from_json(answer.grade), dict(answer.files))
+        return failed
+
+    def _task(self, each: Queued, shared: bool) -> Task:
+        assert each.code is not None  # it has no grade yet
+        path, code = (str((each.folder / CODE).resolve()), b"") if shared else ("", each.code)
+        return Task(each.row.student, path, code, each.row.time, each.notes, each.about)
+
+    def _finish(self, each: Queued, grade: Grade, files: dict[str, bytes]) -> None:
+        """Its files, then its line in the journal."""
+        if FEEDBACK not in files:
+            files[FEEDBACK] = feedback_page(self._assignment, grade).encode("utf-8", "replace")
+        told = grade.to_json()
+        files["grade.json"] = json.dumps(told, indent=1, allow_nan=False).encode() + b"\n"
+        write_files({each.folder / name: partial(_write, data) for name, data in files.items()})
+        self._journal.append({"student": each.row.student, "grade": told})
+        self._grades[each.row.student] = grade
+
+
+def _answer(outcome: Outcome) -> Answer | None:
+    if not outcome.ok:
+        return None
+    answer = outcome.value
+    assert isinstance(answer, Answer)
+    if answer.missing:
+        raise InputError(f"a worker cannot grade: {answer.missing}. What is graded so far is kept; go on with --resume")
+    return answer
+
+
+def _write(data: bytes, stream: Any) -> None:
+    stream.write(data)

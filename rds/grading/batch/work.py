@@ -1,0 +1,153 @@
+"""One submission in a worker process, here or on another computer. Everything that scores depend on is in the order."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.grading.assignment import FILE, Assignment, read_assignment
+from rds.grading.feedback import feedback_page
+from rds.grading.grade_one import grade_with_runs
+from rds.grading.sandbox import Pool, available
+from rds.spread import worker_number
+
+if TYPE_CHECKING:
+    from rds.grading.cases.case import CaseRun
+
+COLUMNS, FEEDBACK = "columns.parquet", "feedback.html"
+_SOLUTION = "reference solution"  # the student whose plants it runs on
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What all submissions of a batch share: the assignment's folder, or its files where no folder is shared."""
+
+    sha256: str  # of the assignment
+    folder: str = ""
+    files: tuple[tuple[str, bytes], ...] = ()
+    jobs: int | None = None  # at the same time on this computer; None where nobody knows
+
+
+@dataclass(frozen=True)
+class Task:
+    """One submission as Python: at `path`, or its `code` where no folder is shared. The rest goes into its grade."""
+
+    student: str
+    path: str = ""
+    code: bytes = b""
+    time: datetime | None = None
+    notes: tuple[str, ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A grade in JSON's types, and files to be kept beside it. `missing` says why this computer cannot grade."""
+
+    grade: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    missing: str = ""
+
+
+def setup_of(assignment: Assignment, jobs: int | None, shared: bool) -> Setup:
+    """The assignment for workers, which see its folder if `shared`."""
+    if shared:
+        return Setup(assignment.sha256, str(assignment.folder.resolve()), jobs=jobs)
+    own = (assignment.solution, assignment.template, assignment.handout)
+    names = {FILE, *(name for name in own if name), *(name for case in assignment.cases for name in case.files)}
+    files = tuple((name, (assignment.folder / name).read_bytes()) for name in sorted(names))
+    return Setup(assignment.sha256, files=files, jobs=jobs)
+
+
+def graded(setup: Setup, task: Task) -> Answer:
+    """The grade of a task. An exception is ours, and no fault of the submission."""
+    if fault := available():
+        return Answer(missing=fault)
+    assignment, solution = _assignment(setup)
+    pool = _pool(threading.get_ident(), setup.jobs)
+    if task.path:
+        found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
+    else:
+        with tempfile.TemporaryDirectory(prefix="rds-grade-") as folder:
+            path = Path(folder) / code_name(assignment)
+            path.write_bytes(task.code)
+            found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
+    grade = found.grade
+    grade = replace(grade, notes=(*task.notes, *grade.notes), details={**grade.details, **task.about})
+    expected = _expected(setup, threading.get_ident()) if solution else ()
+    page = feedback_page(assignment, grade, found.runs, expected, same_plants=False)
+    files = {FEEDBACK: page.encode("utf-8", "replace")}
+    if found.runs:
+        files[COLUMNS] = columns_of(found.runs)
+    return Answer(grade.to_json(), files)
+
+
+def columns_of(runs: tuple[CaseRun, ...]) -> bytes:
+    """All runs as one Parquet table: case, run, and the columns of each; null where a run has no such column.
+
+    Single precision: they are looked at, and scores are made of the runs themselves.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    tables = []
+    for run in runs:
+        count = len(run.result)
+        about = {"case": pa.array([run.case] * count).dictionary_encode(), "run": pa.array([run.number] * count)}
+        tables.append(pa.table(about | {name: pa.array(_single(v)) for name, v in run.result.columns.items()}))
+    sink = pa.BufferOutputStream()
+    pq.write_table(pa.concat_tables(tables, promote_options="permissive"), sink, compression="zstd")
+    data: bytes = sink.getvalue().to_pybytes()
+    return data
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    with np.errstate(over="ignore"):
+        return values.astype(np.float32) if values.dtype == np.float64 else values
+
+
+def code_name(assignment: Assignment) -> str:
+    """What a submission is called in messages to its author."""
+    return next((name for name in assignment.files if name.endswith(".py")), "submission.py")
+
+
+@lru_cache(maxsize=1)
+def _assignment(setup: Setup) -> tuple[Assignment, bytes]:
+    """Read once for each worker, with the reference solution if there is one."""
+    with tempfile.TemporaryDirectory(prefix="rds-assignment-") as own:
+        for name, data in setup.files:
+            path = Path(own) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        read = read_assignment(setup.folder or own)
+        solution = read.path(read.solution)
+        code = b"" if solution is None else solution.read_bytes()
+    if read.sha256 != setup.sha256:
+        raise InputError("the assignment's files were changed while it was graded; put them back and resume")
+    return read, code
+
+
+@lru_cache(maxsize=1)
+def _expected(setup: Setup, thread: int) -> tuple[CaseRun, ...]:
+    """The runs of the reference solution, once for each worker."""
+    assignment, code = _assignment(setup)
+    with tempfile.TemporaryDirectory(prefix="rds-solution-") as folder:
+        path = Path(folder) / code_name(assignment)
+        path.write_bytes(code)
+        return grade_with_runs(assignment, path, _SOLUTION, _pool(thread, setup.jobs)).runs
+
+
+@lru_cache(maxsize=64)
+def _pool(thread: int, jobs: int | None) -> Pool:
+    """A pool for each thread of a worker, because its sandboxes end with that; ended with the process."""
+    number = worker_number()
+    return Pool() if jobs is None or number is None else Pool(jobs, slot=number)

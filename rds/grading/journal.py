@@ -1,0 +1,113 @@
+"""The journal of a batch: one line for each finished submission, on the disk before the next thing is done.
+
+A line is JSON with a check sum. What a kill left of a last line is cut off; any other fault is told, and nothing is
+graded on top of it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rds.core.errors import InputError
+
+FILE = "journal.jsonl"
+_CHECK = 16  # hex digits
+
+
+class Journal:
+    """Opened by one process at a time. `rows` are the finished ones, in the order in which they were written.
+
+    `was_torn` says whether a half-written last line was cut off. InputError if another process has it, or a line in
+    it is damaged.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.was_torn = False
+        self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        try:
+            try:
+                fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise InputError("another rds grade run is at work here; wait for its end", str(path)) from None
+            self.rows, good = _whole_lines(path)
+            if good < os.fstat(self._fd).st_size:
+                self.was_torn = True
+                os.ftruncate(self._fd, good)
+                os.fsync(self._fd)
+        except BaseException:
+            os.close(self._fd)
+            raise
+
+    def append(self, row: Mapping[str, Any]) -> None:
+        """One row, on the disk when this returns."""
+        data = line(row)
+        while data:
+            data = data[os.write(self._fd, data) :]
+        os.fsync(self._fd)
+
+    def close(self) -> None:
+        """Let others have it."""
+        os.close(self._fd)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def read_journal(path: Path) -> list[dict[str, Any]]:
+    """Its rows, while whoever writes it goes on. InputError if a line in it is damaged."""
+    return _whole_lines(path)[0] if path.exists() else []
+
+
+def line(row: Mapping[str, Any]) -> bytes:
+    """A row as it stands in the file."""
+    text = json.dumps(row, allow_nan=False, sort_keys=True)
+    return f"{_sum(text)} {text}\n".encode()
+
+
+def _whole_lines(path: Path) -> tuple[list[dict[str, Any]], int]:
+    """The rows, and how many bytes they take."""
+    data = path.read_bytes()
+    rows: list[dict[str, Any]] = []
+    good = 0
+    *lines, _ = data.split(b"\n")
+    for number, text in enumerate(lines, 1):
+        row = _row(text)
+        if row is None:
+            if number == len(lines) and good + len(text) + 1 == len(data):  # the power went while it was written
+                break
+            raise InputError(
+                "is damaged: its check sum is wrong; restore the file, or grade into a new folder",
+                f"{path}: line {number}",
+            )
+        rows.append(row)
+        good += len(text) + 1
+    return rows, good
+
+
+def _row(text: bytes) -> dict[str, Any] | None:
+    head, _, rest = text.partition(b" ")
+    try:
+        told = rest.decode()
+        if head.decode() != _sum(told):
+            return None
+        row = json.loads(told)
+    except ValueError:
+        return None
+    return row if isinstance(row, dict) else None
+
+
+def _sum(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:_CHECK]
