@@ -120,6 +120,7 @@ def read_criterion(words: Words, kind_of_submission: str, cases: Mapping[str, Ca
     if kind == "unit-tests" and not tests:
         raise InputError("it has no test; add [[criterion.test]] with function, args, expected", words.place())
     _check_cases(words, module, [cases[each] for each in chosen])
+    options = _options(words, module)
     points = words.number("points", None, "points", 0.0, 1e6)
     weight = words.number("weight", 1.0, "a factor of the points", 0.0, 1e6)
     unit = _unit(words, module, [cases[each] for each in chosen])
@@ -132,7 +133,7 @@ def read_criterion(words: Words, kind_of_submission: str, cases: Mapping[str, Ca
         _bands(words, module, unit),
         unit,
         words.flag("visible", True),
-        _options(words, module),
+        options,
         tests,
         _requires(words, name),
     )

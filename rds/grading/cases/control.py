@@ -21,8 +21,9 @@ from rds.grading.linear import PULSE, LinearLoop, linear_loop
 from rds.interface import encoder
 from rds.machines import Axis, Machine, load_machine
 from rds.models import library_model
+from rds.nc.check import Setup, motion
 from rds.programs.judge import judged
-from rds.programs.prepare import SPINDLE_UNIT, Prepared, prepare
+from rds.programs.prepare import SPINDLE_UNIT, Prepared, planned
 from rds.robustness.draws import Spread
 from rds.robustness.figures import voltage_limits
 from rds.robustness.uncertain import Uncertain, uncertain
@@ -174,7 +175,8 @@ def _program(words: Words, folder: Path, machine: Machine) -> tuple[Prepared | N
     if name is None:
         return None, ()
     T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
-    prepared = prepare(folder / name, machine, None, T)
+    # planned from the text: a compiled form beside it would be written into the assignment
+    prepared = planned(motion(folder / name, machine, Setup()), machine, T, folder / name)
     return replace(prepared, program=replace(prepared.program, spindle=None)), (name,)
 
 
@@ -211,8 +213,11 @@ def _uncertain(axis: Any, words: Words) -> Uncertain:
     numbers = {k: float(v) for k, v in axis.model.params.items() if isinstance(v, int | float)}
     ranges = read_spread(words, numbers)
     if ranges:
-        found = uncertain(axis, ranges)
-        for low in (found.spread.low, found.spread.high):  # both ends are possible, or the file says so now
-            found.drawn(low)
+        try:
+            found = uncertain(axis, ranges)
+            for end in (found.spread.low, found.spread.high):  # what is impossible is told now
+                found.drawn(end)
+        except InputError as error:
+            raise InputError(str(error), words.place("vary")) from error
         return found
     return Uncertain(axis.axis.name, Spread((), np.empty(0), {}), axis.model)

@@ -1,0 +1,233 @@
+"""One submission graded: the same samples as every simulation, the same score every time, faults where they belong."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rds
+from rds.grading.assignment import Assignment, read_assignment
+from rds.grading.grade import Band, Grade, Status
+from rds.grading.grade_one import grade, grade_with_runs
+from rds.grading.sandbox import Pool
+from rds.grading.trusted import TrustedFiles
+from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
+
+STATEFUL = """
+params = {"Kp": 30.0, "Kd": 0.3, "Kv": 0.567, "filter": 0.004, "T": 0.001}
+initial_state = [0.0, 0.0]
+
+def control(t, r, y, state, params):
+    last, slope = state
+    error = r.position - y
+    share = params["T"] / (params["filter"] + params["T"])
+    slope = slope + share * ((error - last) / params["T"] - slope)
+    return params["Kp"] * error + params["Kd"] * slope + params["Kv"] * r.velocity, [error, slope]
+"""
+STEP = """
+[[case]]
+name = "step"
+axis = "X"
+duration = 0.3
+plant = "machine"
+runs = 3
+[case.reference]
+kind = "constant"
+value = 1.0
+[case.vary]
+tau = "±10 %"
+K = "±5 %"
+[[criterion]]
+name = "settling"
+kind = "settling-time"
+case = "step"
+points = 5
+full = 0.15
+none = 0.29
+unit = "s"
+"""
+Make = Callable[..., Assignment]
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Make:
+    def make(text: str, solution: str = SOLUTION) -> Assignment:
+        return read_assignment(assignment_in(tmp_path / "assignment", text, solution))
+
+    return make
+
+
+def file(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "handed_in.py"
+    path.write_text(text)
+    return path
+
+
+def test_the_samples_are_those_of_a_simulation_bit_for_bit(made: Make, pool: Pool, tmp_path: Path) -> None:
+    path = file(tmp_path, STATEFUL)
+    (run,) = grade_with_runs(made(HEAD + SINE + RMS), path, "ada", pool).runs
+    reference = rds.sinusoid(amplitude=2.0, frequency=1.0)
+    same = rds.Experiment(axis="X", duration=1.0, reference=reference, controller=str(path)).run()
+    assert set(same) == set(run.result)
+    for name in same:
+        assert np.array_equal(same[name], run.result[name]), name
+    assert run.result.metrics == same.metrics
+
+
+def test_a_case_of_several_axes_keeps_their_states_apart(made: Make, pool: Pool, tmp_path: Path) -> None:
+    text = HEAD + SINE.replace('axis = "X"', 'axes = ["X", "Y"]') + RMS
+    path = file(tmp_path, STATEFUL)
+    (run,) = grade_with_runs(made(text), path, "ada", pool).runs
+    reference = rds.sinusoid(amplitude=2.0, frequency=1.0)
+    same = rds.Experiment(axis=["X", "Y"], duration=1.0, reference=reference, controller=str(path)).run()
+    for name in same:
+        assert np.array_equal(same[name], run.result[name]), name
+
+
+def test_the_same_file_has_the_same_grade_in_another_pool_and_without_one(
+    made: Make, pool: Pool, tmp_path: Path
+) -> None:
+    assignment = made(HEAD + SINE + STEP + RMS)
+    path = file(tmp_path, STATEFUL)
+    first = grade(assignment, path, "ada", pool)
+    with Pool() as other:
+        assert grade(assignment, path, "ada", other).to_json() == first.to_json()
+    assert grade(assignment, path, "ada", TrustedFiles()).to_json() == first.to_json()
+    assert Grade.from_json(json.loads(json.dumps(first.to_json()))) == first
+
+
+def test_each_student_has_a_plant_of_their_own_and_the_worst_of_its_runs_counts(made: Make, tmp_path: Path) -> None:
+    assignment, path, files = made(HEAD + STEP), file(tmp_path, STATEFUL), TrustedFiles()
+    ada, bob = (grade_with_runs(assignment, path, student, files) for student in ("ada", "bob"))
+    assert ada.grade.seed != bob.grade.seed
+    responses = [run.result["X_measured"] for run in (*ada.runs, *bob.runs)]
+    assert len({response.tobytes() for response in responses}) == 6
+    times = [assignment.criteria[0].measure(run) for run in ada.runs]
+    assert ada.grade.criteria[0].value == max(times)
+    assert grade(assignment, path, "bob", files, seed=ada.grade.seed).criteria == ada.grade.criteria
+
+
+def test_noise_and_disturbance_are_the_parent_s(made: Make, tmp_path: Path) -> None:
+    more = "noise = 0.01\n[case.reference]"
+    disturbance = '[case.disturbance]\nkind = "constant"\nvalue = 2.0\nstart = 0.5\n'
+    kinds = (("noise-error", "mm"), ("noise-voltage", "V"), ("disturbance-error", "mm"))
+    criteria = "".join(
+        RMS.replace('"rms"', f'"{kind}"').replace("rms-error", kind).replace('"mm"', f'"{unit}"')
+        for kind, unit in kinds
+    )
+    quiet = file(tmp_path, "def control(t, r, y, state, params):\n    return 0.0, state\n")
+    assignment = made(HEAD + SINE.replace("[case.reference]", more) + disturbance + criteria)
+    (run,) = grade_with_runs(assignment, quiet, "ada", TrustedFiles()).runs
+    noise = run.result["X_measured"] - run.result["X_actual"]
+    assert noise.std() == pytest.approx(0.01, rel=0.1)
+    assert not run.result["X_actual"][:500].any()  # at rest until the disturbance begins
+    assert run.result["X_actual"][501] > 0.0
+    speed = np.diff(run.result["X_actual"][-100:]).mean() / 0.001
+    assert speed == pytest.approx(1.764 * 2.0 - 0.539, rel=0.01)  # mm/s: K u - friction
+    (again,) = grade_with_runs(assignment, quiet, "ada", TrustedFiles()).runs
+    assert np.array_equal(again.result["X_measured"], run.result["X_measured"])
+
+
+def test_a_fault_in_one_case_costs_that_case(made: Make, pool: Pool, tmp_path: Path) -> None:
+    text = "def control(t, r, y, state, params):\n    return (1 / 0 if r.position == 1.0 else r.velocity), state\n"
+    found = grade(made(HEAD + STEP + SINE + RMS), file(tmp_path, text), "ada", pool)
+    assert found.status is Status.BROKE_CONTRACT
+    assert found.reason.startswith("case step: ") and "ZeroDivisionError" in found.reason
+    settling, rms = found.criteria
+    assert (settling.band, settling.value, settling.score) == (Band.NONE, None, 0.0)
+    assert rms.value is not None and rms.score == found.score > 0.0
+
+
+@pytest.mark.parametrize(
+    "text, status",
+    [
+        ("import os\nos._exit(0)\n", Status.KILLED),
+        ("def kontrol(t, r, y, state, params):\n    return 0.0, state\n", Status.FAILED_TO_LOAD),
+        ("", Status.FAILED_TO_LOAD),
+        ("def control(t, r, y, state, params):\n    return float('nan'), state\n", Status.BROKE_CONTRACT),
+        ("def control(t, r, y, state, params):\n    return '1', state\n", Status.BROKE_CONTRACT),
+        ("import os\ndef control(t, r, y, state, params):\n    os._exit(0)\n", Status.KILLED),
+    ],
+)
+def test_what_cannot_be_graded_has_no_points_and_a_reason(
+    text: str, status: Status, made: Make, pool: Pool, tmp_path: Path
+) -> None:
+    found = grade(made(HEAD + SINE + STEP + RMS), file(tmp_path, text), "ada", pool)
+    assert found.status is status and found.reason
+    assert found.score == 0.0 and found.max_score == 15.0
+    assert [each.band for each in found.criteria] == [Band.NONE, Band.NONE]
+    assert all("could not be measured" in each.sentence for each in found.criteria)
+
+
+def test_a_file_that_is_not_there_or_a_link(made: Make, pool: Pool, tmp_path: Path) -> None:
+    assignment = made(HEAD + SINE + RMS)
+    assert grade(assignment, tmp_path / "nothing.py", "ada", pool).status is Status.MISSING
+    (tmp_path / "link.py").symlink_to(assignment.folder / "solution.py")
+    found = grade(assignment, tmp_path / "link.py", "ada", pool)
+    assert found.status is Status.REFUSED and found.sha256 == ""
+
+
+def test_points_that_need_others(made: Make, tmp_path: Path) -> None:
+    effort = RMS.replace('"rms"', '"effort"').replace("rms-error", "effort").replace('"mm"', '"V"')
+    idle = file(tmp_path, "def control(t, r, y, state, params):\n    return 0.0, state\n")
+    free = grade(made(HEAD + SINE + RMS + effort), idle, "ada", TrustedFiles())
+    bound = grade(made(HEAD + SINE + RMS + effort + 'requires = ["rms"]\n'), idle, "ada", TrustedFiles())
+    assert [each.score for each in free.criteria] == [0.0, 10.0]
+    assert [each.score for each in bound.criteria] == [0.0, 0.0]
+    assert (
+        bound.criteria[1].value == 0.0 and "counts only where points are earned for rms" in bound.criteria[1].sentence
+    )
+
+
+def test_weights_and_lateness(made: Make, tmp_path: Path) -> None:
+    text = HEAD.replace("title", "due = 2026-11-30T23:59:00+01:00\ntitle") + SINE + RMS + "weight = 2.5\n"
+    assignment = made(text + "[late]\npercent_per_day = 10\n")
+    assert assignment.due is not None
+    path = file(tmp_path, STATEFUL)
+    found = grade(assignment, path, "ada", TrustedFiles(), submitted=assignment.due + timedelta(hours=30))
+    assert found.before_penalty == found.max_score == 25.0
+    assert found.score == 20.0 and found.late_days == 1.25
+    assert any("20 % of the points" in note for note in found.notes)
+
+
+def test_what_it_prints_is_a_note(made: Make, pool: Pool, tmp_path: Path) -> None:
+    found = grade(made(HEAD + SINE + RMS), file(tmp_path, "print('here I am')\n" + SOLUTION), "ada", pool)
+    assert found.status is Status.OK and "here I am" in found.notes[-1]
+
+
+def test_an_axis_that_runs_away_is_told(made: Make, tmp_path: Path) -> None:
+    """The parent's own model diverges: no fault of the interface, and no value."""
+    model = "def advance(x, u, T, params):\n    return [1e200 * (x[0] + 1e-9 * u), 0.0]\n"
+    assignment = made(HEAD + SINE + RMS)
+    (assignment.folder / "wild.py").write_text(model)
+    text = HEAD + SINE + '[case.model]\nfile = "wild.py"\n' + RMS
+    found = grade(made(text), file(tmp_path, STATEFUL), "ada", TrustedFiles())
+    assert found.status is Status.OK and found.score == 0.0
+    assert "the loop is not stable" in found.criteria[0].sentence
+
+
+def test_hidden_state_does_not_pass_from_case_to_case(made: Make, pool: Pool, tmp_path: Path) -> None:
+    text = (
+        "calls = []\ndef control(t, r, y, state, params):\n    calls.append(t)\n    return 0.001 * len(calls), state\n"
+    )
+    second = SINE.replace('"sine"', '"again"') + RMS.replace('"rms"', '"b"').replace('"sine"', '"again"')
+    first, again = grade_with_runs(made(HEAD + SINE + RMS + second), file(tmp_path, text), "ada", pool).runs
+    assert np.array_equal(first.result["X_command"], again.result["X_command"])
+
+
+def test_work_is_the_same_whenever_it_is_counted(made: Make, pool: Pool, tmp_path: Path) -> None:
+    text = RMS.replace('"rms"', '"work"').replace("rms-error", "work").replace('"mm"', '"events"')
+    assignment = made(HEAD + SINE + text.replace("full = 0.05", "full = 30").replace("none = 0.5", "none = 60"))
+    values = {grade(assignment, file(tmp_path, STATEFUL), "ada", pool).criteria[0].value for _ in range(2)}
+    assert len(values) == 1 and 5.0 < float(values.pop() or 0.0) < 30.0
+
+
+def test_another_secret_draws_other_plants(made: Make) -> None:
+    assignment = made(HEAD + SINE + RMS)
+    assert replace(assignment, secret="another secret").seed("ada") != assignment.seed("ada")

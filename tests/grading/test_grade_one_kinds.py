@@ -1,0 +1,133 @@
+"""Models, interpolators, functions and part programs, graded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rds
+from rds.grading.assignment import Assignment, read_assignment
+from rds.grading.grade import Grade, Status
+from rds.grading.grade_one import grade, grade_with_runs
+from rds.grading.sandbox import Pool
+from rds.grading.trusted import TrustedFiles
+from tests.grading.made import HEAD, RMS, assignment_in
+
+FRICTIONLESS = """
+params = {"tau": 9.943e-3, "K": 1.764}
+initial_state = [0.0, 0.0]
+
+def derivatives(t, x, u, params):
+    return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]
+"""
+SIGNAL = """
+[[case]]
+name = "square"
+axis = "X"
+duration = 2.0
+[case.signal]
+kind = "square"
+amplitude = 2.0
+frequency = 1.0
+[case.model]
+name = "linear-axis"
+friction_plus = 0.0
+friction_minus = 0.0
+"""
+FIT = """
+[[criterion]]
+name = "fit"
+kind = "model-fit"
+points = 10
+full = 99.9
+none = 0
+unit = "%"
+"""
+PART = "G21 G90 G61 G54\nF300\nG1 X5 Y0\nG3 X5 Y0 I-5 J0\nG1 X0 Y0\nM2\n"
+
+
+def both(assignment: Assignment, path: Path, pool: Pool) -> Grade:
+    """The grade in the sandbox, which must be that without it."""
+    found = grade(assignment, path, "ada", pool)
+    assert grade(assignment, path, "ada", TrustedFiles()).to_json() == found.to_json()
+    return found
+
+
+def test_a_model_s_free_run_on_data_that_it_has_not_seen(tmp_path: Path, pool: Pool) -> None:
+    head = HEAD.replace('"controller"', '"model"')
+    folder = assignment_in(tmp_path, head + SIGNAL + FIT, FRICTIONLESS)
+    exact = both(read_assignment(folder), folder / "solution.py", pool)
+    assert exact.score == 10.0 and exact.criteria[0].value == pytest.approx(100.0, abs=0.05)  # the encoder's counts
+    (folder / "half.py").write_text(FRICTIONLESS.replace("1.764", "0.882"))
+    half = both(read_assignment(folder), folder / "half.py", pool)
+    assert half.criteria[0].value is not None and half.criteria[0].value < 60.0
+
+
+def test_a_model_on_a_log_file(tmp_path: Path, pool: Pool) -> None:
+    axis = {"model": {"name": "linear-axis", "friction_plus": 0.0, "friction_minus": 0.0}}
+    signal = {"kind": "square", "amplitude": 2.0, "frequency": 1.0}
+    rds.Experiment(axis="X", duration=1.0, signal=signal, **axis).run().save(tmp_path / "log.csv")
+    (tmp_path / "log.json").unlink(missing_ok=True)
+    text = HEAD.replace('"controller"', '"model"') + '[[case]]\nname = "log"\nlog = "log.csv"\n' + FIT
+    folder = assignment_in(tmp_path, text, FRICTIONLESS)
+    found = both(read_assignment(folder), folder / "solution.py", pool)
+    assert found.score == 10.0
+
+
+def test_an_interpolator_is_measured_row_by_row(tmp_path: Path, pool: Pool) -> None:
+    text = HEAD.replace('"controller"', '"interpolator"') + (
+        '[[case]]\nname = "line"\nsample_period = 0.01\n'
+        '[case.segment]\nkind = "line"\nstart = [0.0, 0.0]\nend = [3.0, 4.0]\nfeed_rate = 10.0\n'
+        '[[criterion]]\nname = "end"\nkind = "end-point-error"\npoints = 1\nfull = 1e-9\nnone = 1.0\nunit = "mm"\n'
+        '[[criterion]]\nname = "work"\nkind = "work"\npoints = 1\nfull = 100\nnone = 1000\nunit = "events"\n'
+    )
+    method = (
+        "def interpolate(segment, T, params):\n    for k in range(1, 51):\n        yield (\n"
+        "            [0.06 * k, 0.08 * k], [6.0, 8.0], [0.0, 0.0]\n        )\n"
+    )
+    folder = assignment_in(tmp_path, text, method)
+    found = grade(read_assignment(folder), folder / "solution.py", "ada", pool)
+    assert found.score == 2.0 and found.status is Status.OK
+    assert found.criteria[1].value is not None and found.criteria[1].value < 20.0
+    (folder / "endless.py").write_text(method.replace("range(1, 51)", "iter(int, 1)"))
+    endless = grade(read_assignment(folder), folder / "endless.py", "ada", pool)
+    assert endless.status is Status.BROKE_CONTRACT and "no end" in endless.reason and endless.score == 0.0
+
+
+def test_functions_are_called_and_judged_here(tmp_path: Path, pool: Pool) -> None:
+    test = '[[criterion.test]]\nfunction = "{}"\nargs = {}\nexpected = {}\ntolerance = {}\n'
+    text = HEAD.replace('"controller"', '"functions"') + (
+        '[[criterion]]\nname = "tests"\nkind = "unit-tests"\npoints = 8\nfull = 100\nnone = 0\nunit = "%"\n'
+        + test.format("double", "[2.0]", "4.0", "1e-9")
+        + test.format("double", "[[1.0, 2.0]]", "[2.0, 4.0]", "1e-9")
+        + test.format("word", "[]", '"yes"', "0.0")
+        + test.format("truth", "[]", "true", "0.0")
+    )
+    equal = "class E:\n    def __eq__(self, other):\n        return True\n"
+    right = "import numpy as np\ndef double(x): return 2 * np.array(x)\ndef word(): return 'yes'\ndef truth(): return True\n"
+    folder = assignment_in(tmp_path, text, right)
+    assert both(read_assignment(folder), folder / "solution.py", pool).score == 8.0
+    (folder / "some.py").write_text("def double(x): return 2 * x\ndef word(): return 1 / 0\n")
+    assert both(read_assignment(folder), folder / "some.py", pool).score == 2.0  # a list twice is no doubled list
+    (folder / "cheat.py").write_text(equal + "def double(x): return E()\nword = truth = lambda: E()\n")
+    assert both(read_assignment(folder), folder / "cheat.py", pool).score == 0.0
+
+
+def test_a_part_program_on_coupled_axes_is_judged_by_its_contour(tmp_path: Path, pool: Pool) -> None:
+    law = (
+        "import numpy as np\ndef control(t, r, y, state, params):\n"
+        "    return 30.0 * (r.position - y) + 0.55 * np.asarray(r.velocity), state\n"
+    )
+    text = HEAD + '[[case]]\nname = "sine"\nprogram = "part.ngc"\ncoupled = true\n'
+    text += RMS.replace("rms-error", "contour-error") + RMS.replace('"rms"', '"max"').replace("rms-error", "max-error")
+    tmp_path.joinpath("part.ngc").write_text(PART)
+    folder = assignment_in(tmp_path, text, law)
+    found = grade_with_runs(read_assignment(folder), folder / "solution.py", "ada", pool)
+    (run,) = found.runs
+    assert found.grade.score == 20.0
+    assert run.result.meta["program"]["completed"] is True
+    assert found.grade.criteria[0].value == pytest.approx(run.result["contour_error"].max(), rel=1e-8)
+    assert 0.0 < run.result["contour_error"].max() < np.abs(run.result["X_reference"] - run.result["X_measured"]).max()
+    assert sorted(path.name for path in folder.iterdir()) == ["assignment.toml", "part.ngc", "solution.py"]

@@ -1,0 +1,106 @@
+"""Margins and poles measured from outside, beside those that are computed from the law's matrices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.load import load_student
+from rds.core.types import Model
+from rds.grading.assignment import Assignment, read_assignment
+from rds.grading.grade_one import Opened
+from rds.grading.linear import PULSE, LinearLoop, linear_loop
+from rds.grading.trusted import TrustedFiles
+from rds.models import library_model
+from rds.robustness.margins import linear_law, loop_margins
+from tests.grading.made import HEAD, RMS, SINE, assignment_in
+
+TEXT = HEAD + SINE.replace("duration = 1.0", "duration = 3.0\n{plant}") + RMS
+
+LAWS = {
+    "proportional": """
+def control(t, r, y, state, params):
+    return 20.0 * (r.position - y), state
+""",
+    "filtered derivative": """
+initial_state = [0.0, 0.0]
+
+def control(t, r, y, state, params):
+    last, slope = state
+    error = r.position - y
+    slope = slope + 0.2 * ((error - last) / 0.001 - slope)
+    return 30.0 * error + 0.3 * slope + 0.567 * r.velocity, [error, slope]
+""",
+    "integral": """
+initial_state = [0.0]
+
+def control(t, r, y, state, params):
+    error = r.position - y
+    total = state[0] + 0.001 * error
+    return 25.0 * error + 150.0 * total, [total]
+""",
+}
+
+
+def found_in(folder: Path, law: str, plant: str = "") -> tuple[LinearLoop | str, Assignment]:
+    assignment = read_assignment(assignment_in(folder, TEXT.replace("{plant}", plant), law))
+    opened = Opened(folder / "solution.py", assignment, TrustedFiles())
+    try:
+        linear = assignment.cases[0].run(opened, 1, 0, ("linear",)).linear
+    finally:
+        opened.close()
+    assert linear is not None
+    return linear, assignment
+
+
+@pytest.mark.parametrize("plant", ["", 'plant = "machine"'])
+@pytest.mark.parametrize("law", LAWS)
+def test_margins_from_outside_are_those_from_within(law: str, plant: str, tmp_path: Path) -> None:
+    found, assignment = found_in(tmp_path, LAWS[law], plant)
+    controller = load_student(tmp_path / "solution.py").controller()
+    matrices = linear_law(replace(controller, initial_state=[0.0] * len(controller.initial_state or ())))
+    assert isinstance(found, LinearLoop) and matrices is not None
+    model: Model = assignment.cases[0].plants[0].base  # type: ignore[attr-defined]
+    gain, phase, modulus, radius = loop_margins(matrices, [model], 0.001)[0]
+    assert found.margins[0] == pytest.approx(gain, abs=0.05)
+    assert found.margins[1] == pytest.approx(phase, abs=0.1)
+    assert found.margins[2] == pytest.approx(modulus, abs=2e-3)
+    assert abs(found.poles[0]) == pytest.approx(radius, abs=2e-5)
+
+
+def test_damping_of_proportional_control_is_that_of_its_second_order_loop(tmp_path: Path) -> None:
+    """tau s² + s + K Kp = 0: zeta = 1 / (2 sqrt(K Kp tau)), a little less for the sample's delay."""
+    found, _ = found_in(tmp_path, LAWS["proportional"])
+    assert isinstance(found, LinearLoop)
+    model = library_model("linear-axis", tau=9.943e-3, K=1.764)
+    zeta = 0.5 / np.sqrt(1.764 * 20.0 * model.params["tau"])
+    w = np.sqrt(1.764 * 20.0 / model.params["tau"])
+    assert found.least_damping == pytest.approx(zeta - 0.25 * w * 0.001, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "law, why",
+    [
+        ("def control(t, r, y, state, params):\n    return 1200.0 * (r.position - y), state\n", "not stable"),
+        ("def control(t, r, y, state, params):\n    return 0.5 * r.velocity, state\n", "no loop|not come to rest"),
+        (
+            "def control(t, r, y, state, params):\n    return (8.0 if y < r.position else -8.0), state\n",
+            "not answer in proportion|not come to rest",
+        ),
+    ],
+)
+def test_what_has_no_linear_loop_has_no_margins(law: str, why: str, tmp_path: Path) -> None:
+    import re
+
+    found, _ = found_in(tmp_path, law)
+    assert isinstance(found, str) and re.search(why, found), found
+
+
+def test_a_law_that_quantizes_what_it_sees_has_no_linear_loop() -> None:
+    time = np.arange(2000)
+    gone = np.exp(-time / 100.0)
+    runs = [(k * gone + (0.3 * np.sin(time) if k else 0.0), 0.01 * k * gone) for k in (0.0, PULSE, -2.0 * PULSE)]
+    assert "in proportion" in str(linear_loop(runs, 0.001))
