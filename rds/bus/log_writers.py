@@ -10,6 +10,7 @@ from typing import Any, Protocol, TextIO, cast
 import can
 
 from rds.bus.logs import asammdf_missing
+from rds.bus.mf4_later import bring_mf4
 
 _LEAST_EPOCH = 631152000.0  # s; BLF keeps no start before 1990
 
@@ -167,6 +168,7 @@ class _Mf4Writer:
     """MDF is put together in memory and written at the end."""
 
     def __init__(self, path: Path):
+        bring_mf4()
         try:
             self._writer = can.MF4Writer(path)
         except NotImplementedError as error:

@@ -33,6 +33,7 @@ from can.util import dlc2len
 
 from rds.bus import log_lock
 from rds.bus.log_lines import TEXT, Lines
+from rds.bus.mf4_later import bring_mf4
 from rds.core.errors import InputError
 
 ENDINGS = (".asc", ".blf", ".log", ".trc", ".csv", ".db", ".mf4")
@@ -126,6 +127,8 @@ class LogFile:
             from rds.bus.blf import check_containers
 
             check_containers(self.path)
+        elif self._ending == ".mf4":
+            bring_mf4()
         number = 0
         reader: Any = None
         try:

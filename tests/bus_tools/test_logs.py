@@ -118,6 +118,7 @@ def test_an_unknown_format_is_refused(name: str, tmp_path: Path) -> None:
 
 def test_mf4_without_its_package_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("can.io.mf4.asammdf", None)  # what python-can has where the package is missing
+    monkeypatch.setitem(sys.modules, "asammdf", None)  # what Python has
     with pytest.raises(InputError, match=r"a\.mf4: .*pip install asammdf"):
         LogWriter(tmp_path / "a.mf4")
     assert not list(tmp_path.iterdir())
@@ -134,6 +135,23 @@ def test_what_is_written_as_mf4_comes_back(tmp_path: Path) -> None:
     assert sorted(kept(message) for message in found) == expected
     with can.LogReader(tmp_path / "a.mf4") as reader:  # python-can's own way
         assert sum(not message.is_error_frame for message in reader) == len(expected)
+
+
+def test_nobody_waits_for_the_package_of_mf4_who_needs_it_not(tmp_path: Path) -> None:
+    """In a process of its own: what is imported stays."""
+    pytest.importorskip("asammdf", reason="MF4 needs the package asammdf: pip install asammdf")
+    script = """
+import sys
+from rds.bus.logs import LogFile, LogWriter
+import can
+assert not {"asammdf", "pandas"} & set(sys.modules)
+log = LogWriter(sys.argv[1])
+log.write(can.Message(arbitration_id=0x12, is_extended_id=False, data=b"abc", timestamp=1.0))
+log.close()
+assert "asammdf" in sys.modules
+assert [bytes(message.data) for message in LogFile(sys.argv[1])] == [b"abc"]
+"""
+    subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.mf4")], check=True)
 
 
 def test_there_is_no_such_log(tmp_path: Path) -> None:

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rds.bus.module import machine_parameters
 from rds.bus.oacs import pid
-from rds.bus.oacs.module_data import machine_parameters, read_modules
+from rds.bus.oacs.module_data import read_modules
 from rds.bus.oacs.pid import Memory, Tuning
 from rds.bus.oacs.plant import Plant
 from rds.bus.oacs.quadrature import Counter, Interrupts, decode, highest_rate, levels

@@ -1,0 +1,42 @@
+"""python-can without the wait for asammdf.
+
+`import can` imports asammdf where it is installed, and pandas with it: one and a half seconds in each process on a bus,
+for a kind of log that few of them touch. While python-can itself is being imported, asammdf is not to be found here;
+`bring_mf4` imports it for who reads or writes such a log.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+
+_WHAT, _WHILE = "asammdf", "can"
+
+
+class _NotYet(MetaPathFinder):
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        importing = getattr(getattr(sys.modules.get(_WHILE), "__spec__", None), "_initializing", False)
+        if name == _WHAT and importing:
+            raise ModuleNotFoundError(f"{_WHAT} is imported when an MF4 file is read or written", name=_WHAT)
+        return None
+
+
+def put_off_mf4() -> None:
+    """From now on `import can` does without asammdf, if it has not been imported yet."""
+    if not any(isinstance(finder, _NotYet) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _NotYet())
+
+
+def bring_mf4() -> None:
+    """Let python-can have asammdf, if it is installed: before an MF4 file is opened."""
+    import can.io.mf4
+
+    if can.io.mf4.asammdf is None and sys.modules.get(_WHAT, can) is not None:  # None: it is not to be had
+        # into the same module: the classes that python-can has registered look for their names there
+        importlib.reload(can.io.mf4)
