@@ -22,6 +22,7 @@ from rds.commands import (
     fault,
     fit,
     grade,
+    grade_export,
     grade_run,
     interpolate,
     modules,
@@ -63,6 +64,7 @@ app.command()(robustness.robustness)
 app.add_typer(design.app, name="design")
 app.add_typer(grade.app, name="grade")
 grade.app.command()(grade_run.run)
+grade.app.command()(grade_export.export)
 machine_app.command("from")(design.machine_from)
 
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]

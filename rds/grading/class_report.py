@@ -19,6 +19,7 @@ _SLOWEST = 5  # of the class that are listed
 _STYLE = f"""<style>
 .cards {{ display: flex; flex-wrap: wrap; gap: 1rem 2.5rem; }} .cards figure {{ margin: 0; max-width: 412px; }}
 figcaption {{ font-weight: 600; }} td, p {{ overflow-wrap: anywhere; }} td {{ max-width: 28rem; }}
+td.number {{ white-space: nowrap; }}
 {histogram.STYLE}</style>"""
 
 

@@ -1,0 +1,21 @@
+"""Gradebooks by name, one file each. A module has
+
+- `FILE`: what is written if nobody says otherwise, counted from the batch's folder: a file, or a folder without an end;
+- `export(finished, wanted) -> Exported`.
+
+`wanted` are `Wanted`; an option that a gradebook has no use for is refused by the module's `USES`.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from rds.core.registry import Registry
+
+GRADEBOOKS = Registry(
+    "gradebook",
+    MappingProxyType(
+        {name: f"rds.grading.exports.{name}" for name in ("nbgrader", "moodle", "canvas", "gradescope", "prairielearn")}
+    ),
+    own=False,
+)

@@ -1,0 +1,106 @@
+"""Moodle: the downloaded grading worksheet, or a downloaded gradebook, with the grades filled in.
+
+Moodle knows a participant by the worksheet's `Identifier`, a user of the gradebook by `ID number` or `Email address`.
+It refuses columns that it did not write, so none is added. Without a download there is a table of three columns to map
+by hand: `useridnumber`, `useremail` and the points.
+"""
+
+from __future__ import annotations
+
+from rds.core.errors import InputError
+from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source
+from rds.grading.exports.said import comment
+from rds.grading.finished import Finished
+from rds.grading.grade import Grade
+from rds.grading.grades_table import csv_text
+
+FILE = "moodle.csv"
+USES = ("gradebook", "column", "points")
+_WORKSHEET = ("Identifier", "Grade", "Last modified (grade)")
+_KEYS = (
+    Key("Identifier", lambda grade: platform(grade, "moodle", "id"), lambda cell: cell.rpartition(" ")[2]),
+    Key("ID number", lambda grade: [grade.student, *source(grade, "sid", "id")]),
+    Key("Email address", lambda grade: [*source(grade, "email"), grade.student]),
+    Key("Full name", lambda grade: [*source(grade, "name"), grade.student], letters),
+)
+
+
+def export(finished: Finished, wanted: Wanted) -> Exported:
+    """The filled-in file. InputError where it is neither a worksheet nor a gradebook of Moodle."""
+    wanted.refuse_all_but(USES, "moodle")
+    if wanted.gradebook is None:
+        return _plain(finished, wanted)
+    sheet = read_sheet(wanted.gradebook)
+    is_worksheet = all(sheet.at(name) is not None for name in _WORKSHEET)
+    if not is_worksheet and sheet.at("Email address") is None and sheet.at("ID number") is None:
+        raise InputError(
+            f"has neither the columns of a grading worksheet ({', '.join(_WORKSHEET)}) nor 'ID number' or 'Email "
+            "address' of a gradebook; download it in English, with comma as separator",
+            str(wanted.gradebook),
+        )
+    at = _column(sheet, finished, wanted, is_worksheet)
+    factor = scale(finished, wanted.points)
+    found, unmatched = find(finished.to_hand_on, sheet, _KEYS)
+    comments = sheet.at("Feedback comments")
+    for number, grade in found.items():
+        row = sheet.rows[number]
+        _check_points(finished, sheet, row, factor, wanted)
+        row[at] = scaled(grade.score, factor)
+        if comments is not None:
+            row[comments] = comment(grade)
+    return Exported({FILE: sheet.to_bytes()}, unmatched, students=len(found))
+
+
+def _column(sheet: Sheet, finished: Finished, wanted: Wanted, is_worksheet: bool) -> int:
+    """Where the points go. Moodle heads an assignment's column "Assignment: TITLE (Real)"."""
+    if is_worksheet and wanted.column is None:
+        at = sheet.at("Grade")
+        assert at is not None  # or it is no worksheet
+        return at
+    name = wanted.column or finished.title
+    alike = [i for i, text in enumerate(sheet.columns) if text.strip().casefold() == name.casefold()]
+    alike = alike or [
+        i
+        for i, text in enumerate(sheet.columns)
+        if text.partition(": ")[2].rpartition(" (")[0].strip().casefold() == name.casefold()
+    ]
+    if len(alike) != 1:
+        known = ", ".join(repr(text) for text in sheet.columns)
+        raise InputError(
+            f"{'several columns are' if alike else 'no column is'} called {name!r}; name one by --column. There are "
+            f"{known}",
+            str(wanted.gradebook),
+        )
+    return alike[0]
+
+
+def _check_points(finished: Finished, sheet: Sheet, row: list[str], factor: float, wanted: Wanted) -> None:
+    """Moodle refuses grades above its maximum."""
+    at = sheet.at("Maximum Grade")
+    if at is None or not row[at].strip():
+        return
+    try:
+        most = float(row[at].replace(",", "."))
+    except ValueError:
+        return
+    if abs(most - finished.max_score * factor) > 1e-6 * max(1.0, most):
+        raise InputError(
+            f"Maximum Grade is {most:g}, and full marks are {finished.max_score * factor:g} points; give --points "
+            f"{most:g} to have them scaled",
+            str(wanted.gradebook),
+        )
+
+
+def _plain(finished: Finished, wanted: Wanted) -> Exported:
+    factor = scale(finished, wanted.points)
+    rows = [_plain_row(grade, factor) for grade in finished.to_hand_on]
+    text = csv_text([["useridnumber", "useremail", wanted.column or finished.title], *rows])
+    note = "map useridnumber or useremail when Moodle asks; with --gradebook FILE the file fills in a download"
+    return Exported({FILE: text.encode()}, notes=(note,), students=len(rows))
+
+
+def _plain_row(grade: Grade, factor: float) -> list[str | float | None]:
+    emails = source(grade, "email") or ([grade.student] if "@" in grade.student else [])
+    numbers = source(grade, "sid") or ([] if "@" in grade.student else [grade.student])
+    return ["".join(numbers[:1]), "".join(emails[:1]), float(scaled(grade.score, factor))]

@@ -1,0 +1,66 @@
+"""nbgrader: the columns of its own export; or, with `--gradebook`, a grade cell per criterion in its database.
+
+The table has no columns for criteria (nbgrader's export plug-in has none), and is what other tools of nbgrader read.
+"""
+
+from __future__ import annotations
+
+from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.roster import source
+from rds.grading.finished import Finished
+from rds.grading.grade import Grade
+from rds.grading.grades_table import csv_text
+
+FILE = "nbgrader.csv"
+USES = ("gradebook", "column", "points")
+COLUMNS = (
+    "assignment",
+    "duedate",
+    "timestamp",
+    "student_id",
+    "last_name",
+    "first_name",
+    "email",
+    "raw_score",
+    "late_submission_penalty",
+    "score",
+    "max_score",
+)
+
+
+def export(finished: Finished, wanted: Wanted) -> Exported:
+    """`grades.csv`; or nothing but the changed database, if one is named."""
+    wanted.refuse_all_but(USES, "nbgrader")
+    if wanted.gradebook is not None:
+        from rds.grading.exports.nbgrader_gradebook import into_gradebook
+
+        return into_gradebook(finished, wanted)
+    factor = scale(finished, wanted.points)
+    rows = [_row(finished, grade, wanted.column or finished.title, factor) for grade in finished.to_hand_on]
+    text = csv_text([COLUMNS, *rows])
+    return Exported({FILE: text.encode()}, students=len(rows))
+
+
+def _row(finished: Finished, grade: Grade, assignment: str, factor: float) -> list[str | float | None]:
+    handed_in = finished.time(grade.student)
+    numbers = (grade.before_penalty, grade.before_penalty - grade.score, grade.score, grade.max_score)
+    email = source(grade, "email")
+    return [
+        assignment,
+        naive_utc(finished.due),
+        naive_utc(handed_in),
+        grade.student,
+        "",
+        "",
+        email[0] if email else "",
+        *(float(scaled(number, factor)) for number in numbers),
+    ]
+
+
+def naive_utc(time: object) -> str:
+    """A time as nbgrader keeps it, in UTC without saying so; empty where there is none."""
+    from datetime import UTC, datetime
+
+    if not isinstance(time, datetime):
+        return ""
+    return time.astimezone(UTC).replace(tzinfo=None, microsecond=0).isoformat(" ")

@@ -1,0 +1,128 @@
+"""Finding a student's line in a gradebook that the instructor has downloaded."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rds.core.errors import InputError
+from rds.grading.grade import Grade
+
+_LARGEST = 64 << 20  # bytes
+Row = list[str]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A gradebook as it was downloaded: headings and rows, each as long as the headings."""
+
+    columns: Row
+    rows: list[Row]
+    has_mark: bool  # whether it begins with a byte order mark
+
+    def at(self, column: str) -> int | None:
+        """The place of a column, whatever its capitals; None if there is none."""
+        names = [name.strip().casefold() for name in self.columns]
+        wanted = column.strip().casefold()
+        return names.index(wanted) if wanted in names else None
+
+    def to_bytes(self) -> bytes:
+        """As CSV, every cell as it is: it is the platform's own."""
+        stream = io.StringIO()
+        csv.writer(stream, lineterminator="\r\n").writerows([self.columns, *self.rows])
+        return stream.getvalue().encode("utf-8-sig" if self.has_mark else "utf-8")
+
+
+def read_sheet(path: Path) -> Sheet:
+    """The CSV file at `path`. InputError if it is none."""
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise InputError(f"has more than {_LARGEST} bytes; name the gradebook as it was downloaded", str(path))
+        data = path.read_bytes()
+        text = data.decode("utf-8-sig")
+        rows = [row for row in csv.reader(io.StringIO(text, newline=""), strict=True) if any(row)]
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}; name the gradebook's CSV file", str(path)) from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"is no CSV file in UTF-8 ({error}); download it once more", str(path)) from error
+    if not rows:
+        raise InputError("is empty; download it once more", str(path))
+    width = len(rows[0])
+    if any(len(row) > width and any(row[width:]) for row in rows):
+        raise InputError("has rows that are longer than its headings; download it once more", str(path))
+    return Sheet(rows[0], [(row + [""] * width)[:width] for row in rows[1:]], data.startswith(b"\xef\xbb\xbf"))
+
+
+@dataclass(frozen=True)
+class Key:
+    """One way to know a student: a column of the sheet, and what a grade says that must be there.
+
+    `of_row` changes a cell before it is compared; what is empty is never compared.
+    """
+
+    column: str
+    of_grade: Callable[[Grade], Iterable[str]]
+    of_row: Callable[[str], str] = str
+
+
+def find(grades: Sequence[Grade], sheet: Sheet, keys: Sequence[Key]) -> tuple[dict[int, Grade], dict[str, str]]:
+    """Grades by row of the sheet, and by student why there is no row for him.
+
+    The first key that finds a row decides. Several rows, or two students for one row, are never guessed at.
+    """
+    tables = [(key, _by_cell(sheet, key)) for key in keys if sheet.at(key.column) is not None]
+    found: dict[int, list[Grade]] = {}
+    unmatched: dict[str, str] = {}
+    for grade in grades:
+        rows, column = _rows_of(grade, tables)
+        if len(rows) == 1:
+            found.setdefault(rows[0], []).append(grade)
+        elif rows:
+            unmatched[grade.student] = f"{len(rows)} lines of the gradebook have the same {column}"
+        else:
+            unmatched[grade.student] = "no line of the gradebook is this student's"
+    for row, several in list(found.items()):
+        if len(several) > 1:
+            for grade in several:
+                others = ", ".join(other.student for other in several if other is not grade)
+                unmatched[grade.student] = f"the same line of the gradebook would be {others}'s"
+            del found[row]
+    return {row: several[0] for row, several in found.items()}, unmatched
+
+
+def _by_cell(sheet: Sheet, key: Key) -> Mapping[str, list[int]]:
+    at, table = sheet.at(key.column), {}  # type: tuple[int | None, dict[str, list[int]]]
+    assert at is not None  # by `find`
+    for number, row in enumerate(sheet.rows):
+        if value := key.of_row(row[at]).strip().casefold():
+            table.setdefault(value, []).append(number)
+    return table
+
+
+def _rows_of(grade: Grade, tables: Sequence[tuple[Key, Mapping[str, list[int]]]]) -> tuple[list[int], str]:
+    for key, table in tables:
+        for value in key.of_grade(grade):
+            if rows := table.get(key.of_row(value).strip().casefold()):
+                return rows, key.column
+    return [], ""
+
+
+def source(grade: Grade, *names: str) -> list[str]:
+    """What the export from which the submission came says of the student, where it does."""
+    about = grade.details.get("source")
+    if not isinstance(about, Mapping):
+        return []
+    return [str(about[name]) for name in names if about.get(name)]
+
+
+def platform(grade: Grade, name: str, *names: str) -> list[str]:
+    """As `source`, of submissions that came from the platform called `name`."""
+    return source(grade, *names) if source(grade, "platform") == [name] else []
+
+
+def letters(name: str) -> str:
+    """A name without what is written differently here and there: spaces, commas, capitals."""
+    return "".join(each for each in name.casefold() if each.isalnum())
