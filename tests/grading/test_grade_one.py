@@ -90,9 +90,7 @@ def test_a_case_of_several_axes_keeps_their_states_apart(made: Make, pool: Pool,
         assert np.array_equal(same[name], run.result[name]), name
 
 
-def test_the_same_file_has_the_same_grade_in_another_pool_and_without_one(
-    made: Make, pool: Pool, tmp_path: Path
-) -> None:
+def test_the_same_file_has_the_same_grade_in_every_pool_and_without_one(made: Make, pool: Pool, tmp_path: Path) -> None:
     assignment = made(HEAD + SINE + STEP + RMS)
     path = file(tmp_path, STATEFUL)
     first = grade(assignment, path, "ada", pool)
@@ -127,7 +125,7 @@ def test_noise_and_disturbance_are_the_parent_s(made: Make, tmp_path: Path) -> N
     noise = run.result["X_measured"] - run.result["X_actual"]
     assert noise.std() == pytest.approx(0.01, rel=0.1)
     assert not run.result["X_actual"][:500].any()  # at rest until the disturbance begins
-    assert run.result["X_actual"][501] > 0.0
+    assert run.result["X_actual"][520] > 0.0
     speed = np.diff(run.result["X_actual"][-100:]).mean() / 0.001
     assert speed == pytest.approx(1.764 * 2.0 - 0.539, rel=0.01)  # mm/s: K u - friction
     (again,) = grade_with_runs(assignment, quiet, "ada", TrustedFiles()).runs
@@ -135,7 +133,8 @@ def test_noise_and_disturbance_are_the_parent_s(made: Make, tmp_path: Path) -> N
 
 
 def test_a_fault_in_one_case_costs_that_case(made: Make, pool: Pool, tmp_path: Path) -> None:
-    text = "def control(t, r, y, state, params):\n    return (1 / 0 if r.position == 1.0 else r.velocity), state\n"
+    law = "    return (1 / 0 if r.position == 1.0 else 30 * (r.position - y)), state\n"
+    text = "def control(t, r, y, state, params):\n" + law
     found = grade(made(HEAD + STEP + SINE + RMS), file(tmp_path, text), "ada", pool)
     assert found.status is Status.BROKE_CONTRACT
     assert found.reason.startswith("case step: ") and "ZeroDivisionError" in found.reason
@@ -201,6 +200,7 @@ def test_what_it_prints_is_a_note(made: Make, pool: Pool, tmp_path: Path) -> Non
     assert found.status is Status.OK and "here I am" in found.notes[-1]
 
 
+@pytest.mark.filterwarnings("ignore:overflow")  # of the model, which is meant to
 def test_an_axis_that_runs_away_is_told(made: Make, tmp_path: Path) -> None:
     """The parent's own model diverges: no fault of the interface, and no value."""
     model = "def advance(x, u, T, params):\n    return [1e200 * (x[0] + 1e-9 * u), 0.0]\n"

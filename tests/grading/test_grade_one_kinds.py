@@ -59,7 +59,7 @@ def test_a_model_s_free_run_on_data_that_it_has_not_seen(tmp_path: Path, pool: P
     head = HEAD.replace('"controller"', '"model"')
     folder = assignment_in(tmp_path, head + SIGNAL + FIT, FRICTIONLESS)
     exact = both(read_assignment(folder), folder / "solution.py", pool)
-    assert exact.score == 10.0 and exact.criteria[0].value == pytest.approx(100.0, abs=0.05)  # the encoder's counts
+    assert exact.score == 10.0 and exact.criteria[0].value == pytest.approx(100.0, abs=0.1)  # the encoder's counts
     (folder / "half.py").write_text(FRICTIONLESS.replace("1.764", "0.882"))
     half = both(read_assignment(folder), folder / "half.py", pool)
     assert half.criteria[0].value is not None and half.criteria[0].value < 60.0
@@ -90,7 +90,7 @@ def test_an_interpolator_is_measured_row_by_row(tmp_path: Path, pool: Pool) -> N
     folder = assignment_in(tmp_path, text, method)
     found = grade(read_assignment(folder), folder / "solution.py", "ada", pool)
     assert found.score == 2.0 and found.status is Status.OK
-    assert found.criteria[1].value is not None and found.criteria[1].value < 20.0
+    assert found.criteria[1].value is not None and found.criteria[1].value < 30.0
     (folder / "endless.py").write_text(method.replace("range(1, 51)", "iter(int, 1)"))
     endless = grade(read_assignment(folder), folder / "endless.py", "ada", pool)
     assert endless.status is Status.BROKE_CONTRACT and "no end" in endless.reason and endless.score == 0.0
@@ -106,7 +106,8 @@ def test_functions_are_called_and_judged_here(tmp_path: Path, pool: Pool) -> Non
         + test.format("truth", "[]", "true", "0.0")
     )
     equal = "class E:\n    def __eq__(self, other):\n        return True\n"
-    right = "import numpy as np\ndef double(x): return 2 * np.array(x)\ndef word(): return 'yes'\ndef truth(): return True\n"
+    right = "import numpy as np\ndef double(x): return 2 * np.array(x)\ndef word(): return 'yes'\n"
+    right += "def truth(): return True\n"
     folder = assignment_in(tmp_path, text, right)
     assert both(read_assignment(folder), folder / "solution.py", pool).score == 8.0
     (folder / "some.py").write_text("def double(x): return 2 * x\ndef word(): return 1 / 0\n")
