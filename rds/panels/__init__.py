@@ -17,6 +17,9 @@ PANELS = Registry(
         "menu": "rds.panels.menu",
         "equipment-model": "rds.panels.equipment_model",
         "equipment-control": "rds.panels.equipment_control",
+        "design": "rds.panels.design",
+        "program": "rds.panels.program",
+        "drawing": "rds.panels.drawing",
         "help": "rds.panels.guide",
     },
 )

@@ -89,28 +89,34 @@ class Design:
             voltage_range=self.machine.converter.range,
         )
 
-    def move(self, name: str, place: complex) -> TrackingDesign:
-        """Put the pole called `name` ("pair", "first", "second", "observer") to `place`, 1/s, and give the design.
+    def preview(self, name: str, place: complex) -> TrackingDesign:
+        """The design with the pole called `name` ("pair", "first", "second", "observer") at `place`, 1/s.
 
-        InputError that says why it cannot be there; then nothing has moved.
+        InputError that says why it cannot be there. Nothing is chosen by it.
         """
-        chosen = self.choices
-        poles, observer = self.poles, float(chosen["observer"])
+        return self._placed(name, place)[0]
+
+    def move(self, name: str, place: complex) -> TrackingDesign:
+        """Choose that place for a pole, and give the design; InputError as `preview`, and then nothing has moved."""
+        made, values = self._placed(name, place)
+        for each, value in values.items():
+            self.choices.set(each, value)
+        return made
+
+    def _placed(self, name: str, place: complex) -> tuple[TrackingDesign, dict[str, float]]:
+        poles, observer = self.poles, float(self.choices["observer"])
+        values = {name: place.real}
         if name == PAIR:
             poles = complex(place.real, abs(place.imag)), complex(place.real, -abs(place.imag))
             values = {"real": place.real, "imaginary": abs(place.imag)}
         elif name in ("first", "second"):
             poles = (complex(place.real), poles[1]) if name == "first" else (poles[0], complex(place.real))
-            values = {name: place.real}
         elif name == "observer":
-            observer, values = place.real, {name: place.real}
+            observer = place.real
         else:
             raise InputError(f"there is no pole {name!r}; there are pair, first, second and observer")
         made = self.with_poles(poles, observer)
-        checked = {each: chosen.fields[each].check(value) for each, value in values.items()}
-        for each, value in checked.items():
-            chosen.set(each, value)
-        return made
+        return made, {each: self.choices.fields[each].check(value) for each, value in values.items()}
 
     def limit(self) -> np.ndarray:
         """Points (n, 2) of the bound of what this sample period can hold stable, upper half of the s-plane, 1/s."""

@@ -1,0 +1,119 @@
+"""The design panel in a browser: poles moved by mouse and by keyboard, what follows them, and the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from tests.panels.conftest import App
+
+
+def _numbers(page: Any) -> str:
+    return str(page.inner_text(".rds-splane-row .scroll"))
+
+
+def _value(page: Any, label: str) -> str:
+    field = page.locator(f'.rds-field:has(.rds-label:has-text("{label}")) input')
+    return str(field.input_value())
+
+
+def _type(page: Any, label: str, text: str) -> None:
+    field = page.locator(f'.rds-field:has(.rds-label:has-text("{label}")) input')
+    field.fill(text)
+    field.press("Enter")
+
+
+def _ready(page: Any) -> Any:
+    pole = page.locator('.rds-splane-pole[tabindex="0"]').first
+    pole.wait_for()
+    page.wait_for_function("document.querySelectorAll('.rds-curves svg').length == 6")
+    return pole
+
+
+def test_a_pole_is_dragged_with_the_mouse_and_the_design_follows(open_page: Callable[..., Any]) -> None:
+    page = open_page("Design")
+    pole = _ready(page)
+    assert "1600" in _numbers(page)
+    box = pole.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 60, y - 20, steps=6)
+    page.wait_for_function("!document.querySelector('.rds-splane-row .scroll').innerText.includes('1600')")
+    page.mouse.up()
+    page.wait_for_function("""() => {
+        const label = [...document.querySelectorAll('.rds-label')].find((each) => each.innerText.includes('Real part'));
+        return parseFloat(label.closest('.rds-field').querySelector('input').value) < -35;
+    }""")
+    real, imaginary = float(_value(page, "Real part")), float(_value(page, "Imaginary part"))
+    assert imaginary > 24.0
+    shown = re.search(r"g₁\s+(\S+)", _numbers(page))
+    assert shown is not None and abs(float(shown[1]) / (real**2 + imaginary**2) - 1.0) < 1e-3
+    page.wait_for_selector('.rds-main:has-text("axes drawn from the ranges")')
+
+
+def test_a_pole_is_moved_with_the_keys(open_page: Callable[..., Any]) -> None:
+    page = open_page("Design")
+    pole = _ready(page)
+    _type(page, "Real part", "-32")
+    _type(page, "Imaginary part", "24")
+    page.wait_for_selector('.rds-splane-row .scroll:has-text("1600")')
+    pole = page.locator('.rds-splane-pole[tabindex="0"]').first
+    assert pole.get_attribute("role") == "slider" and pole.get_attribute("aria-label") == "pair of poles"
+    pole.focus()
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_selector('[aria-valuetext="-33.00 ± 24.00 i, 1/s"]')
+    page.keyboard.press("Shift+ArrowUp")  # the pole has kept the focus
+    page.wait_for_selector('[aria-valuetext="-33.00 ± 34.00 i, 1/s"]')
+    page.wait_for_selector(f'.rds-splane-row .scroll:has-text("{33**2 + 34**2}")')
+    assert _value(page, "Real part") == "-33" and _value(page, "Imaginary part") == "34"
+
+
+def test_a_place_that_is_not_stable_is_refused_with_the_reason(open_page: Callable[..., Any]) -> None:
+    page = open_page("Design")
+    pole = _ready(page)
+    _type(page, "Real part", "-5")
+    page.wait_for_selector('[aria-valuetext^="-5.000 ±"]')
+    pole = page.locator('.rds-splane-pole[tabindex="0"]').first
+    pole.focus()
+    page.keyboard.press("Shift+ArrowRight")
+    page.wait_for_selector('.rds-notice-error:has-text("its real part must be less than 0")')
+    page.wait_for_selector('[aria-valuetext^="-5.000 ±"]')
+    assert _value(page, "Real part") == "-5"
+    _type(page, "Real part", "7")
+    page.wait_for_selector('.rds-refusal:has-text("from -100000 to -0.1 1/s")')
+    _type(page, "Real part", "-5")
+    _type(page, "Imaginary part", "3000")
+    page.wait_for_selector('.rds-notice-error:has-text("make the sampled loop unstable")')
+    assert page.locator('button:text-is("Write the file")').is_disabled()
+    _type(page, "Imaginary part", "24")
+    page.wait_for_selector(".rds-splane-row .scroll")
+
+
+def test_the_file_is_written_checked_asked_about_and_tried(open_page: Callable[..., Any], app: App) -> None:
+    page = open_page("Design")
+    _ready(page)
+    _type(page, "File", "dragged.py")
+    page.click('button:text-is("Write the file")')
+    page.wait_for_selector('.rds-notice-good:has-text("dragged.py: the controller keeps its interface")')
+    first = (app.folder / "dragged.py").read_text()
+    _type(page, "Real part", "-45")
+    page.wait_for_selector('[aria-valuetext^="-45.00"]')
+    page.click('button:text-is("Write the file")')
+    page.wait_for_selector('.rds-notice-error:has-text("is there already")')
+    assert (app.folder / "dragged.py").read_text() == first
+    page.click('button:text-is("Replace it")')
+    page.wait_for_selector('.rds-notice-good:has-text("wrote dragged.py")')
+    assert (app.folder / "dragged.py").read_text() != first
+    page.click('button:text-is("Try it")')
+    page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
+    page.wait_for_function("[...document.querySelectorAll('input')].some((each) => each.value == 'dragged.py')")
+
+
+def test_design_fits_the_screen_in_the_dark(open_page: Callable[..., Any]) -> None:
+    page = open_page("Design")
+    page.click('button:text-is("Dark")')
+    _ready(page)
+    page.wait_for_selector('.rds-main:has-text("axes drawn from the ranges")')
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
