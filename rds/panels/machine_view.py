@@ -34,7 +34,7 @@ class MachineView:
         self._plot = k3d.plot(
             height=340, camera_auto_fit=False, menu_visibility=False, grid_visible=False, axes=["X", "Y", "Z"]
         )
-        self._plot += _box_lines(self._low, self._high)
+        self._plot += box_lines(self._low, self._high)
         self._table = _solid((0.5 * size, 0.5 * size, 0.04 * size), _TABLE)
         self._head = _solid((0.14 * size, 0.14 * size, 0.3 * size), _HEAD)
         self._tool = _solid((0.09 * size, 0.025 * size, 0.16 * size), _TOOL)
@@ -89,7 +89,7 @@ def _corners(low: Any, high: Any) -> np.ndarray:
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
-def _box_lines(low: np.ndarray, high: np.ndarray) -> Any:
+def box_lines(low: np.ndarray, high: np.ndarray) -> Any:
     """The travel of all axes."""
     corners = _corners(low, high).astype(np.float32)
     return k3d.lines(corners, np.array(_EDGES, dtype=np.uint32), indices_type="segment", color=_FRAME, shader="simple")

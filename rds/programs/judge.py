@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ _LINEAR = AXES[:3]
 def judged(result: Result, prepared: Prepared) -> Result:
     """The result with the column `contour_error` (mm; 0 on the way home) and with `meta["program"]`."""
     state = result["program_state"].astype(int)
-    error, line = _contour(result, prepared, state)
+    error, line = contour(result, prepared, state)
     columns = dict(result.columns)
     units = dict(result.units)
     columns["contour_error"], units["contour_error"] = error, "mm"
@@ -72,13 +73,18 @@ def worst_lines(result: Result, column: np.ndarray, count: int = 5) -> list[tupl
     return sorted(found, key=lambda entry: -entry[1])[:count]
 
 
-def _contour(result: Result, prepared: Prepared, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of each measured position to the path, and the program line that it is nearest to."""
+def contour(
+    result: Result | Mapping[str, np.ndarray], prepared: Prepared, state: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (mm) of each measured position to the path, and the program line that it is nearest to.
+
+    `result` may be some of a run's rows, as columns; `state` is its `program_state`, as integers.
+    """
     path, axes = prepared.path, prepared.program.axes
     line = result["program_line"].astype(int)
     if not len(path):
-        return np.zeros(len(result)), line
-    points, wanted = np.zeros((len(result), 3)), np.zeros((len(result), 3))
+        return np.zeros(len(line)), line
+    points, wanted = np.zeros((len(line), 3)), np.zeros((len(line), 3))
     for i, name in enumerate(_LINEAR):
         if name in axes:
             points[:, i], wanted[:, i] = result[f"{name}_measured"], result[f"{name}_reference"]
@@ -90,7 +96,7 @@ def _contour(result: Result, prepared: Prepared, state: np.ndarray) -> tuple[np.
     corner = float(np.where(np.isfinite(given), given, TOLERANCE).max(initial=0.0))
     reach = np.linalg.norm(points - wanted, axis=1) + corner + 1e-3
     on_path = state != State.HOME
-    error = np.zeros(len(result))
+    error = np.zeros(len(line))
     error[on_path], nearest = contour_error(points[on_path], path, prepared.segment[row][on_path], reach[on_path])
     line = line.copy()
     line[on_path] = path["line"][nearest]

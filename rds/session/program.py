@@ -11,6 +11,7 @@ from rds.machines import load_machine
 from rds.session.build import Builds
 from rds.session.choices import Choices
 from rds.session.fields import Choice, Field, Flag, Number, Text
+from rds.session.latest import Latest
 from rds.session.program_text import ProgramText, check_name, programs
 from rds.session.session import Session
 from rds.session.task import Task
@@ -47,8 +48,15 @@ def _fields(folder: Path) -> Iterable[Field]:
         "tracking or my_controller.py",
         120,
     )
-    yield Number("override", "Feed override", "of the programmed feed, for a run's start and while it runs; rapids only "
-                 "get slower", 100.0, unit="%", low=0.0, high=200.0)
+    yield Number(
+        "override",
+        "Feed override",
+        "of the programmed feed, for a run's start and while it runs; rapids only get slower",
+        100.0,
+        unit="%",
+        low=0.0,
+        high=200.0,
+    )
     yield Flag("optional_stop", "Stop at M1", "whether M1 waits for Resume", True)
     yield Flag("block_delete", "Leave out / blocks", "whether blocks that begin with / are left out", False)
 
@@ -59,7 +67,9 @@ def _table_field(folder: Path) -> Choice:
     except OSError:
         found = []
     options = {NO_TABLE: "none"} | {name: name for name in found}
-    return Choice("tools", "Tool table", "a .tbl file of your folder, as LinuxCNC keeps it, lengths in mm", NO_TABLE, options)
+    return Choice(
+        "tools", "Tool table", "a .tbl file of your folder, as LinuxCNC keeps it, lengths in mm", NO_TABLE, options
+    )
 
 
 class Program:
@@ -71,8 +81,7 @@ class Program:
         self.choices = program_choices(session)
         self.builds = Builds()
         self.latest: Look | None = None
-        self._task: Task[Look] | None = None
-        self._again = True
+        self._looks = Latest(self._begin)
         self.trouble = ""  # why the file that was chosen is not open
         self.text = self._opened()
         self.choices.watch(self._chosen)
@@ -124,39 +133,57 @@ class Program:
             self.text.edit(text)
             self.look_again()
 
+    def save(self) -> None:
+        """Write the file; InputError where it was changed by somebody else, or cannot be written."""
+        self.text.save()
+        if self.looking:  # the draft that is being read has gone
+            self.look_again()
+
+    def discard(self) -> None:
+        """Give up what is not saved."""
+        self.text.discard()
+        self.look_again()
+
     def save_as(self, name: str) -> None:
         """Save under another name, which is open then; InputError if there is such a file."""
         other = self.text.save_as(name.strip())
         self.text.draft.unlink(missing_ok=True)
         self.choices.set("file", other.name)
 
+    def follow_disk(self) -> bool:
+        """Read the file again where somebody else wrote it and nothing here is unsaved; whether that was so."""
+        if self.text.changed or not self.text.replaced:
+            return False
+        try:
+            self.text = ProgramText(self.session.folder, self.text.name)
+        except InputError as error:
+            self.text.accept()
+            self.session.say(f"{self.text.name} was replaced by what cannot be edited here: {error}", "warning")
+            return False
+        self.look_again()
+        return True
+
     # looking at it
 
     def look_again(self) -> None:
         """Text or setting has changed: what was found does not hold any more."""
-        self._again = True
-        if self._task is not None and not self._task.done:
-            self._task.stop()
+        self._looks.again()
 
     @property
     def looking(self) -> bool:
         """Whether `latest` is not yet of the text as it is."""
-        return self._again or self._task is not None
+        return self._looks.going_on
 
     def tick(self) -> Look | None:
         """Ten times a second: begin to look where something has changed; what was found, once, when it is there."""
-        task = self._task
-        if task is not None and task.done:
-            self._task = None
-            if task.error is None and not self._again:
-                self.latest = task.result
-                return task.result
-            if task.error is not None and not task.stopped:
-                self.session.say(f"the check failed: {task.error}", "error")
-        if self._task is None and self._again:
-            self._again = False
-            self._task = self._begin()
-        return None
+        task = self._looks.tick()
+        if task is None:
+            return None
+        if task.error is not None:
+            self.session.say(f"the check failed: {task.error}", "error")
+            return None
+        self.latest = task.result
+        return task.result
 
     def _begin(self) -> Task[Look]:
         text, setup, machine = self.text, self.setup(), self.machine
@@ -164,7 +191,7 @@ class Program:
         def work(task: Task[Look]) -> Look:
             from rds.session.program_check import look
 
-            return look(task, text.source, text.name, machine, setup)
+            return look(task, text.on_disk(), text.name, machine, setup)
 
         return self.session.work(f"check {text.name}", work)
 
@@ -203,7 +230,7 @@ class Program:
                 "experiment.toml` with its [bus] does"
             )
         if self.text.changed:
-            self.text.save()
+            self.save()
         changes = [(0.0, "override", share)] if share != 1.0 else []
         changes += [] if self.choices["optional_stop"] else [(0.0, "optional_stop", 0.0)]
         prepare = (lambda: self.builds.require(files, self.machine.sample_period)) if files else None

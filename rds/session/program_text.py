@@ -64,6 +64,7 @@ class ProgramText:
         self._open()
 
     def _open(self) -> None:
+        self._stamp = _stamp(self.path)
         saved, draft = _read(self.path), _read(self.draft)
         self._digest = _digest(saved)
         self._saved = saved
@@ -79,10 +80,22 @@ class ProgramText:
         """Whether something here is not saved."""
         return self.text != self._saved
 
+    def on_disk(self) -> Path:
+        """A file that holds the text as it is now: the program itself, or its draft, written if there is none yet."""
+        if not self.changed:
+            return self.path
+        if not self.draft.exists():
+            write_whole(self.draft, _data(self.text))
+        return self.draft
+
     @property
-    def source(self) -> Path:
-        """The file that has the text as it is now: the draft, or the program itself."""
-        return self.draft if self.changed else self.path
+    def replaced(self) -> bool:
+        """Whether somebody else has written the file since it was read or saved here."""
+        return _stamp(self.path) != self._stamp
+
+    def accept(self) -> None:
+        """Say no more that the file was replaced, as it is now."""
+        self._stamp = _stamp(self.path)
 
     def edit(self, text: str) -> None:
         """Take the text, and keep it as a draft; InputError where it is too long or the draft cannot be written."""
@@ -104,7 +117,7 @@ class ProgramText:
                 "discard your changes to see the other's"
             )
         write_whole(self.path, _data(self.text))
-        self._saved, self._digest = self.text, _digest(self.text)
+        self._saved, self._digest, self._stamp = self.text, _digest(self.text), _stamp(self.path)
         self.draft.unlink(missing_ok=True)
 
     def save_as(self, name: str) -> ProgramText:
@@ -120,6 +133,14 @@ class ProgramText:
         """Give the draft up: the text is the file's, as it is on disk now."""
         self.draft.unlink(missing_ok=True)
         self._open()
+
+
+def _stamp(path: Path) -> tuple[int, int] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
 
 
 def _data(text: str) -> bytes:

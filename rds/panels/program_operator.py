@@ -1,0 +1,83 @@
+"""An operator's hand on a program: run, hold, resume, home, stop, and the override of the feed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.core.errors import InputError
+from rds.panels.kit.field import FieldView
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.work_bar import WorkBar
+from rds.session.choices import Choices
+from rds.session.program_run import ProgramWork
+
+_STEP = 5  # % of the override's slider
+
+
+class Operator:
+    """A row of buttons. `run()` is called for Run; `work` is what they act on, None when nothing runs."""
+
+    def __init__(self, shell: Any, choices: Choices, notice: Notice, run: Callable[[], None]):
+        self._choices, self._notice = choices, notice
+        self.work: ProgramWork | None = None
+        self.bar = WorkBar(shell.ticker)
+        self.run_button = _button("Run", "Save the program and run it in the mode chosen", run, "primary")
+        self.hold_button = _button("Hold", "Come to rest on the path", lambda: self._do(lambda work: work.hold()))
+        self.resume_button = _button(
+            "Resume", "Go on after a hold, M0, M1 or a tool change", lambda: self._do(lambda work: work.resume())
+        )
+        self.home_button = _button(
+            "Home", "End the program where it is, go up and move home", lambda: self._do(lambda work: work.home())
+        )
+        field = choices.fields["override"]
+        self.override = widgets.IntSlider(
+            int(choices["override"]),
+            0,
+            200,
+            _STEP,
+            description="Override [%]",
+            tooltip=f"{field.tooltip} (0 to 200 %); arrow keys change it",
+            style={"description_width": "90px"},
+        )
+        self.override.observe(self._overridden, "value")
+        buttons = [self.run_button, self.hold_button, self.resume_button, self.home_button]
+        self.mode = FieldView(choices, "mode")
+        self.mode.add_class("rds-program-mode")
+        self.widget = widgets.HBox([self.mode, *buttons, self.override, self.bar])
+        self.widget.add_class("rds-row")
+        self.enable()
+
+    def enable(self) -> None:
+        """Only what has a sense now can be pressed."""
+        work = self.work
+        operable = work is not None and work.operable
+        self.run_button.disabled = work is not None
+        held = operable and work is not None and work.held
+        status = work.status() if operable and work is not None else None
+        waits = status is not None and status.state.name in ("STOP", "TOOL")
+        self.hold_button.disabled = not operable or held
+        self.resume_button.disabled = not (held or waits)
+        self.home_button.disabled = not operable
+
+    def _do(self, act: Callable[[ProgramWork], None]) -> None:
+        if self.work is None:
+            return
+        try:
+            act(self.work)
+        except InputError as error:
+            self._notice.say(str(error), "error")
+        self.enable()
+
+    def _overridden(self, change: Any) -> None:
+        self._choices.set("override", change["new"])
+        if self.work is not None and self.work.operable:
+            self._do(lambda work: work.override(change["new"] / 100.0))
+
+
+def _button(text: str, tip: str, act: Callable[[], None], style: str = "") -> widgets.Button:
+    button = widgets.Button(description=text, tooltip=tip, button_style=style)
+    button.on_click(lambda _: act())
+    return button

@@ -1,0 +1,58 @@
+"""What came of a program's run: where it is worst, by line; its path as measured; where its files are."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.panels.kit.figure import FigureView
+from rds.results import html
+from rds.session.program_run import ProgramWork
+
+_EMPTY = "<p>No result yet: press Run.</p>"
+
+
+class ProgramResult:
+    """`show(work)` when the loop is over, `saved(work)` when its files are there, `clear()` before the next run."""
+
+    def __init__(self, shell: Any):
+        self._shell = shell
+        self.words = widgets.HTML(_EMPTY)
+        self.where = widgets.HTML()
+        self.path, self.along = FigureView(), FigureView()
+        self.widget = widgets.VBox([self.words, self.where, self.path, self.along])
+
+    def show(self, work: ProgramWork) -> None:
+        """Sentences, the worst lines, and pictures."""
+        from rds.programs.pictures import along, path
+        from rds.programs.report import program_report
+
+        result, prepared = work.result, work.prepared
+        if result is None or prepared is None:
+            return
+        report = program_report(result, prepared)
+        found = "".join(f"<p>{escape(sentence)}</p>" for sentence in report.findings)
+        tables = "".join(
+            html.table(each.columns, each.shown(), each.title, each.note)
+            for each in (*report.tables[1:], report.tables[0])
+        )
+        self.words.value = html.verdict_line(result, "Timing") + found + tables
+        self.where.value = "<p>its files are being written …</p>"
+        session, ticker = self._shell.session, self._shell.ticker
+        self.path.draw(session, ticker, lambda: path(result, prepared))
+        self.along.draw(session, ticker, lambda: along(result, prepared))
+
+    def saved(self, work: ProgramWork) -> None:
+        """Its files are written."""
+        self.where.value = (
+            f"<p>Saved in <code>{escape(str(work.folder))}</code>: <code>program.html</code> is the report, "
+            "<code>result.csv</code> all samples.</p>"
+        )
+
+    def clear(self) -> None:
+        """Nothing to show."""
+        self.words.value, self.where.value = _EMPTY, ""
+        self.path.clear()
+        self.along.clear()

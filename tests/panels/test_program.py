@@ -1,0 +1,118 @@
+"""The program panel in a browser: faults at their words, preview, a run with an operator's hand on it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.panels.conftest import App
+
+EDITOR = ".rds-editor textarea"
+VALID = '.rds-verdict .rds-notice-good:has-text("the machine can run it")'
+
+
+def lines(*middle: str) -> str:
+    return "\n".join(("G21 G90 G94", *middle, "M2", ""))
+
+
+def opened(open_page: Callable[..., Any]) -> Any:
+    """The panel, once it has looked at whatever an earlier test has left in the editor."""
+    page = open_page("Program")
+    page.wait_for_selector(".rds-verdict .rds-notice-good, .rds-verdict .rds-notice-error")
+    return page
+
+
+def write(page: Any, text: str) -> None:
+    page.fill(EDITOR, text)
+
+
+def test_a_fault_is_marked_at_its_word_and_the_mark_goes_when_it_is_mended(open_page: Callable[..., Any]) -> None:
+    page = opened(open_page)
+    write(page, lines("G1 X10 Q5 F300"))
+    word = page.locator(".rds-editor-word.rds-editor-error")
+    word.wait_for()
+    assert word.get_attribute("data-word") == "Q5"
+    assert "nothing on the line uses Q" in page.inner_text(".rds-editor-list button")
+    box, area = word.bounding_box(), page.locator(EDITOR).bounding_box()
+    assert box["y"] - area["y"] == pytest.approx(4 + 19, abs=2)  # line 2, below the padding
+    page.click('button:text-is("Run")')
+    page.wait_for_selector('.rds-notice:has-text("it cannot run yet: 1 fault; line 2")')
+    write(page, lines("G1 X10 F300"))
+    page.wait_for_selector(VALID)
+    assert word.count() == 0 and page.locator(".rds-editor-list button").count() == 0
+
+
+def test_what_leaves_the_travel_is_crossed_in_the_preview(open_page: Callable[..., Any]) -> None:
+    page = opened(open_page)
+    write(page, lines("G1 X90 F300"))
+    page.wait_for_selector('.rds-verdict .rds-notice-error:has-text("beyond its travel")')
+    page.wait_for_function("Number(document.querySelector('.rds-path').dataset.beyond) > 0")
+    for side in ("YZ", "ZX", "XY"):
+        page.click(f'.rds-path-bar button:text-is("{side}")')
+        page.wait_for_selector(f'.rds-path canvas[aria-label^="{side} view"]')
+    page.click('button:text-is("In space (3-D)")')
+    page.wait_for_selector(".k3d-target canvas")
+
+
+def test_a_text_that_was_not_saved_is_there_after_a_reload(open_page: Callable[..., Any], app: App) -> None:
+    page = opened(open_page)
+    write(page, lines("(unsaved words)", "G0 X1"))
+    page.wait_for_selector('.rds-program :text("● ")')
+    page.wait_for_selector(VALID)
+    page.wait_for_timeout(500)
+    again = open_page("Program")
+    again.wait_for_function("document.querySelector('.rds-editor textarea').value.includes('unsaved words')")
+    again.fill(".rds-program-name input", "kept.ngc")
+    again.press(".rds-program-name input", "Tab")
+    again.click('button:text-is("Save as")')
+    again.wait_for_selector('.rds-program :text("✔ saved")')
+    assert "unsaved words" in (app.folder / "kept.ngc").read_text()
+
+
+def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(open_page: Callable[..., Any]) -> None:
+    page = opened(open_page)
+    write(page, lines("G1 X30 F120", "X0", "X30"))
+    page.wait_for_selector(VALID)
+    page.click('button:text-is("Emulation")')
+    page.click('button:text-is("Run")')
+    page.wait_for_selector('.rds-state:has-text("Line 2 runs")')
+    page.wait_for_selector('.rds-editor[data-running="2"]')
+    page.click('button:text-is("Hold")')
+    page.wait_for_selector('.rds-state:has-text("Line 2 held")')
+    held = page.inner_text(".rds-positions")
+    page.wait_for_timeout(400)
+    assert page.inner_text(".rds-positions") == held
+    page.click('button:text-is("Resume")')
+    page.wait_for_selector('.rds-state:has-text("Line 2 runs")')
+    slider = page.locator('.rds-program [role="slider"]').first
+    for _ in range(20):
+        slider.press("ArrowRight")
+    page.wait_for_selector('.rds-state:has-text("override 200 %")')
+    page.wait_for_function("Number(/Feed (\\d+)/.exec(document.querySelectorAll('.rds-state')[1].innerText)[1]) > 200")
+    page.click('.rds-work button:text-is("Stop")')
+    page.wait_for_selector('.rds-notice:has-text("ended early: stopped in line")')
+    page.wait_for_selector('.rds-main :text("Where the contour error is largest")')
+    page.wait_for_selector('.rds-main :text("Saved in")')
+    assert re.search(r"override\s+1\s+2|override\s+1\s+", page.inner_text(".rds-main"))
+
+
+def test_nothing_is_cut_off_at_1280_by_800(open_page: Callable[..., Any]) -> None:
+    page = opened(open_page)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
+    page.click('button:text-is("Dark")')
+    page.wait_for_selector(".rds-app.rds-dark")
+
+
+def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], app: App) -> None:
+    page = opened(open_page)
+    write(page, lines("G1 X3 F300", "Y3"))
+    page.wait_for_selector(VALID)
+    page.click('button:text-is("Simulation")')
+    page.click('button:text-is("Run")')
+    page.wait_for_selector('.rds-main :text("Saved in")')
+    found = [each for each in Path(app.folder / "runs").iterdir() if (each / "program.html").is_file()]
+    assert found
