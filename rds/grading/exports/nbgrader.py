@@ -6,7 +6,7 @@ The table has no columns for criteria (nbgrader's export plug-in has none), and 
 from __future__ import annotations
 
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.roster import source
+from rds.grading.exports.roster import platform, source
 from rds.grading.finished import Finished
 from rds.grading.grade import Grade
 from rds.grading.grades_table import csv_text
@@ -35,10 +35,16 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
         from rds.grading.exports.nbgrader_gradebook import into_gradebook
 
         return into_gradebook(finished, wanted)
-    factor = scale(finished, wanted.points)
-    rows = [_row(finished, grade, wanted.column or finished.title, factor) for grade in finished.to_hand_on]
+    name, factor = assignment_name(finished, wanted), scale(finished, wanted.points)
+    rows = [_row(finished, grade, name, factor) for grade in finished.to_hand_on]
     text = csv_text([COLUMNS, *rows])
     return Exported({FILE: text.encode()}, students=len(rows))
+
+
+def assignment_name(finished: Finished, wanted: Wanted) -> str:
+    """The instructor's word, else the name in nbgrader's folders from which the submissions came, else the title."""
+    names = {name for grade in finished.grades for name in platform(grade, "nbgrader", "assignment")}
+    return wanted.column or (names.pop() if len(names) == 1 else finished.title)
 
 
 def _row(finished: Finished, grade: Grade, assignment: str, factor: float) -> list[str | float | None]:

@@ -6,12 +6,13 @@ there, and touches nothing else.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.nbgrader import naive_utc
+from rds.grading.exports.nbgrader import assignment_name, naive_utc
 from rds.grading.finished import Finished
 from rds.grading.grade import Grade
 from rds.grading.grades_table import criteria_of
@@ -20,8 +21,9 @@ NOTEBOOK = "rds"
 
 
 def into_gradebook(finished: Finished, wanted: Wanted) -> Exported:
-    """Write the grades into the database `wanted.gradebook`, under the assignment `wanted.column` (default: the title).
+    """Write the grades into the database `wanted.gradebook`, under the assignment `wanted.column`.
 
+    By default that is called as in nbgrader's folders, else by the title.
     A database with students keeps to them: others are named as unmatched. One without gets all. InputError where
     nbgrader is not installed in this Python, or refuses.
     """
@@ -33,11 +35,13 @@ def into_gradebook(finished: Finished, wanted: Wanted) -> Exported:
             "out, and get a table"
         ) from error
     path = Path(str(wanted.gradebook)).resolve()
-    if not path.parent.is_dir():
-        raise InputError("its folder is not there; name the gradebook.db of your course", str(path))
+    if not path.is_file():
+        raise InputError("is not there; name the gradebook.db of your course", str(path))
     try:
-        with Gradebook(f"sqlite:///{path}") as gradebook:
-            return _write(gradebook, finished, wanted)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", module=r"nbgrader\.api")  # its own use of its database
+            with Gradebook(f"sqlite:///{path}") as gradebook:
+                return _write(gradebook, finished, wanted)
     except InputError:
         raise
     except Exception as error:  # of the database, whatever library it comes from
@@ -45,7 +49,7 @@ def into_gradebook(finished: Finished, wanted: Wanted) -> Exported:
 
 
 def _write(gradebook: Any, finished: Finished, wanted: Wanted) -> Exported:
-    name, factor = wanted.column or finished.title, scale(finished, wanted.points)
+    name, factor = assignment_name(finished, wanted), scale(finished, wanted.points)
     due = naive_utc(finished.due)
     gradebook.update_or_create_assignment(name, **({"duedate": due} if due else {}))
     gradebook.update_or_create_notebook(NOTEBOOK, name)
