@@ -27,6 +27,7 @@ from rds.grading.sandbox.limits import Limits
 from rds.grading.unit_tests import share_passed
 
 _LONGEST_OUTPUT = 4000  # characters of what it printed, in the notes
+_HIDDEN = "in a case that is hidden"
 
 
 class Opener(Protocol):
@@ -112,12 +113,8 @@ def grade_with_runs(
     path = Path(path)
     seed = assignment.seed(student) if seed is None else seed
     work = _Work(assignment, list(assignment.criteria if criteria is None else criteria), seed)
-    opened = Opened(path, assignment, pool)
-    try:
-        work.go(opened)
-        output = opened.output
-    finally:
-        opened.close()
+    for is_hidden in (False, True):
+        work.go(path, pool, is_hidden)
     scores = work.scores()
     before = _rounded(sum(score.score for score in scores))
     days = days_late(assignment.due, submitted)
@@ -125,9 +122,8 @@ def grade_with_runs(
     notes = list(work.notes)
     if lost:
         notes.append(f"Late by {days:.2f} days: {100 * lost:.3g} % of the points are lost.")
-    if output:
-        more = "\n…" if len(output) > _LONGEST_OUTPUT else ""
-        notes.append(f"It printed:\n{output[:_LONGEST_OUTPUT]}{more}")
+    if work.output[False]:
+        notes.append(f"It printed:\n{_cut(work.output[False])}")
     made = Grade(
         student=student,
         status=work.status,
@@ -140,13 +136,18 @@ def grade_with_runs(
         seed=seed,
         late_days=days,
         notes=tuple(notes),
-        details={"assignment": assignment.sha256, "late_share": lost, "cases": work.details},
+        details={"assignment": assignment.sha256, "late_share": lost, "cases": work.details} | work.withheld(),
     )
-    return Graded(made, tuple(work.runs))
+    order = [case.name for case in assignment.cases]
+    return Graded(made, tuple(sorted(work.runs, key=lambda run: order.index(run.case))))
 
 
 class _Work:
-    """What has been run and measured of one submission."""
+    """What has been run and measured of one submission.
+
+    Hidden cases and tests are run apart, after the others. What the submission prints or raises there could be what it
+    saw of them: it is withheld from all that a student reads, unless the assignment's feedback shows all.
+    """
 
     def __init__(self, assignment: Assignment, criteria: list[Criterion], seed: int):
         self.assignment, self.criteria, self.seed = assignment, criteria, seed
@@ -155,31 +156,54 @@ class _Work:
         self.details: dict[str, Any] = {}
         self.runs: list[CaseRun] = []
         self.was_opened = True
+        self.output = {False: "", True: ""}  # what it printed: where all is visible, and in hidden cases
+        self._told = ""  # of a hidden case: what went wrong
         self._failed: dict[str, str] = {}  # by case: why
         self._tested: dict[str, float] = {}  # by criterion: the value of unit tests
         self._stopped = ""
 
-    def go(self, opened: Opened) -> None:
-        """Run all cases that the criteria need, and the unit tests."""
-        wanted = [case for case in self.assignment.cases if any(case.name in c.cases for c in self.criteria)]
-        if wanted:
+    def go(self, path: Path, pool: Opener, is_hidden: bool) -> None:
+        """Run what is visible, or what is hidden, of the cases and unit tests that the criteria need."""
+        wanted = {name for criterion in self.criteria for name in criterion.cases}
+        cases = [each for each in self.assignment.cases if each.name in wanted and self._hides(each) is is_hidden]
+        tested = [each for each in self.criteria if each.tests and self._hides(each) is is_hidden]
+        if self._stopped or not (cases or tested):
+            return
+        opened = Opened(path, self.assignment, pool)
+        try:
+            self._part(opened, cases, tested)
+        finally:
+            opened.close()
+            self.output[is_hidden] = opened.output
+
+    def withheld(self) -> dict[str, Any]:
+        """What only the instructor reads."""
+        found = {"hidden_output": _cut(self.output[True]), "hidden_reason": self._told}
+        return {key: text for key, text in found.items() if text}
+
+    def _hides(self, part: Case | Criterion) -> bool:
+        return not part.is_visible and self.assignment.feedback != "all"
+
+    def _part(self, opened: Opened, cases: Sequence[Case], tested: Sequence[Criterion]) -> None:
+        if cases:
             try:
                 opened.subject()
             except SubmissionError as error:
                 self._blame(error, "")
                 return
-        for case in wanted:
+        for case in cases:
             try:
                 self._run(case, opened)
             except SubmissionError as error:
-                self._failed[case.name] = error.reason
-                if self._blame(error, f"case {case.title}: "):
+                self._failed[case.name] = self._blame(error, f"case {case.title}: ", self._hides(case))
+                if self._stopped:
                     return
-        for criterion in (each for each in self.criteria if each.tests):
+        for criterion in tested:
             try:
                 self._tested[criterion.name] = share_passed(criterion.tests, opened)
             except SubmissionError as error:
-                if self._blame(error, f"{criterion.title}: "):
+                self._blame(error, f"{criterion.title}: ", self._hides(criterion))
+                if self._stopped:
                     return
 
     def _run(self, case: Case, opened: Opened) -> None:
@@ -196,15 +220,19 @@ class _Work:
                 counts = {"calls": run.counts.calls, "events": run.counts.events, "refused": run.counts.refused}
                 about.setdefault("counts", []).append(counts)
 
-    def _blame(self, error: SubmissionError, place: str) -> bool:
-        """Record the first thing that went wrong; whether nothing more can be run."""
+    def _blame(self, error: SubmissionError, place: str, is_hidden: bool = False) -> str:
+        """Record the first thing that went wrong, and whether more can be run; the reason as a student may read it."""
+        said = f"{place}{error.reason}"
+        if is_hidden:
+            self._told = self._told or said
+            said = f"{_HIDDEN}: {error.status}"
         if self.status is Status.OK:
-            self.status, self.reason = error.status, f"{place}{error.reason}"
+            self.status, self.reason = error.status, said
         if error.status in (Status.MISSING, Status.REFUSED):
             self.was_opened = False
         if error.status is not Status.BROKE_CONTRACT:
-            self._stopped = error.reason
-        return bool(self._stopped)
+            self._stopped = said
+        return said if is_hidden else error.reason
 
     def scores(self) -> tuple[CriterionScore, ...]:
         """Of all criteria, in their order."""
@@ -237,6 +265,10 @@ class _Work:
                     worst = value, name
         assert worst is not None  # every criterion has a case, every case a run
         return criterion.score(*worst)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST_OUTPUT else text[:_LONGEST_OUTPUT] + "\n…"
 
 
 def _rounded(points: float) -> float:

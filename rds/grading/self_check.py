@@ -94,7 +94,7 @@ def self_check(assignment: Assignment, file: Path, student: str, pool: Opener) -
         lines += [make(criterion, score) for criterion, score in zip(criteria, scores, strict=True)]
     status, reason = Status.OK, ""
     if second is not None and second.status is not Status.OK:
-        status, reason = second.status, "in a case that is hidden from you"
+        status, reason = second.status, "in a case that is hidden"
     if first is not None and first.status is not Status.OK:
         status, reason = first.status, first.reason
     order = {criterion.name: number for number, criterion in enumerate(assignment.criteria)}

@@ -231,3 +231,17 @@ def test_work_is_the_same_whenever_it_is_counted(made: Make, pool: Pool, tmp_pat
 def test_another_secret_draws_other_plants(made: Make) -> None:
     assignment = made(HEAD + SINE + RMS)
     assert replace(assignment, secret="another secret").seed("ada") != assignment.seed("ada")
+
+
+def test_what_it_says_of_a_hidden_case_is_for_the_instructor(made: Make, pool: Pool, tmp_path: Path) -> None:
+    law = "    print('saw', r.position)\n    return 1 / (r.position - 7.125), state\n"
+    spy = file(tmp_path, "def control(t, r, y, state, params):\n" + law)
+    text = HEAD + STEP.replace("runs = 3", "visible = false").replace("value = 1.0", "value = 7.125") + SINE + RMS
+    found = grade(made(text), spy, "ada", pool)
+    shown = json.dumps(found.to_json() | {"details": {}})
+    assert "saw 7.125" not in shown and "ZeroDivisionError" not in shown and "saw 0.0" in shown
+    assert found.status is Status.BROKE_CONTRACT and found.reason == "in a case that is hidden: broke the contract"
+    assert "saw 7.125" in found.details["hidden_output"]
+    assert "ZeroDivisionError" in found.details["hidden_reason"]
+    whole = grade(made('feedback = "all"\n' + text), spy, "ada", pool)
+    assert "ZeroDivisionError" in whole.reason and "saw 7.125" in whole.notes[-1]
