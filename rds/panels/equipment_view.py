@@ -56,6 +56,7 @@ class EquipmentView:
         self.widget = widgets.HBox([self.settings.widget, main])
         self.widget.add_class("rds-columns")
         self._shown: Result | None = None
+        self._end_look: Callable[[], None] = lambda: None
 
     def start(self) -> None:
         """What the run button does."""
@@ -66,8 +67,8 @@ class EquipmentView:
             self.tabs.selected_index = LIVE
             self.results.clear()
             self.live.follow(self.run)
-            self._follow(self.run, self._ended)
             self._end_look = self.shell.ticker.add(self._look)
+            self._follow(self.run, self._ended)
 
         self._try(begin)
 

@@ -42,14 +42,16 @@ class Choices:
 
     def reset(self) -> None:
         """All defaults."""
-        for name, each in self._fields.items():
-            self.set(name, each.default)
+        for name, each in list(self._fields.items()):
+            if name in self._fields:  # one choice may take others away
+                self.set(name, each.default)
 
     def replace(self, fields: Iterable[Field]) -> None:
         """Other fields for the same names, or new ones.
 
         A value that will not do any more, or that was in another unit, becomes the default.
         """
+        fields = list(fields)
         for each in fields:
             before = self._fields.get(each.name)
             same = getattr(before, "unit", None) == getattr(each, "unit", None)
@@ -60,19 +62,26 @@ class Choices:
                 self._values[each.name] = each.check(old)
             except InputError:
                 self._values[each.name] = each.default
+        for each in fields:  # once all of them are there
             self._tell(each.name)
 
     def remove(self, names: Iterable[str]) -> None:
         """Take fields away."""
-        for name in names:
-            if name in self._fields:
-                del self._fields[name], self._values[name]
-                self._tell(name)
+        gone = [name for name in names if name in self._fields]
+        for name in gone:
+            del self._fields[name], self._values[name]
+        for name in gone:
+            self._tell(name)
 
     def watch(self, watcher: Callable[[str], None]) -> Callable[[], None]:
-        """Call `watcher(name)` after each change; the answer ends that."""
+        """Call `watcher(name)` after each change; the answer ends that, however often it is called."""
         self._watchers.append(watcher)
-        return lambda: self._watchers.remove(watcher)
+
+        def end() -> None:
+            if watcher in self._watchers:
+                self._watchers.remove(watcher)
+
+        return end
 
     def values(self) -> dict[str, Any]:
         """All values, in JSON's types."""

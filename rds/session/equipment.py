@@ -58,7 +58,8 @@ class Equipment:
         """The names of the controller's parameters among the choices, in the library's order."""
         if self.kind == "model":
             return []
-        return [each.name for each in parameter_fields(self.choices["controller"], self.axis)]
+        wanted = parameter_fields(self.choices["controller"], self.axis)
+        return [each.name for each in wanted if each.name in self.choices]
 
     @property
     def shown(self) -> list[str]:

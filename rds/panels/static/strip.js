@@ -126,7 +126,7 @@ function render({ model, el }) {
   const rebuild = () => { build(); dirty = true; };
   model.on("msg:custom", receive);
   model.on("change:traces", rebuild);
-  model.on("change:window", () => { dirty = true; });
+  model.on("change:window change:tells", () => { dirty = true; });
   const themed = new MutationObserver(rebuild);
   themed.observe(document.body, { attributes: true, attributeFilter: ["class", "data-jp-theme-light"] });
   const app = document.querySelector(".rds-app");
