@@ -65,22 +65,26 @@ def _items(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo]) -> tuple[li
         parts = tuple(part for part in name.split("/") if part not in ("", "."))
         if not parts or is_clutter(parts):
             continue
-        if entry.is_dir():
-            folders.add(parts[0])
+        if _leads_out(name, parts):
+            found.append(faulty((name,), "its name leads out of the zip"))
             continue
-        if len(parts) > 1:
+        if entry.is_dir() or len(parts) > 1:
             folders.add(parts[0])
-        if fault := _fault(entry, name, parts, seen):
-            found.append(faulty(parts if ".." not in parts else (name,), fault))
+        if entry.is_dir():
+            continue
+        if fault := _fault(entry, parts, seen):
+            found.append(faulty(parts, fault))
         else:
             found.append(Item(parts, partial(_read, archive, entry), _time(entry)))
         seen.add(parts)
-    return found, sorted(folders - {".."})
+    return found, sorted(folders)
 
 
-def _fault(entry: zipfile.ZipInfo, name: str, parts: tuple[str, ...], seen: set[tuple[str, ...]]) -> str:
-    if ".." in parts or name.startswith("/") or (len(parts[0]) == 2 and parts[0][1] == ":"):
-        return "its name leads out of the zip"
+def _leads_out(name: str, parts: tuple[str, ...]) -> bool:
+    return ".." in parts or name.startswith("/") or (len(parts[0]) == 2 and parts[0][1] == ":")
+
+
+def _fault(entry: zipfile.ZipInfo, parts: tuple[str, ...], seen: set[tuple[str, ...]]) -> str:
     mode = entry.external_attr >> 16
     if stat.S_IFMT(mode) not in (0, stat.S_IFREG):
         return "it is a link or a device in the zip; hand in one Python file or notebook"

@@ -1,0 +1,347 @@
+"""What was handed in is found in every layout, and nothing hostile in it becomes more than a row with its reason."""
+
+from __future__ import annotations
+
+import io
+import os
+import socket
+import zipfile
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.grading.grade import Status
+from rds.grading.intake import HandedIn, Intake, collect
+from rds.grading.intake.archives import MOST_OWN
+from rds.grading.intake.items import Refusal
+from rds.grading.intake.names import safe_id, shown
+from rds.grading.sandbox.submission import LARGEST
+from tests.grading.batches import law, put, zipped
+
+ACCEPTED = ("controller.py", "controller.ipynb")
+CET = timezone(timedelta(hours=1))
+
+
+def rows(intake: Intake) -> dict[str, HandedIn]:
+    return {row.student: row for row in intake.rows}
+
+
+def of(place: Path, **more: object) -> dict[str, HandedIn]:
+    return rows(collect(place, ACCEPTED, **more))  # type: ignore[arg-type]
+
+
+def test_flat_files_and_folders_of_students(tmp_path: Path) -> None:
+    put(tmp_path, {"ada.py": "a", "ben/controller.py": "b", "cy/my law.py": "c", "dan/notes.txt": "", "readme.md": ""})
+    (tmp_path / "eve").mkdir()
+    intake = collect(tmp_path, ACCEPTED)
+    found = rows(intake)
+    assert list(found) == ["ada", "ben", "cy", "dan", "eve"]
+    assert [found[name].read() for name in ("ada", "ben", "cy")] == [b"a", b"b", b"c"]
+    assert found["dan"].status is found["eve"].status is Status.MISSING
+    assert "notes.txt" in found["dan"].reason
+    assert intake.ignored == ("readme.md",)
+
+
+def test_nbgrader_s_tree_with_its_time(tmp_path: Path) -> None:
+    tree = {
+        "submitted/ada/ps1/controller.py": "a",
+        "submitted/ada/ps1/timestamp.txt": "2026-01-09 10:00:00.123456 UTC",
+        "submitted/ada/ps2/controller.py": "other",
+        "submitted/ben/ps2/controller.py": "other",
+        "submitted/cy/ps1/controller.py": "c",
+        "submitted/cy/ps1/timestamp.txt": "2026-01-09 10:00:00 America/Los_Angeles",
+        "submitted/dan/ps1/controller.py": "d",
+        "submitted/dan/ps1/timestamp.txt": "../../etc/passwd x y",
+    }
+    found = of(put(tmp_path, tree), assignments=("Tracking", "ps1"))
+    assert list(found) == ["ada", "ben", "cy", "dan"]
+    assert found["ada"].read() == b"a"
+    assert found["ada"].time == datetime(2026, 1, 9, 10, 0, 0, 123456, UTC)
+    assert found["ben"].status is Status.MISSING
+    assert found["cy"].time == datetime(2026, 1, 9, 18, 0, tzinfo=UTC)
+    assert found["dan"].time is None and "cannot be understood" in found["dan"].notes[0]
+    assert of(tmp_path / "submitted", assignments=("ps1",)).keys() == found.keys()
+
+
+def test_of_several_assignments_one_must_be_named(tmp_path: Path) -> None:
+    tree = {f"ada/{name}/{file}": "" for name in ("ps1", "ps2") for file in ("controller.py", "timestamp.txt")}
+    with pytest.raises(InputError, match="several assignments \\(ps1, ps2\\)"):
+        collect(put(tmp_path, tree), ACCEPTED, ("Tracking",))
+
+
+def test_moodle_s_zip(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {
+        "Ada Lovelace_123_assignsubmission_file_/controller.py": "a",
+        "Ben Ö_124_assignsubmission_file/law.py": "b",
+        "Cy_125_assignsubmission_file_law.py": "c",
+        "Dan_126_assignsubmission_onlinetext_/onlinetext.html": "<p>",
+    }
+    found = of(zipped(tmp_path / "all.zip", files), zone=CET)
+    assert list(found) == ["Ada Lovelace_123", "Ben Ö_124", "Cy_125", "Dan_126"]
+    assert [found[name].read() for name in list(found)[:3]] == [b"a", b"b", b"c"]
+    assert found["Ada Lovelace_123"].source == {"platform": "moodle", "name": "Ada Lovelace", "id": "123"}
+    assert found["Ada Lovelace_123"].time == datetime(2026, 1, 12, 11, tzinfo=CET)
+    assert found["Dan_126"].status is Status.MISSING
+
+
+def test_canvas_s_zip(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {
+        "lovelaceada_111_9001_controller.py": "first",
+        "lovelaceada_111_9002_controller-1.py": "second",
+        "benson_LATE_112_9003_controller.py": "late",
+        "c_113_9004_a_5_6_b.py": "underscores",
+        "odd.py": "no canvas name",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert list(found) == ["benson_112", "c_113", "lovelaceada_111", "odd"]
+    assert found["lovelaceada_111"].read() == b"second"
+    assert "Canvas marks it as late" in found["benson_112"].notes[0] and found["benson_112"].time is None
+    assert found["c_113"].read() == b"underscores"
+
+
+GRADESCOPE = """---
+submission_1:
+  :submitters:
+  - :name: Ada Lovelace
+    :sid: '0042'
+    :email: ada@example.edu
+  :created_at: 2026-01-09 10:00:00.5 Z
+submission_2:
+  :submitters:
+  - :name: Ada Lovelace
+    :sid: '0042'
+    :email: ada@example.edu
+  :created_at: 2026-01-08 10:00:00 Z
+submission_3:
+  :submitters:
+  - :name: "Ben\\nOdd"
+    :sid:
+    :email: ben@example.edu
+  - :name: Cy
+    :sid: '7'
+    :email: cy@example.edu
+  :created_at: 2026-01-09 12:00:00 +01:00
+"""
+
+
+def test_gradescope_s_zip_takes_the_newest(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {
+        "assignment_5_export/submission_metadata.yml": GRADESCOPE,
+        "assignment_5_export/submission_1/controller.py": "newer",
+        "assignment_5_export/submission_2/controller.py": "older",
+        "assignment_5_export/submission_3/controller.py": "group",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert list(found) == ["0042", "ben@example.edu"]
+    assert found["0042"].read() == b"newer"
+    assert found["0042"].time == datetime(2026, 1, 9, 10, 0, 0, 500000, UTC)
+    assert found["0042"].source["email"] == "ada@example.edu"
+    assert [each["name"] for each in found["ben@example.edu"].source["members"]] == ["Ben\\nOdd", "Cy"]
+
+
+@pytest.mark.parametrize("text", ["[", "- 1", "a: 1", "!!python/object/apply:os.system [id]", "x: &a [*a]"])
+def test_gradescope_metadata_that_is_none(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputError, match=r"submission_metadata\.yml"):
+        collect(put(tmp_path, {"submission_metadata.yml": text, "submission_1/controller.py": ""}), ACCEPTED)
+
+
+def test_times_of_the_instructor(tmp_path: Path) -> None:
+    times = "student,timestamp\nada,2026-01-10T13:00:00\nben,2026-01-10T13:00:00Z\n"
+    found = of(put(tmp_path, {"ada.py": "", "ben.py": "", "timestamps.csv": times}), zone=CET)
+    assert found["ada"].time == datetime(2026, 1, 10, 13, tzinfo=CET)
+    assert found["ben"].time == datetime(2026, 1, 10, 13, tzinfo=UTC)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("who,when\n", "columns student and timestamp"),
+        ("student,timestamp\nzoe,2026-01-10\n", "line 2: student 'zoe' handed nothing in"),
+        ("student,timestamp\nada,soon\n", "line 2: timestamp = 'soon' is no time"),
+    ],
+)
+def test_times_that_will_not_do(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        collect(put(tmp_path, {"ada.py": "", "timestamps.csv": text}), ACCEPTED)
+
+
+def test_which_file_of_several(tmp_path: Path) -> None:
+    put(tmp_path, {f"ada/{name}": name for name in ("controller.py", "controller.ipynb", "old.py")})
+    put(tmp_path, {f"ben/{name}": name for name in ("one.py", "two.py")})
+    put(tmp_path, {f"cy/{name}": name for name in ("law.py", "law (1).py", "deep/other.py")})
+    found = of(tmp_path)
+    assert found["ada"].read() == b"controller.py"
+    assert "controller.py is graded, and not controller.ipynb" in found["ada"].notes
+    assert found["ben"].status is Status.REFUSED and "one.py, two.py" in found["ben"].reason
+    assert found["cy"].read() == b"law (1).py"
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    secret = tmp_path / "secret.txt"
+    secret.write_text("x")
+    place = tmp_path / "in"
+    (place / "folder.py").mkdir(parents=True)
+    (place / "link.py").symlink_to(secret)
+    (place / "dangling.py").symlink_to(tmp_path / "nothing")
+    (place / "around").symlink_to(tmp_path)
+    os.mkfifo(place / "pipe.py")
+    with socket.socket(socket.AF_UNIX) as bound:
+        bound.bind(str(place / "socket.py"))
+    put(place, {"good.py": "x", "ada/inner/controller.py": "x"})
+    (place / "ada/controller.py").symlink_to(secret)
+    found = of(place)
+    bad = {name: row for name, row in found.items() if name not in ("good", "ada")}
+    assert {row.status for row in bad.values()} == {Status.REFUSED}
+    words = {"folder": "folder", "link": "link", "dangling": "link", "around": "link", "pipe": "FIFO"}
+    assert all(word in bad[name].reason for name, word in {**words, "socket": "socket"}.items())
+    assert set(bad) == {*words, "socket"}
+    assert found["good"].read() == b"x"
+    assert found["ada"].status is Status.REFUSED or found["ada"].read() == b"x"
+
+
+def test_a_file_that_turns_into_a_link_is_not_followed(tmp_path: Path) -> None:
+    put(tmp_path, {"in/ada.py": "x", "secret": "y"})
+    row = of(tmp_path / "in")["ada"]
+    (tmp_path / "in/ada.py").unlink()
+    (tmp_path / "in/ada.py").symlink_to(tmp_path / "secret")
+    with pytest.raises(Refusal, match="cannot be opened"):
+        row.read()
+
+
+def test_a_file_of_a_gigabyte_is_not_read(tmp_path: Path) -> None:
+    with open(tmp_path / "ada.py", "wb") as file:
+        file.truncate(1 << 30)
+    with pytest.raises(Refusal, match=f"more than {LARGEST} bytes"):
+        of(tmp_path)["ada"].read()
+
+
+def test_names_that_would_fool_somebody(tmp_path: Path) -> None:
+    names = ["a\nb", "a\\nb", "\u202eabc", "..", "Ada", "ada", "\x1b[31m", "con", "x" * 120]
+    folder = put(tmp_path, {f"{name}.py" if name != ".." else "...py": "" for name in names})
+    raw = os.fsencode(folder) + b"/\xff\xfe.py"
+    Path(os.fsdecode(raw)).write_text("")
+    students = [row.student for row in collect(folder, ACCEPTED).rows]
+    assert len(set(students)) == len(students) == len(names) + 1
+    assert all(name.isprintable() for name in students)
+    safe = [safe_id(name).lower() for name in students]
+    assert len(set(safe)) == len(safe)
+
+
+@given(st.lists(st.text(), unique=True, max_size=20))
+def test_names_of_folders_are_plain_and_never_the_same(names: list[str]) -> None:
+    made = [safe_id(shown(name)) for name in names]
+    assert all(set(each) <= set("abcdefghijklmnopqrstuvwxyz0123456789_-~") and len(each) < 80 for each in made)
+    assert len(set(made)) == len(names)
+
+
+def test_a_zip_that_leads_out_of_itself(tmp_path: Path) -> None:
+    files: dict[str, str | bytes] = {
+        "../evil.py": "x",
+        "/etc/cron.py": "x",
+        "C:/evil.py": "x",
+        "a/../../b.py": "x",
+        "..\\win.py": "x",
+        "ada.py": "good",
+    }
+    found = of(zipped(tmp_path / "all.zip", files))
+    assert found["ada"].read() == b"good"
+    others = [row for name, row in found.items() if name != "ada"]
+    assert len(others) == 5
+    assert {(row.status, row.reason) for row in others} == {(Status.REFUSED, "its name leads out of the zip")}
+    assert not list(tmp_path.parent.glob("evil.py"))
+
+
+def test_links_in_a_zip(tmp_path: Path) -> None:
+    entry = zipfile.ZipInfo("ada.py")
+    entry.external_attr = 0o120777 << 16
+    with zipfile.ZipFile(tmp_path / "all.zip", "w") as archive:
+        archive.writestr(entry, "/etc/passwd")
+    assert "link or a device" in of(tmp_path / "all.zip")["ada"].reason
+
+
+def own_zip(files: dict[str, bytes]) -> bytes:
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return data.getvalue()
+
+
+def test_zips_that_students_hand_in(tmp_path: Path) -> None:
+    handed_in = {
+        "good": own_zip({"project/controller.py": b"x", "project/data.csv": b"1"}),
+        "bomb": own_zip({"controller.py": b"0" * (64 << 20)}),
+        "large": own_zip({"controller.py": os.urandom(LARGEST) + b"0"}),
+        "many": own_zip({f"{n}.py": b"" for n in range(MOST_OWN + 1)}),
+        "nested": own_zip({"inner.zip": own_zip({"controller.py": b"x"})}),
+        "broken": b"PK\x03\x04 no zip",
+        "empty": own_zip({}),
+    }
+    for name, data in handed_in.items():
+        (tmp_path / f"{name}.zip").write_bytes(data)
+    found = of(tmp_path)
+    assert found["good"].read() == b"x"
+    with pytest.raises(Refusal, match="unpacks to more than"):
+        found["large"].read()
+    said = {"bomb": "says that it unpacks to", "many": "more than 200", "nested": "another zip", "broken": "not a zip"}
+    assert all(word in found[name].reason for name, word in said.items())
+    assert {found[name].status for name in said} == {Status.REFUSED}
+    assert found["empty"].status is Status.MISSING
+
+
+def test_a_bomb_that_lies_about_its_size_is_cut_off(tmp_path: Path) -> None:
+    data = bytearray(own_zip({"controller.py": b"0" * (4 << 20)}))
+    size = (4 << 20).to_bytes(4, "little")
+    lie = (1000).to_bytes(4, "little")
+    (tmp_path / "ada.zip").write_bytes(bytes(data).replace(size, lie))
+    row = of(tmp_path)["ada"]
+    with pytest.raises(Refusal):
+        row.read()
+
+
+def test_files_of_two_students_that_differ_by_case_only(tmp_path: Path) -> None:
+    found = of(zipped(tmp_path / "all.zip", {"Ada.py": "1", "ada.py": "2"}))
+    assert {name: row.read() for name, row in found.items()} == {"Ada": b"1", "ada": b"2"}
+
+
+def test_two_files_of_one_name_in_a_zip(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "all.zip", "w") as archive:
+        archive.writestr("ada.py", "1")
+        with pytest.warns(UserWarning, match="Duplicate"):
+            archive.writestr("ada.py", "2")
+    assert of(tmp_path / "all.zip")["ada"].status is Status.REFUSED
+
+
+@pytest.mark.parametrize("name", ["nothing", "empty", "text.txt", "broken.zip"])
+def test_places_without_submissions(tmp_path: Path, name: str) -> None:
+    (tmp_path / "empty").mkdir()
+    put(tmp_path, {"text.txt": "", "broken.zip": "no zip"})
+    with pytest.raises(InputError):
+        collect(tmp_path / name, ACCEPTED)
+
+
+@given(st.dictionaries(st.text(min_size=1, max_size=30), st.binary(max_size=40), min_size=1, max_size=8))
+def test_no_zip_whatever_its_names_is_more_than_rows(files: dict[str, bytes]) -> None:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "all.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, data in files.items():
+                archive.writestr(zipfile.ZipInfo(name.encode("utf-8", "replace").decode()), data)
+        try:
+            intake = collect(path, ACCEPTED)
+        except InputError:
+            return
+        for row in intake.rows:
+            assert row.student.isprintable()
+            assert row.status is not None or isinstance(row.read(), bytes)
+
+
+def test_a_single_file_is_a_submission_too(tmp_path: Path) -> None:
+    put(tmp_path, {"ada.py": law()})
+    assert of(tmp_path / "ada.py")["ada"].read().decode() == law()

@@ -1,0 +1,108 @@
+"""Notebooks: what their cells define becomes a file, and what runs, draws or explores stays out."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rds.grading.intake.items import Refusal
+from rds.grading.intake.notebooks import converted
+from tests.grading.batches import notebook
+
+
+def made(*cells: str) -> dict[str, object]:
+    """The names that the converted notebook defines, by running it: these are our own."""
+    names: dict[str, object] = {}
+    exec(converted(notebook(*cells).encode()).code.decode(), names)
+    return names
+
+
+def test_only_what_the_controller_needs_is_kept() -> None:
+    found = converted(
+        notebook(
+            "import numpy as np\nimport matplotlib.pyplot as plt\nimport rds",
+            "params = {'Kp': 1.0}\nlimit = 5.0\nT, state, r = 1e-3, no_such, no_such",
+            "%matplotlib inline\n!pip install x\nplt.figure()",
+            "def clipped(u):\n    return np.clip(u, -limit, limit)",
+            "def control(t, r, y, state, params):\n    return float(clipped(params['Kp'] * (r - y))), state",
+            "params['Kp'] = 2.0\nparams.update(Kd=0.1)",
+            "experiment = rds.Experiment(controller=control)\nexperiment.run().plot()",
+        ).encode()
+    )
+    text = found.code.decode()
+    assert not any(word in text for word in ("matplotlib", "Experiment", "no_such", "pip"))
+    names: dict[str, object] = {}
+    exec(text, names)
+    assert names["params"] == {"Kp": 2.0, "Kd": 0.1}
+    assert names["control"](0.0, 9.0, 0.0, None, {"Kp": 2.0}) == (5.0, None)  # type: ignore[operator]
+    assert found.notes[0] == "cell 3: 2 of IPython's own commands left out"
+    assert found.notes[1].startswith("of its 15 statements 7 define")
+
+
+def test_lines_keep_their_numbers() -> None:
+    text = converted(notebook("print(1)\nprint(2)", "x = 1\ndef control():\n    return x").encode()).code.decode()
+    assert text.split("\n")[5] == "def control():"
+
+
+def test_decorators_defaults_conditions_and_loops() -> None:
+    names = made(
+        "def twice(f):\n    return lambda *a: 2 * f(*a)",
+        "K = 3\nif K > 2:\n    gain = 5\nelse:\n    gain = 6",
+        "table = []\nfor n in range(3):\n    table.append(n * gain)",
+        "unused = 1 / 0",
+        "@twice\ndef control(x, g=gain):\n    return g * x + sum(table)",
+    )
+    assert names["control"](1) == 10  # type: ignore[operator]
+    assert "unused" not in names
+
+
+def test_classes_and_names_in_them() -> None:
+    names = made("base = 4", "class Filter:\n    order = base", "def control():\n    return Filter().order")
+    assert names["control"]() == 4  # type: ignore[operator]
+
+
+def test_a_percent_sign_that_is_none_of_ipython_s() -> None:
+    assert made("a = 7\ncontrol = (a\n% 4)")["control"] == 3
+
+
+def test_a_cell_of_another_language_is_left_out() -> None:
+    assert "rm" not in made("%%bash\nrm = 1", "control = 1")
+
+
+def test_code_that_python_cannot_read_is_kept_for_its_message() -> None:
+    assert b"def control(:" in converted(notebook("def control(:").encode()).code
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"\xff", "not UTF-8"),
+        (b"{", "no notebook"),
+        (b"[" * 100_000, "no notebook"),
+        (b"[]", "format 4"),
+        (b'{"worksheets": []}', "format 4"),
+        (b'{"cells": []}', "no code"),
+        (b'{"cells": [{"cell_type": "code", "source": 5}]}', "no text"),
+    ],
+)
+def test_what_is_no_notebook(data: bytes, said: str) -> None:
+    with pytest.raises(Refusal, match=said):
+        converted(data)
+
+
+@pytest.mark.parametrize("text", ["(" * 5000, "-" * 50_000 + "1", "x = " + "[" * 150 + "]" * 150, "a." * 20_000 + "b"])
+def test_code_made_to_crash_a_parser(text: str) -> None:
+    assert converted(notebook(text).encode()).code
+
+
+@given(st.recursive(st.none() | st.integers() | st.text(), lambda x: st.lists(x) | st.dictionaries(st.text(), x)))
+def test_any_json_is_refused_or_converted(value: object) -> None:
+    cells = {"cells": [{"cell_type": "code", "source": value}, value]}
+    for each in (value, cells):
+        try:
+            converted(json.dumps(each).encode())
+        except Refusal:
+            continue
