@@ -12,7 +12,7 @@ import numpy as np
 
 from rds.motion.segments import LINE, in_plane
 
-_CHUNK = 16384  # samples at a time
+_CHUNK = 1024  # samples at a time: far from the path each has a thousand candidates of 200 bytes
 _MOST = 512  # segments to either side
 _STEPS = 40  # of Newton's method, at most
 _GRID = 65  # places along a helix that are looked at first

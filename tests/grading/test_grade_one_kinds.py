@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from rds.grading.grade import Grade, Status
 from rds.grading.grade_one import grade, grade_with_runs
 from rds.grading.sandbox import Pool
 from rds.grading.trusted import TrustedFiles
-from tests.grading.made import HEAD, RMS, assignment_in
+from tests.grading.made import HEAD, RMS, SINE, assignment_in
 
 FRICTIONLESS = """
 params = {"tau": 9.943e-3, "K": 1.764}
@@ -132,3 +133,44 @@ def test_a_part_program_on_coupled_axes_is_judged_by_its_contour(tmp_path: Path,
     assert found.grade.criteria[0].value == pytest.approx(run.result["contour_error"].max(), rel=1e-8)
     assert 0.0 < run.result["contour_error"].max() < np.abs(run.result["X_reference"] - run.result["X_measured"]).max()
     assert sorted(path.name for path in folder.iterdir()) == ["assignment.toml", "part.ngc", "solution.py"]
+
+
+def test_numbers_beyond_measure_are_the_submission_s_fault_and_not_the_grader_s(tmp_path: Path, pool: Pool) -> None:
+    line = '[case.segment]\nkind = "line"\nstart = [0.0]\nend = [1.0]\nfeed_rate = 10.0\n'
+    errors = RMS.replace("rms-error", "path-error")
+    for kind, text, law in (
+        ("model", SIGNAL + FIT, "def advance(x, u, T, params):\n    return [1.7e308 if u < 0 else -1.7e308, 0.0]\n"),
+        (
+            "interpolator",
+            '[[case]]\nname = "sine"\n' + line + errors,
+            "def interpolate(segment, T, params):\n    for k in range(4):\n        yield [1.7e308], [0.0], [0.0]\n",
+        ),
+    ):
+        folder = assignment_in(tmp_path / kind, HEAD.replace('"controller"', f'"{kind}"') + text, law)
+        found = both(read_assignment(folder), folder / "solution.py", pool)
+        assert found.status is Status.BROKE_CONTRACT and "1e+100" in found.reason and found.score == 0.0
+
+
+def test_a_controller_that_asks_for_everything_is_graded(tmp_path: Path, pool: Pool) -> None:
+    """Without limits of the converter the axis runs away; with them it only tracks badly."""
+    law = "def control(t, r, y, state, params):\n    return (1.7e308 if r.position > y else -1.7e308), state\n"
+    free = SINE + "[case.interface]\nsaturation = false\nquantization = false\n"
+    for case in (SINE, free):
+        criteria = RMS + RMS.replace('"rms"', '"effort"').replace("rms-error", "effort").replace('"mm"', '"V"')
+        folder = assignment_in(tmp_path, HEAD + case + criteria, law)
+        found = both(read_assignment(folder), folder / "solution.py", pool)
+        assert found.status is Status.OK
+        assert found.criteria[1].score == 0.0
+
+
+def test_contours_far_from_the_path_stay_within_bounds(tmp_path: Path) -> None:
+    idle = "def control(t, r, y, state, params):\n    return 0.0 * y, state\n"
+    circle = SINE.replace('axis = "X"', 'axes = ["X", "Y"]\ncoupled = true')
+    text = HEAD + circle.replace("duration = 1.0", "duration = 4.0") + RMS.replace("rms-error", "contour-error")
+    folder = assignment_in(tmp_path, text, idle)
+    assignment = read_assignment(folder)
+    tracemalloc.start()
+    grade(assignment, folder / "solution.py", "ada", TrustedFiles())
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1e9

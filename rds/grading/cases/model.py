@@ -17,10 +17,13 @@ from rds.grading.cases.control import plants_of
 from rds.grading.cases.loop import run_loop
 from rds.grading.cases.plant import disturbed, drawn_model, noise_of
 from rds.grading.cases.words import Common, as_own_file, inside, read_common
+from rds.grading.grade import Status
+from rds.grading.sandbox.errors import SubmissionError
 from rds.results import Result
 from rds.robustness.uncertain import Uncertain
 from rds.runtime.plan import Plan
 
+_LARGEST = 1e100  # of an output, in the axis's unit: beyond it sums of squares are no numbers
 _NOT_HERE = ("mode", "controller", "bus", "timing", "compiled", "reference")
 
 
@@ -49,6 +52,8 @@ class ModelCase:
         axis = data.axes[0]
         subject = submitted.subject()
         modelled = np.array(free_run(subject, data[f"{axis}_voltage"].tolist(), self.params, data.sample_period))
+        if np.abs(modelled).max() > _LARGEST:
+            raise SubmissionError(Status.BROKE_CONTRACT, f"its output went beyond {_LARGEST:g} {self.unit}")
         # where an axis stands at first is not the model's to know
         modelled += data[f"{axis}_measured"][0] - modelled[0]
         columns = dict(data.columns) | {f"{axis}_modelled": modelled}

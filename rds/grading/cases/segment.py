@@ -22,6 +22,7 @@ from rds.interpolators.segment import checked
 from rds.machines import load_machine
 from rds.results import Result
 
+_LARGEST = 1e100  # mm, mm/s, mm/s²: beyond it sums of squares are no numbers
 _SLOWER, _SPARE = 10, 5000  # rows: so much longer than at constant speed, for a slow start and stop
 
 
@@ -50,7 +51,9 @@ class SegmentCase:
         n = len(self.axes)
         rows = np.array(list(subject.rows(self.segment, self.T, self.params, most)), float).reshape(-1, 3, n)
         if not len(rows):
-            raise SubmissionError(Status.BROKE_CONTRACT, f"case {self.name}: interpolate() yielded no row")
+            raise SubmissionError(Status.BROKE_CONTRACT, "interpolate() yielded no row")
+        if np.abs(rows).max() > _LARGEST:
+            raise SubmissionError(Status.BROKE_CONTRACT, f"a row of interpolate() holds more than {_LARGEST:g}")
         counts = subject.counts if COUNTS in needs else None
         start = np.zeros((1, 3, n))
         start[0, 0] = self.segment.start
