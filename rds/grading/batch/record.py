@@ -21,7 +21,7 @@ _FORMAT = 1
 class Record:
     """`versions` are of all that scores depend on; `handed_in` is by student the SHA-256 of the file, or the reason.
 
-    `late` are days by student, as they were known.
+    `times` are when it was, as far as that is known; `layout` is how the submissions lay.
     """
 
     title: str
@@ -31,6 +31,7 @@ class Record:
     handed_in: Mapping[str, str]
     times: Mapping[str, str]
     layout: str
+    due: str | None
 
     def write(self, folder: Path) -> None:
         """Into the batch's folder, whole."""
@@ -43,9 +44,9 @@ def record_of(assignment: Assignment, handed_in: Mapping[str, str], times: Mappi
     from importlib.metadata import version
 
     versions = {"rds": version("rds"), "Python": platform.python_version(), "numpy": version("numpy")}
-    return Record(
-        assignment.title, str(assignment.folder.resolve()), assignment.sha256, versions, handed_in, times, layout
-    )
+    due = None if assignment.due is None else assignment.due.isoformat()
+    folder = str(assignment.folder.resolve())
+    return Record(assignment.title, folder, assignment.sha256, versions, handed_in, times, layout, due)
 
 
 def read_record(folder: Path) -> Record:

@@ -15,17 +15,20 @@ from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.queue import CODE, Queued, keep, queued, ungraded
 from rds.grading.batch.record import FILE, check_same, read_record, record_of
 from rds.grading.batch.work import FEEDBACK, Answer, Task, graded, setup_of
+from rds.grading.class_files import write_class_files
 from rds.grading.feedback import feedback_page
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import collect
 from rds.grading.journal import FILE as JOURNAL
 from rds.grading.journal import Journal
 from rds.grading.sandbox import available
-from rds.results.atomic import write_files
+from rds.grading.similarity import Pair, fingerprints, similar_pairs
+from rds.grading.similarity_table import pairs_html, pairs_json
+from rds.results.atomic import write_files, write_whole
 from rds.spread import Outcome, processors, spread
 from rds.spread.spread import Progress
 
-STUDENTS = "students"
+STUDENTS, SIMILARITY = "students", "similarity.json"
 _PATIENCE = 600.0  # s for one submission beyond all that it may take: then it is the grader that hangs
 
 
@@ -76,8 +79,31 @@ def run_batch(
         if len(todo) < len(rows):
             say(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
         batch.go(todo, jobs, scheduler, progress)
-        outcome = BatchOutcome(out, batch.grades(), len(todo), time.monotonic() - began, tuple(notes))
+        grades = batch.grades()
+        pairs = _pairs(read, rows, jobs)
+        write_whole(out / SIMILARITY, pairs_json(pairs))
+        write_class_files(
+            out,
+            read.title,
+            list(grades.values()),
+            seconds=batch.seconds,
+            similar=pairs_html(pairs),
+            about=intake.layout,
+        )
+        outcome = BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
+        write_class_files(out, read.title, list(outcome.grades.values()))
     return outcome
+
+
+def _pairs(assignment: Assignment, rows: Sequence[Queued], jobs: int | None) -> list[Pair]:
+    """Submissions that are alike. Parsed in other processes, which may crash."""
+    given = [(each.row.student, each.code) for each in rows if each.code]
+    template = assignment.path(assignment.template)
+    if template is not None and template.suffix == ".py":
+        given.append(("", template.read_bytes()))
+    done = spread(fingerprints, [code for _, code in given], jobs=jobs, retries=0, time_limit=_PATIENCE)
+    found = {student: outcome.value or {} for (student, _), outcome in zip(given, done, strict=True)}
+    return similar_pairs(found, [found.pop("", {})])
 
 
 def _check_free(out: Path, resume: bool) -> None:
@@ -99,6 +125,7 @@ class _Batch:
         self._assignment, self._journal = assignment, journal
         self._rows = {each.row.student: each for each in rows}
         self._grades = {row["student"]: Grade.from_json(row["grade"]) for row in journal.rows}
+        self.seconds: dict[str, float] = {row["student"]: row["seconds"] for row in journal.rows}
 
     def todo(self) -> list[Queued]:
         """What has no grade yet, or none but by our fault."""
@@ -143,7 +170,7 @@ class _Batch:
             if answer is None:
                 failed.append((each, outcome.reason))
             else:
-                self._finish(each, Grade.from_json(answer.grade), dict(answer.files))
+                self._finish(each, Grade.from_json(answer.grade), dict(answer.files), answer.seconds)
         return failed
 
     def _task(self, each: Queued, shared: bool) -> Task:
@@ -151,14 +178,15 @@ class _Batch:
         path, code = (str((each.folder / CODE).resolve()), b"") if shared else ("", each.code)
         return Task(each.row.student, path, code, each.row.time, each.notes, each.about)
 
-    def _finish(self, each: Queued, grade: Grade, files: dict[str, bytes]) -> None:
+    def _finish(self, each: Queued, grade: Grade, files: dict[str, bytes], seconds: float = 0.0) -> None:
         """Its files, then its line in the journal."""
         if FEEDBACK not in files:
             files[FEEDBACK] = feedback_page(self._assignment, grade).encode("utf-8", "replace")
         told = grade.to_json()
         files["grade.json"] = json.dumps(told, indent=1, allow_nan=False).encode() + b"\n"
         write_files({each.folder / name: partial(_write, data) for name, data in files.items()})
-        self._journal.append({"student": each.row.student, "grade": told})
+        self._journal.append({"student": each.row.student, "grade": told, "seconds": seconds})
+        self.seconds[each.row.student] = seconds
         self._grades[each.row.student] = grade
 
 
