@@ -82,16 +82,10 @@ def run_batch(
         grades = batch.grades()
         pairs = _pairs(read, rows, jobs)
         write_whole(out / SIMILARITY, pairs_json(pairs))
-        write_class_files(
-            out,
-            read.title,
-            list(grades.values()),
-            seconds=batch.seconds,
-            similar=pairs_html(pairs),
-            about=intake.layout,
-        )
+        everybody, similar = list(grades.values()), pairs_html(pairs)
+        about = f"{len(everybody)} submissions, handed in as {intake.layout}"
+        write_class_files(out, read.title, everybody, seconds=batch.seconds, similar=similar, about=about)
         outcome = BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
-        write_class_files(out, read.title, list(outcome.grades.values()))
     return outcome
 
 

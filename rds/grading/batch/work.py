@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import threading
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -55,6 +56,7 @@ class Answer:
 
     grade: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
+    seconds: float = 0.0  # that it took: of no score's concern
     missing: str = ""
 
 
@@ -72,6 +74,7 @@ def graded(setup: Setup, task: Task) -> Answer:
     """The grade of a task. An exception is ours, and no fault of the submission."""
     if fault := available():
         return Answer(missing=fault)
+    began = time.monotonic()
     assignment, solution = _assignment(setup)
     pool = _pool(threading.get_ident(), setup.jobs)
     if task.path:
@@ -88,7 +91,7 @@ def graded(setup: Setup, task: Task) -> Answer:
     files = {FEEDBACK: page.encode("utf-8", "replace")}
     if found.runs:
         files[COLUMNS] = columns_of(found.runs)
-    return Answer(grade.to_json(), files)
+    return Answer(grade.to_json(), files, time.monotonic() - began)
 
 
 def columns_of(runs: tuple[CaseRun, ...]) -> bytes:

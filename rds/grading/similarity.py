@@ -1,0 +1,139 @@
+"""Submissions of like structure, pointed out for the instructor to look at. A hint, and never a deduction.
+
+A program is read as the sequence of its syntax tree's nodes, without names, numbers, texts, comments, docstrings and
+layout. Of all runs of `GRAM` nodes, those of the smallest hash in each window of `WINDOW` are its fingerprints
+(winnowing: Schleimer, Wilkerson and Aiken, 2003): a common passage of GRAM + WINDOW - 1 nodes or more is always found.
+Fingerprints of the hand-out's template, and those that more than half of a large class share, count for nothing.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+GRAM = 12  # nodes
+WINDOW = 6  # of grams
+LEAST_SCORE = 0.5  # of a pair that is worth a look
+LEAST_COMMON = 6  # fingerprints; less is chance
+_CLASS = 12  # submissions from which on what many share is taken for common knowledge
+_MANY = 0.5
+
+Lines = tuple[int, int]  # first and last
+Fingerprints = dict[int, Lines]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two students, the share of the smaller program's fingerprints that both have, and where: lines of either."""
+
+    first: str
+    second: str
+    score: float
+    common: int
+    first_lines: tuple[Lines, ...]
+    second_lines: tuple[Lines, ...]
+
+
+def fingerprints(code: bytes) -> Fingerprints:
+    """The fingerprints of a Python file with the lines each comes from; none if Python cannot read it.
+
+    Parses what somebody wrote: call it in a process that may crash.
+    """
+    try:
+        tree = ast.parse(code)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return {}
+    words: list[tuple[str, int]] = []
+    _walk(tree, words)
+    grams = [
+        (_hash(" ".join(word for word, _ in words[n : n + GRAM])), _span(line for _, line in words[n : n + GRAM]))
+        for n in range(len(words) - GRAM + 1)
+    ]
+    chosen: Fingerprints = {}
+    for n in range(max(len(grams) - WINDOW + 1, min(len(grams), 1))):
+        # the rightmost of the smallest, as in the paper: neighbouring windows then choose the same
+        value, lines = min(reversed(grams[n : n + WINDOW]), key=lambda gram: gram[0])
+        chosen.setdefault(value, lines)
+    return chosen
+
+
+def similar_pairs(found: Mapping[str, Fingerprints], template: Iterable[Fingerprints] = ()) -> list[Pair]:
+    """The pairs of students whose programs are alike, the most alike first. `found` is by student."""
+    known = {value for prints in template for value in prints}
+    spread = Counter(value for prints in found.values() for value in prints)
+    if len(found) >= _CLASS:
+        known |= {value for value, count in spread.items() if count > _MANY * len(found) and count > 2}
+    own = {student: {v: lines for v, lines in prints.items() if v not in known} for student, prints in found.items()}
+    holders: dict[int, list[str]] = {}
+    for student in sorted(own):
+        for value in own[student]:
+            holders.setdefault(value, []).append(student)
+    shared: dict[tuple[str, str], list[int]] = {}
+    for value, students in holders.items():
+        for pair in combinations(students, 2):
+            shared.setdefault(pair, []).append(value)
+    pairs = [_pair(*both, values, own) for both, values in shared.items() if len(values) >= LEAST_COMMON]
+    return sorted(
+        (pair for pair in pairs if pair.score >= LEAST_SCORE), key=lambda pair: (-pair.score, pair.first, pair.second)
+    )
+
+
+def _pair(first: str, second: str, values: list[int], own: Mapping[str, Fingerprints]) -> Pair:
+    smaller = min(len(own[first]), len(own[second]))
+    where = [_joined(own[student][value] for value in values) for student in (first, second)]
+    return Pair(first, second, len(values) / smaller, len(values), where[0], where[1])
+
+
+def _joined(spans: Iterable[Lines]) -> tuple[Lines, ...]:
+    """Ranges of lines, joined where they touch."""
+    whole: list[Lines] = []
+    for first, last in sorted(spans):
+        if whole and first <= whole[-1][1] + 1:
+            whole[-1] = (whole[-1][0], max(whole[-1][1], last))
+        else:
+            whole.append((first, last))
+    return tuple(whole)
+
+
+def _walk(tree: ast.AST, words: list[tuple[str, int]]) -> None:
+    """The nodes of the tree from outside in, by their kinds alone, each with its line. Without recursion."""
+    todo: list[tuple[ast.AST, int]] = [(tree, 1)]
+    while todo:
+        node, line = todo.pop()
+        line = getattr(node, "lineno", line)
+        if isinstance(node, ast.expr_context | ast.alias | ast.arguments | ast.Module):
+            pass  # says nothing that the nodes around it do not say
+        elif isinstance(node, ast.Constant):
+            words.append((type(node.value).__name__ if isinstance(node.value, str | bytes) else "number", line))
+        else:
+            words.append((type(node).__name__, line))
+        todo.extend((child, line) for child in reversed(_children(node)))
+
+
+def _children(node: ast.AST) -> list[ast.AST]:
+    """Its parts; a function's, class's or file's without the docstring, annotations and other texts that do nothing."""
+    skipped = {"annotation", "returns", "type_comment"}
+    found: list[ast.AST] = []
+    for name, value in ast.iter_fields(node):
+        if name in skipped:
+            continue
+        parts = value if isinstance(value, list) else [value]
+        found += [part for part in parts if isinstance(part, ast.AST) and not _does_nothing(part)]
+    return found
+
+
+def _does_nothing(node: ast.AST) -> bool:
+    return isinstance(node, ast.Pass) or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
+
+
+def _span(lines: Iterable[int]) -> Lines:
+    seen = list(lines)
+    return min(seen), max(seen)
+
+
+def _hash(text: str) -> int:
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "big")

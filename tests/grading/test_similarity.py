@@ -1,0 +1,123 @@
+"""Copies are found whatever was done to their names, numbers, comments and layout; what differs is not."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rds.grading.similarity import GRAM, WINDOW, fingerprints, similar_pairs
+from rds.grading.similarity_table import pairs_html
+
+LAW = '''"""PD control with a filtered derivative."""
+
+params = {"Kp": 30.0, "Kd": 0.3, "Kv": 0.567, "filter": 0.004, "T": 0.001}
+initial_state = [0.0, 0.0]
+
+
+def control(t, r, y, state, params):
+    """One sample."""
+    last_error, slope = state
+    error = r.position - y
+    share = params["T"] / (params["filter"] + params["T"])
+    slope = slope + share * ((error - last_error) / params["T"] - slope)
+    voltage = params["Kp"] * error + params["Kd"] * slope + params["Kv"] * r.velocity
+    if abs(voltage) > 10.0:
+        voltage = 10.0 if voltage > 0.0 else -10.0
+    return voltage, [error, slope]
+'''
+OTHER = """
+import numpy as np
+
+A = np.array([[0.9, 0.1], [0.0, 0.8]])
+
+
+class Observer:
+    def __init__(self, gain):
+        self.gain = gain
+
+    def step(self, x, y, u):
+        for _ in range(1):
+            x = A @ x + self.gain * (y - x[0])
+        return x + np.array([0.0, u])
+
+
+def control(t, r, y, state, params):
+    x = Observer(np.ones(2)).step(np.asarray(state), y, 0.0)
+    while x[0] > 1e3:
+        x = x / 2
+    return float(-x @ [1.0, 2.0]), x.tolist()
+
+
+initial_state = [0.0, 0.0]
+"""
+
+
+def disguised(code: str) -> str:
+    """Other names, numbers, texts, comments, docstrings, annotations and layout; the same program."""
+    for number, name in enumerate(("last_error", "slope", "share", "voltage", "error")):
+        code = re.sub(rf"\b{name}\b", f"q{number}", code)
+    code = code.replace("30.0", "27.125").replace("One sample.", "Mine!").replace("(t, r, y,", "(t: float, r, y,")
+    return "# mine\n\n" + ast.unparse(ast.parse(code)).replace("\n", "\n\n").replace("    ", "  ")
+
+
+def prints(**codes: str) -> dict[str, dict[int, tuple[int, int]]]:
+    return {name: fingerprints(code.encode()) for name, code in codes.items()}
+
+
+def test_a_copy_in_disguise_is_the_same_and_another_law_is_not() -> None:
+    pairs = similar_pairs(prints(ada=LAW, ben=disguised(LAW), cy=OTHER))
+    assert [(pair.first, pair.second, pair.score) for pair in pairs] == [("ada", "ben", 1.0)]
+
+
+def test_the_lines_are_told() -> None:
+    (pair,) = similar_pairs(prints(a=LAW, b="x = 1\n" * 40 + disguised(LAW)))
+    assert pair.first_lines[0][0] >= 1 and pair.first_lines[-1][1] <= LAW.count("\n")
+    assert pair.second_lines[-1][0] > 40
+
+
+def test_functions_in_another_order_are_still_found() -> None:
+    head, tail = LAW.split("def control", 1)
+    moved = f"def control{tail}\n{OTHER.split('class Observer')[1].join(['class Observer', ''])}\n{head}"
+    scores = [pair.score for pair in similar_pairs(prints(a=LAW, b=moved))]
+    assert scores and scores[0] > 0.6
+
+
+def test_what_the_template_gave_counts_for_nothing() -> None:
+    template = [fingerprints(LAW.encode())]
+    assert not similar_pairs(prints(ada=LAW, ben=disguised(LAW)), template)
+
+
+def test_what_most_of_a_class_have_is_no_sign() -> None:
+    everybody = prints(**{f"s{n}": LAW for n in range(20)})
+    assert not similar_pairs(everybody)
+    few = prints(**{f"s{n}": OTHER for n in range(3)}, **{f"t{n}": f"x{n} = {n}" for n in range(20)})
+    assert len(similar_pairs(few)) == 3
+
+
+@pytest.mark.parametrize("code", ["", "def (", "\0", "(" * 9999, "x = 1", "-" * 5000 + "1"])
+def test_code_that_is_none_has_no_pairs(code: str) -> None:
+    assert not similar_pairs(prints(ada=code, ben=code))
+
+
+@given(st.lists(st.sampled_from("abcdefgh"), max_size=25), st.lists(st.sampled_from("abcdefgh"), max_size=25))
+def test_a_common_passage_of_enough_nodes_is_always_found(before: list[str], after: list[str]) -> None:
+    """The guarantee of winnowing. Each form has three nodes or more."""
+    forms = dict(zip("abcdefgh", FORMS, strict=True))
+    common = [forms[name] for name in "abcdefghhgfedcba"]
+    assert 3 * len(common) >= GRAM + WINDOW - 1
+    one = "\n".join([*(forms[name] for name in before), *common])
+    two = "\n".join([*common, *(forms[name] for name in after)])
+    assert fingerprints(one.encode()).keys() & fingerprints(two.encode()).keys()
+
+
+FORMS = ("x = 1", "f(x)", "x += y", "del x", "x = [y]", "assert x", "x = -y", "x = y if x else 1")
+
+
+def test_the_table_escapes_names() -> None:
+    pairs = similar_pairs(prints(**{"<b>": LAW, "ben": disguised(LAW)}))
+    assert "<b>" not in pairs_html(pairs) and "&lt;b&gt;" in pairs_html(pairs)
+    assert "No two submissions" in pairs_html([])
