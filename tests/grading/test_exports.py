@@ -1,0 +1,389 @@
+"""Gradebooks: the columns and fields that each platform knows, nobody forgotten, no cell that a spreadsheet runs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from rds.cli import app
+from rds.core.errors import InputError
+from rds.grading.export import Written, export
+from rds.grading.exports import GRADEBOOKS
+from rds.grading.exports.exported import Wanted
+from rds.grading.exports.one_json import LARGEST
+from rds.grading.grade import Grade, Status
+from rds.grading.grades_table import csv_text, grades_csv
+from tests.grading.grades import HOSTILE, batch_in, grade, score
+
+NOTHING = Wanted()
+CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Tracking (77),Essay (78),Current Score
+,,,,,Manual Posting,,(read only)
+    Points Possible,,,,,30.0,10.0,(read only)
+"Lovelace, Ada",101,s-ada,ada@x.edu,M1,,9,90
+"Hopper, Grace",102,s-grace,grace@x.edu,M1,12,8,80
+"Twin, A",103,s-a,a@x.edu,M1,,,
+"Twin, A",104,s-b,b@x.edu,M1,,,
+"""
+WORKSHEET_COLUMNS = (
+    "Identifier,Full name,Email address,Status,Grade,Maximum Grade,Grade can be changed,"
+    "Last modified (submission),Last modified (grade),Feedback comments"
+)
+WORKSHEET = f"""\ufeff{WORKSHEET_COLUMNS}
+Participant 501,Ada Lovelace,Ada@x.edu,Submitted for grading,,30.00,Yes,-,-,
+Participant 502,Grace Hopper,grace@x.edu,Submitted for grading,,30.00,Yes,-,-,
+"""
+GRADESCOPE = {
+    "type": "object",
+    "additionalProperties": False,
+    "properties": {
+        "score": {"type": "number"},
+        "execution_time": {"type": "number"},
+        "output": {"type": "string"},
+        "output_format": {"enum": ["text", "html", "simple_format", "md", "ansi"]},
+        "visibility": {"enum": ["hidden", "after_due_date", "after_published", "visible"]},
+        "stdout_visibility": {"enum": ["hidden", "after_due_date", "after_published", "visible"]},
+        "extra_data": {"type": "object"},
+        "tests": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["score", "max_score", "name"],
+                "properties": {
+                    "score": {"type": "number"},
+                    "max_score": {"type": "number"},
+                    "status": {"enum": ["passed", "failed"]},
+                    "name": {"type": "string"},
+                    "number": {"type": "string"},
+                    "output": {"type": "string"},
+                    "output_format": {"enum": ["text", "html", "simple_format", "md", "ansi"]},
+                    "tags": {"type": "array", "items": {"type": "string"}},
+                    "visibility": {"enum": ["hidden", "after_due_date", "after_published", "visible"]},
+                    "extra_data": {"type": "object"},
+                },
+            },
+        },
+        "leaderboard": {"type": "array"},
+    },
+}
+IMAGES = {
+    "type": "array",
+    "items": {
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["url"],
+        "properties": {"label": {"type": "string"}, "url": {"type": "string", "pattern": "^data:image/"}},
+    },
+}
+PRAIRIELEARN = {
+    "type": "object",
+    "additionalProperties": False,
+    "properties": {
+        "score": {"type": "number", "minimum": 0.0, "maximum": 1.0},
+        "gradable": {"type": "boolean"},
+        "format_errors": {"type": "array", "items": {"type": "string"}},
+        "message": {"type": "string"},
+        "output": {"type": "string"},
+        "images": IMAGES,
+        "tests": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "additionalProperties": False,
+                "required": ["name", "points", "max_points"],
+                "properties": {
+                    "name": {"type": "string"},
+                    "description": {"type": "string"},
+                    "points": {"type": "number"},
+                    "max_points": {"type": "number"},
+                    "message": {"type": "string"},
+                    "output": {"type": "string"},
+                    "images": IMAGES,
+                },
+            },
+        },
+    },
+    "if": {"properties": {"gradable": {"const": True}}},
+    "then": {"required": ["score"]},
+}
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The lines of a CSV file by column."""
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig"), newline="")))
+
+
+def from_platform(platform: str, student: str, /, **about: str) -> Grade:
+    """A grade of a submission that came from a platform's export."""
+    return replace(grade(student), details={"source": {"platform": platform, **about}})
+
+
+def exported(tmp_path: Path, to: str, grades: list[Grade], wanted: Wanted = NOTHING, **record: Any) -> Written:
+    return export(batch_in(tmp_path / "out", grades, **record), to, None, wanted)
+
+
+def test_nbgrader_has_the_columns_of_its_own_export(tmp_path: Path) -> None:
+    late = replace(grade("bob", score=23.4), late_days=0.5)
+    record = {"due": "2026-11-20T23:59:00+01:00", "times": {"bob": "2026-11-21T13:00:00+01:00"}}
+    done = exported(tmp_path, "nbgrader", [grade("ada"), late], **record)
+    text = Path(done.files[0]).read_text()
+    assert text.splitlines()[0] == (
+        "assignment,duedate,timestamp,student_id,last_name,first_name,email,raw_score,late_submission_penalty,score,max_score"
+    )
+    ada, bob = rows_of(Path(done.files[0]))
+    assert (ada["score"], ada["late_submission_penalty"], ada["timestamp"]) == ("26", "0", "")
+    assert (bob["raw_score"], bob["late_submission_penalty"], bob["score"]) == ("26", "2.6", "23.4")
+    assert (bob["duedate"], bob["timestamp"]) == ("2026-11-20 22:59:00", "2026-11-21 12:00:00")
+
+
+def test_nbgrader_takes_the_name_from_its_folders(tmp_path: Path) -> None:
+    done = exported(tmp_path, "nbgrader", [from_platform("nbgrader", "ada", assignment="ps1")])
+    assert rows_of(Path(done.files[0]))[0]["assignment"] == "ps1"
+
+
+@pytest.mark.skipif(find_spec("nbgrader") is not None, reason="nbgrader is installed")
+def test_nbgrader_database_without_nbgrader_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="pip install nbgrader"):
+        exported(tmp_path, "nbgrader", [grade()], Wanted(gradebook=tmp_path / "gradebook.db"))
+
+
+def test_canvas_keeps_the_lines_that_it_needs_and_no_other_grade(tmp_path: Path) -> None:
+    book = tmp_path / "canvas-export.csv"
+    book.write_text(CANVAS)
+    grades = [
+        from_platform("canvas", "lovelaceada_101", id="101", name="lovelaceada"),
+        grade("grace@x.edu"),
+        from_platform("canvas", "nobody_999", id="999", name="nobody"),
+        from_platform("other", "A Twin", name="Twin A"),
+    ]
+    done = exported(tmp_path, "canvas", grades, Wanted(gradebook=book))
+    lines = list(csv.reader(io.StringIO(Path(done.files[0]).read_text())))
+    assert lines == [
+        ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Tracking (77)"],
+        ["", "", "", "", "", "Manual Posting"],
+        ["    Points Possible", "", "", "", "", "30.0"],
+        ["Lovelace, Ada", "101", "s-ada", "ada@x.edu", "M1", "26"],
+        ["Hopper, Grace", "102", "s-grace", "grace@x.edu", "M1", "26"],
+    ]
+    assert set(done.left_out) == {"nobody_999", "A Twin"}
+    assert "2 lines" in done.left_out["A Twin"]
+    assert book.read_text() == CANVAS
+
+
+def test_canvas_asks_for_the_gradebook_and_for_the_same_points(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="--gradebook"):
+        exported(tmp_path / "a", "canvas", [grade()])
+    book = tmp_path / "book.csv"
+    book.write_text(CANVAS.replace("30.0", "100"))
+    with pytest.raises(InputError, match="--points 100"):
+        exported(tmp_path / "b", "canvas", [grade("s-ada")], Wanted(gradebook=book))
+    done = exported(tmp_path / "c", "canvas", [grade("s-ada")], Wanted(gradebook=book, points=100.0))
+    assert rows_of(Path(done.files[0]))[-1]["Tracking (77)"] == "86.6666667"
+
+
+def test_canvas_new_column_gets_its_points(tmp_path: Path) -> None:
+    book = tmp_path / "book.csv"
+    book.write_text(CANVAS)
+    done = exported(tmp_path, "canvas", [grade("s-ada")], Wanted(gradebook=book), title="Observer")
+    rows = rows_of(Path(done.files[0]))
+    assert [row["Observer"] for row in rows] == ["", "30", "26"]
+    assert "no column 'Observer'" in done.notes[0]
+    with pytest.raises(InputError, match="no column 'Obsrver'"):
+        exported(tmp_path / "x", "canvas", [grade("s-ada")], Wanted(gradebook=book, column="Obsrver"))
+
+
+def test_two_students_never_share_a_line(tmp_path: Path) -> None:
+    book = tmp_path / "book.csv"
+    book.write_text(CANVAS)
+    done = exported(tmp_path, "canvas", [grade("s-ada"), grade("ada@x.edu")], Wanted(gradebook=book))
+    assert set(done.left_out) == {"s-ada", "ada@x.edu"}
+    assert done.students == 0
+
+
+def test_moodle_worksheet_is_filled_in_and_otherwise_the_same(tmp_path: Path) -> None:
+    sheet = tmp_path / "worksheet.csv"
+    sheet.write_text(WORKSHEET, encoding="utf-8")
+    hostile = grade("x", Status.OK, score("rms", 10.0, 30.0, sentence="<script>alert(1)</script>"))
+    grades = [
+        from_platform("moodle", "Ada Lovelace_501", id="501", name="Ada Lovelace"),
+        replace(hostile, details={"source": {"platform": "moodle", "id": "502"}}),
+        from_platform("moodle", "Else_777", id="777", name="Else"),
+    ]
+    done = exported(tmp_path, "moodle", grades, Wanted(gradebook=sheet))
+    text = Path(done.files[0]).read_text(encoding="utf-8")
+    assert text.splitlines()[0] == WORKSHEET.splitlines()[0]
+    ada, grace = rows_of(Path(done.files[0]))
+    assert (ada["Grade"], grace["Grade"]) == ("26", "10")
+    assert "Error rms: 6 of 10 points. The rms error is 0.23 mm." in ada["Feedback comments"]
+    assert "Error hidden: 20 of 20 points. Hidden" in ada["Feedback comments"]
+    assert "secret" not in text and "<script>" not in text
+    assert ada["Email address"] == "Ada@x.edu"  # Moodle minds the capitals
+    assert set(done.left_out) == {"Else_777"}
+
+
+def test_moodle_maximum_grade_is_kept_to(tmp_path: Path) -> None:
+    sheet = tmp_path / "worksheet.csv"
+    sheet.write_text(WORKSHEET.replace("30.00", "100.00"), encoding="utf-8")
+    with pytest.raises(InputError, match="--points 100"):
+        exported(tmp_path, "moodle", [grade("ada@x.edu")], Wanted(gradebook=sheet))
+
+
+def test_moodle_gradebook_is_filled_in_by_title(tmp_path: Path) -> None:
+    book = tmp_path / "grades.csv"
+    book.write_text(
+        "First name,Last name,ID number,Email address,Assignment: Tracking (Real),Course total (Real)\n"
+        "Ada,Lovelace,s1,ada@x.edu,-,-\nGrace,Hopper,s2,grace@x.edu,-,-\n"
+    )
+    done = exported(tmp_path, "moodle", [grade("s2")], Wanted(gradebook=book))
+    assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["-", "26"]
+
+
+def test_moodle_without_a_download_has_three_columns(tmp_path: Path) -> None:
+    done = exported(tmp_path, "moodle", [grade("ada@x.edu"), grade("4711")])
+    assert Path(done.files[0]).read_text().splitlines() == [
+        "useridnumber,useremail,Tracking",
+        "4711,,26",
+        ",ada@x.edu,26",
+    ]
+
+
+def page_with(*sizes: int) -> str:
+    """A feedback page with pictures of so many characters."""
+    return "".join(f'<img alt="case {k}" src="data:image/svg+xml;base64,{"A" * n}">' for k, n in enumerate(sizes))
+
+
+def test_gradescope_is_valid_and_hides_what_is_hidden(tmp_path: Path) -> None:
+    everything = [grade(f"s{k}", status) for k, status in enumerate(Status)]
+    everything += [grade(name) for name in HOSTILE]
+    everything[0] = replace(everything[0], notes=("It printed:\n</pre><script>alert(1)</script>",))
+    done = exported(tmp_path, "gradescope", everything, pages={"s0": page_with(100)})
+    assert len(done.files) == len(everything)
+    for name in done.files:
+        data = json.loads(Path(name).read_text())
+        jsonschema.validate(data, GRADESCOPE)
+        assert "<script>" not in data["output"] and "secret" not in json.dumps(data.get("tests"))
+    first = json.loads((tmp_path / "out/gradescope/s0/results.json").read_text())
+    assert first["score"] == 26.0
+    assert [(t["score"], t["max_score"], t["status"], t["visibility"]) for t in first["tests"]] == [
+        (6.0, 10.0, "failed", "visible"),
+        (20.0, 20.0, "passed", "after_published"),
+    ]
+    assert 'alt="case 0"' in first["output"]
+    assert first["tests"][0]["extra_data"]["value"] == 0.23
+
+
+def test_prairielearn_is_valid_and_no_larger_than_it_may_be(tmp_path: Path) -> None:
+    everything = [grade(f"s{k}", status) for k, status in enumerate(Status)]
+    done = exported(tmp_path, "prairielearn", everything, pages={"s0": page_with(400_000, 400_000, 400_000)})
+    for name in done.files:
+        data = Path(name).read_bytes()
+        assert len(data) <= LARGEST
+        jsonschema.validate(json.loads(data), PRAIRIELEARN)
+    first = json.loads((tmp_path / "out/prairielearn/s0/results.json").read_text())
+    assert first["score"] == pytest.approx(26 / 30)
+    assert [image["label"] for image in first["images"]] == ["case 0", "case 1"]
+    assert "1 of 3 pictures" in done.notes[0]
+
+
+def test_what_the_grader_could_not_grade_is_a_zero_nowhere(tmp_path: Path) -> None:
+    grades = [grade("ada"), grade("bob", Status.GRADER_ERROR)]
+    for to in ("nbgrader", "moodle"):
+        done = exported(tmp_path / to, to, grades)
+        assert "bob" not in Path(done.files[0]).read_text()
+        assert "not been graded" in done.left_out["bob"]
+    for to in ("gradescope", "prairielearn"):
+        exported(tmp_path / to, to, grades)
+        data = json.loads((tmp_path / to / "out" / to / "bob/results.json").read_text())
+        assert "score" not in data
+    assert ",grader error,," in grades_csv(grades)
+
+
+def test_a_batch_that_is_not_finished_says_who_is_missing(tmp_path: Path) -> None:
+    done = exported(tmp_path, "nbgrader", [grade("ada")], handed_in={"ada": "1", "bob": "2"})
+    assert set(done.left_out) == {"bob"}
+
+
+def test_one_student_may_be_one_file(tmp_path: Path) -> None:
+    out = batch_in(tmp_path / "out", [grade("ada")])
+    done = export(out, "gradescope", tmp_path / "results.json", NOTHING)
+    assert done.files == (str(tmp_path / "results.json"),)
+    assert json.loads((tmp_path / "results.json").read_text())["score"] == 26.0
+
+
+@pytest.mark.parametrize("to", GRADEBOOKS.names())
+def test_options_are_used_or_refused(to: str, tmp_path: Path) -> None:
+    out = batch_in(tmp_path / "out", [grade("ada")])
+    uses = getattr(GRADEBOOKS.module(to), "USES", ())
+    for option, value in (("gradebook", tmp_path / "no.csv"), ("column", "Else"), ("points", 50.0)):
+        if option not in uses:
+            with pytest.raises(InputError, match=f"--{option} has no meaning for {to}"):
+                export(out, to, None, Wanted(**{option: value}))
+
+
+def test_refusals(tmp_path: Path) -> None:
+    out = batch_in(tmp_path / "out", [grade("ada")])
+    book = tmp_path / "book.csv"
+    book.write_text(CANVAS)
+    with pytest.raises(InputError, match="known gradebooks: nbgrader, moodle, canvas, gradescope, prairielearn"):
+        export(out, "blackboard", None, NOTHING)
+    with pytest.raises(InputError, match="your own gradebook"):
+        export(out, "canvas", book, Wanted(gradebook=book))
+    for text in ("", "a,b\n1,2\n", "Student,ID,Section\n1,2,3,4,5\n", '"unfinished'):
+        book.write_text(text)
+        for to in ("canvas", "moodle"):
+            with pytest.raises(InputError, match=r"book\.csv"):
+                export(out, to, None, Wanted(gradebook=book))
+    book.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="UTF-8"):
+        export(out, "canvas", None, Wanted(gradebook=book))
+    with pytest.raises(InputError, match=r"rds grade run"):
+        export(tmp_path, "nbgrader", None, NOTHING)
+    (out / "students/ada/grade.json").write_text("{}")
+    with pytest.raises(InputError, match="is not a grade"):
+        export(out, "nbgrader", None, NOTHING)
+    assert not list(out.glob("*.csv"))
+
+
+@given(st.text())
+def test_no_cell_of_a_table_is_a_formula(text: str) -> None:
+    (row,) = csv.reader(io.StringIO(csv_text([[text, "x"]]), newline=""))
+    assert not row[0].startswith(("=", "+", "-", "@", "\t", "\r", "\n"))
+    assert row[1] == "x"
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False, width=32))
+def test_numbers_of_a_table_stay_numbers(value: float) -> None:
+    (row,) = csv.reader(io.StringIO(csv_text([[value]])))
+    assert float(row[0]) == pytest.approx(value, rel=1e-11)
+
+
+def test_the_class_table_has_a_column_with_its_unit_for_each_criterion() -> None:
+    lines = list(csv.DictReader(io.StringIO(grades_csv([grade(name) for name in HOSTILE]), newline="")))
+    assert len(lines) == len(HOSTILE)
+    assert lines[0]["rms [points of 10]"] == "6" and lines[0]["rms value [mm]"] == "0.23"
+    assert lines[0]["student"] == '\'=HYPERLINK("http://x")'
+    assert lines[2]["student"] == "\\u202eevil\nline"
+
+
+def test_the_command_lists_who_is_left_out(tmp_path: Path) -> None:
+    book = tmp_path / "book.csv"
+    book.write_text(CANVAS)
+    out = batch_in(tmp_path / "out", [grade("s-ada"), grade("nobody")])
+    arguments = ["grade", "export", str(out), "--to", "canvas", "--gradebook", str(book)]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 1
+    assert "left out: nobody" in done.stderr
+    told = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
+    assert told["students"] == 1 and list(told["left_out"]) == ["nobody"]
+    assert CliRunner().invoke(app, ["grade", "export", str(out), "--to", "word"]).exit_code == 2
