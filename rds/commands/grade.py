@@ -120,7 +120,8 @@ def _show_self(found: SelfCheck) -> None:
     ]
     note = "Margin: 0 % where points begin, 100 % where they are full."
     if found.left_out:
-        note += f" {found.left_out} more criteria, worth {found.left_out_points:g} points, are hidden."
+        many = "criterion is" if found.left_out == 1 else "criteria are"
+        note += f" {found.left_out} more {many} not tried here, worth {found.left_out_points:g} points."
     show_table("Self-check", ["criterion", "result", "value", "margin", "points"], rows, note)
     for line in found.lines:
         if line.sentence and line.word != "pass":
