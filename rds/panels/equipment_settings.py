@@ -29,7 +29,8 @@ class EquipmentSettings:
         self._parameters = _box()
         self._folded = widgets.Accordion([self._parameters], titles=("Parameters",), selected_index=None)
         self._folded.add_class("rds-folded")
-        self.widget = widgets.VBox([])
+        at = 1 + next(i for i, names in enumerate(_GROUPS) if "controller" in names)
+        self.widget = widgets.VBox([*self._groups[:at], self._folded, *self._groups[at:]])
         self.widget.add_class("rds-side")
         equipment.choices.watch(lambda name: self._arrange())
         self._arrange()
@@ -50,27 +51,17 @@ class EquipmentSettings:
         for name in [name for name in self._views if name not in self._equipment.choices]:
             self._views.pop(name).close()
         shown = self._equipment.shown
-        parts: list[widgets.Widget] = []
+        # the parts stay in their places, so that nothing that is being typed elsewhere is drawn anew
         for box, names in zip(self._groups, _GROUPS, strict=True):
             _fill(box, [self._view(name) for name in names if name in shown])
-            if box.children:
-                parts.append(box)
-            if "controller" in names and self._equipment.parameters:
-                self._fold(parts)
-        if tuple(parts) != self.widget.children:
-            self.widget.children = parts
-
-    def _fold(self, parts: list[widgets.Widget]) -> None:
-        names = self._equipment.parameters
-        _fill(self._parameters, [self._view(name) for name in names])
-        title = f"Parameters ({len(names)})"
-        if self._folded.titles != (title,):
-            self._folded.titles = (title,)
-        parts.append(self._folded)
+        parameters = self._equipment.parameters
+        _fill(self._parameters, [self._view(name) for name in parameters])
+        self._folded.titles = (f"Parameters ({len(parameters)})",)
+        self._folded.layout.display = "" if parameters else "none"
 
 
 def _box() -> widgets.Box:
-    box = widgets.Box([])
+    box = widgets.Box([], layout={"display": "none"})
     box.add_class("rds-group")
     box.add_class("rds-fields")
     return box
@@ -80,3 +71,4 @@ def _fill(box: widgets.Box, views: Iterable[widgets.Widget]) -> None:
     children = tuple(views)
     if box.children != children:
         box.children = children
+        box.layout.display = "" if children else "none"

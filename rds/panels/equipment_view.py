@@ -166,7 +166,8 @@ class EquipmentView:
         self._shown = result
         self.results.show(result, self.run.folder if self.run else self.equipment.session.folder)
         self.notice.say(*_verdict(result))
-        self.tabs.selected_index = RESULTS
+        if self.tabs.selected_index == LIVE:  # whoever looks at something else is left there
+            self.tabs.selected_index = RESULTS
 
     def _reopened(self, results: list[Result], names: list[str], short: list[str]) -> None:
         if len(results) == 1:

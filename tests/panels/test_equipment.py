@@ -1,0 +1,299 @@
+"""Equipment model and equipment control in a browser: the main paths, each refusal, what happens meanwhile."""
+
+from __future__ import annotations
+
+import email
+import socket
+import tomllib
+from collections.abc import Callable
+from email.policy import default
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FAULTY = "def control(t, r, y, state, params):\n    error = r.positoin - y\n    return 10.0 * error, state\n"
+MODEL = "def derivatives(t, x, u, params):\n    return [x[1], (1.764 * u[0] - x[1]) / 0.009943]\n"
+
+
+class Equipment:
+    """A page at one of the equipment panels, as a person uses it."""
+
+    def __init__(self, page: Any):
+        self.page = page
+
+    def field(self, label: str) -> Any:
+        return self.page.locator(".rds-field:visible", has_text=label).first
+
+    def choose(self, label: str, option: str) -> None:
+        self.field(label).locator("select").select_option(label=option)
+
+    def type(self, label: str, value: str) -> None:
+        box = self.field(label).locator("input")
+        box.fill(value)
+        box.press("Enter")
+
+    def refusal(self, label: str) -> str:
+        text = self.field(label).locator(".rds-refusal [role=alert]")
+        text.wait_for()
+        return str(text.inner_text())
+
+    def press(self, text: str) -> None:
+        self.page.click(f'button:visible:text-is("{text}")')
+
+    def tab(self, title: str) -> None:
+        self.page.click(f'.lm-TabBar-tab:visible:has-text("{title}")')
+
+    def sees(self, text: str) -> None:
+        self.page.wait_for_selector(f':text("{text}"):visible')
+
+    def notice(self) -> str:
+        line = self.page.locator(".rds-main > .rds-notice [role]:visible").first
+        line.wait_for()
+        return str(line.inner_text())
+
+    def run(self) -> Path:
+        """Run, and wait for the files of this run, not of one before it."""
+        place = self.page.locator(':text("Saved with its report in") code')
+        before = place.inner_text() if place.count() else ""
+        self.press("Run")
+        self.page.wait_for_function(
+            """(before) => [...document.querySelectorAll('code')].some(
+                (each) => each.parentElement.innerText.startsWith('Saved with') && each.innerText !== before)""",
+            arg=before,
+        )
+        return self.saved()
+
+    def saved(self) -> Path:
+        """Wait until the run's files are written; their folder."""
+        self.sees("Saved with its report in")
+        return Path(self.page.inner_text(':text("Saved with its report in") code'))
+
+
+@pytest.fixture
+def at(open_page: Callable[..., Any]) -> Callable[..., Equipment]:
+    """Open an equipment panel, with the choices of a first run of half a second."""
+
+    def show(panel: str = "Equipment control", **options: Any) -> Equipment:
+        equipment = Equipment(open_page(panel, **options))
+        equipment.choose("System", "X axis")
+        equipment.choose("Mode", "Simulation")
+        equipment.choose("Voltage signal" if panel == "Equipment model" else "Reference", "Sinusoid")
+        equipment.type("Final time", "0.5")
+        if panel == "Equipment control":
+            equipment.choose("Controller", "Proportional")
+        return equipment
+
+    return show
+
+
+def test_three_actions_from_the_page_to_a_tracked_sine(
+    start_app: Callable[..., Any], open_page: Callable[..., Any]
+) -> None:
+    page = open_page(on=start_app())
+    page.evaluate("window.actions = 0; document.addEventListener('click', () => { window.actions += 1 }, true)")
+    page.click('button:text-is("Track a sine")')
+    page.click('button:visible:text-is("Run")')
+    page.wait_for_selector(':text("RMS error"):visible')
+    page.wait_for_selector(".rds-figure canvas:visible")
+    assert page.evaluate("window.actions") <= 3
+    assert "done: 10000 samples" in Equipment(page).notice()
+    wide = page.evaluate("[document.documentElement.scrollWidth, window.innerWidth]")
+    assert wide[0] <= wide[1]
+
+
+def test_wrong_values_are_refused_beside_their_fields(at: Callable[..., Equipment]) -> None:
+    control = at()
+    for label, value, reason in (
+        ("Amplitude", "900", "Amplitude must be from 0 to 75 mm, not 900"),
+        ("Frequency", "0", "Frequency must be more than 0"),
+        ("Offset", "twelve", "Offset must be a number mm, not 'twelve'"),
+        ("Final time", "1e9", "Final time must be more than 0 and at most 3600 s"),
+        ("Sample period", "0.00001", "Sample period must be from 0.0001 to 1 s"),
+    ):
+        control.type(label, value)
+        assert reason in control.refusal(label)
+    control.press("Run")
+    assert "first mend what is refused on the left: Amplitude, Frequency, Offset" in control.notice()
+    for label, value in (("Amplitude", "5"), ("Frequency", "0,2"), ("Offset", "0"), ("Final time", "0.5")):
+        control.type(label, value)
+    control.type("Sample period", "0.001 s")
+    control.choose("Reference", "User-defined")
+    control.type("CSV file, or formula", "open('x')")
+    assert "the formula knows no 'open'" in control.refusal("CSV file, or formula")
+    control.type("CSV file, or formula", "no-such.csv")
+    control.press("Run")
+    control.sees("there is no such file")
+    control.choose("Reference", "Sinusoid")
+    control.choose("Controller", "User-defined")
+    control.type("File of the controller", "")
+    control.press("Build")
+    control.sees("name the file of your controller")
+
+
+def test_a_fault_is_marked_at_its_line(at: Callable[..., Equipment], app: Any) -> None:
+    (app.folder / "faulty.py").write_text(FAULTY)
+    control = at()
+    control.choose("Controller", "User-defined")
+    control.type("File of the controller", "faulty.py")
+    control.press("Build")
+    fault = control.page.wait_for_selector(".rds-source-fault:visible")
+    assert fault.inner_text().split() == ["2", "error", "=", "r.positoin", "-", "y"]
+    assert "faulty.py, line 2" in control.notice()
+    assert control.page.locator("svg[role=img]:visible").get_attribute("aria-label").count("faulty.py") == 1
+    (app.folder / "faulty.py").write_text(FAULTY.replace("positoin", "position"))
+    control.press("Build")
+    control.sees("faulty.py: the controller keeps its interface")
+    control.press("Run")
+    control.saved()
+
+
+def test_a_gain_changes_while_it_runs_and_a_run_is_stopped(at: Callable[..., Equipment]) -> None:
+    control = at()
+    control.choose("Mode", "Emulation")
+    control.type("Final time", "60")
+    control.press("Load")
+    assert "loaded: 60000 samples, 1 ms each" in control.notice()
+    control.press("Run")
+    gain = control.page.locator(".rds-live-values .rds-field", has_text="Pgain")
+    gain.locator("input").fill("-3")
+    gain.locator("input").press("Enter")
+    gain.locator("[role=alert]").wait_for()
+    assert "Pgain, proportional gain must be at least 0 V/mm, not -3" in gain.inner_text()
+    control.page.wait_for_function("+(document.querySelector('[data-samples]')?.dataset.samples || 0) > 20")
+    gain.locator("input").fill("25")
+    gain.locator("input").press("Enter")
+    control.page.wait_for_selector('td:text-is("X.Pgain"):visible')
+    control.press("Stop")
+    control.sees("ended early (stopped)")
+    control.saved()
+    control.page.wait_for_selector('td:text-is("25"):visible')
+    control.tab("Timing")
+    control.page.wait_for_selector('td:text-is("lateness"):visible')
+    control.page.wait_for_selector(".rds-figure canvas:visible")
+
+
+def test_model_validation_has_a_fit_and_a_verdict(at: Callable[..., Equipment], app: Any) -> None:
+    (app.folder / "axis.py").write_text(MODEL)
+    model = at("Equipment model")
+    model.choose("Mode", "Model validation")
+    model.type("Final time", "2")
+    model.press("User-defined")
+    model.type("File of the model", "axis.py")
+    model.press("Run")
+    model.saved()
+    model.sees("fit [%]")
+    model.sees("Does the model hold?")
+
+
+def test_a_system_test_has_no_model(at: Callable[..., Equipment]) -> None:
+    model = at("Equipment model")
+    model.choose("Mode", "System test")
+    model.page.wait_for_selector(':text("File of the model")', state="hidden")
+    model.choose("Voltage signal", "User-defined")
+    model.type("CSV file, or formula", "2*sin(2*pi*t)")
+    model.press("Run")
+    folder = model.saved()
+    assert "machine" not in folder.name and "system-test" in folder.name
+    model.press("View model")
+    assert "Machine, X axis" in model.page.locator("svg[role=img]:visible").get_attribute("aria-label")
+
+
+def test_earlier_runs_are_reopened_and_laid_over(at: Callable[..., Equipment]) -> None:
+    control = at()
+    for gain in ("10", "20"):
+        if not control.page.locator('.rds-field:visible:has-text("Pgain")').count():
+            control.page.click('.jupyter-widget-Collapse-header:visible:has-text("Parameters")')
+        control.type("Pgain", gain)
+        control.run()
+        control.page.wait_for_selector(".rds-figure canvas:visible")
+    control.tab("Earlier runs")
+    control.press("Open")
+    control.sees("choose a run in the list first")
+    runs = control.page.locator("select[multiple]:visible")
+    runs.select_option(index=[0])
+    control.press("Open")
+    control.saved()
+    control.tab("Earlier runs")
+    runs.select_option(index=[0, 1])
+    control.press("Open")
+    control.sees("2 runs over each other")
+    control.page.wait_for_selector(".rds-figure canvas:visible")
+    assert control.page.locator(".rds-figure .jupyter-matplotlib:visible").count() == 1
+    assert control.page.locator(".widget-tab-contents table:visible tbody tr").count() == 2
+
+
+def test_the_panel_as_a_file(at: Callable[..., Equipment], app: Any) -> None:
+    control = at()
+    control.press("View model")
+    control.page.click('.jupyter-widget-Collapse-header:visible:has-text("Show as file")')
+    text = control.page.inner_text("pre:visible")
+    table = tomllib.loads(text)
+    assert table["axis"] == "X" and table["duration"] == 0.5 and table["controller"]["name"] == "p"
+    (app.folder / "mine.toml").unlink(missing_ok=True)
+    control.page.fill('input[placeholder="experiment.toml"]:visible', "mine.toml")
+    control.page.keyboard.press("Enter")
+    control.press("Save the file")
+    control.sees("in a terminal: rds run mine.toml")
+    assert tomllib.loads((app.folder / "mine.toml").read_text()) == table
+    control.press("Save the file")
+    control.sees("there is such a file already")
+
+
+def test_a_result_is_saved_and_sent(at: Callable[..., Equipment], app: Any) -> None:
+    aiosmtpd_controller = pytest.importorskip("aiosmtpd.controller", reason="aiosmtpd is not installed")
+    mails: list[Any] = []
+
+    class Box:
+        async def handle_DATA(self, server: Any, session: Any, envelope: Any) -> str:
+            mails.append(envelope.content)
+            return "250 taken"
+
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    (app.folder / "email.toml").unlink(missing_ok=True)
+    (app.folder / "kept.csv").unlink(missing_ok=True)
+    control = at()
+    control.press("Run")
+    control.saved()
+    control.type("Save as", "kept.csv")
+    control.press("Save")
+    control.sees("saved as")
+    assert (app.folder / "kept.csv").is_file()
+    control.press("Save")
+    control.sees("there is such a file already")
+    control.type("E-mail to", "me at home")
+    assert "no e-mail address" in control.refusal("E-mail to")
+    control.type("E-mail to", "me@example.edu")
+    control.press("Send")
+    control.sees("no mail server is set up")
+    (app.folder / "email.toml").write_text(
+        f'host = "127.0.0.1"\nport = {port}\nsecurity = "none"\nsender = "lab@example.edu"\n'
+    )
+    control.press("Send")
+    control.sees("nothing listens there; the files are kept in")
+    server = aiosmtpd_controller.Controller(Box(), hostname="127.0.0.1", port=port)
+    server.start()
+    try:
+        control.press("Send")
+        control.sees("sent to me@example.edu: report.html, result.csv")
+    finally:
+        server.stop()
+    (mail,) = mails
+    names = [part.get_filename() for part in email.message_from_bytes(mail, policy=default).iter_attachments()]
+    assert names == ["report.html", "result.csv"]
+
+
+def test_the_machine_moves_with_the_strip(at: Callable[..., Equipment]) -> None:
+    control = at()
+    control.type("Final time", "5")
+    control.press("Run")
+    control.saved()
+    control.tab("Live")
+    control.press("Show the machine")
+    control.page.wait_for_selector(".k3d-target canvas:visible, .k3d-widget canvas:visible, canvas:visible")
+    control.sees("at 4.99 s: X")
+    scrub = control.page.locator('input[aria-label="time shown"]')
+    scrub.evaluate("(box) => { box.value = 250; box.dispatchEvent(new Event('input')) }")
+    control.sees("at 1.24 s: X 4.9")  # a sine of 5 mm and 0.2 Hz is near its top then
