@@ -21,6 +21,7 @@ _SQUARE = 420  # px of a panel of a path
 _COLUMNS = 360  # of which a curve keeps lowest and highest
 _MOST_POINTS = 1500  # of a path
 _FAR = 4.0  # times the range of what is expected: a curve that goes further is cut
+_MOST = 1e12  # of any number that is drawn: beyond it doubles have no small differences
 _GRID, _TEXT = "#E2E2E2", "#3A3A3A"
 
 
@@ -178,7 +179,7 @@ def _extent(values: Sequence[np.ndarray]) -> tuple[float, float]:
     if not finite:
         return 0.0, 1.0
     low, high = min(float(each.min()) for each in finite), max(float(each.max()) for each in finite)
-    return max(low, -1e12), min(high, 1e12)
+    return min(max(low, -_MOST), _MOST), min(max(high, -_MOST), _MOST)
 
 
 def _with_margin(low: float, high: float) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rds.grading.cases.case import CaseRun
 from rds.grading.chart import Chart, Curve, Panel, chart
+from rds.grading.plain_text import one_line
 from rds.results import Result
 from rds.results.colours import BLUE, GREEN, GREY, VERMILLION
 from rds.results.metrics import tracking_error
@@ -44,7 +45,7 @@ def case_picture(runs: Sequence[CaseRun], solution: Sequence[CaseRun], title: st
     if len(runs) > 1:
         said.append(f"run {run.number + 1} of {len(runs)}, the one with the largest error")
     if run.fault:
-        said.append(run.fault)
+        said.append(one_line(run.fault, 300).rstrip("."))
     if drawn.is_cut:
         said.append("where your run goes far beyond the reference, it is cut off")
     return CasePicture(drawn, "; ".join(said) + ".")
