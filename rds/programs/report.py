@@ -90,7 +90,7 @@ def findings(about: dict[str, Any]) -> list[str]:
     share, kind, axis = max(
         (share, kind, axis) for axis, shares in about["limit_shares"].items() for kind, share in shares.items()
     )
-    said.append(f"What was sent to the axes is at most {share:.1%} of a limit ({kind} of {axis}).")
+    said.append(f"What was sent to the axes is at most {100.0 * share:.1f} % of a limit ({kind} of {axis}).")
     predicted, moving = about["predicted_s"], about["moving_s"]
     if not about["completed"]:
         said.append(f"The run ended in line {about['last_line']}, after {about['done_percent']:.1f} % of the program.")
