@@ -13,19 +13,20 @@ from rds.commands.common import Json, print_json, progress_bars, refusals, stdou
 from rds.commands.nc_options import MachineName, MaxJumps, Parameters, Tools, With, setup
 
 if TYPE_CHECKING:
-    from rds.commands.interpolate_path import Programmed
     from rds.core.types import Segment
     from rds.interpolators.acceleration import Acceleration
     from rds.interpolators.interpolator import Interpolator
     from rds.interpolators.result import Interpolation
+    from rds.nc.interpolator_segments import Programmed
 
-MOST = 2_000_000  # samples of a program
 _FOLDER = Path("interpolation")
 _METHOD = "constant-velocity"
 
 
 def interpolate(
-    file: Annotated[Path | None, typer.Argument(help="A part program; instead of it, --line or --arc.")] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="A part program, or a .toml of segments; instead of it, --line or --arc.")
+    ] = None,
     line: Annotated[
         str | None, typer.Option(help="Straight moves over points, mm: 0,0:30,40 or 0,0,0:10,0,5:20,0,0.")
     ] = None,
@@ -79,6 +80,7 @@ def interpolate(
             _follow_profile(profile, file, given, machine, period, reading, plot, out, json)
     with refusals(), stdout_kept(json):
         from rds.interpolators.path import interpolate as follow
+        from rds.interpolators.segment_rows import read_segments
 
         _check_words(file, {"--line": line, "--arc": arc}, clockwise, plane, feed)
         notes: list[str] = []
@@ -86,7 +88,7 @@ def interpolate(
         arcs = None if arc_method is None else _method(arc_method, None, period, notes)
         filter_ = _acceleration(acceleration, acceleration_time, multipliers, exact_stop)
         rests: dict[int, float] = {}
-        if file is not None:
+        if file is not None and file.suffix != ".toml":
             segments, rests, said = _program(file, machine, period, reading)
             notes += said
         else:
@@ -97,7 +99,7 @@ def interpolate(
                 "max-jumps": max_jumps,
             }
             _check_program_words({"machine": machine != "mini-cnc", **of_programs})
-            segments = _segments(line, arc, clockwise, plane, feed or "")
+            segments = read_segments(file) if file is not None else _segments(line, arc, clockwise, plane, feed or "")
         done = follow(segments, period, chosen, arcs=arcs, acceleration=filter_, exact_stop=exact_stop, rests=rests)
         files = _save(done, out, plot)
     if json:
@@ -136,7 +138,7 @@ def _check_program_words(given: dict[str, Any]) -> None:
 
     for name, value in given.items():
         if value:
-            raise InputError(f"--{name} is for a part program; --line and --arc are taken as they are")
+            raise InputError(f"--{name} is for a part program; segments are taken as they are")
 
 
 def _method(name: str, options: list[str] | None, T: float, notes: list[str]) -> Interpolator:
@@ -243,9 +245,9 @@ def _check_program_file(file: Path, T: float) -> None:
 
 
 def _program(file: Path, machine: str, T: float, reading: tuple[Any, Any, Any, Any]) -> Programmed:
-    from rds.commands.interpolate_path import program
     from rds.machines import load_machine
     from rds.nc.check import motion
+    from rds.nc.interpolator_segments import MOST, program
 
     _check_program_file(file, T)
     loaded = load_machine(machine)
@@ -274,39 +276,9 @@ def _write(data: bytes, stream: BinaryIO) -> None:
 
 def _show(done: Interpolation, notes: list[str], files: list[Path]) -> None:
     from rds.console import show_table
+    from rds.interpolators.summary import summary
 
-    about = done.to_json()
-    top = (
-        f"{about['method'] if isinstance(about['method'], str) else ' and '.join(about['method'])}"
-        f"{', ' + about['acceleration'] + ' acceleration' if about['acceleration'] else ''}: "
-        f"{about['segments']} segment{'s' if about['segments'] > 1 else ''}, a sample every {1000 * done.T:g} ms"
-    )
-    rows = [
-        ("samples", str(done.samples), ""),
-        ("time", f"{done.duration:.6g}", "s"),
-        ("programmed length", f"{done.programmed_length:.4f}", "mm"),
-        ("length", f"{done.length:.4f}", "mm"),
-        ("largest distance from the path, samples", f"{about['path_error_mm']:.6f}", "mm"),
-        ("largest distance from the path, between them", f"{about['chord_error_mm']:.6f}", "mm"),
-    ]
-    worst = done.worst_steps
-    if worst is not None:
-        rows += [
-            ("steps of the arc" if len(done.segments) == 1 else "steps of the worst arc", str(worst.count), ""),
-            ("steps by the formula", f"{worst.formula:.2f}", ""),
-            ("radial error", f"{worst.radial_error:.6f}", "mm"),
-            ("chord height error", f"{worst.chord_error:.6f}", "mm"),
-            (f"within one BLU of {worst.blu:g} mm", "yes" if worst.within else "NO", ""),
-        ]
-    if about["generation_error_mm"] is not None:
-        kept = "yes" if done.within else "NO"
-        rows += [
-            ("commanded minus theoretical, largest", f"{about['generation_error_mm']:.6f}", "mm"),
-            (f"within one BLU of {done.blu:g} mm", kept, ""),
-        ]
-    for name, unit in (("velocity", "mm/s"), ("acceleration", "mm/s²")):
-        largest = about[f"largest_{name}_{'mm_s' if name == 'velocity' else 'mm_s2'}"]
-        rows += [(f"largest {name} {axis}", f"{value:.6g}", unit) for axis, value in largest.items()]
+    top, rows = summary(done)
     show_table(top, ("quantity", "value", "unit"), rows)
     for note in notes:
         typer.echo(f"note: {note}")

@@ -6,6 +6,8 @@ from math import atan2, dist, hypot, pi
 
 from rds.core.types import ArcSegment, LineSegment, Segment
 
+PLANES = {"XY": (0, 1), "ZX": (2, 0), "YZ": (1, 2)}  # of arcs: their axes by index, the normal towards the viewer
+
 
 def radius(segment: ArcSegment) -> float:
     """Distance of the start from the centre in the arc's plane, mm."""

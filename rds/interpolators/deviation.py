@@ -16,14 +16,17 @@ def distances(segment: Segment, positions: np.ndarray) -> np.ndarray:
 
     For an arc it is taken to the point of the path at the same angle: the nearest one, but for steep helices.
     """
+    return np.linalg.norm(positions - nearest_points(segment, positions), axis=1)
+
+
+def nearest_points(segment: Segment, positions: np.ndarray) -> np.ndarray:
+    """The points of the segment (rows, axes), mm, that `distances` measures to."""
     if isinstance(segment, ArcSegment):
         arc = Arc.of(segment)
-        nearest = arc.points(_share(arc, segment, positions))
-    else:
-        start, way = np.array(segment.start), np.subtract(segment.end, segment.start)
-        share = np.clip((positions - start) @ way / max(float(way @ way), 1e-300), 0.0, 1.0)
-        nearest = start + np.outer(share, way)
-    return np.linalg.norm(positions - nearest, axis=1)
+        return arc.points(_share(arc, segment, positions))
+    start, way = np.array(segment.start), np.subtract(segment.end, segment.start)
+    share = np.clip((positions - start) @ way / max(float(way @ way), 1e-300), 0.0, 1.0)
+    return start + np.outer(share, way)
 
 
 def path_distances(
@@ -37,6 +40,22 @@ def path_distances(
         if rows.start < rows.stop:
             found[rows] = np.minimum(found[rows], distances(segment, positions[rows]))
     return found
+
+
+def path_deviations(
+    segments: Sequence[Segment], positions: np.ndarray, first: np.ndarray, last: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The nearest points of those segments, and the way from them to each row: both (rows, axes), mm."""
+    nearest, found = positions.copy(), np.full(len(positions), np.inf)
+    for index, segment in enumerate(segments):
+        rows = slice(int(np.searchsorted(last, index, "left")), int(np.searchsorted(first, index, "right")))
+        if rows.start < rows.stop:
+            points = nearest_points(segment, positions[rows])
+            far = np.linalg.norm(positions[rows] - points, axis=1)
+            closer = far < found[rows]
+            found[rows] = np.where(closer, far, found[rows])
+            nearest[rows] = np.where(closer[:, None], points, nearest[rows])
+    return nearest, positions - nearest
 
 
 def _share(arc: Arc, segment: ArcSegment, positions: np.ndarray) -> np.ndarray:

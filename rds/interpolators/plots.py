@@ -17,14 +17,24 @@ _STYLES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)), 
 
 def pictures(done: Interpolation) -> dict[str, Picture]:
     """All that there is to draw, by name."""
-    found = {"motion": motion(done), "errors": errors(done)}
-    if done.worst_steps is not None:
-        found["steps"] = steps(done.worst_steps)
-    if len(done.axes) > 1:
-        found["path"] = path(done)
-    if done.generation_error is not None:
-        found["generation-error"] = generation_error(done)
-    return found
+    return {name: picture(done, name) for name in names_of(done)}
+
+
+def names_of(done: Interpolation) -> list[str]:
+    """The names of the pictures that there are of it."""
+    names = ["motion", "path", "magnified"] if len(done.axes) > 1 else ["motion"]
+    names.append("errors")
+    names += ["steps"] if done.worst_steps is not None else []
+    return names + (["generation-error"] if done.generation_error is not None else [])
+
+
+def picture(done: Interpolation, name: str) -> Picture:
+    """One of them."""
+    if name == "steps":
+        assert done.worst_steps is not None
+        return steps(done.worst_steps)
+    drawn = {"motion": motion, "path": path, "magnified": magnified, "errors": errors}
+    return (drawn | {"generation-error": generation_error})[name](done)
 
 
 def motion(done: Interpolation) -> Picture:
@@ -67,6 +77,39 @@ def path(done: Interpolation) -> Picture:
         dress(axes, f"{done.axes[j]} [mm]", f"{done.axes[i]} [mm]")
         axes.set_aspect("equal", adjustable="datalim")
     legend(grid[0])
+    return picture
+
+
+def magnified(done: Interpolation, times: float | None = None) -> Picture:
+    """The path in the plane in which it is furthest off, with its distances from the programmed path `times` larger.
+
+    By default as large as fits the picture. Circles are samples; the line goes through the chords' middles too.
+    """
+    from rds.interpolators.deviation import path_deviations
+
+    middles = (done.position[1:] + done.position[:-1]) / 2.0
+    rows = np.empty((2 * len(done.position) - 1, len(done.axes)))
+    rows[::2], rows[1::2] = done.position, middles
+    segment = np.empty(len(rows), dtype=int)
+    segment[::2], segment[1::2] = done.segment, done.segment[1:]
+    # a filtered sample may belong to the segment before: both are looked at
+    nearest, off = path_deviations(done.segments, rows, np.maximum(segment - 1, 0), segment)
+    spread = np.abs(off).max(axis=0) + 1e-6 * np.ptp(done.theory, axis=0)
+    i, j = sorted(np.argsort(-spread, kind="stable")[:2].tolist())
+    largest = float(np.linalg.norm(off, axis=1).max())
+    size = float(np.ptp(nearest[:, [i, j]], axis=0).max())
+    scale = times or (float(f"{0.12 * size / largest:.0e}") if largest > _ROUNDING else 1.0)
+    shown = nearest + max(scale, 1.0) * off
+    picture = Picture(6.0, 8.0)
+    axes = picture.subplots()
+    programmed = _programmed(done)
+    axes.plot(programmed[:, i], programmed[:, j], color=GREY, linewidth=4.0, alpha=0.45, label="programmed")
+    axes.plot(shown[:, i], shown[:, j], color=BLUE, linewidth=1.0, label=f"errors {max(scale, 1.0):g} times as large")
+    if len(shown) < 800:
+        axes.plot(shown[::2, i], shown[::2, j], "o", color=BLUE, markersize=3, label="samples")
+    dress(axes, f"{done.axes[j]} [mm]", f"{done.axes[i]} [mm]")
+    axes.set_aspect("equal", adjustable="datalim")
+    legend(axes)
     return picture
 
 

@@ -18,8 +18,10 @@ PANELS = Registry(
         "equipment-model": "rds.panels.equipment_model",
         "equipment-control": "rds.panels.equipment_control",
         "design": "rds.panels.design",
+        "interpolator": "rds.panels.interpolator",
         "program": "rds.panels.program",
         "drawing": "rds.panels.drawing",
+        "data": "rds.panels.data",
         "help": "rds.panels.guide",
     },
 )

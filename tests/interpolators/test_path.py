@@ -70,7 +70,7 @@ def test_the_table_reopens_as_it_was_saved(tmp_path: Path) -> None:
 def test_pictures(method: str) -> None:
     drawn = pictures(interpolate(KEYHOLE, T, library_interpolator(method)))
     own = {"reference-pulse": "generation-error", "improved-tustin": "steps"}[method]
-    assert set(drawn) == {"motion", "path", "errors", own}
+    assert set(drawn) == {"motion", "path", "magnified", "errors", own}
     assert all(picture.png().startswith(b"\x89PNG") for picture in drawn.values())
     assert [axes.get_ylabel() for axes in drawn["motion"].axes] == [
         "position [mm]",

@@ -1,0 +1,96 @@
+"""A path written down row by row: each a line or an arc from where the one before ended.
+
+A row is a mapping: `kind` ("line" or "arc"), `end` (mm per axis), of an arc `centre` (mm per axis), `clockwise` (false)
+and `plane` ("XY"); `feed` where it is not that of the path. It is the form of a table on a page and of a TOML file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.core.geometry import PLANES
+from rds.core.options import check_known
+from rds.core.types import ArcSegment, LineSegment, Segment
+from rds.core.words import Words
+
+FEED_UNITS = {"mm/min": 1 / 60, "mm/s": 1.0, "m/min": 1000 / 60, "in/min": 25.4 / 60, "in/s": 25.4}  # mm/s
+_KEYS = {"line": ("kind", "end", "feed"), "arc": ("kind", "end", "centre", "clockwise", "plane", "feed")}
+
+
+def segments_of(start: Sequence[float], rows: Sequence[Mapping[str, Any]], feed: float, unit: str) -> list[Segment]:
+    """The path from `start` (mm per axis) over `rows`, at `feed` in `unit` where a row has no feed of its own.
+
+    InputError naming the row and what it must be. Whether an arc closes is checked when it is interpolated.
+    """
+    if unit not in FEED_UNITS:
+        raise InputError(f"feed unit {unit!r} must be one of {', '.join(FEED_UNITS)}")
+    if not rows:
+        raise InputError("there is no segment to interpolate; give a line or an arc")
+    here = point(start, "start", None)
+    made: list[Segment] = []
+    for number, row in enumerate(rows, start=1):
+        made.append(_segment(here, row, f"segment {number}", feed, unit))
+        here = made[-1].end
+    return made
+
+
+def point(value: Any, what: str, axes: int | None) -> tuple[float, ...]:
+    """A position, mm per axis, from a list of numbers; InputError for anything else, or another number of axes."""
+    said = f"{what} = {value!r:.60}"
+    numbers = isinstance(value, list | tuple) and all(
+        isinstance(each, int | float) and not isinstance(each, bool) and isfinite(each) for each in value
+    )
+    if not numbers or not 1 <= len(value) <= 3:
+        raise InputError(f"{said} must be one to three positions in mm: X, Y, Z")
+    if axes is not None and len(value) != axes:
+        raise InputError(f"{said} must have {axes} position{'s' if axes > 1 else ''}, as the start has")
+    return tuple(float(each) for each in value)
+
+
+def read_segments(path: str | Path) -> list[Segment]:
+    """The path that a TOML file gives: `start`, `feed`, `feed_unit` (mm/min) and `[[segment]]` rows. InputError."""
+    words = Words.read(path)
+    for key in ("start", "feed"):
+        if key not in words:
+            raise InputError(
+                f"{key} is missing; as in `{key} = {'[0.0, 0.0]' if key == 'start' else '600'}`", words.place()
+            )
+    start, feed = words.any("start"), words.any("feed")
+    unit = words.text("feed_unit", "mm/min") or "mm/min"
+    rows = [dict(table.table) for table in words.tables("segment")]
+    try:
+        made = segments_of(start, rows, _feed(feed, "feed"), unit)
+    except InputError as error:
+        raise InputError(str(error), words.place()) from error
+    known = {"start", "feed", "feed_unit", "segment"}
+    check_known(words.table, known, str(path))
+    return made
+
+
+def _segment(here: tuple[float, ...], row: Mapping[str, Any], name: str, feed: float, unit: str) -> Segment:
+    kind = row.get("kind")
+    if kind not in _KEYS:
+        raise InputError(f"{name}: kind = {kind!r} must be line or arc")
+    check_known(row, _KEYS[kind], f"{name} ({kind})")
+    end = point(row.get("end"), f"{name}: end", len(here))
+    rate = FEED_UNITS[unit] * _feed(feed if row.get("feed") is None else row["feed"], f"{name}: feed")
+    if kind == "line":
+        return LineSegment(here, end, rate)
+    centre = point(row.get("centre"), f"{name}: centre", len(here))
+    clockwise, plane = row.get("clockwise", False), row.get("plane", "XY")
+    if not isinstance(clockwise, bool):
+        raise InputError(f"{name}: clockwise = {clockwise!r} must be true or false")
+    if plane not in PLANES or max(PLANES[plane]) >= len(here):
+        fitting = ", ".join(each for each, axes in PLANES.items() if max(axes) < len(here)) or "none, of one axis"
+        raise InputError(f"{name}: plane = {plane!r} must be one of {fitting}")
+    return ArcSegment(here, end, centre, rate, clockwise, PLANES[plane])
+
+
+def _feed(value: Any, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < float("inf"):
+        raise InputError(f"{what} = {value!r:.60} must be a number above 0")
+    return float(value)
