@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import cos, radians, sin
 from typing import Any
@@ -50,11 +50,13 @@ class Modes:
 class Follower(Interpreter):
     """An interpreter that keeps the modes after each line of the program's own file, as its last run left them.
 
-    `modes` by line number. Lines of plain moves that are read many at once have no entry of their own: `modes_at`.
+    `between` is called after each line, and may raise to end it all. `modes` is by line number; lines of plain moves
+    that are read many at once have no entry of their own: see `modes_at`.
     """
 
-    def __init__(self, *given: Any, **options: Any):
+    def __init__(self, *given: Any, between: Callable[[], None] = lambda: None, **options: Any):
         super().__init__(*given, **options)
+        self._between = between
         self.modes: dict[int, Modes] = {}
         self._path = "G64"
         self._seen: list[Any] = []
@@ -62,6 +64,7 @@ class Follower(Interpreter):
 
     def _line(self, raw: bytes) -> bool:
         ended = super()._line(raw)
+        self._between()
         for item in self.out.items:
             if isinstance(item, Call) and item.name == "SET_MOTION_CONTROL_MODE":
                 self._path = _PATH[str(item.args[0])]

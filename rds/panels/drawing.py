@@ -11,7 +11,7 @@ from rds.panels.drawing_view import DrawingView
 NAME = "drawing"
 TITLE = "Drawing"
 SUMMARY = "Draw cells or take a picture, and make a part program of its outline"
-HELP = "paths"
+HELP = "program-panel"
 
 
 def build(shell: Any) -> widgets.Widget:

@@ -50,7 +50,8 @@ class DrawingView:
         )
         make.on_click(lambda _: self.make())
         row = widgets.HBox([self._views["program"], make])
-        row.add_class("rds-action")
+        row.add_class("rds-row")
+        row.layout.align_items = "flex-end"
         main = widgets.VBox([row, self.notice, self.verdict, self._place])
         main.add_class("rds-main")
         self.widget = widgets.HBox([side, main])

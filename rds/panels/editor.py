@@ -42,6 +42,10 @@ class Editor(anywidget.AnyWidget):
         """Show these, and no others."""
         self.marks = [mark.to_json() for mark in marks]
 
+    def go(self, line: int) -> None:
+        """Go to a line, and select it."""
+        self.send({"kind": "go", "line": line})
+
     def _asked(self, _: Any, content: Any, __: Any) -> None:
         if content == {"kind": "save"}:
             self._on_save()

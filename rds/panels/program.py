@@ -11,7 +11,7 @@ from rds.panels.program_view import ProgramView
 NAME = "program"
 TITLE = "Program"
 SUMMARY = "Write a part program, see its path and its faults, run it, hold it, change its feed"
-HELP = "part-programs"
+HELP = "program-panel"
 
 
 def build(shell: Any) -> widgets.Widget:

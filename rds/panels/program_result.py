@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from html import escape
 from typing import Any
 
@@ -11,21 +12,26 @@ from rds.panels.kit.figure import FigureView
 from rds.results import html
 from rds.session.program_run import ProgramWork
 
+_WORST = 3  # lines that have a button
 _EMPTY = "<p>No result yet: press Run.</p>"
 
 
 class ProgramResult:
     """`show(work)` when the loop is over, `saved(work)` when its files are there, `clear()` before the next run."""
 
-    def __init__(self, shell: Any):
-        self._shell = shell
+    def __init__(self, shell: Any, go: Callable[[int], None]):
+        """`go(line)` shows a line of the program."""
+        self._shell, self._go = shell, go
         self.words = widgets.HTML(_EMPTY)
         self.where = widgets.HTML()
         self.path, self.along = FigureView(), FigureView()
-        self.widget = widgets.VBox([self.words, self.where, self.path, self.along])
+        self.worst = widgets.HBox([])
+        self.worst.add_class("rds-row")
+        self.widget = widgets.VBox([self.worst, self.words, self.where, self.path, self.along])
 
     def show(self, work: ProgramWork) -> None:
         """Sentences, the worst lines, and pictures."""
+        from rds.programs.judge import worst_lines
         from rds.programs.pictures import along, path
         from rds.programs.report import program_report
 
@@ -39,6 +45,9 @@ class ProgramResult:
             for each in (*report.tables[1:], report.tables[0])
         )
         self.words.value = html.verdict_line(result, "Timing") + found + tables
+        self.worst.children = [
+            self._button(line, error) for line, error, _ in worst_lines(result, result["contour_error"], _WORST)
+        ]
         self.where.value = "<p>its files are being written …</p>"
         session, ticker = self._shell.session, self._shell.ticker
         self.path.draw(session, ticker, lambda: path(result, prepared))
@@ -54,5 +63,12 @@ class ProgramResult:
     def clear(self) -> None:
         """Nothing to show."""
         self.words.value, self.where.value = _EMPTY, ""
+        self.worst.children = []
         self.path.clear()
         self.along.clear()
+
+    def _button(self, line: int, error: float) -> widgets.Button:
+        tip = "Contour error: how far off its path the tool was at most in this line; shows the line in the editor"
+        button = widgets.Button(description=f"Line {line}: {error:.4f} mm off", tooltip=tip)
+        button.on_click(lambda _: self._go(line))
+        return button

@@ -52,13 +52,10 @@ def _positions(status: Status | None, modes: Modes | None, machine: Machine) -> 
             )
             continue
         digits = 3 if axis.unit == "mm" else 2
-        rows.append(
-            f"<tr><td>{escape(name)}</td><td>{_number(at, digits)}</td><td>{_number(work.get(name), digits)}</td>"
-            f"<td>{_bar(at, low, high, axis.unit)}</td></tr>"
-        )
-    head = (
-        "<tr><th>Axis</th><th>Machine [mm]</th><th>Work [mm]</th><th>Within the travel; to the nearest limit</th></tr>"
-    )
+        cells = [f"{escape(name)} [{escape(axis.unit)}]", _number(at, digits), _number(work.get(name), digits)]
+        cells.append(_bar(at, low, high, axis.unit))
+        rows.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
+    head = "<tr><th>Axis</th><th>Machine</th><th>Work</th><th>Within the travel; to the nearest limit</th></tr>"
     return f'<table class="rds-positions">{head}{"".join(rows)}</table>'
 
 

@@ -40,9 +40,9 @@ class ProgramView:
         self.operator = Operator(shell, self.program.choices, self.notice, self.start)
         self.preview = Preview(self.program)
         self.status = widgets.HTML()
-        self.strip = StripChart(height=200)
+        self.strip = StripChart(height=170)
         self.strip.layout.display = "none"
-        self.result = ProgramResult(shell)
+        self.result = ProgramResult(shell, self.editor.go)
         self.tools = widgets.HTML()
         self.program.choices.watch(self._chosen)
         self.widget = self._arranged()
@@ -56,7 +56,10 @@ class ProgramView:
         settings = field_group(choices, ["controller", "optional_stop", "block_delete"])
         again = widgets.Button(description="Look again", tooltip="Look for tool tables in the folder")
         again.on_click(lambda _: self._refresh_tools())
-        more = widgets.VBox([settings, FieldView(choices, "tools", buttons=False), again, self.tools])
+        table = widgets.HBox([FieldView(choices, "tools", buttons=False), again])
+        table.add_class("rds-row")
+        table.layout.align_items = "flex-end"
+        more = widgets.VBox([settings, table, self.tools])
         run = widgets.VBox([self.status, self.strip])
         self.tabs = widgets.Tab([self.preview.widget, run, self.result.widget, more], titles=TABS)
         self.tabs.add_class("rds-tabs")

@@ -25,6 +25,7 @@ PANEL = "drawing"
 CELLS, PICTURE = "cells", "picture"
 PICTURES = (".png", ".jpg", ".jpeg", ".pgm", ".pbm", ".ppm", ".pnm", ".txt")
 MOST_CELLS = 96  # across and up
+_LEAST = 5  # rows and columns that can be chosen
 LARGEST = 20 << 20  # bytes of a picture that is taken into the folder
 _NO_PICTURE = ""
 _START = "\n".join(
@@ -51,8 +52,8 @@ def check_cells(text: str) -> None:
 def _fields(folder: Path) -> Iterable[Field]:
     yield Choice("source", "Drawing", "cells that you fill, or a picture", CELLS, {CELLS: "Cells", PICTURE: "Picture"})
     yield Text("cells", "Cells", "rows of . and #", _START, longest=MOST_CELLS * (MOST_CELLS + 1), refuse=check_cells)
-    yield Number("columns", "Columns", "of cells", 28, low=5, high=MOST_CELLS, whole=True)
-    yield Number("rows", "Rows", "of cells", 16, low=5, high=MOST_CELLS, whole=True)
+    yield Number("columns", "Columns", "of cells", 28, low=_LEAST, high=MOST_CELLS, whole=True)
+    yield Number("rows", "Rows", "of cells", 16, low=_LEAST, high=MOST_CELLS, whole=True)
     yield picture_field(folder)
     yield Number("pixel", "Size of a cell or pixel", "the side of one", 1.0, unit="mm", above=0.0, high=50.0)
     yield Number(
@@ -173,17 +174,22 @@ class Drawing:
         self.choices = session.choices(PANEL, _fields(session.folder))
         self.latest: Traced | None = None
         self.refusal = ""
+        self._fitting = False  # rows and columns follow the cells, and not the other way round
         self._written: dict[Path, bytes] = {}
         self._traces = Latest(self._begin)
         self.choices.watch(self._changed)
 
     def _changed(self, name: str) -> None:
-        if name in ("columns", "rows"):
+        if name in ("columns", "rows") and not self._fitting:
             self._resize()
         elif name == "cells":
             rows = str(self.choices["cells"]).split("\n")
-            self.choices.set("rows", max(len(rows), 5))
-            self.choices.set("columns", max(len(rows[0]), 5))
+            self._fitting = True
+            try:
+                self.choices.set("rows", max(len(rows), _LEAST))
+                self.choices.set("columns", max(len(rows[0]), _LEAST))
+            finally:
+                self._fitting = False
         if name != "program":
             self._traces.again()
 

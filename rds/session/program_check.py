@@ -81,14 +81,19 @@ def look(task: Task[Any], source: Path, name: str, machine: Machine, setup: Setu
     validator, trace = Validator(machine, tools, label), Trace()
     try:
         follower = Follower(
-            source, tools=tools, parameters=parameters, options=setup.options, name=label, remark=validator.warn
+            source,
+            tools=tools,
+            parameters=parameters,
+            options=setup.options,
+            name=label,
+            remark=validator.warn,
+            between=lambda: task.advance(0.0, 0.0, "checking"),
         )
     except ProgramError as error:
         return Look((Mark(0, 0, 0, error.reason),))
     kept: list[PathBlock] = []
     try:
-        items = _watched(follower.run(), task)
-        for block in validator.watch(toolpath(items, report=validator.report, warn=validator.warn_of_spindle)):
+        for block in validator.watch(toolpath(follower.run(), report=validator.report, warn=validator.warn_of_spindle)):
             trace.add(block.segments)
             kept.append(block)
     finally:
@@ -109,12 +114,6 @@ def look(task: Task[Any], source: Path, name: str, machine: Machine, setup: Setu
     except RdsError as error:
         return Look(marks, result, trace, follower.modes, trouble=str(error).replace(label, name))
     return Look(marks, result, trace, follower.modes, cycle)
-
-
-def _watched(items: Iterable[Any], task: Task[Any]) -> Iterator[Any]:
-    for item in items:
-        task.advance(0.0, 0.0, "checking")
-        yield item
 
 
 def _divided(blocks: Iterable[PathBlock], task: Task[Any]) -> Iterator[PathBlock]:

@@ -68,6 +68,22 @@ class ProgramWork(EquipmentRun):
         self.files = save_run(self.result, part.prepared, self.folder)
         return self.result
 
+    # what a progress bar follows: waiting is no progress
+
+    @property
+    def share(self) -> float | None:
+        """0 to 1 of the planned samples; before the first one as the work says."""
+        status = self.status()
+        return super().share if status is None else status.share
+
+    @property
+    def seconds_left(self) -> float | None:
+        """s, at the rate of now; None while it waits or rests."""
+        status = self.status()
+        if status is None or self.prepared is None:
+            return super().seconds_left
+        return self.prepared.seconds * (1.0 - status.share) / status.rate if status.rate > 0.01 else None
+
     # an operator's hand
 
     @property

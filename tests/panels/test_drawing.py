@@ -82,7 +82,9 @@ def test_a_picture_of_the_folder_is_traced(open_page: Callable[..., Any], app: A
     page = opened(open_page)
     page.click('button:text-is("Picture")')
     page.wait_for_selector(f'{BAD}:has-text("choose a picture")')
-    page.set_input_files('.rds-side input[type="file"]', path)
+    with page.expect_file_chooser() as chooser:
+        page.click('.rds-side button:has-text("Take a picture")')
+    chooser.value.set_files(path)
     page.wait_for_selector(f'{GOOD}:has-text("off the traced outline")')
     page.wait_for_selector(".rds-main .rds-figure canvas, .rds-main .rds-figure img")
     assert (app.folder / "disc.png").is_file()

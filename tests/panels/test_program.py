@@ -9,9 +9,17 @@ from typing import Any
 
 import pytest
 
+from rds.machines import load_machine
+from rds.nc.active import Modes
+from rds.panels.program_status import status_html
+from rds.programs.run import Status
+from rds.runtime.execution import State
 from tests.panels.conftest import App
 
 EDITOR = ".rds-editor textarea"
+SELECTED = (
+    "(({value, selectionStart, selectionEnd}) => value.slice(selectionStart, selectionEnd))(document.activeElement)"
+)
 VALID = '.rds-verdict .rds-notice-good:has-text("the machine can run it")'
 
 
@@ -28,6 +36,16 @@ def opened(open_page: Callable[..., Any]) -> Any:
 
 def write(page: Any, text: str) -> None:
     page.fill(EDITOR, text)
+
+
+def test_a_limit_that_is_near_is_said_by_a_sign() -> None:
+    machine = load_machine("mini-cnc")
+    measured = {"X": 72.0, "Y": 0.0, "Z": -10.0, "spindle": 1500.0}
+    status = Status(1.0, 3, State.RUNS, 1.0, 300.0, 0.5, measured, dict(measured))
+    shown = status_html(status, {2: Modes(("G1", "G54"), 4, 300.0, 1500.0, origin=(2.0, 0.0, 0.0))}, machine, 100.0)
+    assert "⚠ 3.0 to high" in shown and shown.count("⚠") == 1
+    assert "<td>72.000</td><td>70.000</td>" in shown and "T4" in shown and "<code>G54</code>" in shown
+    assert "–" in status_html(None, {}, machine, 100.0)
 
 
 def test_a_fault_is_marked_at_its_word_and_the_mark_goes_when_it_is_mended(open_page: Callable[..., Any]) -> None:
@@ -96,8 +114,23 @@ def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(open_page: Call
     page.click('.rds-work button:text-is("Stop")')
     page.wait_for_selector('.rds-notice:has-text("ended early: stopped in line")')
     page.wait_for_selector('.rds-main :text("Where the contour error is largest")')
+    page.click('.rds-main button:has-text("Line 2:")')
+    assert page.evaluate(SELECTED) == "G1 X30 F120"
     page.wait_for_selector('.rds-main :text("Saved in")')
     assert re.search(r"override\s+1\s+2|override\s+1\s+", page.inner_text(".rds-main"))
+
+
+def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(open_page: Callable[..., Any]) -> None:
+    page = opened(open_page)
+    write(page, lines("G1 X1 F600", "M0", "G1 X30 F120"))
+    page.wait_for_selector(VALID)
+    page.click('button:text-is("Emulation")')
+    page.click('button:text-is("Run")')
+    page.wait_for_selector('.rds-state:has-text("Line 3 stops (M0 or M1)")')
+    page.click('button:text-is("Resume")')
+    page.wait_for_selector('.rds-state:has-text("Line 4 runs")')
+    page.click('button:text-is("Home")')
+    page.wait_for_selector('.rds-notice:has-text("ended early: went home from line 4")')
 
 
 def test_nothing_is_cut_off_at_1280_by_800(open_page: Callable[..., Any]) -> None:

@@ -134,6 +134,7 @@ function render({ model, el }) {
   });
   model.on("change:marks", () => { tell(); redraw(); });
   model.on("change:running", () => { if (model.get("running")) show(model.get("running")); redraw(); });
+  model.on("msg:custom", (message) => { if (message.kind === "go") go(message.line, 0, 0); });
   model.on("change:locked", lock);
   function lock() { area.readOnly = model.get("locked"); box.classList.toggle("rds-editor-locked", area.readOnly); }
   const sized = new ResizeObserver(redraw);

@@ -2,10 +2,10 @@
 // Points come once for each program, the tool ten times a second; which side is shown is the page's own affair.
 
 const VIEWS = { XY: [0, 1], YZ: [1, 2], ZX: [0, 2] };
-const KINDS = [ // colours of Okabe and Ito; line styles differ as well
-  { color: "#D55E00", dash: [6, 4], width: 1.2, label: "rapid" },
-  { color: "#0072B2", dash: [], width: 1.6, label: "straight feed" },
-  { color: "#009E73", dash: [], width: 2.2, label: "arc feed" },
+const KINDS = [ // colours of Okabe and Ito, on light and on dark; line styles differ as well
+  { colors: ["#D55E00", "#E69F00"], dash: [6, 4], width: 1.2, label: "rapid" },
+  { colors: ["#0072B2", "#56B4E9"], dash: [], width: 1.6, label: "straight feed" },
+  { colors: ["#009E73", "#1FC79A"], dash: [], width: 2.4, label: "arc feed" },
 ];
 
 function render({ model, el }) {
@@ -25,10 +25,11 @@ function render({ model, el }) {
   const buttons = Object.keys(VIEWS).map((name) => button(name, `Seen along ${"XYZ".replace(name[0], "").replace(name[1], "")}`, () => { model.set("side", name); model.save_changes(); }));
   const wide = button("Whole travel", "Show all of the machine's travel, or the path alone", () => { whole = !whole; redraw(); });
   bar.append(...buttons, wide);
-  KINDS.forEach((kind) => {
+  const samples = KINDS.map((kind) => {
     const item = document.createElement("span");
-    item.innerHTML = `<svg width="28" height="8" aria-hidden="true"><line x1="0" x2="28" y1="4" y2="4" stroke="${kind.color}" stroke-width="${kind.width + 0.6}" stroke-dasharray="${kind.dash}"/></svg> ${kind.label}`;
+    item.innerHTML = `<svg width="28" height="8" aria-hidden="true"><line x1="0" x2="28" y1="4" y2="4" stroke-width="${kind.width + 0.6}" stroke-dasharray="${kind.dash}"/></svg> ${kind.label}`;
     legend.append(item);
+    return item.querySelector("line");
   });
   for (const [sign, words] of [["○", "start"], ["■", "end"], ["✕", "beyond the travel"], ["◎", "tool"], ["┄", "travel limits"]]) {
     const item = document.createElement("span");
@@ -54,6 +55,7 @@ function render({ model, el }) {
     const width = canvas.clientWidth, height = model.get("height"), ratio = window.devicePixelRatio || 1;
     if (!width) return;
     canvas.width = width * ratio; canvas.height = height * ratio; canvas.style.height = `${height}px`;
+    const dark = Boolean(el.closest(".rds-dark"));
     const side = model.get("side"), [across, up] = VIEWS[side], pen = canvas.getContext("2d");
     buttons.forEach((each) => each.setAttribute("aria-pressed", String(each.textContent === side)));
     wide.setAttribute("aria-pressed", String(whole));
@@ -72,7 +74,9 @@ function render({ model, el }) {
     stroke(pen, ink("--rds-quiet"), [8, 3, 2, 3], 1);
     pen.strokeRect(X(travel[across][0]), Y(travel[up][1]), (travel[across][1] - travel[across][0]) * scale, (travel[up][1] - travel[up][0]) * scale);
     parts.forEach((points, kind) => {
-      stroke(pen, KINDS[kind].color, KINDS[kind].dash, KINDS[kind].width);
+      const color = KINDS[kind].colors[dark ? 1 : 0];
+      samples[kind].setAttribute("stroke", color);
+      stroke(pen, color, KINDS[kind].dash, KINDS[kind].width);
       pen.beginPath();
       let on = false;
       for (let i = 0; i < points.length; i += 3) {

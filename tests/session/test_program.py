@@ -1,0 +1,272 @@
+"""Part programs in a session: the text that is never lost, what a look finds, a run."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rds.core.errors import InputError
+from rds.nc.active import Follower, modes_at
+from rds.session import Session
+from rds.session.program import Program
+from rds.session.program_check import Look
+from rds.session.program_text import ProgramText
+
+PATIENCE = 60.0  # s, on a busy computer
+
+
+def program(folder: Path, *lines: str) -> Program:
+    made = Program(Session(folder))
+    if lines:
+        made.edit("\n".join((*lines, "")))
+    return made
+
+
+def looked(made: Program) -> Look:
+    deadline = time.monotonic() + PATIENCE
+    while made.looking:
+        made.tick()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    assert made.latest is not None
+    return made.latest
+
+
+# the text
+
+
+def test_a_folder_without_programs_begins_with_one_that_runs(tmp_path: Path) -> None:
+    made = program(tmp_path)
+    assert looked(made).ok and made.text.is_new
+    assert not (tmp_path / "part.ngc").exists()
+
+
+def test_what_is_not_saved_is_there_in_the_next_session(tmp_path: Path) -> None:
+    program(tmp_path, "(mine)", "M2")
+    again = program(tmp_path)
+    assert again.text.text == "(mine)\nM2\n" and again.text.changed
+    again.save()
+    assert (tmp_path / "part.ngc").read_text() == "(mine)\nM2\n"
+    assert not again.text.draft.exists() and not again.text.changed
+
+
+def test_each_program_keeps_its_draft_while_another_is_open(tmp_path: Path) -> None:
+    made = program(tmp_path, "(first)", "M2")
+    made.open("second.ngc")
+    made.edit("(second)\nM2\n")
+    made.open("part.ngc")
+    assert made.text.text == "(first)\nM2\n"
+    assert made.programs() == ["part.ngc", "second.ngc"]
+
+
+def test_a_file_that_somebody_else_changed_is_not_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "part.ngc"
+    path.write_text("M2\n")
+    text = ProgramText(tmp_path, "part.ngc")
+    text.edit("(mine)\nM2\n")
+    path.write_text("(theirs)\nM2\n")
+    with pytest.raises(InputError, match="changed by another program since it was opened"):
+        text.save()
+    assert path.read_text() == "(theirs)\nM2\n"
+    text.discard()
+    assert text.text == "(theirs)\nM2\n"
+
+
+def test_a_file_that_was_replaced_is_read_again_unless_something_is_unsaved(tmp_path: Path) -> None:
+    path = tmp_path / "part.ngc"
+    path.write_text("M2\n")
+    made = program(tmp_path)
+    assert not made.follow_disk()
+    path.write_text("(longer)\nM2\n")
+    assert made.follow_disk() and made.text.text == "(longer)\nM2\n"
+    made.edit("(mine)\nM2\n")
+    path.write_text("(longer still)\nM2\n")
+    assert not made.follow_disk() and made.text.text == "(mine)\nM2\n"
+
+
+def test_a_copy_takes_no_name_that_is_there(tmp_path: Path) -> None:
+    (tmp_path / "other.ngc").write_text("M2\n")
+    made = program(tmp_path, "(mine)", "M2")
+    with pytest.raises(InputError, match=r"there is a other\.ngc already"):
+        made.save_as("other.ngc")
+    made.save_as("new.ngc")
+    assert made.text.name == "new.ngc" and (tmp_path / "new.ngc").read_text() == "(mine)\nM2\n"
+
+
+@pytest.mark.parametrize(
+    "name", ["../x.ngc", "/etc/x.ngc", "x", "x.py", ".x.ngc", "a\nb.ngc", "", "a\\b.ngc", "x" * 200]
+)
+def test_a_name_that_leads_elsewhere_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError):
+        program(tmp_path).open(name)
+    assert list(tmp_path.glob("*.ngc")) == []
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_looked_at_without_an_error(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    from rds.machines import load_machine
+    from rds.nc.check import Setup
+    from rds.session.program_check import look
+    from rds.session.task import Task
+
+    source = tmp_path_factory.getbasetemp() / "any.ngc"
+    source.write_bytes(text.encode("utf-8", "replace"))
+    task: Task[Look] = Task("look", lambda task: look(task, source, "any.ngc", load_machine("mini-cnc"), Setup()))
+    task.start().wait(PATIENCE)
+    assert task.error is None and task.result is not None
+    assert task.result.ok or task.result.marks or task.result.trouble
+
+
+# what a look finds
+
+
+def test_faults_and_warnings_are_at_their_words(tmp_path: Path) -> None:
+    found = looked(program(tmp_path, "G21 G90", "G1 X10 Q5 F300", "G1 X20 W2", "M2"))
+    marks = [(mark.line, mark.column, mark.length, mark.kind) for mark in found.marks]
+    assert (2, 8, 2, "error") in marks
+    assert not found.ok and found.sentence.startswith("2 faults; line 2: Q5")
+    warned = looked(program(tmp_path, "G21 G90", "M3", "G1 X10 F300", "M2"))
+    assert [(mark.line, mark.kind) for mark in warned.marks] == [(2, "warning")]
+    assert warned.ok
+
+
+def test_what_leaves_the_travel_is_a_fault_and_in_the_trace(tmp_path: Path) -> None:
+    found = looked(program(tmp_path, "G21 G90", "G1 X80 F300", "M2"))
+    assert [(mark.line, mark.column) for mark in found.marks] == [(2, 4)]
+    assert "5 mm beyond its travel" in found.marks[0].text
+    assert found.trace.high[0] == 80.0
+
+
+def test_a_cycle_time_that_can_be_reckoned_by_hand(tmp_path: Path) -> None:
+    found = looked(program(tmp_path, "G21 G90", "G1 X10 F600", "G4 P0.5", "M2"))
+    assert found.cycle is not None
+    # 10 mm at 10 mm/s: 1 s, and v/a + a/j = 0.05 + 0.02 s for both ramps together; the dwell
+    assert found.cycle.total == pytest.approx(1.57, abs=0.01)
+    assert found.cycle.certificate.ok
+
+
+def test_a_wrong_tool_table_is_said_and_nothing_breaks(tmp_path: Path) -> None:
+    (tmp_path / "t.tbl").write_text("T1 P1 nonsense\n")
+    made = program(tmp_path, "M2")
+    made.choices.set("tools", "t.tbl")
+    found = looked(made)
+    assert not found.ok and "nonsense" in found.sentence
+
+
+def test_blocks_behind_a_slash_are_left_out_on_demand(tmp_path: Path) -> None:
+    made = program(tmp_path, "G21 G90", "/G1 X200 F300", "G1 X1 F300", "M2")
+    assert not looked(made).ok
+    made.choices.set("block_delete", True)
+    assert looked(made).ok
+
+
+def test_a_loop_that_never_ends_is_given_up_when_the_text_changes(tmp_path: Path) -> None:
+    made = program(tmp_path, "#1 = 0", "o1 while [1]", "#1 = [#1 + 1]", "o1 endwhile", "M2")
+    made.tick()
+    made.edit("G21 G90\nG1 X1 F300\nM2\n")
+    assert looked(made).ok
+
+
+# modes
+
+
+def test_modes_line_by_line(tmp_path: Path) -> None:
+    path = tmp_path / "m.ngc"
+    path.write_text("G21 G90 G17\nG10 L2 P2 X10 Y20 Z3\nG55\nG1 X1 F100\nS500 M3 G91 G18\nG61\nG0 Z1\nG20\nM2\n")
+    follower = Follower(path)
+    list(follower.run())
+    follower.close()
+    at = {line: modes_at(follower.modes, line) for line in range(1, 9)}
+    assert all(at.values())
+    one, four, five, six, eight = (at[line] for line in (1, 4, 5, 6, 8))
+    assert one is not None and four is not None and five is not None and six is not None and eight is not None
+    assert {"G17", "G90", "G21", "G54", "G64", "M5"} <= set(one.words)
+    assert {"G1", "G55"} <= set(four.words) and four.feed == 100.0
+    assert {"G91", "G18", "M3"} <= set(five.words) and five.speed == 500.0
+    assert "G61" in six.words and "G64" not in six.words
+    assert four.work({"X": 11.0, "Y": 20.0, "Z": 4.0}) == pytest.approx({"X": 1.0, "Y": 0.0, "Z": 1.0})
+    assert eight.work({"X": 10.0}) == pytest.approx({"X": 0.0, "Y": -20.0, "Z": -3.0})  # mm, also in G20
+
+
+@given(
+    st.tuples(*[st.floats(-50, 50)] * 3),
+    st.tuples(*[st.floats(-50, 50)] * 3),
+    st.floats(-180, 180),
+    st.tuples(*[st.floats(-20, 20)] * 3),
+)
+def test_work_coordinates_undo_the_way_to_the_machine(
+    origin: tuple[float, ...], g92: tuple[float, ...], rotation: float, point: tuple[float, ...]
+) -> None:
+    import numpy as np
+
+    from rds.nc.active import Modes
+    from rds.nc.frame import Frame
+
+    frame = Frame()
+    frame.set_origin(1, origin)
+    frame.set_g92(g92)
+    frame.set_tool_length((1.0, 2.0, 3.0))
+    frame.rotation = rotation
+    machine = frame.to_machine(np.array([[*point, 0.0, 0.0, 0.0]]))[0]
+    modes = Modes((), 0, 0.0, 0.0, origin, g92, (1.0, 2.0, 3.0), rotation)
+    found = modes.work(dict(zip("XYZ", machine.tolist(), strict=False)))
+    assert tuple(found.values()) == pytest.approx(point, abs=1e-6)
+
+
+# a run
+
+
+def test_a_run_saves_the_program_and_has_its_results_in_a_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved: list[Path] = []  # pictures take seconds, and are not this test's subject
+    monkeypatch.setattr("rds.session.program_run.save_run", lambda result, prepared, folder: saved.append(folder))
+    made = program(tmp_path, "G21 G90", "G1 X2 F600", "M2")
+    assert looked(made).ok
+    work = made.run().start()
+    assert work.wait(PATIENCE) and work.error is None
+    assert (tmp_path / "part.ngc").read_text() == "G21 G90\nG1 X2 F600\nM2\n"
+    assert saved == [work.folder] and work.folder.parent == tmp_path / "runs"
+    assert [name for name, _ in work.traces()] == ["X_error", "Y_error", "Z_error", "contour_error"]
+    assert work.result is not None
+    rows = work.new_rows()
+    kept = work.result["contour_error"]
+    assert rows[:, -1] == pytest.approx(kept[:: round(0.01 / work.result.sample_period)])
+    assert len(work.new_rows()) == 0
+
+
+def test_what_cannot_run_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    made = program(tmp_path, "G21 G90", "G1 X200 F600", "M2")
+    looked(made)
+    with pytest.raises(InputError, match="cannot run yet: 1 fault; line 2"):
+        made.run()
+    assert not (tmp_path / "part.ngc").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("override", 0.0, "never moves"),
+        ("controller", "nonsense", "nonsense"),
+        ("controller", "no.py", "no file no.py"),
+    ],
+)
+def test_a_choice_that_will_not_do_is_refused_with_the_reason(
+    tmp_path: Path, name: str, value: object, says: str
+) -> None:
+    made = program(tmp_path, "G21 G90", "G1 X1 F600", "M2")
+    made.choices.set(name, value)
+    with pytest.raises(InputError, match=says):
+        made.run()
+
+
+def test_nothing_is_operated_when_nothing_runs(tmp_path: Path) -> None:
+    work = program(tmp_path, "G21 G90", "G1 X1 F600", "M2").run()
+    assert not work.operable and not work.held and work.status() is None
+    for act in (work.hold, work.resume, work.home, lambda: work.override(1.0)):
+        with pytest.raises(InputError, match="no program runs now"):
+            act()
