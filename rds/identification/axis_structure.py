@@ -9,13 +9,13 @@ free per direction would take it up, so with it friction is one number, the same
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from rds.core.options import Option
-from rds.identification.structure import Structure
+from rds.identification.structure import Idle, Start, Structure
 from rds.logs.log import Log
 
 OPTIONS = ("viscous", "stribeck", "offset", "dead-zone", "delay", "backlash")
@@ -79,6 +79,7 @@ _PLACES: dict[str, tuple[tuple[int, float], ...]] = {
     "backlash": ((10, 1.0),),
 }
 _FIRST_STATE = 11
+HARDLY = 30.0  # times the noise: friction of a direction in which the axis moves less may not be told
 
 
 def make(options: Sequence[str] = ()) -> Structure:
@@ -104,17 +105,10 @@ def make(options: Sequence[str] = ()) -> Structure:
         by[:, both] -= by[:, both + 1]
         return y, np.delete(by, both + 1, axis=1)
 
-    def start(logs: Sequence[Log]) -> list[tuple[dict[str, float], list[tuple[float, ...]]]]:
+    def start(logs: Sequence[Log]) -> Iterator[Start]:
         from rds.identification.starting_values import axis_starts
 
         return axis_starts(logs, names, states)
-
-    def unmoved(logs: Sequence[Log]) -> list[str]:
-        from rds.identification.smoothing import motion_of
-
-        motions = [motion_of(log) for log in logs]
-        ways = {"friction_plus": 1, "friction_minus": -1}
-        return [name for name, way in ways.items() if name in table and not any(m.goes(way) for m in motions)]
 
     return Structure(
         name="axis",
@@ -129,7 +123,7 @@ def make(options: Sequence[str] = ()) -> Structure:
         state_names=("position", "velocity", "place in the play")[:states],
         state_bounds=((-np.inf, np.inf), (-np.inf, np.inf), (-1.0, 1.0))[:states],
         start=start,
-        unmoved=unmoved,
+        idle=_idle if "friction_minus" in table else None,
         held=_held if "viscous" in options else None,
         no_effect={name: why for name, why in NO_EFFECT.items() if name in table},
     )
@@ -155,6 +149,29 @@ def _moved(
     y, by = np.empty(len(t)), np.empty((len(t), len(where)))
     move(t, u, start, place(values), where, y, by)
     return y, by
+
+
+def _idle(logs: Sequence[Log], begun: Mapping[str, float]) -> dict[str, Idle]:
+    """Friction of a direction in which no log moves by more than noise and the encoder's steps may do."""
+    from rds.identification.smoothing import motion_of, travel
+
+    fastest = max(float(np.abs(motion_of(log).velocity).max()) for log in logs)
+    found = {}
+    for name, other, way in (("friction_plus", "friction_minus", 1.0), ("friction_minus", "friction_plus", -1.0)):
+        if any(travel(log, way) > HARDLY * motion_of(log).noise for log in logs):
+            continue
+        # by sign of K, the largest voltage that drives that way
+        sign = way if begun["K"] >= 0.0 else -way
+        peak = max(0.0, *(float((sign * log.command).max()) for log in logs))
+
+        def likely(
+            values: Mapping[str, float], other: str = other, way: float = way, peak: float = peak
+        ) -> tuple[float, float]:
+            return -values[other], way * max(1.05 * abs(values["K"]) * peak, abs(values[other]))
+
+        holding = 1e3 * max(fastest, abs(begun["K"]) * peak)
+        found[name] = Idle(way * holding, likely)
+    return found
 
 
 def _held(fixed: frozenset[str]) -> dict[str, tuple[float, str]]:

@@ -85,6 +85,10 @@ class Problem:
         self._tick()
         return one.position - y, by
 
+    def rms(self, squares: float) -> float:
+        """The root mean square of residuals with this sum of squares, in the output's unit."""
+        return float(np.sqrt(squares / sum(len(log) for log in self.logs)))
+
     def triangle(self, point: np.ndarray) -> np.ndarray:
         """R (n + 1, n + 1) of [J r]; NaN where the free run leaves the finite numbers."""
         n, blocks = self.size, []

@@ -10,7 +10,7 @@ Options: `fixed` {name: value}, parameters that are held; `start` {name: value},
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,17 +20,16 @@ from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.identification.estimate import Estimate
 from rds.identification.made_estimate import made_estimate
-from rds.identification.problem import Problem
-from rds.identification.smoothing import encoder_step, motion_of
-from rds.identification.solve import EVALUATIONS, Solution, first_state, least_squares
-from rds.identification.structure import Structure
+from rds.identification.search import find
+from rds.identification.smoothing import encoder_step
+from rds.identification.solve import EVALUATIONS, first_state
+from rds.identification.structure import Start, Structure
 from rds.identification.suspicions import suspicions
 from rds.identification.uncertainty import uncertainty_of
 from rds.identification.untold import untold_by
 from rds.logs.log import Log
 
 OPTIONS = ("fixed", "start", "progress")
-_ENOUGH = 2.0  # times the noise: with residuals that small, no other start can do much better
 
 
 def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Estimate:
@@ -54,11 +53,9 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         raise InputError(
             f"{samples} samples are too few for {unknowns} unknowns (parameters and initial states); give longer logs"
         )
-    unmoved = [name for name in (structure.unmoved(logs) if structure.unmoved else ()) if name not in holding]
     starts = _starts(logs, structure, begun, holding)
-    holding |= {name: starts[0][0][name] for name in unmoved}
-    problem = Problem(logs, structure, holding, _ticker(options.get("progress"), structure, len(logs)))
-    solution, tried = _search(problem, starts)
+    found = find(logs, structure, holding, starts, _ticker(options.get("progress"), structure, len(logs)))
+    problem, solution = found.problem, found.solution
     uncertainty = uncertainty_of(problem, solution)
     values = problem.values(solution.point)
     order = list(structure.parameters)
@@ -66,7 +63,10 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     free = len(problem.names)
     covariance = np.zeros((len(order), len(order)))
     covariance[np.ix_(places, places)] = uncertainty.covariance[:free, :free]
-    for name in unmoved:
+    if not solution.converged:  # what is still to go may be as wrong as it is large
+        left = solution.step[:free][:, None]
+        covariance[np.ix_(places, places)] += left @ left.T
+    for name in found.unmoved:
         covariance[order.index(name), order.index(name)] = np.inf
     return made_estimate(
         structure,
@@ -77,13 +77,13 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         uncertainty.effective - problem.size,
         untold=[
             *(sentence for name, (_, sentence) in held.items()),
-            *untold_by(structure, problem.names, values, uncertainty, unmoved),
+            *untold_by(structure, problem.names, values, uncertainty, found.unmoved),
         ],
         warnings=suspicions(problem, solution, uncertainty),
         details={
             "fixed": dict(fixed),
             "evaluations": solution.evaluations,
-            "starts": tried,
+            "starts": found.tried,
             "noise_rms": uncertainty.noise,
             "correlated_over_samples": uncertainty.block,
             "effective_samples": uncertainty.effective,
@@ -94,31 +94,15 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
 
 def _starts(
     logs: Sequence[Log], structure: Structure, begun: Mapping[str, float], holding: Mapping[str, float]
-) -> list[tuple[dict[str, float], list[tuple[float, ...]]]]:
+) -> Iterator[Start]:
     """Values and initial states to search from, best first; what the user gave goes before what the data say."""
     if structure.start is not None:
-        return [({**values, **begun}, states) for values, states in structure.start(logs)]
+        for values, states in structure.start(logs):
+            yield {**values, **begun}, states
+        return
     if missing := [name for name in structure.parameters if name not in begun and name not in holding]:
         raise InputError(f"structure {structure.name} needs a value to start from for {', '.join(missing)}")
-    return [(dict(begun), [first_state(structure, log) for log in logs])]
-
-
-def _search(
-    problem: Problem, starts: Sequence[tuple[Mapping[str, float], Sequence[tuple[float, ...]]]]
-) -> tuple[Solution, int]:
-    """The best end of a search from each start, and how many starts that took."""
-    noise = sum(len(log) * motion_of(log).noise ** 2 for log in problem.logs)
-    best: Solution | None = None
-    tried = 0
-    for values, states in starts if problem.names else starts[:1]:
-        found = least_squares(problem, problem.point(values, states))
-        tried += 1
-        if best is None or found.squares < best.squares:
-            best = found
-        if best.squares <= _ENOUGH**2 * noise:
-            break
-    assert best is not None
-    return best, tried
+    yield dict(begun), [first_state(structure, log) for log in logs]
 
 
 def _checked(given: Mapping[str, Any], structure: Structure) -> dict[str, float]:

@@ -10,7 +10,6 @@ from rds.logs.log import Log
 
 _LONGEST = 0.05  # of a log: the widest difference that a velocity is taken over
 _SLOW = 0.03  # of the highest speed: slower is taken for rest
-_SAMPLES = 5  # that a motion lasts at least
 _STILL = 12.0  # noise alone spans 8 standard deviations in 10^4 samples, 10.4 in 10^7
 _NOISY = 0.05  # of the highest speed: what noise a velocity may have
 
@@ -23,11 +22,6 @@ class Motion:
     velocity: np.ndarray
     threshold: float  # mm/s, below which the axis may as well be at rest
     moves: bool  # whether the position changes by more than noise and quantization do
-
-    def goes(self, way: int) -> bool:
-        """Whether the axis ever moves forward (+1) or backward (-1), for some samples on end."""
-        moving = way * self.velocity > self.threshold
-        return bool(np.count_nonzero(moving) >= _SAMPLES)
 
 
 def motion_of(log: Log) -> Motion:
@@ -44,6 +38,12 @@ def motion_of(log: Log) -> Motion:
         if uncertain <= _NOISY * fastest or 2 * half > longest:
             return Motion(noise, velocity, max(2.0 * uncertain, _SLOW * fastest), moves)
         half *= 2
+
+
+def travel(log: Log, way: float) -> float:
+    """The farthest that the log's position moves forward (`way` = 1) or backward (-1), noise included."""
+    y = way * log.position
+    return float((y - np.minimum.accumulate(y)).max())
 
 
 def _noise(y: np.ndarray) -> float:

@@ -35,6 +35,11 @@ class Solution:
         """The sum of squared residuals."""
         return float(self.triangle[:, -1] @ self.triangle[:, -1])
 
+    @property
+    def step(self) -> np.ndarray:
+        """How far the least squares still are, were the free run linear in the numbers (n)."""
+        return np.linalg.lstsq(self.triangle[:, :-1], self.triangle[:, -1], rcond=1e-7)[0]
+
 
 def least_squares(problem: Problem, start: np.ndarray) -> Solution:
     """The point with the least squared residuals near `start`. InputError if the free run there is not finite."""

@@ -11,13 +11,14 @@ where noise or quantization makes an acceleration worthless.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import exp, expm1
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.identification.smoothing import Motion, motion_of
+from rds.identification.stick_grid import stick_starts
 from rds.logs.log import Log
 from rds.motion.compiling import kernel
 
@@ -30,8 +31,8 @@ _BEGIN = {"viscous": 0.0, "stribeck": 0.1, "dead_zone": 0.01, "offset": 0.0}
 
 def axis_starts(
     logs: Sequence[Log], names: Sequence[str], states: int
-) -> list[tuple[dict[str, float], list[tuple[float, ...]]]]:
-    """Values of the parameters `names` and each log's initial state, the likeliest first.
+) -> Iterator[tuple[dict[str, float], list[tuple[float, ...]]]]:
+    """Values of the parameters `names` and each log's initial state, the likeliest first, made as they are asked for.
 
     InputError where no log holds any motion, or no voltage that differs from 0.
     """
@@ -46,7 +47,10 @@ def axis_starts(
     minima = [i for i in range(GRID) if costs[i] <= costs[max(i - 1, 0)] and costs[i] <= costs[min(i + 1, GRID - 1)]]
     minima.sort(key=lambda i: costs[i])
     begins = [_initial_state(log, motion, states) for log, motion in zip(parts, motions, strict=True)]
-    return [(_values(found[i][1], found[i][2], names, parts, motions), begins) for i in minima[:3]]
+    for i in minima[:2]:
+        yield _values(found[i][1], found[i][2], names, parts, motions), begins
+    for solved, tau in stick_starts(parts):
+        yield _values(solved, tau, names, parts, motions), begins
 
 
 def _check_excitation(logs: Sequence[Log], motions: Sequence[Motion]) -> None:

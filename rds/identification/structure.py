@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,6 +24,16 @@ class Response(Protocol):
     def __call__(self, t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]) -> np.ndarray:
         """The outputs."""
         ...
+
+
+Start = tuple[dict[str, float], list[tuple[float, ...]]]  # values, and an initial state for each log
+
+
+class Idle(NamedTuple):
+    """A parameter that logs hardly show: what is to be known to fit the others without it."""
+
+    value: float  # at which it certainly shows nothing
+    likely: Callable[[Mapping[str, float]], Sequence[float]]  # from the fit's values: what it may be, likeliest first
 
 
 @dataclass(frozen=True)
@@ -45,15 +55,16 @@ class Structure:
     state_names: tuple[str, ...] = ("position", "velocity")
     state_bounds: tuple[tuple[float, float], ...] = ()  # of each initial state; none where empty
     # values to begin a fit with, best first, and an initial state for each log; InputError where the data hold none
-    start: Callable[[Sequence[Log]], list[tuple[dict[str, float], list[tuple[float, ...]]]]] | None = None
+    start: Callable[[Sequence[Log]], Iterable[Start]] | None = None
     output_unit: str = "mm"
     # parameters that only make sense held at a value unless another is held, with the sentence that says so
     held: Callable[[frozenset[str]], Mapping[str, tuple[float, str]]] | None = None
     # parameters that the logs state and no fit can tell (a force per volt), held at these values, with 0 std error
     given: Callable[[Sequence[Log]], Mapping[str, float]] | None = None
     default_method: str = "simulation"  # the method where the user names none
-    # parameters that these logs have no occasion to tell (friction of a direction in which the axis never moves)
-    unmoved: Callable[[Sequence[Log]], Sequence[str]] | None = None
+    # parameters that these logs have little occasion to tell (friction of a direction in which the axis hardly moves),
+    # given values to begin with
+    idle: Callable[[Sequence[Log], Mapping[str, float]], Mapping[str, Idle]] | None = None
     # the same structure in a form that answers these logs sooner, as exactly as their noise asks
     prepare: Callable[[Sequence[Log]], Structure] | None = None
     no_effect: Mapping[str, str] = field(default_factory=dict)  # what it means that a parameter changes nothing

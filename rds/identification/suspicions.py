@@ -15,6 +15,7 @@ from rds.identification.uncertainty import Uncertainty
 _TWINS = 0.99  # correlation from which two parameters are told together rather than each
 _POOR = 90.0  # per cent: a model that fits worse does not explain the motion
 _MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
+_LITTLE = 100.0  # times the measurement's noise: with less motion than that, a fit is not told by much
 _WHITE = 2.576  # 99 % band, in units of 1/√N
 _TIMES = (1e-4, 10.0)  # s: time constants of the axes of machine tools
 _SPEEDS = (0.05, 5000.0)  # mm/s: the highest speed of a log
@@ -34,7 +35,9 @@ def _search(problem: Problem, solution: Solution) -> list[str]:
     said = []
     if not solution.converged:
         said.append(
-            f"the search had not settled after {solution.evaluations} free runs: the values are the best so far"
+            f"do not use these parameters yet: the search had not settled after {solution.evaluations} free runs; the "
+            "values are the best so far, and the intervals are widened by what seemed left to go. Give other values to "
+            "start from (--start), hold a parameter (--fix), or fit fewer options"
         )
     values = problem.values(solution.point)
     for name, side in zip(problem.names, solution.at_bound, strict=False):
@@ -78,12 +81,19 @@ def _residuals(problem: Problem, solution: Solution, number: int) -> list[str]:
     said = []
     spread = float(log.position.std())
     fit = 100.0 * (1.0 - float(error.std()) / spread) if spread > 0.0 else 0.0
-    if fit < _POOR:
+    noise = motion_of(log).noise
+    reach = float(np.ptp(log.position))
+    if reach < _LITTLE * noise:
+        said.append(
+            f"{log.name}: the axis moves by {reach:.3g} {unit} in all, only {reach / noise:.0f} times the "
+            f"measurement's noise ({noise:.2g} {unit}): intervals hold for errors that are small beside the motion, "
+            "and may be too narrow here; record more motion"
+        )
+    if fit < _POOR and size > _MISSED * noise:
         said.append(
             f"{log.name}: the free run explains {fit:.1f} % of the motion only: do not use these parameters; look at "
             "the data with `rds data describe` (columns, signs, units), and try other options or structures"
         )
-    noise = motion_of(log).noise
     if noise > 0.0 and size > _MISSED * noise:
         said.append(
             f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / noise:.1f} times the measurement's noise "

@@ -88,6 +88,7 @@ def uncertainty_of(problem: Problem, solution: Solution) -> Uncertainty:
     hidden = empty.copy()
     for row in right[~told]:
         hidden[kept] |= np.abs(row) > 1e-3
+    hidden |= np.diag(covariance) < 0.0  # by rounding: too near to such a direction
     covariance /= np.outer(scale, scale)
     covariance[hidden, :] = covariance[:, hidden] = 0.0
     covariance[hidden, hidden] = np.inf

@@ -26,9 +26,10 @@ def untold_by(
     said = []
     for name in (*unmoved, *(names[i] for i in uncertainty.without_effect if i < len(names))):
         why = structure.no_effect.get(name)
+        origin = "a guess at which that stays so" if name in unmoved else "only where the search began"
         said.append(
             f"{name} changes nothing in the response to these commands{f' ({why})' if why else ''}: its value, "
-            f"{_with_unit(structure, name, values[name])}, is only where the search began"
+            f"{_with_unit(structure, name, values[name])}, is {origin}"
         )
     for direction in uncertainty.directions:
         sentence = _together(names, direction)

@@ -63,6 +63,37 @@ def test_a_direction_that_never_occurs_is_not_told() -> None:
     assert found.to_json()["parameters"]["friction_minus"]["std_error"] is None
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_friction_of_a_direction_that_hardly_shows_does_not_disturb_the_rest(seed: int) -> None:
+    """Some twenty noises of backward motion are worth estimating from; what noise can make is not."""
+    t, draw = np.arange(4000) * 0.001, np.random.default_rng(seed)
+    for dip, told in ((-0.02, False), (-0.28, True)):
+        u = np.where((t > 1.0) & (t < 1.3), dip, 2.0 + np.sin(9.0 * t) + np.sin(23.0 * t))
+        y = make().respond(t, u, (0.0, 0.0), X) + 0.001 * draw.standard_normal(len(t))
+        found = fit([Log("one way", t, u, y)], make())
+        assert np.isfinite(found.parameters["friction_minus"].std_error) == told
+        for name in X if told else ("tau", "K", "friction_plus"):
+            assert abs(found.parameters[name].value - X[name]) < 4.0 * found.parameters[name].std_error, name
+
+
+def test_a_search_that_does_not_settle_is_said_loudly_and_widens_the_intervals(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, start = axis_log(X), {name: 3.0 * value for name, value in X.items()}
+    settled = fit([log], make(), options={"start": start})
+    monkeypatch.setattr("rds.identification.solve.EVALUATIONS", 2)
+    found = fit([log], make(), options={"start": start})
+    assert found.warnings[0].startswith("do not use these parameters yet: the search had not settled after 2 free runs")
+    for name, value in X.items():
+        assert found.parameters[name].std_error > 10.0 * settled.parameters[name].std_error
+        assert found.parameters[name].low < value < found.parameters[name].high
+
+
+def test_little_motion_is_said() -> None:
+    t = np.arange(4000) * 0.001
+    u = np.where(t < 1.0, 0.0, 0.31)
+    y = make().respond(t, u, (0.0, 0.0), X) + 0.001 * np.random.default_rng(0).standard_normal(len(t))
+    assert "record more motion" in said(Log("creeps", t, u, y))
+
+
 def test_a_constant_voltage_tells_only_a_combination_of_gain_and_friction() -> None:
     found = fit([forward(np.full(4000, 3.0))], make())
     assert any(s.startswith("K and friction_plus cannot be told apart") for s in found.untold), found.untold

@@ -54,7 +54,7 @@ def test_periods_poles_and_limits_are_taken(tmp_path: Path) -> None:
 
 
 def test_viscous_friction_is_part_of_the_design_and_the_rest_is_named(tmp_path: Path) -> None:
-    import model_files
+    from tests.identification import model_files
 
     units = model_files.UNITS | {"viscous": ""}
     file = write_made(tmp_path / "x.toml", FULL | {"viscous": 0.25}, ("viscous", *OPTIONS), units=units)

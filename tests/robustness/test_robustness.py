@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import integers
-from model_files import X, Y, write_made
 from typer.testing import CliRunner
 
 import rds
@@ -22,6 +21,7 @@ from rds.robustness.draws import Spread, draws
 from rds.robustness.margins import linear_law, loop_margins
 from rds.robustness.report import write_study
 from rds.robustness.summary import sentences, summaries, to_json
+from tests.identification.model_files import X, Y, write_made
 
 FULL = X | {"stribeck": 0.1, "stribeck_velocity": 0.8, "delay": 0.0017, "backlash": 0.003, "dead_zone": 0.1}
 OPTIONS = ("stribeck", "dead-zone", "delay", "backlash")

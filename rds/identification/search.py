@@ -1,0 +1,113 @@
+"""The least squares of a problem, searched from one start after the other until the measurement is explained.
+
+A parameter that hardly shows (friction of a direction in which the axis hardly moves) leaves a valley without a floor.
+So the fit is made without it as well as with it, and with it holds only if the residuals become smaller by more than
+chance makes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, islice, tee
+
+import numpy as np
+
+from rds.identification.problem import Problem
+from rds.identification.residuals import effective_samples
+from rds.identification.smoothing import motion_of
+from rds.identification.solve import Solution, least_squares
+from rds.identification.structure import Idle, Start, Structure
+from rds.logs.log import Log
+
+_ENOUGH = 1.5  # times the noise: residuals that are no larger, and not smooth, hold nothing more
+_SMOOTH = 0.5  # correlation of neighbouring residuals from which they hold motion
+_EXACT = 1e-6  # of the motion: residuals of data without noise
+_SAME = 0.01  # of the noise: runs that differ by less are the same
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where the searches ended. `unmoved` were held: the data give no occasion to tell them."""
+
+    problem: Problem
+    solution: Solution
+    tried: int  # starts
+    unmoved: tuple[str, ...] = ()
+
+
+def find(
+    logs: Sequence[Log],
+    structure: Structure,
+    holding: Mapping[str, float],
+    starts: Iterable[Start],
+    tick: Callable[[], None],
+) -> Found:
+    """The best fit with the parameters in `holding` held. InputError where the free run from a start is not finite."""
+    given = iter(starts)
+    first = next(given)
+    first_pass, second_pass = tee(chain([first], given))
+    idle = structure.idle(logs, first[0]) if structure.idle else {}
+    idle = {name: how for name, how in idle.items() if name not in holding}
+    if not idle:
+        return _search(Problem(logs, structure, holding, tick), first_pass)
+    without = Problem(logs, structure, {**holding, **{name: how.value for name, how in idle.items()}}, tick)
+    still = _search(without, first_pass)
+    moved = _search(Problem(logs, structure, holding, tick), second_pass)
+    if still.solution.squares - moved.solution.squares > len(idle) * _by_chance(moved):
+        return moved
+    return _guessed(still, idle, min(without.rms(still.solution.squares), *(motion_of(log).noise for log in logs)))
+
+
+def _by_chance(found: Found) -> float:
+    """What one parameter more may take off the sum of squares where the truth does not need it.
+
+    It may choose, among all N samples, where it shows: 2 ln N variances of a residual that is worth one sample.
+    """
+    problem, solution = found.problem, found.solution
+    residuals = [problem.residuals(solution.point, number)[0] for number in range(len(problem.logs))]
+    samples = sum(len(error) for error in residuals)
+    alike = samples / sum(effective_samples(error) for error in residuals)
+    return 2.0 * float(np.log(samples)) * alike * solution.squares / samples
+
+
+def _guessed(found: Found, idle: Mapping[str, Idle], noise: float) -> Found:
+    """With likely values in the place of those that hold out anything, where the free runs stay the same."""
+    problem, point = found.problem, found.solution.point
+    for name, how in idle.items():
+        runs = [problem.response(point, i) for i in range(len(problem.logs))]
+        for value in how.likely(problem.values(point)):
+            tried = Problem(problem.logs, problem.structure, {**problem.fixed, name: value})
+            if all(np.abs(tried.response(point, i) - run).max() <= _SAME * noise for i, run in enumerate(runs)):
+                problem = tried
+                break
+    return Found(problem, found.solution, found.tried, tuple(idle))
+
+
+def _search(problem: Problem, starts: Iterable[Start]) -> Found:
+    """The best end of a search from each start, up to the first that explains the measurement."""
+    best: Solution | None = None
+    tried = 0
+    for values, states in starts if problem.names else islice(starts, 1):
+        solution = least_squares(problem, problem.point(values, states))
+        tried += 1
+        if best is None or solution.squares < best.squares:
+            best = solution
+        if best.converged and _explains(problem, best):
+            break
+    assert best is not None
+    return Found(problem, best, tried)
+
+
+def _explains(problem: Problem, solution: Solution) -> bool:
+    """Whether the residuals are as small as the noise, and no motion."""
+    for number, log in enumerate(problem.logs):
+        error, _ = problem.residuals(solution.point, number)
+        size = float(np.sqrt(np.mean(error**2)))
+        rounding = (log.resolution or 0.0) / np.sqrt(12.0)
+        if size <= max(_ENOUGH * rounding, _EXACT * float(log.position.std())):
+            continue
+        neighbours = float(error[1:] @ error[:-1]) / float(error @ error)
+        if size > _ENOUGH * motion_of(log).noise or neighbours > _SMOOTH:
+            return False
+    return True
