@@ -15,7 +15,7 @@ from rds.panels.kit.work_bar import WorkBar
 from rds.panels.live_view import LiveView
 from rds.panels.result_view import ResultView
 from rds.panels.what_runs import WhatRuns
-from rds.results import Result
+from rds.results import Result, html
 from rds.session.equipment import Equipment
 from rds.session.equipment_run import EquipmentRun
 
@@ -191,9 +191,8 @@ class EquipmentView:
 
 def _verdict(result: Result) -> tuple[str, str]:
     """What to say of a result in one line, and how."""
-    ending = result.meta.get("ending")
-    if ending not in (None, "done"):
-        return f"ended early ({ending}): {result.meta.get('ending_reason')}", "warning"
+    if result.meta.get("ending") not in (None, "done"):
+        return f"ended early: {html.ending(result)}", "warning"
     if result.verdict:
         kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
         return f"timing {result.verdict}: {result.meta.get('verdict_reason')}", kind

@@ -165,7 +165,7 @@ def test_a_gain_changes_while_it_runs_and_a_run_is_stopped(at: Callable[..., Equ
     gain.locator("input").press("Enter")
     control.page.wait_for_selector('td:text-is("X.Pgain"):visible')
     control.press("Stop")
-    control.sees("ended early (stopped)")
+    control.sees("ended early: stopped")
     control.saved()
     control.page.wait_for_selector('td:text-is("25"):visible')
     control.tab("Timing")
