@@ -25,3 +25,12 @@ def test_dark_and_light(open_page: Callable[..., Any]) -> None:
     page.click('button:text-is("Dark")')
     page.wait_for_selector(".rds-app.rds-dark")
     assert page.evaluate("getComputedStyle(document.querySelector('.rds-app')).backgroundColor") != light
+
+
+def test_emergency_stop_stays_in_sight_on_a_long_panel(open_page: Callable[..., Any]) -> None:
+    page = open_page("Data", height=600)
+    page.mouse.move(640, 400)
+    page.mouse.wheel(0, 3000)
+    page.wait_for_function("document.querySelector('.rds-app').scrollTop > 50")
+    box = page.locator("button.rds-stop").bounding_box()
+    assert box["y"] >= 0 and box["y"] + box["height"] <= 120

@@ -1,0 +1,241 @@
+"""Data: logged data described, a model fitted to them, and validated on others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.core.errors import RdsError
+from rds.panels.kit.field import FieldView
+from rds.panels.kit.figure import FigureView
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.work_bar import WorkBar
+from rds.session.data_desk import DataDesk
+from rds.session.task import Task
+
+NAME = "data"
+TITLE = "Data"
+SUMMARY = "Describe logged data, fit a model to them, and validate it on others"
+HELP = "data"
+
+_SIGNS = {"fault": "✖", "warning": "⚠", "note": "ℹ"}
+
+
+def build(shell: Any) -> widgets.Widget:
+    """The panel."""
+    return DataView(shell).widget
+
+
+class DataView:
+    """Three steps from left to right: data, fit, validation."""
+
+    def __init__(self, shell: Any):
+        self.shell, self.desk = shell, DataDesk(shell.session)
+        self.notice, self.bar = Notice(), WorkBar(shell.ticker)
+        self.text, self.figure = widgets.HTML(), FigureView()
+        self.text.add_class("rds-scroll")
+        self._known = widgets.Dropdown(options=[("files of the folder …", "")], tooltip="What the folder holds")
+        self._known.observe(self._picked, "value")
+        self._upload = widgets.FileUpload(description="Import a file", tooltip="Copy a file into the folder")
+        self._upload.observe(self._imported, "value")
+        self._map = widgets.Textarea(rows=10, layout=widgets.Layout(width="100%"))
+        self._map_box = widgets.VBox(
+            [
+                widgets.HTML("What its columns mean is not clear. Correct this map, and save it:"),
+                self._map,
+                self._button("Save map", "Write it beside the data, and describe again", self._keep_map),
+            ]
+        )
+        self._map_box.layout.display = "none"
+        side = widgets.VBox([*self._data_step(), *self._fit_step(), *self._validation_step()])
+        side.add_class("rds-side")
+        main = widgets.VBox([self.bar, self.notice, self._map_box, self.text, self.figure])
+        main.add_class("rds-main")
+        self.widget = widgets.HBox([side, main])
+        self.widget.add_class("rds-columns")
+        self._refresh()
+
+    def _data_step(self) -> list[widgets.Widget]:
+        return [
+            self._group(
+                "1 Data",
+                [self._known, self._upload, self._field("file"), self._field("map")],
+                [self._button("Describe", "Columns, sample period, and what is doubtful", self.describe, primary=True)],
+            )
+        ]
+
+    def _fit_step(self) -> list[widgets.Widget]:
+        own = self._field("structure_file")
+        self.desk.choices.watch(lambda name: self._show_own(own))
+        self._show_own(own)
+        fields = [self._field("structure"), own, self._field("options"), self._field("method"), self._field("model")]
+        buttons = [
+            self._button("Fit", "Estimate the parameters", self.fit, primary=True),
+            self._button("Save model", "Write the model file, which every mode takes", self.save_model),
+            self._button("Use it", "Equipment control with this model", self.use_model),
+        ]
+        return [self._group("2 Fit", fields, buttons)]
+
+    def _validation_step(self) -> list[widgets.Widget]:
+        button = self._button("Validate", "How far the model can be trusted on other data", self.validate, primary=True)
+        return [self._group("3 Validate", [self._field("validation_file")], [button])]
+
+    def describe(self) -> None:
+        """What the file holds."""
+        self._begin(self.desk.describe, self._show_description)
+
+    def fit(self) -> None:
+        """Estimate."""
+        self._begin(self.desk.fit, self._show_estimate)
+
+    def validate(self) -> None:
+        """Judge the model on other data."""
+        self._begin(self.desk.validate, self._show_validation)
+
+    def save_model(self) -> None:
+        """Write the model file."""
+        try:
+            self.notice.say(f"wrote {self.desk.write_model()}", "good")
+            self._refresh()
+        except RdsError as error:
+            self.notice.say(str(error), "error")
+
+    def use_model(self) -> None:
+        """Go to equipment control with the model file chosen there."""
+        try:
+            path = self.desk.path(self.desk.choices["model"], "the model file")
+            if not path.exists():
+                self.desk.write_model()
+            self.shell.open("equipment-control")
+            choices = self.shell.session.choices("equipment control", ())
+            choices.set("model", "user")
+            choices.set("model_file", self.desk.choices["model"])
+        except RdsError as error:
+            self.notice.say(str(error), "error")
+
+    def _begin(self, start: Callable[[], Task[Any]], show: Callable[[Any], None]) -> None:
+        if self.bar.busy:
+            return
+        try:
+            task = start()
+        except RdsError as error:
+            self.notice.say(str(error), "error")
+            return
+        self.notice.clear()
+        self._map_box.layout.display = "none"
+
+        def ended() -> None:
+            if task.stopped:
+                self.notice.say("stopped", "warning")
+            elif task.error is not None:
+                self.notice.say(str(task.error), "error")
+            else:
+                show(task.result)
+
+        self.bar.follow(task, ended)
+
+    def _show_description(self, found: Any) -> None:
+        from rds.logs.describe_plot import overview
+        from rds.results import html
+        from rds.results.units import heading
+
+        rows = [[heading(c.name, c.unit), c.low, c.high, c.step, c.values, c.missing] for c in found.columns]
+        parts = [html.table(["column", "lowest", "highest", "step", "values", "missing"], rows)]
+        for log in found.logs:
+            parts.append(
+                f"<p><b>{escape(log.name)}</b>: {len(log)} samples, {log.time[-1] - log.time[0]:.6g} s, "
+                f"every {log.sample_period:.6g} s</p>"
+            )
+        parts += [
+            f"<p><b>{_SIGNS[str(finding.gravity)]} {escape(str(finding.gravity))}</b>: {escape(finding.what)}</p>"
+            for finding in found.findings
+        ]
+        self.text.value = "".join(parts)
+        if found.usable:
+            self.notice.say(f"{found.path.name} can be fitted; columns: {found.map or 'as they are'}", "good")
+        else:
+            self.notice.say(f"{found.path.name} cannot be used as it is: see below", "error")
+        if found.draft:
+            self._map.value = found.draft
+            self._map_box.layout.display = ""
+        if found.logs:
+            self.figure.show(overview(found.logs))
+        else:
+            self.figure.clear()
+
+    def _show_estimate(self, estimate: Any) -> None:
+        from rds.identification.fit_report import fragment, free_run_picture
+        from rds.identification.structures import structure
+
+        self.text.value = fragment(estimate)
+        kind = "warning" if estimate.warnings or estimate.untold else "good"
+        count = len(estimate.warnings)
+        said = "fitted" if kind == "good" else f"fitted, with {count} warning{'s' * (count != 1)}: read them first"
+        self.notice.say(said, kind)
+        if self.desk.fitted:
+            made = structure(estimate.structure, estimate.options)
+            self.figure.show(free_run_picture(estimate, self.desk.fitted[0], made))
+
+    def _show_validation(self, validation: Any) -> None:
+        from rds.validation.plots import overlay
+        from rds.validation.report import fragment
+
+        self.text.value = fragment(validation, pictures=False)
+        self.notice.say(validation.verdict.sentence, "good" if validation.verdict.ok else "warning")
+        self.figure.show(overlay(next(iter(validation.assessments.values()))))
+
+    def _keep_map(self) -> None:
+        try:
+            self.desk.keep_map(self._map.value)
+        except RdsError as error:
+            self.notice.say(str(error), "error")
+            return
+        self.describe()
+
+    def _picked(self, change: Any) -> None:
+        if change["new"]:
+            self.desk.choices.set("file", change["new"])
+
+    def _imported(self, change: Any) -> None:
+        from rds.results.atomic import write_whole
+
+        for item in change["new"] or ():
+            path = self.shell.session.folder / _plain(item["name"])
+            if path.exists():
+                self.notice.say(f"{path.name} is there already; rename one of them", "error")
+                continue
+            try:
+                write_whole(path, bytes(item["content"]))
+                self.desk.choices.set("file", path.name)
+            except RdsError as error:
+                self.notice.say(str(error), "error")
+        self._refresh()
+
+    def _refresh(self) -> None:
+        self._known.options = [("files of the folder …", ""), *((name, name) for name in self.desk.files())]
+
+    def _show_own(self, own: widgets.Widget) -> None:
+        own.layout.display = "" if self.desk.choices["structure"] == "user" else "none"
+
+    def _field(self, name: str) -> FieldView:
+        return FieldView(self.desk.choices, name)
+
+    def _button(self, text: str, tip: str, act: Callable[[], None], primary: bool = False) -> widgets.Button:
+        button = widgets.Button(description=text, tooltip=tip, button_style="primary" if primary else "")
+        button.on_click(lambda _: act())
+        return button
+
+    def _group(self, title: str, fields: list[Any], buttons: list[Any]) -> widgets.VBox:
+        row = widgets.HBox(buttons)
+        row.add_class("rds-row")
+        group = widgets.VBox([widgets.HTML(f"<h3>{title}</h3>"), *fields, row])
+        group.add_class("rds-group")
+        return group
+
+
+def _plain(name: str) -> str:
+    """The last part of a file name that a browser sent, without what a file system might obey."""
+    return "".join(c for c in name.replace("\\", "/").rpartition("/")[2] if c.isprintable()).lstrip(".") or "imported"

@@ -1,0 +1,184 @@
+"""Logged data in a sitting: describe a file, fit a model to it, validate the model on another file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rds.core.errors import InputError
+from rds.session.choices import Choices
+from rds.session.fields import Choice, Field, Several, Text
+from rds.session.session import RUNS, Session
+from rds.session.task import Task
+
+if TYPE_CHECKING:
+    from rds.identification.estimate import Estimate
+    from rds.logs.describe import Description
+    from rds.logs.log import Log
+    from rds.validation.validate import Validation
+
+STRUCTURES = {
+    "axis": "Axis (τ, K, friction)",
+    "axis-mass": "Axis in mass form (M, F_v, F_c)",
+    "spindle": "Spindle (first order)",
+    "user": "Own file",
+}
+METHODS = {
+    "": "The structure's own",
+    "simulation": "Simulation error",
+    "inverse-dynamics": "Inverse dynamics",
+    "step": "Step response",
+    "frequency": "Frequency response",
+}
+OPTIONS = {
+    "viscous": "viscous friction",
+    "stribeck": "Stribeck friction",
+    "offset": "offset",
+    "dead-zone": "dead zone",
+    "delay": "delay",
+    "backlash": "backlash",
+}
+SUFFIXES = (".csv", ".txt", ".mat", ".parquet", ".asc", ".blf", ".trc", ".log", ".mf4")
+
+
+@dataclass
+class DataDesk:
+    """What is chosen, and what was found last. Each step is a Task; its result is kept here when it is over."""
+
+    session: Session
+
+    def __post_init__(self) -> None:
+        self.choices: Choices = self.session.choices("data", _fields())
+        self.description: Description | None = None
+        self.estimate: Estimate | None = None
+        self.validation: Validation | None = None
+        self.fitted: tuple[Log, ...] = ()
+
+    def files(self) -> list[str]:
+        """Files of the folder that may hold logged data, and its runs, by their way from the folder."""
+        folder = self.session.folder
+        found = [path for path in _entries(folder) if path.is_file() and path.suffix.lower() in SUFFIXES]
+        runs = [run.folder for run in self.session.runs()]
+        return [str(path.relative_to(folder)) for path in [*found, *runs]]
+
+    def path(self, name: str, what: str) -> Path:
+        """A file that was named; InputError if none was."""
+        if not name:
+            raise InputError(f"name {what} (in {self.session.folder})")
+        return self.session.folder / name
+
+    def describe(self) -> Task[Description]:
+        """Read the chosen file and say what it holds."""
+        path, mapping = self.path(self.choices["file"], "a file with logged data"), self._map()
+
+        def work(task: Task[Description]) -> Description:
+            from rds.logs.describe import describe
+
+            self.description = describe(path, mapping, lambda done, of: task.advance(done, of, "reading"))
+            return self.description
+
+        return self.session.work(f"describe {path.name}", work)
+
+    def keep_map(self, text: str) -> Path:
+        """Write `text` as the map beside the chosen file, after it was tried; InputError says what is wrong in it."""
+        from rds.logs.guess import map_path
+        from rds.logs.map import LogMap
+        from rds.results.atomic import write_whole
+
+        path = map_path(self.path(self.choices["file"], "a file with logged data"))
+        before = path.read_bytes() if path.exists() else None
+        write_whole(path, text.encode())
+        try:
+            LogMap.read(path)
+        except InputError:
+            if before is None:
+                path.unlink()
+            else:
+                write_whole(path, before)
+            raise
+        return path
+
+    def fit(self) -> Task[Estimate]:
+        """Estimate the chosen structure's parameters from the chosen file."""
+        path, mapping = self.path(self.choices["file"], "a file with logged data"), self._map()
+        name = self.choices["structure"]
+        if name == "user":
+            name = str(self.path(self.choices["structure_file"], "the file of your model"))
+        method, options = self.choices["method"] or None, tuple(self.choices["options"])
+
+        def work(task: Task[Estimate]) -> Estimate:
+            from rds.identification.fit import fit
+            from rds.identification.structures import structure
+            from rds.logs.read_log import read_log
+
+            made = structure(name, options)
+            task.note = "reading"
+            logs = read_log(path, mapping)
+            given: dict[str, Any] = {}
+            if (method or made.default_method) == "simulation":
+                given["progress"] = lambda done, of: task.advance(done, of, "fitting")
+            task.note = "fitting"
+            self.estimate = fit(logs, made, method, given)
+            self.fitted = tuple(logs)
+            return self.estimate
+
+        return self.session.work(f"fit {path.name}", work)
+
+    def write_model(self) -> Path:
+        """Write the last estimate as a model file; InputError if there is none, or the file is another thing."""
+        from rds.identification.model_file import write_model
+
+        if self.estimate is None:
+            raise InputError("there is no estimate yet: fit first")
+        path = self.path(self.choices["model"], "the model file to write")
+        if path.suffix != ".toml":
+            raise InputError("a model file is TOML; give it a name that ends in .toml", str(path))
+        return write_model(path, self.estimate)
+
+    def validate(self) -> Task[Validation]:
+        """Validate the model file (or the last estimate, where none is named) on the chosen validation log."""
+        path = self.path(self.choices["validation_file"], "a file with other data than those of the fit")
+        model: Any = self.session.folder / self.choices["model"] if self.choices["model"] else self.estimate
+        if model is None or (isinstance(model, Path) and not model.exists()):
+            if self.estimate is None:
+                raise InputError("there is no model: fit one, or name a model file that exists")
+            model = self.estimate
+        mapping = self._map() if path == self.session.folder / self.choices["file"] else None
+
+        def work(task: Task[Validation]) -> Validation:
+            from rds.logs.read_log import read_log
+            from rds.validation.validate import validate
+
+            task.note = "reading"
+            logs = read_log(path, mapping)
+            task.note = "validating"
+            self.validation = validate(model, logs)
+            return self.validation
+
+        return self.session.work(f"validate on {path.name}", work)
+
+    def _map(self) -> Path | None:
+        name = self.choices["map"]
+        return self.session.folder / name if name else None
+
+
+def _fields() -> Iterable[Field]:
+    yield Text("file", "File with logged data", "CSV, MAT, Parquet, a bus log, or the folder of a run", "", "log.csv")
+    yield Text("map", "Map of its columns", "TOML file; empty: FILE.map.toml beside it, or guessed", "", "by itself")
+    yield Choice("structure", "Structure", "which model is fitted", "axis", STRUCTURES)
+    yield Text("structure_file", "Own file", "a Python file with derivatives() and params", "", "my_model.py")
+    yield Several("options", "With", "what else the structure has (axis only)", [], OPTIONS, least=0)
+    yield Choice("method", "Method", "how it is fitted", "", METHODS)
+    yield Text(
+        "model", "Model file", "the fitted model is written here; every mode takes it", "fitted.toml", "fitted.toml"
+    )
+    yield Text("validation_file", "Validate on", "a file with other data than those of the fit", "", "other.csv")
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError:
+        return []
