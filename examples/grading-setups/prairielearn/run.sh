@@ -1,0 +1,5 @@
+#!/bin/sh
+# PrairieLearn starts the container for each submission, and reads results/results.json.
+grade="${GRADE:-/grade}"
+mkdir -p "$grade/results"
+exec "${PYTHON:-python3}" -m rds.grading.one_submission prairielearn "$grade"

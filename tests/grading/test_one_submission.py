@@ -1,0 +1,99 @@
+"""The ready set-ups: their scripts are run as the platforms run them, in a folder that stands for the container."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from rds.grading.one_submission import CONTAINERS, grade_in, main
+from rds.grading.sandbox import available
+from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
+from tests.grading.test_exports import GRADESCOPE, PRAIRIELEARN
+
+SETUPS = Path(__file__).resolve().parents[2] / "examples" / "grading-setups"
+LATE = HEAD + "due = 2026-11-20T23:59:00+01:00\n\n[late]\npercent_per_day = 10.0\n"
+ABOUT = {
+    "gradescope": {"created_at": "2026-11-21T12:00:00.123456-08:00", "users": [{"email": "ada@x.edu", "id": 5}]},
+    "prairielearn": {"variant_seed": 12345},
+}
+SCHEMAS = {"gradescope": GRADESCOPE, "prairielearn": PRAIRIELEARN}
+SCRIPTS = {"gradescope": "run_autograder", "prairielearn": "run.sh"}
+needs_sandbox = pytest.mark.skipif(available() is not None, reason=str(available()))
+
+
+def container_in(root: Path, platform: str, code: str = SOLUTION) -> Path:
+    """What the platform puts into its container."""
+    container = CONTAINERS[platform]
+    assignment_in(root / container.assignment, LATE + SINE + RMS)
+    for name in (container.submission, "results", Path(container.about).parent):
+        (root / name).mkdir(parents=True, exist_ok=True)
+    (root / container.submission / "my_controller.py").write_text(code)
+    (root / container.about).write_text(json.dumps(ABOUT[platform]))
+    return root
+
+
+@needs_sandbox
+@pytest.mark.parametrize(("platform", "score"), [("gradescope", 9.0), ("prairielearn", 1.0)])
+def test_the_script_leaves_results(platform: str, score: float, tmp_path: Path) -> None:
+    root = container_in(tmp_path, platform)
+    environment = dict(os.environ, PYTHON=sys.executable, AUTOGRADER=str(root), GRADE=str(root))
+    script = SETUPS / platform / SCRIPTS[platform]
+    done = subprocess.run([str(script)], env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    data = json.loads((root / "results/results.json").read_text())
+    jsonschema.validate(data, SCHEMAS[platform])
+    assert data["score"] == pytest.approx(score)  # late on Gradescope, which says when; a share on PrairieLearn
+    assert len(data["tests"]) == 1
+
+
+@needs_sandbox
+def test_what_cannot_be_loaded_costs_no_attempt(tmp_path: Path) -> None:
+    data = json.loads(grade_in("prairielearn", container_in(tmp_path, "prairielearn", "def (")).read_text())
+    assert data["gradable"] is False and "failed to load" in data["format_errors"][0]
+
+
+@pytest.mark.parametrize("platform", SCRIPTS)
+def test_without_a_sandbox_nothing_is_run_and_nobody_gets_a_zero(
+    platform: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rds.grading.batch.run.available", lambda: "bubblewrap is missing: apt install bubblewrap")
+    root = container_in(tmp_path, platform)
+    data = json.loads(grade_in(platform, root).read_text())
+    jsonschema.validate(data, SCHEMAS[platform])
+    assert "score" not in data
+    assert "bubblewrap is missing" in data["output"] + str(data.get("format_errors"))
+
+
+@pytest.mark.parametrize("damage", ["about", "assignment", "submission"])
+def test_an_answer_is_there_whatever_is_missing(damage: str, tmp_path: Path) -> None:
+    root = container_in(tmp_path, "gradescope")
+    path = root / getattr(CONTAINERS["gradescope"], damage)
+    shutil.rmtree(path) if path.is_dir() else path.write_text("{")
+    (root / "results/results.json").write_text('{"score": 100}')  # as an earlier one might have left it
+    data = json.loads(grade_in("gradescope", root).read_text())
+    assert "score" not in data and "nothing was graded" in data["output"]
+
+
+def test_calls_that_will_not_do(tmp_path: Path) -> None:
+    assert main(["blackboard", str(tmp_path)]) == 2
+    assert main([]) == 2
+
+
+@pytest.mark.parametrize("script", ["gradescope/setup.sh", "gradescope/run_autograder", "prairielearn/run.sh"])
+def test_scripts_are_scripts(script: str) -> None:
+    path = SETUPS / script
+    assert os.access(path, os.X_OK)
+    shell = path.read_text().splitlines()[0].split()[-1].rpartition("/")[2]
+    subprocess.run([shell, "-n", str(path)], check=True)
+
+
+def test_the_question_is_json() -> None:
+    options = json.loads((SETUPS / "prairielearn/info.json").read_text())["externalGradingOptions"]
+    assert options["enabled"] is True and options["timeout"] <= 600
