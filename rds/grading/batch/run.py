@@ -53,10 +53,9 @@ def run_batch(
     began = time.monotonic()
     say = announce or (lambda text: None)
     out = Path(out)
-    if scheduler is None and (fault := available()):
-        raise InputError(fault)
     _check_free(out, resume)
     read = read_assignment(assignment)
+    _check_sandbox(jobs, scheduler)
     names = (read.title, read.folder.resolve().name)
     intake = collect(submissions, read.files, names, read.due.tzinfo if read.due else None)
     rows = queued(read, intake, out / STUDENTS, jobs if scheduler is None else None)
@@ -87,6 +86,23 @@ def run_batch(
         write_class_files(out, read.title, everybody, seconds=batch.seconds, similar=similar, about=about)
         outcome = BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
     return outcome
+
+
+def _check_sandbox(jobs: int | None, scheduler: str | None) -> None:
+    """InputError where submissions cannot be run, before anything is written."""
+    if scheduler is None:
+        if fault := available():
+            raise InputError(fault)
+        return
+    for outcome in spread(_missing, [0], jobs=jobs, scheduler=scheduler):
+        if not outcome.ok:
+            raise InputError(f"scheduler {scheduler!r}: a worker cannot grade: {outcome.reason}; install rds there")
+        _answer(outcome)
+
+
+def _missing(_: int) -> Answer:
+    """On a worker: whether it can grade."""
+    return Answer(missing=available() or "")
 
 
 def _pairs(assignment: Assignment, rows: Sequence[Queued], jobs: int | None) -> list[Pair]:
@@ -190,7 +206,7 @@ def _answer(outcome: Outcome) -> Answer | None:
     answer = outcome.value
     assert isinstance(answer, Answer)
     if answer.missing:
-        raise InputError(f"a worker cannot grade: {answer.missing}. What is graded so far is kept; go on with --resume")
+        raise InputError(f"a worker cannot grade: {answer.missing}. What is graded is kept; go on with --resume")
     return answer
 
 
