@@ -14,6 +14,7 @@ _LAGS = 10  # windows by which a motion may follow its command
 _CLEAR, _FAINT = 0.5, 0.15  # correlations
 _JUMP, _SMOOTH = 0.3, 0.1  # of the range, in one sample: what a command may do, and a position does not
 _FACTOR = 30.0  # of the expected size: beyond it a unit is wrong, not an axis
+_DRIVEN = 3.0  # times the voltage that overcomes friction
 _FASTEST, _LONGEST = 20e3, 100e3  # mm/s, mm
 _FINEST, _COARSEST = 1e-7, 1.0  # mm: steps of an encoder
 _SPINDLE = 500e3  # rev/min
@@ -102,9 +103,17 @@ def _both(log: Log) -> dict[str, np.ndarray]:
 
 
 def _follows(seen: Motion) -> float:
-    """The correlation of speed with command that is furthest from 0, over the lags that an axis may have."""
+    """The correlation of speed with command over the lags that an axis may have: at its first clear peak, or furthest
+    from 0.
+
+    An axis follows a sine by less than a quarter of its period and its delay, so the peak of its own sign comes first;
+    half a period later stands one of the other.
+    """
     most = min(_LAGS, len(seen.speed) // 4)
     values = [correlation(seen.command[: len(seen.command) - lag], seen.speed[lag:]) for lag in range(most + 1)]
+    for value, following in zip(values, [*values[1:], 0.0], strict=True):
+        if abs(value) > _CLEAR and (abs(following) < abs(value) or following * value < 0.0):
+            return value
     return max(values, key=abs)
 
 
@@ -118,7 +127,9 @@ def _against_machine(log: Log, axis: Axis) -> list[Finding]:
     power = float(seen.command @ seen.command)
     if isinstance(gain, int | float) and gain and power > 0.0 and log.units.get("command") == "V":
         ratio = abs(float(seen.command @ seen.speed)) / power / gain
-        if ratio > _FACTOR or 0.0 < ratio < 1.0 / _FACTOR:
+        friction = max(abs(float(axis.model.get(name, 0.0))) for name in ("friction_plus", "friction_minus"))
+        is_driven = gain * float(np.abs(seen.command).max()) > _DRIVEN * friction  # else it may well stand still
+        if ratio > _FACTOR or (is_driven and 0.0 < ratio < 1.0 / _FACTOR):
             what = (
                 f"the axis moves {ratio:.2g} times as far as this machine's does for the same voltage (K = {gain:g}): "
                 f"a unit is off, by a factor of about 10^{round(log10(ratio))}"
