@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rds.commands.common import Json, print_json, refusals
+
+if TYPE_CHECKING:
+    from rds.identification.design import Linear
 
 app = typer.Typer(no_args_is_help=True, help="Controllers designed from a fitted model.")
 
@@ -16,8 +19,10 @@ Model = Annotated[Path, typer.Argument(help="A model file, as `rds fit -o` write
 
 @app.command()
 def tracking(
-    model: Model,
     out: Annotated[Path, typer.Option("--out", "-o", help="The controller's file, FILE.py.")],
+    model: Annotated[Path | None, typer.Argument(help="A model file, as `rds fit -o` writes it.")] = None,
+    axis: Annotated[str | None, typer.Option(help="Instead of a model file: an axis by its machine's data.")] = None,
+    machine: Annotated[str | None, typer.Option(help="The machine of --axis (default mini-cnc).")] = None,
     sample_period: Annotated[float, typer.Option(help="Of the loop, s.")] = 0.001,
     poles: Annotated[str, typer.Option(help="Two poles of the error, 1/s.")] = "-32+24j,-32-24j",
     observer_pole: Annotated[float, typer.Option(help="Of the velocity's observer, 1/s.")] = -320.0,
@@ -26,26 +31,38 @@ def tracking(
 ) -> None:
     """The general tracking controller with its observer, as a file of your own."""
     with refusals():
-        from rds.identification.design import linear_axis_of, write_tracking
-        from rds.identification.model_file import read_model
+        from rds.identification.design import write_tracking
 
-        file = read_model(model)
-        axis = linear_axis_of(file)
+        designed = _axis(model, axis, machine)
         write_tracking(
             out,
-            file,
+            designed,
             sample_period=sample_period,
             poles=_poles(poles),
             observer_pole=observer_pole,
             voltage_range=voltage_range,
         )
     if json:
-        print_json({"file": str(out), "tau": axis.tau, "K": axis.K, "left_out": list(axis.left_out)})
+        print_json({"file": str(out), "tau": designed.tau, "K": designed.K, "left_out": list(designed.left_out)})
         return
-    typer.echo(f"designed for tau = {axis.tau:.6g} s, K = {axis.K:.6g} (mm/s)/V")
-    for sentence in axis.left_out:
+    typer.echo(f"designed for tau = {designed.tau:.6g} s, K = {designed.K:.6g} (mm/s)/V")
+    for sentence in designed.left_out:
         typer.echo(f"not in the design: {sentence}")
     typer.echo(f"wrote {out}")
+
+
+def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
+    from rds.core.errors import InputError
+    from rds.identification.design import linear_axis_of, linear_axis_of_machine
+    from rds.machines import load_machine
+
+    if (model is None) == (axis is None):
+        raise InputError("give one of a model file and --axis (with --machine, if it is not the mini-cnc)")
+    if model is not None:
+        if machine is not None:
+            raise InputError("--machine is for --axis; a model file says what the axis is")
+        return linear_axis_of(model)
+    return linear_axis_of_machine(load_machine(machine or "mini-cnc"), str(axis))
 
 
 def _poles(text: str) -> list[complex]:

@@ -15,7 +15,8 @@ from rds.controllers import tracking
 from rds.core.errors import InputError
 from rds.core.types import Controller
 from rds.identification.model_file import ModelFile, read_model
-from rds.identification.run_model import run_model
+from rds.identification.run_model import SPINDLE_UNIT, run_model
+from rds.machines import Machine
 from rds.models.machine_model import MachineAxisMotion, linear_part
 from rds.results.atomic import write_whole
 
@@ -64,6 +65,17 @@ def linear_axis_of(model: Linear | ModelFile | str | Path) -> Linear:
     if file.is_student:
         left_out.append(f"whatever {Path(file.structure).name} has beside tau and K")
     return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), Path(file.path).name)
+
+
+def linear_axis_of_machine(machine: Machine, name: str) -> Linear:
+    """The linear part of a machine's axis, by the model that the machine's file gives it; InputError for a spindle."""
+    axis = machine.axis(name)
+    if axis.unit == SPINDLE_UNIT:
+        raise InputError(
+            f"{name} is a spindle: its speed is measured, and there is nothing to observe; use the controller 'pid'"
+        )
+    params = axis.model
+    return Linear(params["tau"], params["K"], left_out_of(params), f"axis {name} of {machine.name}")
 
 
 def design_tracking(

@@ -88,10 +88,12 @@ class _Row(widgets.HBox):
         self.plane = widgets.Dropdown(options=list(PLANES), value=row.get("plane", "XY"), tooltip="plane of the arc")
         feed = "" if row.get("feed") is None else f"{row['feed']:g}"
         self.feed = widgets.Text(feed, placeholder="feed", tooltip=_FEED_TIP, continuous_update=False)
-        away = widgets.Button(description="Remove", tooltip="Take this segment away")
+        away = widgets.Button(description="✕", tooltip="Remove this segment")
         away.on_click(lambda _: owner.remove(self))
-        for control, width in ((self.label, 18), (self.kind, 72), (self.turn, 150), (self.plane, 64), (self.feed, 70)):
+        for control, width in ((self.label, 18), (self.kind, 66), (self.turn, 144), (self.plane, 60), (self.feed, 58)):
             control.layout.width = f"{width}px"
+        away.layout.min_width = away.layout.width = "34px"
+        self.end.layout.width, self.centre.layout.width = "116px", "140px"
         super().__init__([self.label, self.kind, self.end, self.centre, self.turn, self.plane, self.feed, away])
         self.add_class("rds-row")
         for control in (self.kind, self.end, self.centre, self.turn, self.plane, self.feed):
@@ -127,5 +129,4 @@ def _text(label: str, values: list[float], tip: str) -> widgets.Text:
         ", ".join(f"{value:g}" for value in values), description=label, tooltip=tip, continuous_update=False
     )
     made.style.description_width = "initial"
-    made.layout.width = "150px"
     return made

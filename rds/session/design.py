@@ -201,15 +201,11 @@ class Design:
 
 def from_machine(machine: Machine, name: str) -> DesignedAxis:
     """An axis of a machine, by the model that its file gives it."""
-    from rds.identification.design import Linear, left_out_of
+    from rds.identification.design import linear_axis_of_machine
     from rds.models import library_model
 
     table = dict(machine.axis(name).model)
-    model = library_model(table.pop("name"), **table)
-    left_out = left_out_of(model.params)
-    return DesignedAxis(
-        Linear(model.params["tau"], model.params["K"], left_out, f"axis {name} of {machine.name}"), model
-    )
+    return DesignedAxis(linear_axis_of_machine(machine, name), library_model(table.pop("name"), **table))
 
 
 def from_file(path: Path) -> DesignedAxis:

@@ -75,11 +75,11 @@ def option_fields(role: str, method: str) -> Iterable[Field]:
         return
     module = interpolator_module(method)
     for name, option in module.OPTIONS.items():
-        meaning, _, unit = option.meaning.rpartition(", ")
+        _, _, unit = option.meaning.rpartition(", ")
         known = unit if unit == "mm" else ""
         yield Number(
             f"{role}.{name}",
-            f"{name}, {meaning if known else option.meaning}".split(",")[0] + f" ({role}s)",
+            f"{name} ({role}s)",
             option.meaning,
             module.DEFAULTS[name],
             unit=known,

@@ -31,7 +31,7 @@ def _turn_to(page: Any, picture: str) -> None:
 def test_an_arc_with_its_errors_magnified(open_page: Callable[..., Any], app: App) -> None:
     page = open_page("Interpolator")
     page.select_option('.rds-field:has(.rds-label:has-text("Method for arcs")) select', "improved tustin")
-    page.wait_for_selector('.rds-label:has-text("basic length unit")')
+    page.wait_for_selector('.rds-label:has-text("blu (arcs) [mm]")')
     _go(page)
     page.wait_for_selector('tr:has-text("within one BLU of 0.01 mm"):has-text("yes")')
     page.wait_for_selector(".rds-figure canvas")
@@ -50,7 +50,7 @@ def test_a_table_of_segments_and_what_it_refuses(open_page: Callable[..., Any]) 
     page.click('button:text-is("Several")')
     _type(page, "Start", "0, 0")
     page.click('button:text-is("Add an arc")')
-    page.wait_for_selector('.rds-group button:text-is("Remove") >> nth=2')
+    page.wait_for_selector('.rds-group button[title="Remove this segment"] >> nth=2')
     _go(page)
     page.wait_for_selector('h3:has-text("3 segments")')
     first = page.locator('input[placeholder="feed"]').first

@@ -170,3 +170,19 @@ def test_try_it_chooses_the_file_in_equipment_control(tmp_path: Path) -> None:
     chosen.try_it(chosen.write("mine.py"))
     table = Equipment(chosen.session, "control").table()
     assert table["axis"] == "Y" and table["controller"] == {"file": "mine.py"}
+
+
+def test_the_command_line_writes_the_same_file(tmp_path: Path) -> None:
+    from typer.testing import CliRunner
+
+    from rds.cli import app
+
+    chosen = design(tmp_path)
+    chosen.move("pair", -40 + 10j)
+    there = tmp_path / "by-command.py"
+    words = ["design", "tracking", "--axis", "X", "-o", str(there), "--poles", "-40+10j,-40-10j"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert there.read_text() == chosen.write("by-panel.py").read_text()
+    for bad in (["--axis", "spindle"], [], ["model.toml", "--axis", "X"], ["model.toml", "--machine", "mini-cnc"]):
+        assert CliRunner().invoke(app, ["design", "tracking", "-o", str(there), *bad]).exit_code == 2
