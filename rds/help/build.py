@@ -19,7 +19,17 @@ _HERE = Path(__file__).parent
 FIRST = "index"
 # the order in which a reader needs them; documents that are not named here come last
 ORDER = (
-    *("readme", "panels", "experiments", "paper", "data", "identification", "identification-methods", "validation"),
+    *(
+        "readme",
+        "panels",
+        "equipment",
+        "experiments",
+        "paper",
+        "data",
+        "identification",
+        "identification-methods",
+        "validation",
+    ),
     *("robustness", "part-programs", "part-program-language", "cutter-compensation", "motion", "interpolation"),
     *("paths", "grading", "grading-setup", "sandbox", "safety", "bus", "bus-timing", "oacs", "cia402"),
     *("thesis-reports", "changelog"),

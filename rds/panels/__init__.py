@@ -22,6 +22,7 @@ PANELS = Registry(
         "program": "rds.panels.program",
         "drawing": "rds.panels.drawing",
         "data": "rds.panels.data",
+        "grading": "rds.panels.grading",
         "help": "rds.panels.guide",
     },
 )
