@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rds.commands.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.commands.logs import read_logs
 
 if TYPE_CHECKING:
     from rds.identification.estimate import Estimate
@@ -63,13 +64,15 @@ def fit(
         made = structure_of(structure, option or ())
         options = _options(made, method, fix or [], free, start or [], set_ or [])
         with progress_bars() as bar:
-            found = _read(logs, map_, axis, bar)
+            found = read_logs(logs, map_, axis, bar)
             fitted, rest = _split(found) if split else (found, [])
             if (method or made.default_method) == "simulation":
                 options["progress"] = bar("fitting")
             estimate = fit_model(fitted, made, method, options)
         validation = _validated(estimate, rest) if split else None
         files = _write(out, report, estimate, fitted, made, validation)
+    for sentence in estimate.unusable():
+        typer.echo(f"warning: {sentence}", err=True)
     if json:
         said = estimate.to_json() | {"files": [str(path) for path in files]}
         print_json(said | ({"validation": validation.to_json()} if validation else {}))
@@ -138,12 +141,6 @@ def _values(given: list[str], word: str) -> dict[str, float]:
     return values
 
 
-def _read(paths: list[Path], map_: Path | None, axis: str | None, bar: Any) -> list[Log]:
-    from rds.commands.validate import _logs
-
-    return [log for path in paths for log in _logs(path, map_, axis, bar(f"reading {path.name}"))]
-
-
 def _split(logs: list[Log]) -> tuple[list[Log], list[Log]]:
     first = [log.part(0, round(FITTED_SHARE * len(log))) for log in logs]
     return first, [log.part(len(part), len(log)) for log, part in zip(logs, first, strict=True)]
@@ -181,7 +178,7 @@ def _show(estimate: Estimate, validation: Validation | None) -> None:
     show_table(f"{described(estimate)} by {estimate.method}, from {logs}", *parameter_rows(estimate))
     show_table("On the data that were fitted", *error_rows(estimate), note(estimate))
     show_table("Correlation of the estimates", *correlation_rows(estimate))
-    for sentence in (*estimate.untold, *estimate.warnings):
+    for sentence in (*estimate.warnings, *estimate.untold):
         typer.echo(f"- {sentence}")
     if validation is not None:
         share = round(100 * (1 - FITTED_SHARE))

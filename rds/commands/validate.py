@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rds.commands.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.commands.logs import read_logs
 
 if TYPE_CHECKING:
-    from rds.logs.log import Log
     from rds.validation.validate import Validation
 
 
@@ -38,7 +38,7 @@ def validate(
 
         bands = Bands.read(_bands(band or []))
         with progress_bars() as bar:
-            found = [log for path in logs for log in _logs(path, map_, axis, bar(f"reading {path.name}"))]
+            found = read_logs(logs, map_, axis, bar)
         made = validate_model(model, found, against=against or (), bands=bands, initial_samples=initial_samples)
         files = made.write(report) if report is not None else []
     if json:
@@ -66,25 +66,6 @@ def _bands(given: list[str]) -> dict[str, float]:
             raise InputError(f"--band {name} is given twice; give it once")
         bands[name] = number
     return bands
-
-
-def _logs(path: Path, map_: Path | None, axis: str | None, progress: object) -> list[Log]:
-    """The logs in a file, of one axis."""
-    from rds.core.errors import InputError
-    from rds.logs.read_log import read_log
-
-    found = read_log(path, map_, progress)  # type: ignore[arg-type]
-    axes = list(dict.fromkeys(name for log in found if (name := _axis(log))))
-    if axis is None and len(axes) > 1:
-        raise InputError(f"it holds the axes {', '.join(axes)}; say which with --axis", str(path))
-    if axis is not None and axes and axis not in axes:
-        raise InputError(f"it holds no axis {axis!r}; it holds {', '.join(axes)}", str(path))
-    return [log for log in found if axis is None or not axes or _axis(log) == axis]
-
-
-def _axis(log: Log) -> str:
-    """The axis that a log's name says, where its file holds several: `name:axis`, `name:axis part 2`."""
-    return log.name.rpartition(":")[2].partition(" part ")[0] if ":" in log.name else ""
 
 
 def _show(made: Validation) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+UNUSABLE = "do not use these parameters"  # how a warning begins that leaves nothing to believe in
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -58,6 +60,10 @@ class Estimate:
     def values(self) -> dict[str, float]:
         """The estimates by name."""
         return {name: parameter.value for name, parameter in self.parameters.items()}
+
+    def unusable(self) -> list[str]:
+        """The warnings that leave nothing to believe in."""
+        return [sentence for sentence in self.warnings if UNUSABLE in sentence]
 
     def to_json(self) -> dict[str, Any]:
         """As a dict that JSON can hold, as `rds fit --json` prints it."""

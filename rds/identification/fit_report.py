@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from rds.identification.estimate import Estimate
 from rds.identification.estimate_json import correlation_rows, described, error_rows, note, parameter_rows, to_json
@@ -27,11 +27,33 @@ _POINTS = 20_000  # that a line of a picture is drawn with
 
 def write_fit(folder: Path, estimate: Estimate, logs: Sequence[Log], structure: Structure) -> list[Path]:
     """Write the page, a picture for each log and the numbers into `folder`, all or none; the page is first."""
-    pictures = {log.name: free_run_picture(estimate, log, structure).png() for log in logs}
+    pictures = []
+    for number, log in enumerate(logs, 1):
+        run = free_run_picture(estimate, log, structure).png()
+        pictures.append(_Drawn(f"fit-{number}.png", log.name, "measured and free run", run))
+        if estimate.method == "frequency":
+            bode = _bode(estimate, log, structure).png()
+            pictures.append(_Drawn(f"bode-{number}.png", f"{log.name}: frequency response", "Bode diagram", bode))
     files = {PAGE: _page(estimate, pictures).encode(), NUMBERS: json.dumps(to_json(estimate), indent=2).encode()}
-    files |= {f"fit-{i + 1}.png": data for i, data in enumerate(pictures.values())}
+    files |= {picture.file: picture.png for picture in pictures}
     write_files({folder / name: partial(_fill, data) for name, data in files.items()})
     return [folder / name for name in files]
+
+
+class _Drawn(NamedTuple):
+    file: str
+    title: str
+    shows: str  # in words, for who does not see it
+    png: bytes
+
+
+def _bode(estimate: Estimate, log: Log, structure: Structure) -> Picture:
+    from rds.identification.frequency_plot import bode_picture
+    from rds.identification.frequency_response import frequency_response
+
+    is_rate = structure.output_unit == "rev/min"
+    response = frequency_response(log, is_rate, estimate.details["period"])
+    return bode_picture(response, estimate.values(), is_rate)
 
 
 def _fill(data: bytes, stream: BinaryIO) -> None:
@@ -58,12 +80,12 @@ def free_run_picture(estimate: Estimate, log: Log, structure: Structure) -> Pict
     return picture
 
 
-def _page(estimate: Estimate, pictures: Mapping[str, bytes]) -> str:
-    title = f"Fit of {described(estimate)} to {', '.join(pictures)}"
+def _page(estimate: Estimate, pictures: Sequence[_Drawn]) -> str:
+    title = f"Fit of {described(estimate)} to {', '.join(estimate.free_run)}"
     images = [
-        f"<section><h2>{escape(name)}</h2>"
-        f'<img alt="measured and free run" src="data:image/png;base64,{b64encode(data).decode("ascii")}"></section>'
-        for name, data in pictures.items()
+        f'<section><h2>{escape(drawn.title)}</h2><img alt="{escape(drawn.shows)}" '
+        f'src="data:image/png;base64,{b64encode(drawn.png).decode("ascii")}"></section>'
+        for drawn in pictures
     ]
     return page(title, f"<header><h1>{escape(title)}</h1></header>{fragment(estimate)}{''.join(images)}")
 

@@ -81,7 +81,11 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         max(2 * lines - len(names), 1),
         untold=untold,
         warnings=_warnings(logs, responses, values, chi, is_rate),
-        details={"misfit": chi, "responses": {log.name: _told(r) for log, r in zip(logs, responses, strict=True)}},
+        details={
+            "misfit": chi,
+            "period": period,
+            "responses": {log.name: _told(r) for log, r in zip(logs, responses, strict=True)},
+        },
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.identification.estimate import Errors, Estimate, Parameter
+from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter
 from rds.identification.fitted_stretch import fitted_stretch
 from rds.identification.initial_state import estimate_start
 from rds.identification.kstep import ahead, errors_of
@@ -57,7 +57,14 @@ def made_estimate(
             notes.append(
                 f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is hardly told by these data"
             )
-    begun, free_run, predictions, said = {}, {}, {}, list(warnings)
+    begun, free_run, predictions = {}, {}, {}
+    said = [
+        f"{UNUSABLE}: {log.name}: {finding.what}"
+        for log in logs
+        for finding in log.findings
+        if finding.gravity is Gravity.FAULT
+    ]
+    said += warnings
     for number, log in enumerate(logs):
         state = None if states is None else states[number]
         begun[log.name], free_run[log.name], predictions[log.name] = _runs(structure, log, values, state)
@@ -66,7 +73,7 @@ def made_estimate(
                 f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
                 "fit a little, and the free run lacks the controller that held the axis, so its error grows with time"
             )
-        said += [f"{log.name}: {finding.what}" for finding in log.findings if finding.gravity is not Gravity.NOTE]
+        said += [f"{log.name}: {finding.what}" for finding in log.findings if finding.gravity is Gravity.WARNING]
     return Estimate(
         structure=structure.name,
         options=structure.options,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rds.identification.estimate import UNUSABLE
 from rds.identification.problem import Problem
 from rds.identification.smoothing import motion_of
 from rds.identification.solve import Solution
@@ -35,7 +36,7 @@ def _search(problem: Problem, solution: Solution) -> list[str]:
     said = []
     if not solution.converged:
         said.append(
-            f"do not use these parameters yet: the search had not settled after {solution.evaluations} free runs; the "
+            f"{UNUSABLE} yet: the search had not settled after {solution.evaluations} free runs; the "
             "values are the best so far, and the intervals are widened by what seemed left to go. Give other values to "
             "start from (--start), hold a parameter (--fix), or fit fewer options"
         )
@@ -91,8 +92,8 @@ def _residuals(problem: Problem, solution: Solution, number: int) -> list[str]:
         )
     if fit < _POOR and size > _MISSED * noise:
         said.append(
-            f"{log.name}: the free run explains {fit:.1f} % of the motion only: do not use these parameters; look at "
-            "the data with `rds data describe` (columns, signs, units), and try other options or structures"
+            f"{log.name}: the free run explains {fit:.1f} % of the motion only: {UNUSABLE}; look at the "
+            "data with `rds data describe` (columns, signs, units), and try other options or structures"
         )
     if noise > 0.0 and size > _MISSED * noise:
         said.append(
