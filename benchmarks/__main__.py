@@ -1,7 +1,7 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
 python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [identification]
-                     [robustness] [--json]
+                     [robustness] [grading] [--json]
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from benchmarks import (
     bus,
     cia402,
     desk,
+    grading,
     identification,
     imports,
     machine,
@@ -41,6 +42,7 @@ SUBJECTS = {
     "desk": "Live values and part programs in the loop",
     "identification": "A fit of tau, K, F+ and F- to 10 s at 1 kHz",
     "robustness": "10,000 closed loops with drawn parameters",
+    "grading": "Submissions graded in the sandbox: five criteria of a 10 s run",
 }
 
 
@@ -78,7 +80,7 @@ def main() -> int:
     parser.add_argument(
         "--peer-python",
         default=sys.executable,
-        help="an interpreter that has the peers (bdsim, control and rds; gcodeparser, pygcode)",
+        help="an interpreter that has the peers (bdsim, control and rds; gcodeparser, pygcode; nbgrader)",
     )
     parser.add_argument("--quiet-load", type=float, default=0.5, help="load average to wait for (default 0.5)")
     parser.add_argument("--patience", type=float, default=60.0, help="s to wait for it before each (default 60)")
@@ -95,6 +97,7 @@ def main() -> int:
         "desk": desk.run,
         "identification": identification.run,
         "robustness": robustness.run,
+        "grading": lambda: grading.run(peer_python=options.peer_python),
         "nc": lambda: nc.run(peer_python=options.peer_python),
     }
     report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}

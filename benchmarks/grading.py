@@ -1,0 +1,126 @@
+"""Grading: what the sandbox and five criteria add to a simulation, a batch of 1,000, and others on the same work."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+import rds
+from benchmarks.figures import Figure, interleaved
+from benchmarks.grading_peers import autograde_seconds, nbclient_seconds
+from rds.grading.assignment import read_assignment
+from rds.grading.batch import run_batch
+from rds.grading.grade_one import grade
+from rds.grading.sandbox import Pool, available
+
+STUDENTS = 1000
+JOBS = 2
+BATCH_LIMIT = 180.0  # s
+LIMITS = {"numpy": 50.0, "scipy and control": 100.0}  # ms over the simulation's own time
+IMPORTS = {"numpy": "import numpy", "scipy and control": "import numpy\nimport scipy.signal\nimport control as ct"}
+LAW = """
+{imports}
+
+params = {{"Kp": {gain}, "Kv": 0.567}}
+
+
+def control(t, r, y, state, params):
+    return params["Kp"] * (r.position - y) + params["Kv"] * r.velocity, state
+"""
+HEAD = """
+title = "Benchmark"
+kind = "controller"
+files = ["controller.py"]
+secret = "of the benchmark alone"
+[[case]]
+name = "sine"
+axis = "X"
+duration = 10.0
+[case.reference]
+kind = "sinusoid"
+amplitude = 5.0
+frequency = 0.2
+"""
+CRITERION = """
+[[criterion]]
+name = "{kind}"
+kind = "{kind}"
+case = "sine"
+points = 10.0
+full = {full}
+none = {none}
+unit = "{unit}"
+"""
+CRITERIA = (
+    ("mean-error", 0.02, 1.0, "mm"),
+    ("max-error", 0.05, 1.0, "mm"),
+    ("rms-error", 0.02, 1.0, "mm"),
+    ("effort", 5.0, 50.0, "V"),
+    ("saturation-time", 0.1, 5.0, "s"),
+)
+
+
+def run(rounds: int = 7, students: int = STUDENTS, peer_python: str = sys.executable) -> list[Figure]:
+    """One submission over the simulation's time; a whole batch; peers."""
+    if fault := available():
+        return [Figure("grading", note=f"skipped: {fault}")]
+    with tempfile.TemporaryDirectory() as folder:
+        place = _written(Path(folder), students)
+        figures = _one(place, rounds)
+        begun = perf_counter()
+        run_batch(place / "task", place / "in", place / "out", jobs=JOBS)
+        seconds = perf_counter() - begun
+        figures.append(Figure(f"{students:,} submissions, {JOBS} jobs, in all", "s", (seconds,), BATCH_LIMIT))
+        figures.append(Figure("of one submission", "ms", (1e3 * seconds / students,)))
+        for name, measure in (("nbclient", nbclient_seconds), ("nbgrader autograde", autograde_seconds)):
+            found = measure(place, peer_python)
+            title = f"{name}, one submission: the same simulation in a notebook"
+            note = found if isinstance(found, str) else ""
+            figures.append(Figure(title, "ms", () if isinstance(found, str) else (1e3 * found,), note=note))
+    return figures
+
+
+def _one(place: Path, rounds: int) -> list[Figure]:
+    assignment = read_assignment(place / "task")
+    experiment = rds.Experiment(
+        axis="X", duration=10.0, reference=rds.sinusoid(5.0, 0.2), controller=str(place / "numpy.py")
+    )
+    with Pool(preload=("numpy", "scipy", "control")) as pool:
+
+        def simulated() -> float:
+            begun = perf_counter()
+            experiment.run()
+            return 1e3 * (perf_counter() - begun)
+
+        def graded(name: str) -> float:
+            begun = perf_counter()
+            found = grade(assignment, place / f"{name}.py", "ada", pool)
+            assert len(found.criteria) == len(CRITERIA) and found.score > 0.0, found
+            return 1e3 * (perf_counter() - begun)
+
+        runs = {"simulation": simulated} | {name: lambda name=name: graded(name) for name in IMPORTS}  # type: ignore[misc]
+        for warm in runs.values():
+            warm()
+        times = interleaved(runs, rounds)
+    figures = [Figure("the simulation alone, 10 s at 1 kHz", "ms", times["simulation"])]
+    for name, limit in LIMITS.items():
+        over = tuple(a - b for a, b in zip(times[name], times["simulation"], strict=True))
+        title = f"graded in the sandbox, five criteria, imports {name}: over the simulation"
+        figures.append(Figure(title, "ms", over, limit))
+    return figures
+
+
+def _written(place: Path, students: int) -> Path:
+    """The assignment, submissions that all differ a little, and one of each kind of imports."""
+    for name in ("task", "in"):
+        (place / name).mkdir()
+    criteria = (CRITERION.format(kind=k, full=full, none=none, unit=unit) for k, full, none, unit in CRITERIA)
+    (place / "task/assignment.toml").write_text(HEAD + "".join(criteria))
+    for name, imports in IMPORTS.items():
+        (place / f"{name}.py").write_text(LAW.format(imports=imports, gain=30.0))
+    for number in range(students):
+        text = LAW.format(imports=IMPORTS["numpy"], gain=20.0 + 0.01 * number)
+        (place / f"in/s{number:04}.py").write_text(text)
+    return place
