@@ -10,6 +10,7 @@ _WIDTH, _BAR, _HEIGHT = 340, 12, 40  # px
 _TOP = 12  # px, of the bar: the mark stands above it
 _BEYOND = 0.45  # of the width between the bounds: how much is shown outside them
 _APART = 80  # px that two labels need
+_LETTER = 6.2  # px
 
 STYLE = """
 .bands { width: 340px; max-width: 100%; height: auto; font: 11px system-ui, sans-serif; }
@@ -34,8 +35,10 @@ def band_bar(bands: Bands, value: float | None, unit: str) -> str:
     if right - left < _APART:
         left, right = min(left, (left + right - _APART) / 2), max(right, (left + right + _APART) / 2)
     for bound, at in ((low, left), (high, right)):
-        word = "full" if bound == bands.full else "none"
-        parts.append(f'<text x="{at:.1f}" y="{_HEIGHT - 4}" text-anchor="middle">{word} {_number(bound, unit)}</text>')
+        said = f"{'full' if bound == bands.full else 'none'} {_number(bound, unit)}"
+        half = _LETTER * len(said) / 2
+        at = min(max(at, half), _WIDTH - half)
+        parts.append(f'<text x="{at:.1f}" y="{_HEIGHT - 4}" text-anchor="middle">{said}</text>')
     if value is not None:
         parts.append(_mark(value, first, last, scale))
     said = "no value" if value is None else f"value {_number(value, unit)}"

@@ -146,7 +146,7 @@ def _panel(panel: Panel, top: int, height: int) -> tuple[str, bool]:
                 f'<path d="M0 {at:.0f}h{10 * width}" stroke="{_TEXT}" stroke-width="8" stroke-dasharray="20 40"/>'
             )
             parts.append(
-                f'<text x="{10 * width - 20}" y="{at - 30:.0f}" text-anchor="end" '
+                f'<text x="{10 * width - 20}" y="{at - 30 if at > 150 else at + 110:.0f}" text-anchor="end" '
                 f'font-size="100">{escape(label)}</text>'
             )
     return "".join(parts) + "</svg>", is_cut
