@@ -53,9 +53,6 @@ def test_its_commands_do_what_it_says(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "bob was here" in page and "A sine of 2 mm" in page and "Hidden cases, not shown: 1" in page
     canvas = csv.DictReader(Path("grades/canvas.csv").read_text().splitlines())
     assert [float(row["Tracking (77)"]) for row in canvas] == [40.0, 40.0, pytest.approx(float(bob["score"]))]
-        "40",
-        "40",
-    ]
 
 
 def test_files_of_the_set_ups_are_there() -> None:
