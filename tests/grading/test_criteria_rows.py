@@ -68,3 +68,8 @@ def test_rows_whose_velocities_are_not_those_of_their_positions() -> None:
     wrong = honest.copy()
     wrong[20] += [1.0, 0.0]
     assert measured("row-consistency", rows_of(LINE, straight(50), wrong)) == pytest.approx(0.5, rel=1e-9)
+
+
+def test_a_move_lasts_from_the_start_to_the_last_row() -> None:
+    assert measured("duration", rows_of(LINE, straight(50))) == pytest.approx(0.5, rel=1e-12)  # 5 mm at 10 mm/s
+    assert measured("duration", rows_of(LINE, straight(51))) == pytest.approx(0.51, rel=1e-12)

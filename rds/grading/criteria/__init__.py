@@ -47,6 +47,7 @@ KINDS = Registry(
                 "chord-error",
                 "largest-velocity",
                 "largest-acceleration",
+                "duration",
                 "feed-error",
                 "row-consistency",
                 "work",
