@@ -160,7 +160,7 @@ def _ranges(panel: Panel) -> tuple[tuple[float, float], tuple[float, float], boo
     for (low, high), values in ((x, [c.x for c in panel.curves]), (y, [c.y for c in panel.curves])):
         lowest, highest = _extent(values)
         if panel.most is None:
-            room = _FAR * (high - low) or _FAR * max(abs(high), 1e-9)
+            room = _FAR * max(high - low, abs(low), abs(high), 1e-9)  # what hardly changes has a size too
             low, high = low - room, high + room
         else:
             low, high = -panel.most, panel.most

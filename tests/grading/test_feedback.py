@@ -164,6 +164,12 @@ def test_what_runs_away_is_cut_and_said() -> None:
     assert near is not None and not near.chart.is_cut
 
 
+def test_what_hardly_changes_leaves_room_for_what_is_a_little_off() -> None:
+    time, steady = np.arange(100) * T, np.full(100, 50.0)
+    curves = [Curve("yours", time, steady - 4.0, "#000000"), Curve("solution", time, steady, "#111111", expected=True)]
+    assert not chart([Panel(curves, "path velocity [mm/s]")]).is_cut
+
+
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6))
 def test_ticks_are_round_and_within(low: float, width: float) -> None:
     high = low + width
