@@ -12,6 +12,7 @@ from rds.grading.cases.case import COUNTS
 from rds.grading.criterion import Criterion
 from rds.grading.grade import Band, CriterionScore, Status
 from rds.grading.grade_one import Opener, grade_with_runs
+from rds.grading.intake.single import as_python
 
 _FARTHEST = 200  # % of the band, to either side: how far a hidden criterion's margin is told
 _COARSE = 5  # % of the band: a hidden value is not told any finer
@@ -85,9 +86,10 @@ def self_check(assignment: Assignment, file: Path, student: str, pool: Opener) -
         raise InputError("no criterion of it can be tried here", str(assignment.folder))
     seen = [criterion for criterion in tried if criterion.is_visible]
     others = [criterion for criterion in tried if not criterion.is_visible]
-    first = grade_with_runs(assignment, file, student, pool, criteria=seen).grade if seen else None
-    # apart, so that nothing of the hidden cases is in what is shown
-    second = grade_with_runs(assignment, file, student, pool, criteria=others).grade if others else None
+    with as_python(assignment, file) as path:
+        first = grade_with_runs(assignment, path, student, pool, criteria=seen).grade if seen else None
+        # apart, so that nothing of the hidden cases is in what is shown
+        second = grade_with_runs(assignment, path, student, pool, criteria=others).grade if others else None
     lines = []
     for criteria, grade, make in ((seen, first, _line), (others, second, _blind)):
         scores = grade.criteria if grade is not None else ()

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rds.core.errors import InputError
+from rds.grading.assignment import read_assignment
+from rds.grading.grade import Status
 from rds.grading.intake.items import Refusal
 from rds.grading.intake.notebooks import converted
-from tests.grading.batches import notebook
+from rds.grading.sandbox import Pool
+from rds.grading.self_check import self_check
+from tests.grading.batches import ASSIGNMENT, law, notebook
+from tests.grading.made import assignment_in
 
 
 def made(*cells: str) -> dict[str, object]:
@@ -106,3 +113,14 @@ def test_any_json_is_refused_or_converted(value: object) -> None:
             converted(json.dumps(each).encode())
         except Refusal:
             continue
+
+
+def test_a_notebook_can_be_tried_before_it_is_handed_in(tmp_path: Path, pool: Pool) -> None:
+    task = read_assignment(assignment_in(tmp_path / "task", ASSIGNMENT, law()))
+    (tmp_path / "mine.ipynb").write_text(notebook("import seaborn", law()))
+    (tmp_path / "mine.py").write_text(law())
+    tried = [self_check(task, tmp_path / name, "ada", pool) for name in ("mine.ipynb", "mine.py")]
+    assert tried[0] == tried[1] and tried[0].status is Status.OK
+    (tmp_path / "broken.ipynb").write_text("{")
+    with pytest.raises(InputError, match=r"broken\.ipynb: it is no notebook"):
+        self_check(task, tmp_path / "broken.ipynb", "ada", pool)

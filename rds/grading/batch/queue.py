@@ -12,7 +12,8 @@ from rds.grading.grade import Grade, Status
 from rds.grading.intake import HandedIn, Intake
 from rds.grading.intake.items import Refusal
 from rds.grading.intake.names import safe_id
-from rds.grading.intake.notebooks import INTERFACE, Converted, converted
+from rds.grading.intake.notebooks import Converted, converted
+from rds.grading.intake.single import wanted
 from rds.grading.late import days_late
 from rds.grading.sandbox.submission import LARGEST
 from rds.results.atomic import write_whole
@@ -95,8 +96,7 @@ def ungraded(assignment: Assignment, each: Queued, status: Status, reason: str) 
 
 def _convert(assignment: Assignment, notebooks: list[Queued], jobs: int | None) -> None:
     """In processes of their own: what somebody wrote to crash a parser does not crash the batch."""
-    tests = {test.function for criterion in assignment.criteria for test in criterion.tests}
-    work = [(each.code or b"", (*INTERFACE, *sorted(tests))) for each in notebooks]
+    work = [(each.code or b"", wanted(assignment)) for each in notebooks]
     for each, outcome in zip(
         notebooks, spread(_converted, work, jobs=jobs, retries=0, time_limit=_PATIENCE), strict=True
     ):

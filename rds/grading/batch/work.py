@@ -74,9 +74,9 @@ def graded(setup: Setup, task: Task) -> Answer:
     """The grade of a task. An exception is ours, and no fault of the submission."""
     if fault := available():
         return Answer(missing=fault)
-    began = time.monotonic()
     assignment, solution = _assignment(setup)
     pool = _pool(threading.get_ident(), setup.jobs)
+    began = time.monotonic()
     if task.path:
         found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
     else:
@@ -84,14 +84,14 @@ def graded(setup: Setup, task: Task) -> Answer:
             path = Path(folder) / code_name(assignment)
             path.write_bytes(task.code)
             found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
-    grade = found.grade
+    grade, seconds = found.grade, time.monotonic() - began
     grade = replace(grade, notes=(*task.notes, *grade.notes), details={**grade.details, **task.about})
     expected = _expected(setup, threading.get_ident()) if solution else ()
     page = feedback_page(assignment, grade, found.runs, expected, same_plants=False)
     files = {FEEDBACK: page.encode("utf-8", "replace")}
     if found.runs:
         files[COLUMNS] = columns_of(found.runs)
-    return Answer(grade.to_json(), files, time.monotonic() - began)
+    return Answer(grade.to_json(), files, seconds)
 
 
 def columns_of(runs: tuple[CaseRun, ...]) -> bytes:

@@ -88,12 +88,6 @@ def collect(
     return Intake(layout.name, rows, layout.ignored)
 
 
-def read_single(path: str | Path) -> HandedIn:
-    """One file, as its author checks it."""
-    item = _single(Path(path))
-    return _row(Heap(shown(Path(path).stem), [item]), (), None, None)
-
-
 def _single(path: Path) -> Item:
     return Item((path.name,), lambda most: read_regular(path, most))
 
