@@ -82,6 +82,7 @@ class Program:
         self.builds = Builds()
         self.latest: Look | None = None
         self._looks = Latest(self._begin)
+        self._early: Look | None = None  # what is known while the motion is being planned
         self.trouble = ""  # why the file that was chosen is not open
         self.text = self._opened()
         self.choices.watch(self._chosen)
@@ -168,6 +169,7 @@ class Program:
     def look_again(self) -> None:
         """Text or setting has changed: what was found does not hold any more."""
         self._looks.again()
+        self._early = None
 
     @property
     def looking(self) -> bool:
@@ -178,7 +180,10 @@ class Program:
         """Ten times a second: begin to look where something has changed; what was found, once, when it is there."""
         task = self._looks.tick()
         if task is None:
-            return None
+            found, self._early = self._early, None
+            self.latest = found or self.latest
+            return found
+        self._early = None
         if task.error is not None:
             self.session.say(f"the check failed: {task.error}", "error")
             return None
@@ -191,7 +196,11 @@ class Program:
         def work(task: Task[Look]) -> Look:
             from rds.session.program_check import look
 
-            return look(task, text.on_disk(), text.name, machine, setup)
+            def early(found: Look) -> None:
+                if not task.stopping:
+                    self._early = found
+
+            return look(task, text.on_disk(), text.name, machine, setup, early)
 
         return self.session.work(f"check {text.name}", work)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from rds.nc.reading_on import Later
 from rds.nc.toolpath import PathBlock, toolpath
 from rds.nc.trace import Trace
 from rds.nc.validate import Validation, Validator
+from rds.programs.prepare import least_seconds, require_room
 from rds.session.task import Task
 
 
@@ -38,7 +39,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Look:
-    """What one look found. `cycle` and `trouble` (why there is no cycle time) are of valid programs."""
+    """What one look found. `cycle` and `trouble` (why it cannot be planned) are of valid programs."""
 
     marks: tuple[Mark, ...]
     validation: Validation | None = None
@@ -61,16 +62,25 @@ class Look:
             count, first = len(faults) + more, faults[0]
             place = f"line {first.line}: " if first.line else ""
             return f"{count} fault{'s' * (count > 1)}; {place}{first.text}"
-        if self.trouble or self.validation is None or self.cycle is None:
+        if self.trouble or self.validation is None:
             return self.trouble or "nothing to run"
-        moves, total = self.validation.segments, self.cycle.total
-        return f"the machine can run it: {moves} move{'s' * (moves != 1)}, {total:.2f} s"
+        moves = self.validation.segments
+        time = "its time is being planned" if self.cycle is None else f"{self.cycle.total:.2f} s"
+        return f"the machine can run it: {moves} move{'s' * (moves != 1)}, {time}"
 
 
-def look(task: Task[Any], source: Path, name: str, machine: Machine, setup: Setup) -> Look:
+def look(
+    task: Task[Any],
+    source: Path,
+    name: str,
+    machine: Machine,
+    setup: Setup,
+    early: Callable[[Look], None] = lambda found: None,
+) -> Look:
     """Read, follow and plan the program in `source`, which is called `name` for whoever reads this.
 
-    Writes nothing. Raises Stopped when it should end; faults are marks and never raised.
+    `early` gets what was found before planning, which takes longer. Writes nothing. Raises Stopped when it should end;
+    faults are marks and never raised.
     """
     try:
         tools = setup.tool_list()
@@ -109,6 +119,8 @@ def look(task: Task[Any], source: Path, name: str, machine: Machine, setup: Setu
         return Look(marks, result, trace, follower.modes)
     try:
         task.note = "planning"
+        require_room(least_seconds(kept), machine, machine.sample_period, Path(name))
+        early(Look(marks, result, trace, follower.modes))
         cycle = cycle_time(_divided(kept, task), machine)
         cycle.certificate.require(name)
     except RdsError as error:

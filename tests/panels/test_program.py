@@ -115,7 +115,7 @@ def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(open_page: Call
     page.wait_for_selector('.rds-notice:has-text("ended early: stopped in line")')
     page.wait_for_selector('.rds-main :text("Where the contour error is largest")')
     page.click('.rds-main button:has-text("Line 2:")')
-    assert page.evaluate(SELECTED) == "G1 X30 F120"
+    page.wait_for_function(f"{SELECTED} === 'G1 X30 F120'")
     page.wait_for_selector('.rds-main :text("Saved in")')
     assert re.search(r"override\s+1\s+2|override\s+1\s+", page.inner_text(".rds-main"))
 

@@ -164,6 +164,24 @@ def test_blocks_behind_a_slash_are_left_out_on_demand(tmp_path: Path) -> None:
     assert looked(made).ok
 
 
+def test_a_program_too_long_for_one_run_is_said_without_planning_it(tmp_path: Path) -> None:
+    made = program(tmp_path, "G21 G90", *["G1 X60 F1", "X-60"] * 200, "M2")
+    found = looked(made)
+    assert not found.ok and "takes at least" in found.sentence and found.trace.high[0] == 60.0
+
+
+def test_faults_and_path_are_there_before_the_time_is_planned(tmp_path: Path) -> None:
+    made = program(tmp_path, "G21 G90", *["G1 X60 F60", "X-60"] * 2, "M2")
+    found = []
+    deadline = time.monotonic() + PATIENCE
+    while made.looking and time.monotonic() < deadline:
+        if (each := made.tick()) is not None:
+            found.append(each)
+        time.sleep(0.002)
+    assert [look.cycle is None for look in found] == [True, False]
+    assert all(look.ok and look.trace.high[0] == 60.0 for look in found)
+
+
 def test_a_loop_that_never_ends_is_given_up_when_the_text_changes(tmp_path: Path) -> None:
     made = program(tmp_path, "#1 = 0", "o1 while [1]", "#1 = [#1 + 1]", "o1 endwhile", "M2")
     made.tick()
