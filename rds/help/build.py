@@ -23,6 +23,7 @@ ORDER = (
         "readme",
         "panels",
         "equipment",
+        "design",
         "experiments",
         "paper",
         "data",

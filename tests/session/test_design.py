@@ -15,6 +15,7 @@ from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.session import Session
 from rds.session.design import Design
+from tests.documents import blocks
 
 X = load_machine("mini-cnc").axis("X").model
 
@@ -186,3 +187,10 @@ def test_the_command_line_writes_the_same_file(tmp_path: Path) -> None:
     assert there.read_text() == chosen.write("by-panel.py").read_text()
     for bad in (["--axis", "spindle"], [], ["model.toml", "--axis", "X"], ["model.toml", "--machine", "mini-cnc"]):
         assert CliRunner().invoke(app, ["design", "tracking", "-o", str(there), *bad]).exit_code == 2
+
+
+def test_the_document_s_python_says_what_it_says(capsys: pytest.CaptureFixture[str]) -> None:
+    (block,) = (each for each in blocks("docs/design.md") if each.language == "python")
+    exec(compile(block.text, "docs/design.md", "exec"), {})
+    gain, _, settling = map(float, capsys.readouterr().out.split())
+    assert gain == pytest.approx(1700.0) and 0.05 < settling < 0.2

@@ -18,6 +18,7 @@ from rds.interpolators.result import Interpolation
 from rds.results import open_result
 from rds.session import Session
 from rds.session.interpolator import Interpolating
+from tests.documents import blocks
 
 USERS = """
 def interpolate(segment, T, params):
@@ -72,6 +73,20 @@ def test_table_of_segments_is_that_of_the_toml_file(tmp_path: Path) -> None:
     )
     said = command(str(tmp_path / "path.toml"), "--acceleration", "s-shape", "--acceleration-time", "0.02")
     assert said["samples"] == done.samples and said["path_error_mm"] == pytest.approx(done.path_error.max())
+
+
+def test_the_document_s_path(tmp_path: Path) -> None:
+    (block,) = (each for each in blocks("docs/interpolation.md") if each.language == "toml")
+    (tmp_path / "path.toml").write_text(block.text)
+    said = command(str(tmp_path / "path.toml"))
+    assert said["segments"] == 2 and said["time_s"] == pytest.approx(3.0 + np.pi * 10.0 / 5.0, abs=2e-3)
+    for line, why in (("feed = 600", "feed is missing"), ("end = [30.0, 0.0]", "segment 1: end = None must be")):
+        (tmp_path / "path.toml").write_text(block.text.replace(line, "", 1))
+        done = CliRunner().invoke(app, ["interpolate", str(tmp_path / "path.toml")])
+        assert done.exit_code == 2 and why in done.stderr
+    (tmp_path / "path.toml").write_text("speed = 3\n" + block.text)
+    done = CliRunner().invoke(app, ["interpolate", str(tmp_path / "path.toml")])
+    assert done.exit_code == 2 and "'speed'" in done.stderr
 
 
 def test_part_program_is_that_of_the_command_line(tmp_path: Path) -> None:
