@@ -189,14 +189,16 @@ class InterpolatorView:
         title, rows = summary(done)
         half = -(-len(rows) // 2)
         both = "".join(table(["quantity", "", "unit"], part) for part in (rows[:half], rows[half:]))
-        self.numbers.value = f'<h3>{title}</h3><div class="rds-side-by-side rds-compact">{both}</div>{notes_list(self.work.notes)}'
+        self.numbers.value = (
+            f'<h3>{title}</h3><div class="rds-side-by-side rds-compact">{both}</div>{notes_list(self.work.notes)}'
+        )
         if done.within:
             self.notice.say(f"done: {done.samples} samples, {done.duration:.4g} s", "good")
         else:
             self.notice.say("done, but further from the path than one BLU: see the numbers", "warning")
         self.results.layout.display = ""
         options = [(_PICTURES[name], name) for name in names_of(done)]
-        kept = self.picture.value if self.picture.value in dict(map(reversed, options)) else "motion"  # type: ignore[arg-type]
+        kept = self.picture.value if self.picture.value in names_of(done) else "motion"
         with self.picture.hold_trait_notifications():
             self.picture.options = options
             self.picture.value = kept
