@@ -174,6 +174,7 @@ class ProgramView:
     def _show(self, work: ProgramWork) -> None:
         """The loop is over; its files are still being written."""
         self._shown = True
+        self.editor.running = 0
         result = work.result
         assert result is not None
         ending = result.meta.get("ending")
