@@ -119,7 +119,7 @@ class TrustedFile:
                     raise InputError(f"row {self._calls}: {values[1]}")
                 self._calls += 1
                 if self._calls > most:
-                    raise InputError(f"its interpolator has no end: more than {most} rows")
+                    raise InputError(f"its interpolator has no end, or is far too slow: more than {most} rows")
                 position, velocity, acceleration = (tuple(part) for part in values.tolist())
                 yield position, velocity, acceleration
 

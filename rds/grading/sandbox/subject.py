@@ -132,7 +132,7 @@ class Subject:
             for at in range(0, int(count) * 3 * axes, 3 * axes):
                 taken += 1
                 if taken > most:
-                    run.give_up(f"its interpolator has no end: more than {most} rows")
+                    run.give_up(f"its interpolator has no end, or is far too slow: more than {most} rows")
                 p, v, a = (tuple(values[at + i * axes : at + (i + 1) * axes]) for i in range(3))
                 yield p, v, a
             if run.has_ended:
