@@ -144,11 +144,11 @@ class DataView:
 
         rows = [[heading(c.name, c.unit), c.low, c.high, c.step, c.values, c.missing] for c in found.columns]
         parts = [html.table(["column", "lowest", "highest", "step", "values", "missing"], rows)]
-        for log in found.logs:
-            parts.append(
-                f"<p><b>{escape(log.name)}</b>: {len(log)} samples, {log.time[-1] - log.time[0]:.6g} s, "
-                f"every {log.sample_period:.6g} s</p>"
-            )
+        parts += [
+            f"<p><b>{escape(log.name)}</b>: {len(log)} samples, {log.time[-1] - log.time[0]:.6g} s, "
+            f"every {log.sample_period:.6g} s</p>"
+            for log in found.logs
+        ]
         parts += [
             f"<p><b>{_SIGNS[str(finding.gravity)]} {escape(str(finding.gravity))}</b>: {escape(finding.what)}</p>"
             for finding in found.findings

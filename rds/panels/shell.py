@@ -16,6 +16,7 @@ from rds.core.errors import RdsError
 from rds.panels import PANELS
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
+from rds.panels.presence import Presence
 from rds.session.session import Message, Session
 
 _STYLE = Path(__file__).parent / "static" / "style.css"
@@ -51,11 +52,10 @@ class Shell:
         self._place.add_class("rds-panel")
         body = widgets.HBox([nav, self._place])
         body.add_class("rds-body")
-        self.widget = widgets.VBox([widgets.HTML(_style()), self._head(), self._notice, body])
+        self.widget = widgets.VBox([Presence(self._shown), widgets.HTML(_style()), self._head(), self._notice, body])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
         self.ticker.add(self._show_messages)
-        self._offer_runs()
         self.open(panel)
 
     def open(self, name: str) -> None:
@@ -136,6 +136,11 @@ class Shell:
         heard, self._heard[:] = list(self._heard), []
         for message in heard:
             self.say(message.text, message.kind)
+
+    def _shown(self) -> None:
+        """A browser shows the page: take up what other pages of the folder have done since this one was made ready."""
+        self.session.refresh()
+        self._offer_runs()
 
     def _offer_runs(self) -> None:
         """What was going on when the page was last left."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rds.core.errors import InputError
 from rds.session.choices import Choices
 from rds.session.fields import Choice, Field, Several, Text
-from rds.session.session import RUNS, Session
+from rds.session.session import Session
 from rds.session.task import Task
 
 if TYPE_CHECKING:

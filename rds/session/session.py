@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rds.core.errors import InputError
+from rds.core.errors import InputError, RdsError
 from rds.results.atomic import write_whole
 from rds.session.choices import Choices
 from rds.session.claim import Claim
@@ -48,6 +48,7 @@ class Session:
         self.messages: list[Message] = []
         self.tasks: list[Task[Any]] = []
         self.machine_user: Any = None  # what holds the machine now: something with stop()
+        self.channels: set[str] = set()  # of the built-in bus, on which this page has started other machines
         self._choices: dict[str, Choices] = {}
         self._watchers: list[Callable[[Message], None]] = []
         self._lock = threading.Lock()
@@ -74,6 +75,15 @@ class Session:
         except InputError as error:
             if not any(message.text.startswith("choices are not kept") for message in self.messages):
                 self.say(f"choices are not kept: {error}", "warning")
+
+    def refresh(self) -> None:
+        """Take over the choices that another page of this folder has kept since."""
+        kept = self._read_kept()
+        if kept == self._kept:
+            return
+        self._kept = kept
+        for panel, choices in self._choices.items():
+            choices.load(kept.get(panel, {}))
 
     def _read_kept(self) -> dict[str, dict[str, Any]]:
         path = self.folder / KEPT
@@ -161,8 +171,7 @@ class Session:
         """Let the modules be used again; a sentence. MachineError where a button is still pressed."""
         from rds.bus.estop import reset_everything
 
-        with self._open_bus() as bus:
-            free = reset_everything(bus)
+        free = [node for channel in self._channels() for node in self._on(channel, reset_everything)]
         text = f"{len(free)} modules are free again" if free else "no module is on the bus"
         self.say(text)
         return text
@@ -170,13 +179,33 @@ class Session:
     def _stop_modules(self) -> list[int]:
         from rds.bus.estop import stop_everything
 
-        with self._open_bus() as bus:
-            return stop_everything(bus)
+        stopped, failed = [], None
+        for channel in self._channels():  # one that fails keeps none of the others from being stopped
+            try:
+                stopped += self._on(channel, stop_everything)
+            except RdsError as error:
+                failed = error
+        if failed is not None:
+            raise failed
+        return stopped
 
-    def _open_bus(self) -> Any:
+    def _channels(self) -> list[str | None]:
+        """Where modules of this session may be: the machine's own channel first."""
+        if self.bus.get("interface", "rds") != "rds":
+            return [self.bus.get("channel")]
+        from rds.machines import load_machine
+
+        try:
+            own = self.bus.get("channel") or load_machine(self.machine).name
+        except InputError:  # a file that is broken by now is no reason not to stop
+            own = self.machine
+        return [own, *sorted(self.channels - {own})]
+
+    def _on(self, channel: str | None, act: Callable[[Any], list[int]]) -> list[int]:
         from rds.bus.link import open_bus
 
-        return open_bus(self.bus.get("interface", "rds"), self.bus.get("channel", self.machine))
+        with open_bus(self.bus.get("interface", "rds"), channel) as bus:
+            return act(bus)
 
     # runs
 
