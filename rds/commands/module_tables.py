@@ -5,20 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rds.bus.oacs.pid import MEANINGS
 from rds.console import cell, show_table
-
-TUNING = {  # unit and meaning, as rds/bus/oacs/pid.py has them; 255 duty are the whole supply voltage
-    "controller": ("", "PI or PID"),
-    "Kp": ("duty/count", "proportional gain"),
-    "Ki": ("duty/(count s)", "integral gain"),
-    "Kd": ("duty s/count", "derivative gain"),
-    "integral_limit": ("count s", "the integral stays within ± this"),
-    "output_low": ("duty", "least output; 0: the motor never brakes, the axis coasts"),
-    "output_high": ("duty", "most output; 255 is the whole supply voltage"),
-    "kick": ("duty", "output of the first iteration; 0: no kick"),
-    "sample_time": ("s", "from one iteration to the next"),
-    "tolerance": ("count", "a motion ends when no more is left"),
-}
 
 
 def show_info(found: Mapping[str, Any]) -> None:
@@ -45,5 +33,5 @@ def show_info(found: Mapping[str, Any]) -> None:
 
 def show_tuning(values: Mapping[str, Any]) -> None:
     """The tuning in force, by name."""
-    rows = [[name, cell(value), *TUNING.get(name, ("", ""))] for name, value in values.items()]
+    rows = [[name, cell(value), *MEANINGS.get(name, ("", ""))] for name, value in values.items()]
     show_table("Tuning", ["parameter", "value", "unit", "meaning"], rows)

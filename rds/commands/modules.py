@@ -63,14 +63,9 @@ def scan(
             with bus_of(interface, channel) as bus:
                 watch(bus, json, events, modules, seconds, force)
             return
-        distributed = _oacs(interface, channel)
-        cyclic = _cyclic(interface, channel, {row["id"]: row for row in distributed})
-        rows = [*cyclic, *distributed, *_drives(interface, channel)]
-        if not rows:
-            from rds.bus.traffic import refuse_taken
+        from rds.bus.scan import scan_all
 
-            with bus_of(interface, channel) as bus:
-                refuse_taken(bus)
+        rows = scan_all(interface, channel_of(interface, channel))
     if json:
         print_json({"channel": channel_of(interface, channel), "interface": interface, "modules": rows})
         return
@@ -93,66 +88,6 @@ def _refused(sentence: str) -> Exception:
     from rds.core.errors import InputError
 
     return InputError(sentence)
-
-
-def _oacs(interface: str, channel: str | None) -> list[dict[str, Any]]:
-    from rds.bus.oacs.host import scan as scan_oacs
-
-    with bus_of(interface, channel) as bus:
-        return [info.as_dict() for info in scan_oacs(bus)]
-
-
-def _cyclic(interface: str, channel: str | None, distributed: dict[int, dict[str, Any]]) -> list[dict[str, Any]]:
-    """Modules that answer the cyclic call and speak no other dialect: those of `rds machine serve`.
-
-    The distributed modules take cyclic commands as well. MachineError naming both modules of a clash.
-    """
-    import time
-
-    import can
-
-    from rds.bus import frames
-    from rds.bus.identity import clash, listen, refuse_clashes
-    from rds.core.errors import MachineError
-
-    with bus_of(interface, channel) as bus:
-        identities = listen(bus).modules
-        refuse_clashes(identities)
-        for identity in identities:
-            if other := distributed.get(identity.node):
-                names = [str(identity), f"distributed module {other['type']} with serial number {other['serial']}"]
-                raise MachineError(clash(f"number {identity.node}", names))
-        bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), 0.5)
-        answers = {frames.answer_identifier(node): node for node in frames.NODES}
-        found: dict[int, dict[str, Any]] = {}
-        deadline = time.monotonic() + 0.2
-        while (left := deadline - time.monotonic()) > 0:
-            message = bus.recv(left)
-            if message is None or message.is_extended_id or message.arbitration_id not in answers:
-                continue
-            answer = frames.decode_answer(message.arbitration_id, message.data)
-            node = answers[message.arbitration_id]
-            state = (frames.Status(answer.status).name or "none").lower()
-            state = state.replace("|", ", ").replace("_", " ").replace("none", "idle")
-            if node in distributed:
-                continue
-            found[node] = {"id": node, "type": "axis", "dialect": "rds", "version": None, "state": state}
-        return [found[node] for node in sorted(found)]
-
-
-def _drives(interface: str, channel: str | None) -> list[dict[str, Any]]:
-    from rds.bus.cia402.scan import scan as scan_drives
-
-    return [
-        {
-            "id": device.node,
-            "type": device.name or device.kind,
-            "dialect": "cia402" if device.is_drive else "canopen",
-            "version": device.version,
-            "state": device.state.name.lower().replace("_", " ") if device.state is not None else None,
-        }
-        for device in scan_drives(interface, channel_of(interface, channel))
-    ]
 
 
 @module_app.callback()
@@ -367,8 +302,8 @@ def step(
         folder = folder_for(out, force)
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")
-        from rds.commands.step_plot import plot
         from rds.results.files import save_all
+        from rds.session.step_plot import plot
 
         files = {kind: str(path) for kind, path in save_all(result, folder).items()}
         files["plot"] = str(folder / "step.png")

@@ -21,6 +21,7 @@ PANELS = Registry(
         "interpolator": "rds.panels.interpolator",
         "program": "rds.panels.program",
         "drawing": "rds.panels.drawing",
+        "machine": "rds.panels.machine",
         "data": "rds.panels.data",
         "grading": "rds.panels.grading",
         "help": "rds.panels.guide",

@@ -16,9 +16,8 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus.oacs.pid import Tuning
+from rds.bus.oacs.pid import MEANINGS, Tuning
 from rds.cli import app
-from rds.commands.module_tables import TUNING
 
 pytestmark = pytest.mark.realtime
 Serve = Callable[..., subprocess.Popen[str]]
@@ -152,4 +151,4 @@ def test_what_a_module_says_is_shown_with_units(serve: Serve, rds: Rds) -> None:
 
 
 def test_every_tuning_parameter_has_a_meaning() -> None:
-    assert list(TUNING) == [field.name for field in fields(Tuning)]
+    assert list(MEANINGS) == [field.name for field in fields(Tuning)]

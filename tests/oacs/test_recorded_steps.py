@@ -19,10 +19,10 @@ from rds.bus.oacs.recording import PositionRecorder
 from rds.bus.oacs.talk import Heard
 from rds.bus.oacs.words import Says
 from rds.commands.modules import folder_for
-from rds.commands.step_plot import plot
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.results import Result
+from rds.session.step_plot import plot
 
 X = read_modules(load_machine("mrmt-oacs"))["X"].describe(1)  # 169 counts per mm
 PERIOD = 0.01

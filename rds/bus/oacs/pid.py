@@ -57,6 +57,18 @@ class Tuning:
         return replace(self, **{FIELDS[parameter]: value})  # type: ignore[arg-type]
 
 
+MEANINGS = {  # of the fields of Tuning: unit and words; 255 duty are the whole supply voltage
+    "controller": ("", "PI or PID"),
+    "Kp": ("duty/count", "proportional gain"),
+    "Ki": ("duty/(count s)", "integral gain"),
+    "Kd": ("duty s/count", "derivative gain"),
+    "integral_limit": ("count s", "the integral stays within ± this"),
+    "output_low": ("duty", "least output; 0: the motor never brakes, the axis coasts"),
+    "output_high": ("duty", "most output; 255 is the whole supply voltage"),
+    "kick": ("duty", "output of the first iteration; 0: no kick"),
+    "sample_time": ("s", "from one iteration to the next"),
+    "tolerance": ("count", "a motion ends when no more is left"),
+}
 FIELDS = {
     Parameter.KP: "Kp",
     Parameter.KI: "Ki",

@@ -1,0 +1,66 @@
+"""The machine panel in a browser: modules found, configured, tuned, stepped; their bus watched."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.panels.conftest import App
+
+DIALECT = '.rds-field:has(.rds-label:has-text("Dialect")) select'
+
+
+def press(page: Any, text: str) -> None:
+    page.click(f'button:visible:text-is("{text}")')
+
+
+def tab(page: Any, title: str) -> None:
+    page.click(f'.rds-tabs [role="tab"]:has-text("{title}")')
+
+
+@pytest.fixture
+def own_app(start_app: Callable[..., App]) -> App:
+    """An app for itself: what it serves is on its bus."""
+    return start_app(None, "--machine", "mrmt-oacs")
+
+
+def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_page: Callable[..., Any]) -> None:
+    page = open_page("Machine", on=own_app)
+    press(page, "Scan")
+    page.wait_for_selector('.rds-notice-error:has-text("no module answers"):has-text("start the simulated modules")')
+    page.select_option(DIALECT, "oacs: distributed")
+    press(page, "Start modules")
+    page.wait_for_selector('.rds-notice-good:has-text("4 say what they are")')
+    assert page.locator("caption:has-text('What they say of themselves')").is_visible()
+    tab(page, "2 Configuration")
+    page.wait_for_selector('.rds-notice-good:visible:has-text("this order makes a machine")')
+    page.locator('button:visible:text-is("▼")').first.click()
+    page.wait_for_selector('.rds-notice-error:visible:has-text("the tool (module 5) must be the first")')
+    page.locator('button:visible:text-is("▲")').nth(1).click()
+    press(page, "Write machine")
+    page.wait_for_selector('.rds-notice-good:visible:has-text("wrote my-machine.toml")')
+    assert "[axis.X.module]" in (own_app.folder / "my-machine.toml").read_text()
+    tab(page, "Bus")
+    press(page, "Analyse")
+    page.wait_for_selector("td:visible:has-text('met')")
+    press(page, "Listen")
+    tab(page, "3 Controllers")
+    page.select_option('.widget-dropdown:has-text("Module") select', "4: LinrXa")
+    press(page, "Step")
+    page.wait_for_selector(".rds-figure canvas, .rds-figure img")
+    tab(page, "Bus")
+    page.wait_for_selector("td:visible:has-text('Reply')")
+    page.click('button:text-is("Dark")')
+    page.wait_for_selector(".rds-app.rds-dark")
+
+
+def test_a_gain_that_cannot_be_is_refused_beside_its_field(open_page: Callable[..., Any]) -> None:
+    page = open_page("Machine")
+    tab(page, "3 Controllers")
+    page.wait_for_selector('.rds-notice-warning:visible:has-text("no module with a controller is known")')
+    field = page.locator('.rds-field:has(.rds-label:has-text("Kp")) input').first
+    field.fill("-1")
+    field.press("Enter")
+    page.wait_for_selector('.rds-refusal:has-text("Kp must be from 0 to 1e+06 duty/count, not -1")')
