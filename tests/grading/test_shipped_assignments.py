@@ -1,0 +1,106 @@
+"""The assignments in examples/: all submissions earn what they earned before, and students' copies are sound.
+
+After a change that is meant to change scores: run `rds grade run` on an assignment, look at what has changed, and write
+the new scores into `shipped_scores/`.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.grading.assignment import read_assignment
+from rds.grading.batch import BatchOutcome, run_batch
+from rds.grading.grade import Status
+from rds.grading.grade_one import grade
+from rds.grading.hand_out import hand_out
+from rds.grading.sandbox import Pool, available
+
+HERE = Path(__file__).parent
+ASSIGNMENTS = HERE.parents[1] / "examples" / "assignments"
+NAMES = ("interpolator", "observer", "tracking")
+COPIES = {"interpolator": {"mia", "rosa"}, "observer": {"anna", "greta"}, "tracking": {"ada", "fay"}}
+HOSTILE = {
+    "interpolator": {"uwe", "vera"},
+    "observer": {"ines", "jonas"},
+    "tracking": {"igor", "jin"},
+}
+
+pytestmark = pytest.mark.skipif(available() is not None, reason=str(available()))
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def graded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, BatchOutcome]:
+    """The twelve submissions of one assignment, graded as an instructor does."""
+    folder = ASSIGNMENTS / request.param
+    out = tmp_path_factory.mktemp("graded") / request.param
+    return request.param, run_batch(folder, folder / "submissions", out, jobs=2)
+
+
+def test_every_submission_earns_what_it_did(graded: tuple[str, BatchOutcome]) -> None:
+    name, outcome = graded
+    expected: dict[str, Any] = json.loads((HERE / "shipped_scores" / f"{name}.json").read_text())
+    found = {
+        student: {
+            "status": str(made.status),
+            "score": made.score,
+            "criteria": {criterion.name: criterion.score for criterion in made.criteria},
+        }
+        for student, made in outcome.grades.items()
+    }
+    assert found == expected
+    assert len(found) == 12
+
+
+def test_the_class_is_spread_from_all_points_to_none(graded: tuple[str, BatchOutcome]) -> None:
+    name, outcome = graded
+    scores = {student: made.score for student, made in outcome.grades.items()}
+    assert max(scores.values()) == 100.0
+    assert sum(score == 0.0 for score in scores.values()) >= 4
+    assert sum(0.0 < score < 100.0 for score in scores.values()) >= 3
+    assert all(scores[student] < 50.0 for student in HOSTILE[name])
+    assert any(made.late_days > 0.0 and made.score < made.before_penalty for made in outcome.grades.values())
+
+
+def test_only_the_copy_is_pointed_out_and_costs_nothing(graded: tuple[str, BatchOutcome]) -> None:
+    name, outcome = graded
+    pairs = json.loads((outcome.folder / "similarity.json").read_text())["pairs"]
+    assert [{pair["first"], pair["second"]} for pair in pairs] == [COPIES[name]]
+    assert {outcome.grades[student].score for student in COPIES[name]} == {100.0}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_solution_earns_all_points_of_the_students_copy(name: str, tmp_path: Path, pool: Pool) -> None:
+    assignment = read_assignment(ASSIGNMENTS / name)
+    assert assignment.max_score == 100.0
+    files = hand_out(assignment, tmp_path / "students")
+    assert {path.name for path in files} >= {"assignment.toml", "handout.md", assignment.files[0]}
+    assert not {"solution.py", "contour.ngc"} & {path.name for path in files}
+    copy = read_assignment(tmp_path / "students")
+    assert copy.max_score + copy.hidden.points == 100.0
+    solved = grade(copy, ASSIGNMENTS / name / "solution.py", "self", pool)
+    assert solved.status is Status.OK and solved.score == copy.max_score
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_handout_tells_all_visible_points(name: str) -> None:
+    """Each visible criterion's points are in a row of the handout's table, and the hidden ones' sum in the last."""
+    assignment = read_assignment(ASSIGNMENTS / name)
+    handout = assignment.path(assignment.handout)
+    assert handout is not None
+    rows = [line.split("|")[1] for line in handout.read_text().split("## What counts")[1].split("\n") if "|" in line]
+    told = [float(number) for row in rows[2:] for number in row.split("+")]
+    shown = {case.name for case in assignment.cases if case.is_visible}
+    visible = [each.max_score for each in assignment.criteria if each.is_visible and set(each.cases) <= shown]
+    assert sum(told) == 100.0
+    assert sum(visible) == sum(told) - (told[-1] if name != "observer" else told[-1] + 15.0)
+
+
+def test_a_batch_is_not_begun_twice(graded: tuple[str, BatchOutcome]) -> None:
+    name, outcome = graded
+    with pytest.raises(InputError, match="resume"):
+        run_batch(ASSIGNMENTS / name, ASSIGNMENTS / name / "submissions", outcome.folder)
