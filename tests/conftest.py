@@ -21,10 +21,11 @@ settings.load_profile("judge" if os.environ.get("CI") else "search")
 
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
-# The folders whose tests start no loop, hub or machine: they may run side by side. All others run one by one.
+# The folders whose tests may run side by side: they start no loop, hub or machine, or ask nothing of its timing.
 TOGETHER = {
-    *("checks", "controllers", "core", "experiment", "identification", "interface", "interpolators", "logs", "models"),
-    *("motion", "nc", "paths", "reports", "results", "session", "signals", "validation"),
+    *("checks", "controllers", "core", "experiment", "grading", "identification", "interface", "interpolators", "logs"),
+    *("models", "motion", "nc", "panels", "paths", "reports", "results", "robustness", "session", "signals", "spread"),
+    "validation",
 }
 
 

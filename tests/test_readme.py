@@ -17,7 +17,14 @@ import pytest
 from documents import ROOT, Block, blocks, environment, is_real_time, run, save, shorten
 
 BLOCKS = blocks("README.md")
-ELSEWHERE = ("make ", "python3 -m venv", ".venv/bin/pip", ".venv/bin/rds demo", "jupyter lab")  # not run by this test
+ELSEWHERE = (
+    "make ",
+    "python3 -m venv",
+    ".venv/bin/pip",
+    ".venv/bin/rds demo",
+    "jupyter lab",
+    "rds app",
+)  # not run by this test
 SHORT = 1.0  # s, of real-time runs
 
 

@@ -19,21 +19,10 @@ _HERE = Path(__file__).parent
 FIRST = "index"
 # the order in which a reader needs them; documents that are not named here come last
 ORDER = (
-    *(
-        "readme",
-        "panels",
-        "equipment",
-        "design",
-        "experiments",
-        "paper",
-        "data",
-        "identification",
-        "identification-methods",
-        "validation",
-    ),
-    *("robustness", "part-programs", "part-program-language", "cutter-compensation", "motion", "interpolation"),
-    *("paths", "grading", "grading-setup", "sandbox", "safety", "bus", "bus-timing", "oacs", "cia402"),
-    *("thesis-reports", "changelog"),
+    *("readme", "panels", "equipment", "design", "program-panel", "machine-panel", "experiments", "paper", "data"),
+    *("identification", "identification-methods", "validation", "robustness", "part-programs", "part-program-language"),
+    *("cutter-compensation", "motion", "interpolation", "paths", "assignments", "submissions", "grading"),
+    *("grading-setup", "sandbox", "safety", "bus", "bus-timing", "oacs", "cia402", "thesis-reports", "changelog"),
 )
 
 

@@ -12,7 +12,7 @@ from rds.panels import PANELS
 NAME = "menu"
 TITLE = "Main menu"
 SUMMARY = "What there is to do"
-HELP = "readme"
+HELP = "panels"
 
 
 def build(shell: Any) -> widgets.Widget:

@@ -73,7 +73,7 @@ def test_help_opens_at_the_page_of_the_panel(open_page: Callable[..., Any]) -> N
     page = open_page("Equipment control")
     page.click('.rds-head button:text-is("Help")')
     frame = page.frame_locator(".rds-guide iframe")
-    frame.locator('h1:has-text("Experiments")').wait_for()
+    frame.locator('h1:has-text("Equipment")').wait_for()
     frame.locator('input[name="q"]').fill("friction")
     frame.locator('input[name="q"]').press("Enter")
     frame.locator("#search-results li").first.wait_for()
