@@ -64,6 +64,9 @@ def made_estimate(
         for finding in log.findings
         if finding.gravity is Gravity.FAULT
     ]
+    said += [
+        f"{log.name}: {finding.what}" for log in logs for finding in log.findings if finding.gravity is Gravity.WARNING
+    ]
     said += warnings
     for number, log in enumerate(logs):
         state = None if states is None else states[number]
@@ -73,7 +76,6 @@ def made_estimate(
                 f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
                 "fit a little, and the free run lacks the controller that held the axis, so its error grows with time"
             )
-        said += [f"{log.name}: {finding.what}" for finding in log.findings if finding.gravity is Gravity.WARNING]
     return Estimate(
         structure=structure.name,
         options=structure.options,

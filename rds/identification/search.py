@@ -23,6 +23,8 @@ from rds.logs.log import Log
 _ENOUGH = 1.5  # times the noise: residuals that are no larger, and not smooth, hold nothing more
 _SMOOTH = 0.5  # correlation of neighbouring residuals from which they hold motion
 _EXACT = 1e-6  # of the motion: residuals of data without noise
+_AGAIN = 1e-3  # of the sum of squares: two searches that end nearer than this end at the same place
+_GLIMPSE = 30  # free runs of a search from another start
 _SAME = 0.01  # of the noise: runs that differ by less are the same
 
 
@@ -85,17 +87,27 @@ def _guessed(found: Found, idle: Mapping[str, Idle], noise: float) -> Found:
 
 
 def _search(problem: Problem, starts: Iterable[Start]) -> Found:
-    """The best end of a search from each start, up to the first that explains the measurement."""
+    """The best end of searches, up to the first that explains the measurement or ends where another did.
+
+    The first may take its time; those after it show in few steps whether they lead to a better place, and only the best
+    is then followed to its end.
+    """
     best: Solution | None = None
     tried = 0
     for values, states in starts if problem.names else islice(starts, 1):
-        solution = least_squares(problem, problem.point(values, states))
+        solution = least_squares(problem, problem.point(values, states), _GLIMPSE if tried else None)
         tried += 1
+        again = best is not None and abs(solution.squares - best.squares) <= _AGAIN * best.squares
         if best is None or solution.squares < best.squares:
             best = solution
+        if again and best.converged:
+            break  # what is left is not for want of a better start
         if best.converged and _explains(problem, best):
             break
     assert best is not None
+    if not best.converged and tried > 1:
+        end = least_squares(problem, best.point)
+        best = end if end.squares <= best.squares else best
     return Found(problem, best, tried)
 
 

@@ -99,6 +99,8 @@ def _starts(
     if structure.start is not None:
         for values, states in structure.start(logs):
             yield {**values, **begun}, states
+            if all(name in begun or name in holding for name in structure.parameters):
+                return  # other starts are the same
         return
     if missing := [name for name in structure.parameters if name not in begun and name not in holding]:
         raise InputError(f"structure {structure.name} needs a value to start from for {', '.join(missing)}")

@@ -41,8 +41,11 @@ class Solution:
         return np.linalg.lstsq(self.triangle[:, :-1], self.triangle[:, -1], rcond=1e-7)[0]
 
 
-def least_squares(problem: Problem, start: np.ndarray) -> Solution:
-    """The point with the least squared residuals near `start`. InputError if the free run there is not finite."""
+def least_squares(problem: Problem, start: np.ndarray, most: int | None = None) -> Solution:
+    """The point with the least squared residuals near `start`, after `most` free runs at most (150 and more if None).
+
+    InputError if the free run there is not finite.
+    """
     from scipy.optimize import least_squares as minimize
 
     low, high = problem.bounds()
@@ -81,7 +84,7 @@ def least_squares(problem: Problem, start: np.ndarray) -> Solution:
             ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
             xtol=1e-9,
             gtol=1e-12,
-            max_nfev=EVALUATIONS + MORE * max(len(problem.names) - 4, 0),
+            max_nfev=most or EVALUATIONS + MORE * max(len(problem.names) - 4, 0),
         )
         return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
 

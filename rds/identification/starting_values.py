@@ -12,6 +12,7 @@ where noise or quantization makes an acceleration worthless.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from math import exp, expm1
 
 import numpy as np
@@ -47,9 +48,8 @@ def axis_starts(
     minima = [i for i in range(GRID) if costs[i] <= costs[max(i - 1, 0)] and costs[i] <= costs[min(i + 1, GRID - 1)]]
     minima.sort(key=lambda i: costs[i])
     begins = [_initial_state(log, motion, states) for log, motion in zip(parts, motions, strict=True)]
-    for i in minima[:2]:
-        yield _values(found[i][1], found[i][2], names, parts, motions), begins
-    for solved, tau in stick_starts(parts):
+    first, *rest = ((found[i][1], found[i][2]) for i in minima[:2])
+    for solved, tau in chain([first], stick_starts(parts), rest):
         yield _values(solved, tau, names, parts, motions), begins
 
 

@@ -102,6 +102,7 @@ def _line(parts: Sequence[Log], sign: float, tau: float, plus: float, minus: flo
         z, y = np.empty(len(part)), part.position - part.position.mean()
         move(part.time, sign * part.command, rest, p, columns, z, np.empty((len(z), 0)))
         z -= z.mean()
-        zz, zy, yy = zz + float(z @ z), zy + float(z @ y), yy + float(y @ y)
+        # not by BLAS, whose threads wait for each other longer than so short a sum takes
+        zz, zy, yy = zz + float((z * z).sum()), zy + float((z * y).sum()), yy + float((y * y).sum())
     gain = zy / zz if zz > 0.0 else 0.0
     return gain, yy - gain * zy

@@ -97,7 +97,7 @@ def _residuals(problem: Problem, solution: Solution, number: int) -> list[str]:
         )
     if noise > 0.0 and size > _MISSED * noise:
         said.append(
-            f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / noise:.1f} times the measurement's noise "
+            f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / noise:.3g} times the measurement's noise "
             f"({noise:.2g} {unit}): the machine does something that structure {_named(problem)} lacks. The intervals "
             "count the residuals' correlation, but not that the parameters make up for what is missing"
         )

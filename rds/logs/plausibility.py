@@ -16,7 +16,7 @@ _JUMP, _SMOOTH = 0.3, 0.1  # of the range, in one sample: what a command may do,
 _FACTOR = 30.0  # of the expected size: beyond it a unit is wrong, not an axis
 _DRIVEN = 3.0  # times the voltage that overcomes friction
 _FASTEST, _LONGEST = 20e3, 100e3  # mm/s, mm
-_FINEST, _COARSEST = 1e-7, 1.0  # mm: steps of an encoder
+_FINEST, _COARSEST = 1e-7, 0.5  # mm: steps of an encoder
 _SPINDLE = 500e3  # rev/min
 _SLOWEST = 0.2  # s, sample period
 _VOLTS = 1e3
@@ -160,7 +160,7 @@ def _against_any(log: Log, unit: str) -> list[Finding]:
     if step is not None and step < _FINEST:
         doubts.append(f"the position comes in steps of {step:.2g} mm, finer than encoders are")
     if step is not None and step > _COARSEST:
-        doubts.append(f"the position comes in steps of {step:.4g} mm, coarser than encoders are")
+        doubts.append(f"the position comes in steps of {step:.4g} mm, coarser than encoders are (are they counts?)")
     what = f"{' and '.join(doubts)}: check the unit of the position"
     return [Finding("units", what, Gravity.WARNING)] if doubts else []
 
