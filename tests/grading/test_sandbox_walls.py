@@ -67,7 +67,7 @@ def attack():
     found = answer(pool, written(text, ""))
     assert found["/tmp"] == ["submission.py"]
     assert found["/proc"] == []
-    assert found["/dev"] == ["null", "random", "urandom", "zero"]
+    assert found["/dev"] == ["null", "random", "urandom"]
     assert found["/etc"] == ["ld.so.cache"]
     assert not {"controllers", "interpolators", "experiment", "identification"} & set(found["/opt/rds/rds"])
     assert set(found["/opt/rds/rds/grading"]) <= {"__init__.py", "grade.py", "sandbox"}

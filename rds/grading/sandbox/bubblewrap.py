@@ -19,7 +19,7 @@ ROOMS = (
 """What of this package is visible inside: the fixed interfaces. The laws and methods of the library are not: to write
 such a thing is what an assignment asks for."""
 
-_DEVICES = ("/dev/null", "/dev/zero", "/dev/random", "/dev/urandom")
+_DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")  # not zero: mapped, it is memory that nobody counts
 _LIBRARIES = ("/usr/lib", "/usr/lib64", "/usr/libexec", "/lib", "/lib64", "/etc/ld.so.cache")
 _ENVIRONMENT = {
     "HOME": "/tmp",

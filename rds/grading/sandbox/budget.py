@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rds.grading.grade import Status
 from rds.grading.sandbox.limits import Limits
 
+FLOOD = 8  # times the limit of output: what one may print until it is ended
 _LONGEST_STEP = 0.1  # s: a computer that stood still for longer is not the submission's doing
 
 
@@ -21,7 +22,7 @@ class Budget:
     limits: Limits
     wall: float = 0.0
     cpu_before: float = 0.0  # of cells that have ended
-    printed: int = 0
+    printed: int = 0  # bytes, those that were cut among them
 
     def step(self, seconds: float) -> float:
         """`seconds` more of the submission's turn, less what it waited for a processor; how many of them count."""

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import socket
 import struct
+import termios
 import threading
-from collections.abc import Sequence
+from array import array
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
 from rds.grading.grade import Status
 from rds.grading.sandbox import frames
-from rds.grading.sandbox.budget import Budget
+from rds.grading.sandbox.budget import FLOOD, Budget
 from rds.grading.sandbox.door import make_bell, make_memory
 from rds.grading.sandbox.errors import SandboxError, SubmissionError
 from rds.grading.sandbox.interpreter import Interpreter
@@ -41,13 +44,15 @@ class Cell:
         self._cpu, self._computed, self._turn_seen, self._turn_time = 0.0, 0.0, 0, 0.0
         self._baseline = interpreter.resident_bytes
         self.is_closed = False
+        self.signs: list[Callable[[], bool]] = []  # whether an answer is there that came by another way than the pipe
         self._lock = threading.Lock()  # the supervisor's thread ends cells too
         inner_questions, self.questions = os.pipe()
         self.answers, inner_answers = os.pipe()
         printed, inner_output = os.pipe()
         self._status, inner_status = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._status.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
-        self.output = Output(printed, max(budget.limits.output_bytes - budget.printed, 0))
+        most = budget.limits.output_bytes
+        self.output = Output(printed, max(most - budget.printed, 0), max(FLOOD * most - budget.printed, 0))
         self.door = (make_memory(), make_bell(), make_bell())
         inner = (inner_questions, inner_answers, inner_output, *self.door, inner_status.detach())
         try:
@@ -93,17 +98,29 @@ class Cell:
 
     def inspect(self, seconds: float) -> None:
         """By the supervisor, `seconds` after the last time: count, and end the cell if a limit is exceeded."""
-        turn, used = self.turn, usage(self._process)
+        turn, used = self.turn, usage(self._process, self._baseline)
         computed, self._computed = used.first_seconds - self._computed, used.first_seconds
+        # one that waits for a processor has no fault, if none of its own children keeps it busy
+        is_working = used.first_runs and used.processes == 1
         if turn != self._turn_seen:
             self._turn_seen, self._turn_time = turn, 0.0
+            if turn % 2 and not is_working and not self.has_answered():
+                self._budget.step(seconds)  # asleep at many samples, if only for a moment at each
         elif turn % 2:
-            self._turn_time += self._budget.step(computed if used.first_runs else seconds)
+            self._turn_time += self._budget.step(computed if is_working else seconds)
         self._cpu = max(self._cpu, used.cpu_seconds)
-        memory = used.memory_bytes - used.processes * self._baseline
-        fault = self._budget.fault(self._cpu, memory, self._turn_time, self.turn_limit)
+        fault = self._budget.fault(self._cpu, used.memory_bytes, self._turn_time, self.turn_limit)
         if fault is not None:
             self.kill(*fault)
+
+    def has_answered(self) -> bool:
+        """By the supervisor: whether an answer is there that the grader has not come to yet."""
+        with self._lock:
+            if self.is_closed:
+                return True
+            waiting = array("i", [0])
+            fcntl.ioctl(self.answers, termios.FIONREAD, waiting)
+            return waiting[0] > 0 or any(answered() for answered in self.signs)
 
     @property
     def printed(self) -> str:
@@ -145,12 +162,12 @@ class Cell:
         self._supervisor.forget(self)
         self.output.collect()
         self._budget.cpu_before += self._cpu
-        self._budget.printed += len(self.output.text)
+        self._budget.printed += self.output.seen
         with self._lock:
             os.close(self._handle)
             self._handle = -1
-        for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
-            os.close(descriptor)
+            for descriptor in (self.questions, self.answers, self.output.descriptor, *self.door):
+                os.close(descriptor)
         self._status.close()
 
     def _started(self) -> int:

@@ -14,6 +14,7 @@ from typing import Any
 HEADER = struct.Struct("<I")  # bytes that follow
 LARGEST = 1 << 20  # bytes of one frame
 DEEPEST = 20  # lists and dicts inside each other
+LONGEST_INTEGER = 300  # digits: it fits into a double
 
 
 class FrameError(ValueError):
@@ -42,10 +43,10 @@ def size(header: bytes) -> int:
 def decode(body: bytes) -> Any:
     """The value in the `body` of a frame; FrameError for anything but finite, shallow JSON."""
     try:
-        value = json.loads(body.decode(), parse_constant=_no_constant, parse_float=_finite)
+        value = json.loads(body.decode(), parse_constant=_no_constant, parse_float=_finite, parse_int=_integer)
+        _check(value, 0)
     except (ValueError, RecursionError) as error:
         raise FrameError(f"not JSON as it is agreed: {str(error)[:100]}") from None
-    _check_depth(value, 0)
     return value
 
 
@@ -60,12 +61,21 @@ def _finite(text: str) -> float:
     return number
 
 
-def _check_depth(value: Any, depth: int) -> None:
+def _integer(text: str) -> int:
+    if len(text) > LONGEST_INTEGER:
+        raise ValueError(f"an integer of {len(text)} digits is too large for a number")
+    return int(text)
+
+
+def _check(value: Any, depth: int) -> None:
     if depth > DEEPEST:
         raise FrameError(f"more than {DEEPEST} lists inside each other")
     if isinstance(value, list):
         for part in value:
-            _check_depth(part, depth + 1)
+            _check(part, depth + 1)
     elif isinstance(value, dict):
-        for part in value.values():
-            _check_depth(part, depth + 1)
+        for key, part in value.items():
+            _check(key, depth)
+            _check(part, depth + 1)
+    elif isinstance(value, str):
+        value.encode()  # ValueError for half a character, which no file could hold

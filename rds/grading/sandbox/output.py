@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import os
 
-_FLOOD = 8  # times the limit, from which on printing is an attack and no longer talk
 _READ = 1 << 16
 
 
 class Output:
-    """The outer end of a submission's stdout and stderr; `descriptor` does not block."""
+    """The outer end of a submission's stdout and stderr; `descriptor` does not block.
 
-    def __init__(self, descriptor: int, most_bytes: int):
+    `most_bytes` are kept, and more than `flood_bytes` are no longer talk but an attack.
+    """
+
+    def __init__(self, descriptor: int, most_bytes: int, flood_bytes: int):
         self.descriptor = descriptor
         os.set_blocking(descriptor, False)
         self._kept = bytearray()
-        self._most = most_bytes
+        self._most, self._flood = most_bytes, flood_bytes
         self._seen = 0
 
     def collect(self) -> bool:
@@ -37,7 +39,12 @@ class Output:
     @property
     def is_flood(self) -> bool:
         """Whether it is far more than anyone reads."""
-        return self._seen > _FLOOD * self._most
+        return self._seen > self._flood
+
+    @property
+    def seen(self) -> int:
+        """How many bytes were printed, those that were cut among them."""
+        return self._seen
 
     @property
     def text(self) -> str:

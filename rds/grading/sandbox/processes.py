@@ -19,8 +19,10 @@ class Usage(NamedTuple):
     first_runs: bool  # whether that one computes, or would if it had a processor
 
 
-def usage(top: int) -> Usage:
+def usage(top: int, baseline: int = 0) -> Usage:
     """Of all processes below `top`, the cell's init, which is not counted itself; zeros once it has gone.
+
+    `baseline` bytes of memory of each process are not counted; one that has less leaves nothing over for the others.
 
     Nothing can leave the tree: the orphans of a cell are adopted by its init. CPU time includes that of children that
     were waited for, so that work done by short-lived children adds up.
@@ -32,18 +34,14 @@ def usage(top: int) -> Usage:
         process = waiting.pop()
         count += 1
         cpu += _cpu(_fields(process), True, True)
-        memory += _resident(process)
+        memory += max(_resident(process) - baseline, 0)
         waiting += _children(process)
     return Usage(cpu, memory, count, _cpu(first, True, False), first[:1] == [b"R"])
 
 
 def _children(process: int) -> list[int]:
     found: list[int] = []
-    try:
-        threads = os.listdir(f"/proc/{process}/task")
-    except OSError:
-        return found
-    for thread in threads:
+    for thread in _threads(process):
         found += [int(word) for word in _read(f"/proc/{process}/task/{thread}/children").split()]
     return found
 
@@ -61,8 +59,23 @@ def _cpu(fields: list[bytes], own: bool, children: bool) -> float:
 
 
 def _resident(process: int) -> int:
-    fields = _read(f"/proc/{process}/statm").split()
-    return int(fields[1]) * _PAGE if len(fields) > 1 else 0
+    """In bytes. A process whose first thread has ended seems to have none; its other threads tell."""
+    found = _pages(f"/proc/{process}/statm")
+    if not found:
+        found = max((_pages(f"/proc/{process}/task/{thread}/statm") for thread in _threads(process)), default=0)
+    return found * _PAGE
+
+
+def _pages(path: str) -> int:
+    fields = _read(path).split()
+    return int(fields[1]) if len(fields) > 1 else 0
+
+
+def _threads(process: int) -> list[str]:
+    try:
+        return os.listdir(f"/proc/{process}/task")
+    except OSError:
+        return []
 
 
 def _read(path: str) -> bytes:

@@ -35,6 +35,7 @@ class Run:
         if through_door:
             memory, question_bell, answer_bell = cell.door
             self._door = Door(memory, answer_bell, question_bell, cell.answers, asks=True)
+            cell.signs.append(self._has_answer)
         self._exchange = self._door.asker(layout) if self._door else self._pipes()
 
     def ask(self, *values: float) -> tuple[float, ...]:
@@ -48,7 +49,7 @@ class Run:
         except Closed:
             cell.fail()
         if answer[0] != k or answer[1] != records.OK or not all(map(isfinite, answer)):
-            self._judge(answer[0], answer[1])
+            self._judge(answer[0], answer[1], all(map(isfinite, answer)))
         cell.turn += 1
         self.k = k + 1
         given = answer[2:]
@@ -76,6 +77,9 @@ class Run:
         if self._door is not None:
             self._door.close()
 
+    def _has_answer(self) -> bool:
+        return self._door is not None and self._door.has_come_to(self.k + 1)
+
     def recorded(self, most: int | None = None) -> list[Sample]:
         """What was asked and answered so far, of the first `most` samples."""
         return list(zip(self._asked[:most], self._answered[:most], strict=True))
@@ -91,13 +95,13 @@ class Run:
         self.cell.turn += 1
         return told if isinstance(told, dict) else {}
 
-    def _judge(self, number: int, code: int) -> None:
-        if number == self.k and code == records.END and self.what == "rows":
+    def _judge(self, number: int, code: int, is_finite: bool) -> None:
+        if number == self.k and code == records.END and self.what == "rows" and is_finite:
             self.has_ended = True
         elif number == self.k and code == records.FAULT:
             answer = self.cell.frame()
             self.give_up(reason(answer.get("error") if isinstance(answer, dict) else None))
-        elif number == self.k and code == records.OK:
+        elif number == self.k and code in (records.OK, records.END) and not is_finite:
             self.give_up(f"at t = {self.k * self.T:.3f} s it answered what is not finite")
         else:
             self.give_up("it wrote into the grader's pipe")

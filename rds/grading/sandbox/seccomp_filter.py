@@ -17,7 +17,7 @@ _FILES = """
     mkdir mkdirat rmdir unlink unlinkat rename renameat renameat2 getdents getdents64 ftruncate truncate fallocate fsync
     fdatasync flock umask utimensat dup dup2 dup3 pipe pipe2 select pselect6 poll ppoll
 """
-_MEMORY = "mmap munmap mprotect mremap madvise msync brk membarrier"
+_MEMORY = "munmap mprotect mremap madvise msync brk membarrier"
 _PROCESSES = """
     rt_sigaction rt_sigprocmask rt_sigreturn rt_sigpending rt_sigsuspend rt_sigtimedwait sigaltstack pause alarm
     setitimer getitimer kill tkill tgkill restart_syscall
@@ -45,8 +45,11 @@ _ADMINISTRATION = """
 DENIED = tuple(f"{_TAMPERING} {_ADMINISTRATION}".split())
 
 _NEW_NAMESPACES = 0x7E020080  # all CLONE_NEW* bits: time, mount, cgroup, uts, ipc, user, pid, net
-_ASKS = (0x5401, 0x541B, 0x5421, 0x5450, 0x5451)  # ioctl: TCGETS, FIONREAD, FIONBIO, FIONCLEX, FIOCLEX
-_DUPLICATES = (0, 1, 2, 3, 4, 5, 6, 7, 1030)  # fcntl: duplicate, flags, locks
+# Not among them what makes a descriptor wait: the bells are shared, and the grader must never wait at one.
+_ASKS = (0x5401, 0x541B, 0x5450, 0x5451)  # ioctl: TCGETS, FIONREAD, FIONCLEX, FIOCLEX
+_DUPLICATES = (0, 1, 2, 3, 5, 6, 7, 1030)  # fcntl: duplicate, flags (F_SETFL is not here), locks
+# mmap: private memory, or a file's; shared memory without a file would be in no sum once it is out of sight (madvise)
+_MAPPINGS = ((0x0F, 0x02), (0x2F, 0x01))  # mask of its flags, and what they must be under it
 _NAMES_ITSELF = (15, 16)  # prctl: PR_SET_NAME, PR_GET_NAME
 
 
@@ -61,6 +64,8 @@ def submission_filter() -> bytes:
     # clone3 hides its flags from a filter; told that it does not exist, the C library uses clone
     _add(calls, seccomp.ERRNO(errno.ENOSYS), "clone3")
     calls.add_rule(seccomp.ALLOW, "clone", seccomp.Arg(0, seccomp.MASKED_EQ, _NEW_NAMESPACES, 0))
+    for mask, flags in _MAPPINGS:
+        calls.add_rule(seccomp.ALLOW, "mmap", seccomp.Arg(3, seccomp.MASKED_EQ, mask, flags))
     for number in _ASKS:
         calls.add_rule(seccomp.ALLOW, "ioctl", seccomp.Arg(1, seccomp.EQ, number))
     for number in _DUPLICATES:

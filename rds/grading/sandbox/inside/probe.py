@@ -67,7 +67,7 @@ def count_children(most):
 def take_memory(size):
     """Whether it gets `size` bytes at once."""
     try:
-        mmap.mmap(-1, size).close()
+        mmap.mmap(-1, size, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS).close()
     except (OSError, MemoryError, ValueError):
         return False
     return True

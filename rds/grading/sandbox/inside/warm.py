@@ -16,6 +16,7 @@ import os
 import signal
 import socket
 import sys
+import traceback
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -135,6 +136,11 @@ def _submission(
         os._exit(0)
     status.close()
     os.closerange(3, _ABOVE)
-    code = worker.main(questions, answers, door)
-    sys.stdout.flush()
-    os._exit(code)
+    code = 1
+    try:
+        code = worker.main(questions, answers, door)
+        sys.stdout.flush()
+    except BaseException:  # whatever it is: a submission never gets back into the code that put up its walls
+        traceback.print_exc()
+    finally:
+        os._exit(code)
