@@ -155,6 +155,11 @@ class AxisDrivers:
         self.counters = Counters()
         self._started = True
 
+    @property
+    def standing(self) -> list[float]:
+        """Where the axes stood at start() by their modules' own counters, in axis units: the zero of exchange()."""
+        return [((m.origin + 0x80000000) % 0x100000000 - 0x80000000) * m.axis.resolution for m in self._modules]
+
     def _refuse_company(self) -> None:
         """MachineError if two modules share a node, or another host commands. A filtered bus hides both."""
         if self._owns_bus:

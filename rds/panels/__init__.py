@@ -22,6 +22,7 @@ PANELS = Registry(
         "program": "rds.panels.program",
         "drawing": "rds.panels.drawing",
         "machine": "rds.panels.machine",
+        "jog": "rds.panels.jog",
         "data": "rds.panels.data",
         "grading": "rds.panels.grading",
         "help": "rds.panels.guide",

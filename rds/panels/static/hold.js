@@ -1,0 +1,71 @@
+// Two buttons of an axis, minus and plus. Held: a word every 50 ms, so that whoever listens notices when they end; and
+// a word when they are let go, by whatever happens to the pointer, the focus or the page. By step: one word a press.
+const BEAT = 50; // ms
+
+function render({ model, el }) {
+  const box = document.createElement("div");
+  box.className = "rds-hold";
+  let held = null; // the direction, and the timer that beats
+
+  const release = () => {
+    if (held === null) return;
+    clearInterval(held.timer);
+    held.button.classList.remove("rds-hold-on");
+    held = null;
+    model.send({ kind: "release" });
+  };
+  const press = (button, direction) => {
+    if (button.disabled) return;
+    if (model.get("by_step")) {
+      model.send({ kind: "step", direction });
+      return;
+    }
+    if (held !== null) return;
+    const say = () => (button.disabled ? release() : model.send({ kind: "hold", direction }));
+    held = { button, timer: setInterval(say, BEAT) };
+    button.classList.add("rds-hold-on");
+    say();
+  };
+  const keys = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 };
+  const buttons = [-1, 1].map((direction) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = direction < 0 ? "◀ −" : "+ ▶";
+    button.setAttribute("aria-label", `${model.get("axis")} ${direction < 0 ? "minus" : "plus"}`);
+    button.title = "Hold it, or the arrow keys while it has the focus";
+    button.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      button.setPointerCapture(event.pointerId);
+      press(button, direction);
+    });
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(name, release);
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+    button.addEventListener("keydown", (event) => {
+      const way = keys[event.key] ?? (event.key === " " || event.key === "Enter" ? direction : 0);
+      if (!way) return;
+      event.preventDefault();
+      if (!event.repeat) press(button, way);
+    });
+    button.addEventListener("keyup", release);
+    box.append(button);
+    return button;
+  });
+  const hidden = () => document.hidden && release();
+  window.addEventListener("blur", release);
+  window.addEventListener("pagehide", release);
+  document.addEventListener("visibilitychange", hidden);
+  const enable = () => {
+    for (const button of buttons) button.disabled = model.get("disabled");
+    if (model.get("disabled")) release();
+  };
+  model.on("change:disabled", enable);
+  enable();
+  el.append(box);
+  return () => {
+    release();
+    window.removeEventListener("blur", release);
+    window.removeEventListener("pagehide", release);
+    document.removeEventListener("visibilitychange", hidden);
+  };
+}
+export default { render };
