@@ -1,7 +1,7 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
 python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [identification]
-                     [robustness] [grading] [--json]
+                     [robustness] [grading] [panels] [--json]
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from benchmarks import (
     imports,
     machine,
     nc,
+    panels,
     realtime,
     robustness,
     simulation,
@@ -43,6 +44,7 @@ SUBJECTS = {
     "identification": "A fit of tau, K, F+ and F- to 10 s at 1 kHz",
     "robustness": "10,000 closed loops with drawn parameters",
     "grading": "Submissions graded in the sandbox: five criteria of a 10 s run",
+    "panels": "The page of rds app in a browser",
 }
 
 
@@ -98,6 +100,7 @@ def main() -> int:
         "identification": identification.run,
         "robustness": robustness.run,
         "grading": lambda: grading.run(peer_python=options.peer_python),
+        "panels": panels.run,
         "nc": lambda: nc.run(peer_python=options.peer_python),
     }
     report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}

@@ -1,0 +1,134 @@
+"""The page in a browser: until it can be used, until it answers, what its strip costs, what it does to the loop."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.axis import experiment
+from benchmarks.figures import Figure
+from rds.results import Result, open_result
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+SECONDS = 20.0  # of each emulation
+ROUNDS = 3
+_TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def run() -> list[Figure]:
+    """Figures, or the reason why there are none."""
+    if CHROMIUM is None:
+        return [Figure("the page in a browser", note="no Chromium: apt-get install chromium")]
+    from playwright.sync_api import sync_playwright
+
+    opened, answered, costs, beside, alone = [], [], [], [], []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        for _ in range(ROUNDS):
+            with tempfile.TemporaryDirectory() as folder:
+                kept = {"equipment control": {"mode": "emulation", "duration": SECONDS}}
+                Path(folder, "session.json").write_text(json.dumps(kept))
+                with _app(folder) as (url, server, began):
+                    page = browser.new_page(viewport={"width": 1280, "height": 800})
+                    page.goto(url)
+                    page.wait_for_selector(".rds-nav button")
+                    opened.append(time.perf_counter() - began)
+                    answered += [_answer(page, title) for title in ("Help", "Data", "Main menu", "Data", "Main menu")][
+                        2:
+                    ]
+                    page.click('.rds-nav button:text-is("Equipment control")')
+                    result, cost = _live(page, server, Path(folder))
+                    costs.append(cost)
+                    beside.append(_p99(result))
+                    page.close()
+            alone.append(_p99(experiment(SECONDS).run("emulation")))
+        browser.close()
+    return [
+        Figure("from `rds app` to the first panel", "s", tuple(opened), 6.0),
+        Figure("a press of a button to its answer in sight", "ms", tuple(answered), 100.0),
+        Figure("kernel, live strip of a run at 10 Hz", "% of a core", tuple(costs), 3.0),
+        Figure("lateness of the loop at 99 %, with the page", "µs", tuple(beside)),
+        Figure("lateness of the loop at 99 %, without", "µs", tuple(alone)),
+    ]
+
+
+@contextmanager
+def _app(folder: str) -> Iterator[tuple[str, int, float]]:
+    began = time.perf_counter()
+    command = [sys.executable, "-m", "rds", "app", folder, "--no-browser"]
+    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert server.stderr is not None
+    try:
+        for line in server.stderr:
+            if found := re.search(r"http://127\.0\.0\.1\S+token=\S+", line):
+                yield found.group(0), server.pid, began
+                return
+        raise RuntimeError("rds app did not start")
+    finally:
+        os.killpg(server.pid, signal.SIGTERM)
+        server.wait(20)
+
+
+def _answer(page: Any, title: str) -> float:
+    """ms from a press to the panel's title in sight, both seen from within the page."""
+    return float(
+        page.evaluate(
+            """(title) => new Promise((done) => {
+                const button = [...document.querySelectorAll('.rds-nav button')].find((b) => b.innerText === title);
+                const heading = document.querySelector('.rds-title');
+                const began = performance.now();
+                const look = () => heading.innerText.startsWith(title)
+                    ? done(performance.now() - began) : requestAnimationFrame(look);
+                button.click();
+                look();
+            })""",
+            title,
+        )
+    )
+
+
+def _live(page: Any, server: int, folder: Path) -> tuple[Result, float]:
+    """A run of SECONDS, and the share of a core that the kernel of the page took while it lasted, %."""
+    page.click('button:visible:text-is("Run")')
+    page.wait_for_selector(".rds-strip canvas", timeout=60_000)
+    time.sleep(2.0)  # the chart has been built
+    before = {kernel: _cpu(kernel) for kernel in _kernels(server)}
+    began = time.perf_counter()
+    time.sleep(SECONDS * 0.6)
+    passed = time.perf_counter() - began
+    cost = max(_cpu(kernel) - seconds for kernel, seconds in before.items()) / passed * 100.0
+    page.wait_for_selector(':text("Saved with its report in")', timeout=120_000)
+    return open_result(next((folder / "runs").iterdir())), cost
+
+
+def _kernels(server: int) -> list[int]:
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            if int(stat.read_text().rpartition(")")[2].split()[1]) == server:
+                found.append(int(stat.parent.name))
+        except OSError:
+            continue
+    return found
+
+
+def _cpu(process: int) -> float:
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / _TICKS
+
+
+def _p99(result: Result) -> float:
+    return float(np.percentile(result["lateness"], 99))
