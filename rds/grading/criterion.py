@@ -71,7 +71,10 @@ class Criterion:
 
     def without(self, score: CriterionScore, title: str) -> CriterionScore:
         """The same value without points, because the criterion called `title` earned none."""
-        said = f"{score.sentence.rstrip('.')}; it counts only where points are earned for {title}."
+        assert score.value is not None  # there was a band to lose
+        share = self.bands.share(score.value)
+        sentence = self._sentence(score.value, score.band, share, "would earn")
+        said = f"{sentence.rstrip('.')}; it counts only where points are earned for {title}."
         return replace(score, score=0.0, band=Band.NONE, sentence=said)
 
     @property
@@ -89,11 +92,11 @@ class Criterion:
         nothing = f"none {beyond} {_number(self.bands.none, self.unit)} {tail}".rstrip()
         return f"full points for {way} {_number(self.bands.full, self.unit)}, {nothing}"
 
-    def _sentence(self, value: float, band: Band, share: float) -> str:
+    def _sentence(self, value: float, band: Band, share: float, earns: str = "earns") -> str:
         said = {
-            Band.FULL: "which earns full points",
-            Band.PARTIAL: f"which earns {100 * share:.3g} % of the points",
-            Band.NONE: "which earns no points",
+            Band.FULL: f"which {earns} full points",
+            Band.PARTIAL: f"which {earns} {100 * share:.3g} % of the points",
+            Band.NONE: f"which {earns} no points",
         }[band]
         # some meanings end with a comma, as they explain themselves
         return f"{self.meaning} is {_number(value, self.unit)}, {said} ({self.bounds})."
