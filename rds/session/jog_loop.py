@@ -25,6 +25,7 @@ from rds.motion.jog import advance
 PERIOD = 0.002  # s
 DEAD_MAN = 0.2  # s
 REPORTS = 20.0  # 1/s
+_REST = 0.08  # s from the highest speed to rest at most
 _COUNTS = 5.0  # of error at rest over which friction is made up for
 
 
@@ -37,6 +38,7 @@ class JogAxis:
     travel: tuple[float, float]
     speed: float  # the most
     acceleration: float
+    braking: float  # deceleration to rest, when it is let go
     resolution: float
     tau: float
     K: float
@@ -69,7 +71,19 @@ def _jog_axis(axis: Axis, machine: Machine) -> JogAxis | None:
     friction = float(axis.model.get("friction_plus", 0.0)), float(axis.model.get("friction_minus", 0.0))
     speed = axis.limits.velocity if axis.limits else 0.5 * K * volts
     acceleration = axis.limits.acceleration if axis.limits else speed / (5.0 * tau)
-    return JogAxis(axis.name, axis.unit, axis.travel, speed, acceleration, axis.resolution, tau, K, friction, volts)
+    return JogAxis(
+        name=axis.name,
+        unit=axis.unit,
+        travel=axis.travel,
+        speed=speed,
+        acceleration=acceleration,
+        braking=max(acceleration, speed / _REST),
+        resolution=axis.resolution,
+        tau=tau,
+        K=K,
+        friction=friction,
+        voltage=volts,
+    )
 
 
 class Orders:
@@ -125,7 +139,8 @@ def jog(machine: Machine, drivers: Any, orders: Orders) -> None:
         wanted = orders.wanted(now)
         for i, axis in enumerate(axes):
             goal, speed = wanted[1:] if wanted is not None and wanted[0] == axis.name else (None, axis.speed)
-            places[i], speeds[i] = advance(places[i], speeds[i], goal, speed, axis.acceleration, PERIOD)
+            rate = axis.braking if goal is None else axis.acceleration
+            places[i], speeds[i] = advance(places[i], speeds[i], goal, speed, rate, PERIOD)
             if goal is not None and places[i] == goal:
                 orders.reached(axis.name, goal)
         drivers.write([axis.volts(p - y, v) for axis, p, y, v in zip(axes, places, measured, speeds, strict=True)])

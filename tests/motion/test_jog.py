@@ -1,0 +1,33 @@
+"""A jogged axis keeps its speed and acceleration, reaches its goal without passing it, and comes to rest."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rds.motion.jog import advance
+
+T = 0.002  # s
+
+
+@given(goal=st.floats(-20, 20), speed=st.floats(0.5, 15), acceleration=st.floats(5, 500))
+def test_it_reaches_its_goal_within_its_limits(goal: float, speed: float, acceleration: float) -> None:
+    x, v = 0.0, 0.0
+    for _ in range(round((abs(goal) / speed + 2 * speed / acceleration + 0.1) / T) + 2000):
+        before = v
+        x, v = advance(x, v, goal, speed, acceleration, T)
+        assert abs(v) <= speed * (1 + 1e-9)
+        assert abs(v - before) <= 2 * acceleration * T * (1 + 1e-9)  # the last sample may end two at once
+        assert min(0.0, goal) - 1e-9 <= x <= max(0.0, goal) + 1e-9
+    assert (x, v) == (goal, 0.0)
+
+
+@given(v=st.floats(-15, 15), acceleration=st.floats(5, 500))
+def test_let_go_it_rests_after_the_time_that_its_deceleration_takes(v: float, acceleration: float) -> None:
+    x, samples = 0.0, 0
+    start = v
+    while v:
+        x, v = advance(x, v, None, 1.0, acceleration, T)
+        samples += 1
+        assert samples <= abs(start) / (acceleration * T) + 2  # one for what is left, one for rounding
+    assert abs(x) <= start * start / (2 * acceleration) + 1e-9

@@ -1,0 +1,124 @@
+"""Jogging in a session: axes move while they are told to, and stop whatever dies."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.machines import load_machine
+from rds.session import Session
+from rds.session.jog import Jog
+from rds.session.jog_loop import DEAD_MAN, Orders, jog_axes
+
+pytestmark = pytest.mark.realtime
+PATIENCE = 30.0  # s, on a busy computer
+
+
+def wait_for(look: Callable[[], object]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not look():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def jog(alone: Path) -> Iterator[Jog]:
+    made = Jog(Session(alone))
+    task = made.begin()
+    assert task.wait(PATIENCE)
+    assert task.error is None
+    yield made
+    made.end()
+
+
+def hold_until(jog: Jog, position: float) -> None:
+    def on() -> bool:
+        jog.hold("X", 1)
+        return jog.positions["X"] > position
+
+    wait_for(on)
+
+
+def test_a_hold_that_is_not_renewed_ends(jog: Jog) -> None:
+    hold_until(jog, 1.0)
+    wait_for(lambda: not jog.moving)
+    time.sleep(0.3)  # it settles
+    rested = jog.positions["X"]
+    time.sleep(0.3)
+    assert jog.positions["X"] == pytest.approx(rested, abs=0.003)
+    assert jog.positions["Y"] == jog.positions["Z"] == 0.0
+
+
+def test_steps_go_as_far_as_they_say_and_not_out_of_the_travel(jog: Jog) -> None:
+    jog.choices.set("step", "0.1")
+    jog.step("Y", -1)
+    wait_for(lambda: jog.positions["Y"] == pytest.approx(-0.1, abs=0.008))
+    jog.choices.set("step", "10")
+    jog.axes["X"] = replace(jog.axes["X"], travel=(-5.0, 5.0))
+    with pytest.raises(InputError, match=r"X would leave its travel, -5 to 5 mm, at 10\.000; choose a smaller step"):
+        jog.step("X", 1)
+
+
+def test_one_hand_at_a_time_and_the_emergency_stop_ends_it(jog: Jog) -> None:
+    with pytest.raises(InputError, match="in use"):
+        Session(jog.session.folder).take_machine("something else", object())
+    jog.hold("X", 1)
+    assert "4 modules are at zero volts" in jog.session.emergency_stop()
+    assert not jog.ready
+    Session(jog.session.folder).take_machine("something else", object())
+    with pytest.raises(InputError):
+        jog.hold("X", 1)
+
+
+DIES = """
+import sys, time
+from rds.session import Session
+from rds.session.jog import Jog
+jog = Jog(Session(sys.argv[1]))
+jog.begin().wait(30)
+while True:
+    jog.hold("X", 1)
+    print(jog._loop.pid, jog.positions["X"], flush=True)
+    time.sleep(0.05)
+"""
+
+
+def test_whoever_gave_orders_dies_and_the_loop_ends_with_it(alone: Path) -> None:
+    page = subprocess.Popen([sys.executable, "-c", DIES, str(alone)], stdout=subprocess.PIPE, text=True)
+    assert page.stdout is not None
+    for line in page.stdout:
+        if float(line.split()[1]) > 0.5:
+            break
+    loop = int(line.split()[0])
+    os.kill(page.pid, signal.SIGKILL)
+    page.wait()
+    page.stdout.close()
+    wait_for(lambda: not Path(f"/proc/{loop}").exists() or "\nState:\tZ" in Path(f"/proc/{loop}/status").read_text())
+    Session(alone).take_machine("a run after it", object())
+
+
+def test_a_hold_lasts_as_long_as_it_is_renewed_and_goals_follow_each_other() -> None:
+    orders = Orders(jog_axes(load_machine("mini-cnc")))
+    orders.hear({"hold": "X", "direction": -1, "speed": 99.0}, 10.0)
+    assert orders.wanted(10.0 + DEAD_MAN) == ("X", -75.0, 13.0)  # its own limit
+    assert orders.wanted(10.01 + DEAD_MAN) is None
+    orders.hear({"goals": [["Z", 0.0], ["X", 1.0]], "speed": 2.0}, 11.0)
+    assert orders.wanted(11.0) == ("Z", 0.0, 2.0)
+    orders.reached("Z", 0.0)
+    assert orders.wanted(20.0) == ("X", 1.0, 2.0)
+    orders.hear({"stop": True}, 21.0)
+    assert orders.wanted(21.0) is None
+
+
+def test_what_has_no_position_is_not_jogged() -> None:
+    assert list(jog_axes(load_machine("mini-cnc"))) == ["X", "Y", "Z"]
+    assert list(jog_axes(load_machine("mrmt-oacs"))) == ["X", "Z", "A"]

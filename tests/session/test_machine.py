@@ -1,0 +1,159 @@
+"""Modules in a session: started, scanned, configured to a machine, tuned, stepped; the monitor's filter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rds.bus.oacs.module_data import read_modules
+from rds.core.errors import InputError, MachineError
+from rds.machines import load_machine
+from rds.session import Session
+from rds.session.configuration import directions, faults, first_order, moved, write_machine
+from rds.session.machine import MachineDesk
+from rds.session.monitor import BusMonitor, parse_filter
+from rds.session.task import Stopped, Task
+
+PATIENCE = 60.0  # s, on a busy computer
+
+
+def described() -> dict[int, dict[str, Any]]:
+    """What the modules of the thesis say of themselves, without a bus."""
+    from dataclasses import asdict
+
+    found = {}
+    for data in read_modules(load_machine("mrmt-oacs")).values():
+        told = data.describe(1)
+        more = {"number": data.node, "kind": told.kind.name.lower(), "unit": told.unit}
+        found[data.node] = asdict(told) | more
+    return found
+
+
+def done(task: Task[Any]) -> Any:
+    assert task.wait(PATIENCE)
+    if task.error is not None:
+        raise task.error
+    return task.result
+
+
+@pytest.fixture
+def desk(alone: Path) -> Iterator[MachineDesk]:
+    made = MachineDesk(Session(alone, "mrmt-oacs"))
+    made.choices.set("dialect", "oacs")
+    yield made
+    made.end()
+
+
+# configuration
+
+
+def test_the_thesis_s_machine_is_viable_from_its_tool_on_and_can_be_read_again(tmp_path: Path) -> None:
+    data = described()
+    order = first_order(data)
+    assert order == [5, 2, 3, 4]
+    assert faults(order, data) == []
+    shifts = {number: direction.round(9).tolist() for number, (_, direction) in directions(order, data).items()}
+    assert shifts == {2: [0, 0, 1], 3: [0, 0, 1], 4: [1, 0, 0]}
+    machine = load_machine(str(write_machine(tmp_path, "mine.toml", order, data)))
+    own = load_machine("mrmt-oacs")
+    assert {axis.node: axis.travel for axis in machine.axes.values()} == {a.node: a.travel for a in own.axes.values()}
+    assert machine.axis("X").resolution == pytest.approx(1 / 169)
+    with pytest.raises(InputError, match="there is such a file already"):
+        write_machine(tmp_path, "mine.toml", order, data)
+    with pytest.raises(InputError, match="plain name"):
+        write_machine(tmp_path, "../mine.toml", order, data)
+
+
+def test_what_makes_no_machine_is_said(tmp_path: Path) -> None:
+    data = described()
+    assert "must be the first" in faults([2, 5, 3, 4], data)[0]
+    assert "one tool; there are 0" in faults([2, 3, 4], data)[0]
+    assert "one axis at least" in faults([5], data)[0]
+    assert "scan" in faults([], data)[0]
+    twice = data | {6: data[4] | {"number": 6}}
+    assert [fault.split(";")[0] for fault in faults([5, 2, 3, 4, 6], twice)] == [
+        "2 modules are called X",
+        "module 6 (X) shifts the tool in a direction in which the modules before it do already: leave it out, or mount "
+        "it in another direction",
+    ]
+    with pytest.raises(InputError, match="must be the first"):
+        write_machine(tmp_path, "mine.toml", [2, 5, 3, 4], data)
+    assert not (tmp_path / "mine.toml").exists()
+
+
+@given(order=st.permutations([2, 3, 4, 5]), place=st.integers(0, 3), by=st.integers(-5, 5))
+def test_a_module_that_is_moved_leaves_the_order_of_the_others(order: list[int], place: int, by: int) -> None:
+    number = order[place]
+    after = moved(order, number, by)
+    assert [each for each in after if each != number] == [each for each in order if each != number]
+    assert after.index(number) == min(max(place + by, 0), 3)
+
+
+# the monitor's filter
+
+
+@pytest.mark.parametrize(
+    "text, keeps", [("", 4), ("0x020", 1), ("0x020-0x022", 2), ("reply", 1), ("0x7F, reply", 2), ("32", 1)]
+)
+def test_filters(text: str, keeps: int) -> None:
+    keep = parse_filter(text)
+    frames = [(0x020, ""), (0x021, ""), (0x000, "Reply"), (0x07F, "")]
+    assert sum(keep(*each) for each in frames) == keeps
+
+
+@pytest.mark.parametrize("text", ["0x", "1-", "0x30-0x20", "12-x"])
+def test_filters_that_cannot_be(text: str) -> None:
+    with pytest.raises(InputError, match="filter"):
+        parse_filter(text)
+
+
+# modules on a bus
+
+
+@pytest.mark.realtime
+def test_modules_are_scanned_tuned_and_stepped(desk: MachineDesk) -> None:
+    with pytest.raises(MachineError, match="no module answers on rds:mrmt-oacs; start the simulated modules"):
+        done(desk.scan())
+    done(desk.start())
+    with pytest.raises(InputError, match="already"):
+        desk.start()
+    rows = done(desk.scan())
+    assert [row["id"] for row in rows] == [2, 3, 4, 5] == sorted(desk.data)
+    desk.load_tuning(4)
+    desk.tuning.set("controller", "P")
+    desk.tuning.set("Kp", 2.5)
+    in_force = done(desk.tune(4))
+    assert (in_force["controller"], in_force["Kp"], in_force["Ki"]) == ("PI", 2.5, 0.0)
+    saved = desk.save_tuning(4, "four.toml")
+    desk.tuning.set("Kp", 9.0)
+    desk.read_tuning(saved.name)
+    assert desk.tuning["Kp"] == 2.5
+    with pytest.raises(InputError, match="Step first"):
+        desk.suggest()
+    with pytest.raises(InputError, match="is a tool"):
+        desk.step(5)
+    result = done(desk.step(4))
+    assert 3.0 < result["X_measured"][-1] - result["X_measured"][0] < 8.0
+    stopped = desk.step(4)
+    assert "4 modules are at zero volts" in desk.session.emergency_stop()
+    assert stopped.wait(PATIENCE)
+    assert isinstance(stopped.error, Stopped | MachineError)  # whichever comes first
+    desk.session.release_emergency_stop()
+
+
+@pytest.mark.realtime
+def test_a_monitor_listens_until_it_is_ended(desk: MachineDesk) -> None:
+    done(desk.start())
+    monitor = BusMonitor()
+    task = desk.session.work("bus monitor", monitor.watch(*desk.bus), monitor.end)
+    done(desk.scan())
+    while not monitor.lines("reply"):
+        assert not task.wait(0.1)
+    assert "kbit/s" in monitor.headline
+    task.stop()
+    assert done(task).snapshot.frames > 10
