@@ -117,5 +117,5 @@ def _place(axis: JogAxis, position: float | None) -> str:
         f'<span class="rds-jog-at">{position:.3f} {escape(axis.unit)}</span>'
         f'<span class="rds-jog-end">{low:g}</span><span class="rds-jog-bar" role="img" '
         f'aria-label="{100 * share:.0f} % of the travel"><i style="left:{100 * share:.2f}%"></i></span>'
-        f'<span class="rds-jog-end">{high:g}</span> {near}{left:.3f} to the {end} limit'
+        f'<span class="rds-jog-end">{high:g}</span> {near}{left:.3f} {escape(axis.unit)} to the {end} limit'
     )

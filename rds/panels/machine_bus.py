@@ -142,7 +142,9 @@ class BusView:
         sign = "" if view.healthy else "⚠ "
         said = f"<p>{sign}{escape(self.monitor.headline)}</p>"
         self.live.value = (
-            said + _bar(view.snapshot.load) + (html.table(heads, rows) if rows else "<p>no such frames</p>")
+            said
+            + _bar(view.snapshot.load)
+            + (html.table(heads, rows) if rows else "<p>no frame that is to be shown goes over the bus</p>")
         )
 
     def _enable(self) -> None:

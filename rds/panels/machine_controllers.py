@@ -25,7 +25,7 @@ class ControllersView:
 
     def __init__(self, shell: Any, desk: MachineDesk):
         self.desk = desk
-        self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView()
+        self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView(7.4)
         files = shell.session.choices("tuning file", [_FILE])
         self._files = files
         self._which = widgets.Dropdown(description="Module", tooltip="The module that is tuned")
