@@ -230,3 +230,18 @@ def test_random_bytes_are_an_error_of_the_submission(
     assert found.status in (Status.BROKE_CONTRACT, Status.TIMED_OUT, Status.FAILED_TO_LOAD), found
     assert "not inside" not in found.reason
     unchanged(either, before)
+
+
+def test_a_bell_cannot_be_made_to_wait(pool: Pool, written: Written) -> None:
+    text = """
+def attack():
+    refused = 0
+    for number in (question_bell, answer_bell):
+        try: fcntl.fcntl(number, fcntl.F_SETFL, 0)
+        except PermissionError: refused += 1
+        try: os.set_blocking(number, True)
+        except PermissionError: refused += 1
+    return [refused, *(bool(fcntl.fcntl(n, fcntl.F_GETFL) & os.O_NONBLOCK) for n in (question_bell, answer_bell))]
+"""
+    with pool.open(written(INSIDE + ENDS + text, ""), SHORT, "functions") as subject:
+        assert subject.call("attack") == [4, True, True]
