@@ -43,6 +43,7 @@ ADDED = {
     "delay": {"delay": Option("time from a command to its effect, s", at_least=0.0)},
     "backlash": {"backlash": Option("whole width of the play before the encoder, mm", at_least=0.0)},
 }
+NEUTRAL = {"stribeck": 0.0, "stribeck_velocity": 1.0, "dead_zone": 0.0, "delay": 0.0, "backlash": 0.0}
 UNITS = {
     "tau": "s",
     "K": "(mm/s)/V",
@@ -123,6 +124,7 @@ def make(options: Sequence[str] = ()) -> Structure:
         state_names=("position", "velocity", "place in the play")[:states],
         state_bounds=((-np.inf, np.inf), (-np.inf, np.inf), (-1.0, 1.0))[:states],
         start=start,
+        neutral={name: value for name, value in NEUTRAL.items() if name in table},
         idle=_idle if "friction_minus" in table else None,
         held=_held if "viscous" in options else None,
         no_effect={name: why for name, why in NO_EFFECT.items() if name in table},

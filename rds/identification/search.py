@@ -7,7 +7,7 @@ chance makes them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice, tee
 
@@ -24,6 +24,7 @@ _ENOUGH = 1.5  # times the noise: residuals that are no larger, and not smooth, 
 _SMOOTH = 0.5  # correlation of neighbouring residuals from which they hold motion
 _EXACT = 1e-6  # of the motion: residuals of data without noise
 _AGAIN = 1e-3  # of the sum of squares: two searches that end nearer than this end at the same place
+_LITTLE = 0.02  # of what an option begins with: hardly any effect, but a derivative
 _GLIMPSE = 30  # free runs of a search from another start
 _SAME = 0.01  # of the noise: runs that differ by less are the same
 
@@ -71,6 +72,27 @@ def _by_chance(found: Found) -> float:
     samples = sum(len(error) for error in residuals)
     alike = samples / sum(effective_samples(error) for error in residuals)
     return 2.0 * float(np.log(samples)) * alike * solution.squares / samples
+
+
+def from_plain(
+    logs: Sequence[Log],
+    structure: Structure,
+    holding: Mapping[str, float],
+    starts: Iterable[Start],
+    tick: Callable[[], None],
+) -> Iterator[Start]:
+    """Before the starts given, those from the best fit without what options add, which `holding` holds without effect.
+
+    So a structure with options never ends far above the plain one, which is the easier to find.
+    """
+    given, again = tee(starts)
+    begun = next(again)[0]
+    found = find(logs, structure, holding, given, tick)
+    plain = found.problem.values(found.solution.point)
+    states = [found.problem.state(found.solution.point, number) for number in range(len(logs))]
+    for share in (1.0, _LITTLE):
+        yield {name: share * begun[name] if name in holding else value for name, value in plain.items()}, states
+    yield from chain([(begun, states)], again)
 
 
 def _guessed(found: Found, idle: Mapping[str, Idle], noise: float) -> Found:

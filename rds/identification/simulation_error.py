@@ -20,7 +20,7 @@ from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.identification.estimate import Estimate
 from rds.identification.made_estimate import made_estimate
-from rds.identification.search import find
+from rds.identification.search import find, from_plain
 from rds.identification.smoothing import encoder_step
 from rds.identification.solve import EVALUATIONS, first_state
 from rds.identification.structure import Start, Structure
@@ -53,8 +53,12 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         raise InputError(
             f"{samples} samples are too few for {unknowns} unknowns (parameters and initial states); give longer logs"
         )
+    tick = _ticker(options.get("progress"), structure, len(logs))
     starts = _starts(logs, structure, begun, holding)
-    found = find(logs, structure, holding, starts, _ticker(options.get("progress"), structure, len(logs)))
+    neutral = {name: value for name, value in structure.neutral.items() if name not in holding and name not in begun}
+    if neutral:
+        starts = from_plain(logs, structure, {**holding, **neutral}, starts, tick)
+    found = find(logs, structure, holding, starts, tick)
     problem, solution = found.problem, found.solution
     uncertainty = uncertainty_of(problem, solution)
     values = problem.values(solution.point)

@@ -65,6 +65,7 @@ class Structure:
     # parameters that these logs have little occasion to tell (friction of a direction in which the axis hardly moves),
     # given values to begin with
     idle: Callable[[Sequence[Log], Mapping[str, float]], Mapping[str, Idle]] | None = None
+    neutral: Mapping[str, float] = field(default_factory=dict)  # values at which what options add has no effect
     # the same structure in a form that answers these logs sooner, as exactly as their noise asks
     prepare: Callable[[Sequence[Log]], Structure] | None = None
     no_effect: Mapping[str, str] = field(default_factory=dict)  # what it means that a parameter changes nothing

@@ -91,6 +91,16 @@ def test_every_option_is_found_where_the_data_hold_it() -> None:
         assert estimated.std_error < 0.1 * abs(value), (name, estimated)
 
 
+@pytest.mark.parametrize(
+    "options", [("stribeck",), ("delay", "backlash"), ("stribeck", "dead-zone", "delay", "backlash")]
+)
+def test_a_structure_with_options_fits_no_worse_than_the_plain_one(options: tuple[str, ...]) -> None:
+    for number, kind in enumerate(("square", "sine", "multisine")):
+        log = axis_log(mini_cnc("Y"), kind, seed=number, seconds=4.0)
+        plain, more = fit([log], make()), fit([log], make(options))
+        assert more.details["noise_rms"] <= 1.0001 * plain.details["noise_rms"]
+
+
 def test_an_offset_goes_with_friction_that_is_the_same_both_ways() -> None:
     values = {"tau": 0.01, "K": 1.8, "friction": 0.4, "offset": -0.15}
     found = fit([axis_log(values, options=("offset",))], make(("offset",)))
