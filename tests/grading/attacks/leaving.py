@@ -44,9 +44,7 @@ ATTACKS = {
     ),
     "abort": Attack("import os; os.abort()", KILLED, "SIGABRT"),
     "kill itself": Attack(in_control("os.kill(os.getpid(), 9)"), KILLED, "SIGKILL"),
-    "kill everybody": Attack(
-        "import os; os.fork(); os.kill(-1, 9)\nimport time; time.sleep(60)", TIMED_OUT, "no answer"
-    ),
+    "kill everybody": Attack("import os, time\nif os.fork(): os.kill(-1, 9)\ntime.sleep(60)", TIMED_OUT, "no answer"),
     "kill its group": Attack("import os; os.killpg(0, 9)", KILLED, "SIGKILL"),
     "kill the init above it": Attack(
         "import os\nfor number in range(1, 65):\n    if number != 19:\n        os.kill(1, number)\nimport time; time.sleep(0.05)"
