@@ -73,6 +73,7 @@ def _log(result: Result, axis: str, name: str, source: str, sha256: str) -> Log:
         units["reference"] = result.units.get(f"{axis}_reference") or unit
     reach = meta.get("voltage_range")
     mode = meta.get("mode")
+    is_driven = not meta.get("controller", True) and not extra  # by a voltage over time, in whatever mode
     return Log(
         name=f"{name}:{axis}" if len(result.axes) > 1 else name,
         time=_floats(result, "time"),
@@ -82,7 +83,7 @@ def _log(result: Result, axis: str, name: str, source: str, sha256: str) -> Log:
         units=units,
         resolution=_resolution(meta, axis, unit),
         voltage_range=(-float(reach), float(reach)) if isinstance(reach, int | float) and reach else None,
-        closed_loop=None if mode is None else mode not in _OPEN,
+        closed_loop=None if mode is None else mode not in _OPEN and not is_driven,
         source=source,
         sha256=sha256,
         findings=tuple(_findings(result, command)),

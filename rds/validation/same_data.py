@@ -35,10 +35,11 @@ def overlap(candidate: Candidate, log: Log) -> Overlap:
     if rows > 0.0:
         return Overlap(rows, f"the file is one that the model was fitted on ({log.source or log.name})", known=True)
     if alike > 0.0:
-        how = "these are other rows of the fit's file" if log.sha256 and log.sha256 in hashes else "the file is another"
-        return Overlap(
-            alike, f"{how}, but with the same numbers as the fit's data (a command that repeats?)", known=True
-        )
+        if log.sha256 and log.sha256 in hashes:
+            how = "these are other rows of the fit's file, but hold the same numbers again: does the command repeat?"
+        else:
+            how = "the file is another, but holds the same numbers as the fit's data"
+        return Overlap(alike, how, known=True)
     known = bool(prints or (hashes and log.sha256))
     if known:
         return Overlap(0.0, "other data than the fit's", known=True)

@@ -147,6 +147,20 @@ def test_our_own_results_explain_themselves(tmp_path: Path, ending: str) -> None
     assert len(log.sha256) == 64
 
 
+@pytest.mark.parametrize(
+    ("controller", "reference", "closed"), [({}, False, False), ({"X": {"name": "p"}}, True, True), ({}, True, True)]
+)
+def test_a_simulated_voltage_is_no_closed_loop(
+    tmp_path: Path, controller: dict[str, object], reference: bool, closed: bool
+) -> None:
+    made = axis(1000)
+    columns = {"time": made["time"], "X_voltage": made["voltage"], "X_measured": made["position"]}
+    columns |= {"X_reference": made["position"]} if reference else {}
+    meta = {"axes": ["X"], "sample_period": 1e-3, "mode": "simulation", "machine": "mini-cnc", "controller": controller}
+    (log,) = read_log(Result(columns, {}, meta).save(tmp_path / "run"))
+    assert log.closed_loop is closed
+
+
 # --- the command
 
 
