@@ -227,8 +227,11 @@ def test_the_commands_of_the_document(tmp_path: Path, monkeypatch: pytest.Monkey
     Path("part.ngc").write_text(PROGRAM)
     Path("my_interpolator.py").write_text(GOOD)
     text = (ROOT / "docs" / "interpolation.md").read_text(encoding="utf-8")
+    table = re.search(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert table is not None
+    Path("path.toml").write_text(table.group(1))
     commands = re.findall(r"^rds interpolate (.*?)(?:   .*)?$", text, re.MULTILINE)
-    assert len(commands) == 5
+    assert len(commands) == 6
     for command in commands:
         assert run(command).exit_code == 0, command
     code = re.search(r"```python\n(.*?)```", text, re.DOTALL)
