@@ -68,7 +68,7 @@ def plain_fit(log: Log, simulate: Callable[..., np.ndarray]) -> np.ndarray:
     """The four parameters (and the initial state) by least squares with finite differences."""
     from scipy.optimize import least_squares
 
-    values, states = make().start([log])[0]  # type: ignore[misc]
+    values, states = next(iter(make().start([log])))  # type: ignore[misc]
     start = np.array([*(values[name] for name in NAMES), *states[0]])
     found = least_squares(
         lambda x: log.position - simulate(log.time, log.command, x),
