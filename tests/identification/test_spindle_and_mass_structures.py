@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import InputError
@@ -66,6 +66,10 @@ def test_derivatives_by_direction_are_exact(F_plus: float, F_minus: float, seed:
 @given(tau=floats(2e-3, 1.0), delay=floats(0.0, 0.02), seed=integers(0, 99))
 def test_derivatives_of_the_spindle_are_exact(tau: float, delay: float, seed: int) -> None:
     values = {"tau": tau, "K": 1000.0, "offset": -0.1, "delay": delay + 1e-4}
+    t, _ = excited(seed)
+    late = t + values["delay"]
+    nearest = t[np.clip(np.searchsorted(t, late), 1, len(t) - 1)[:, None] - [0, 1]]
+    assume(np.abs(nearest - late[:, None]).min() > 1e-7)  # s: there the response by the delay has a kink
     assert by_differences(structure("spindle", ("offset", "delay")), values, (10.0,), seed) < 1e-4
 
 
