@@ -24,7 +24,7 @@ LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it 
 # The folders whose tests may run side by side: they start no loop, hub or machine, or ask nothing of its timing.
 TOGETHER = {
     *("checks", "controllers", "core", "experiment", "grading", "identification", "interface", "interpolators", "logs"),
-    *("models", "motion", "nc", "panels", "paths", "reports", "results", "robustness", "session", "signals", "spread"),
+    *("models", "motion", "nc", "paths", "reports", "results", "robustness", "session", "signals", "spread"),
     "validation",
 }
 

@@ -222,6 +222,9 @@ def test_our_own_errors_are_tried_again_then_listed_and_never_a_zero(
 
     def spread(work: Any, tasks: list[Any], **_: Any) -> Any:
         for index, task in enumerate(tasks):
+            if not hasattr(task, "student"):  # other work of the batch: submissions compared
+                yield Outcome(index, work(task))
+                continue
             tries.append(task.student)
             try:
                 if task.student == "ada" or (task.student == "ben" and tries.count("ben") == 1):

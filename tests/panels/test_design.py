@@ -35,7 +35,8 @@ def test_a_pole_is_dragged_with_the_mouse_and_the_design_follows(open_page: Call
     page = open_page("Design")
     pole = _ready(page)
     assert "1600" in _numbers(page)
-    box = pole.bounding_box()
+    while (box := pole.bounding_box()) is None:  # while it is drawn anew
+        page.wait_for_timeout(50)
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
     page.mouse.down()

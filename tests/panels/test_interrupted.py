@@ -43,19 +43,6 @@ def wait_for(look: Callable[[], Any]) -> Any:
     raise AssertionError("it did not come about")
 
 
-def kernels(app: App) -> list[int]:
-    """The kernels that belong to a server."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-            if int(fields[1]) == app.process.pid and b"ipykernel" in (stat.parent / "cmdline").read_bytes():
-                found.append(int(stat.parent.name))
-        except OSError:
-            continue
-    return found
-
-
 def test_a_reload_during_a_run_loses_nothing(running: tuple[App, Any, Path], open_page: Callable[..., Any]) -> None:
     app, page, folder = running
     page.reload()
@@ -85,8 +72,7 @@ def test_a_kernel_that_dies_leaves_the_record_and_no_claim(
 ) -> None:
     app, _, folder = running
     wait_for(lambda: len(open_result(folder)) > 300 if (folder / "record.rds").is_file() else False)
-    for kernel in kernels(app):
-        os.kill(kernel, signal.SIGKILL)
+    os.kill(json.loads((app.folder / ".machine.json").read_text())["process"], signal.SIGKILL)
     wait_for(lambda: state_of(folder) is State.CUT_SHORT)
     assert len(open_result(folder)) > 300
     session = Session(app.folder)
