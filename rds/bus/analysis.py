@@ -36,8 +36,8 @@ from rds.bus.schedule import occupied
 from rds.core.errors import InputError
 
 NS = 1_000_000_000
-_INSTANCES = 100_000  # of a message in one busy period; beyond it, its bound is of no use
-_ROUNDS = 1000  # of passing responses on as jitter
+_INSTANCES = 1000  # of a message in one busy period; beyond it, its bound is of no use
+_ROUNDS = 100  # of passing responses on as jitter
 
 
 @dataclass(frozen=True)
