@@ -137,7 +137,7 @@ def test_stdout_is_the_json_s_whatever_the_student_prints(folder: Path, mode: st
         (["run", "e.toml", "--mode", "system-test"], "give [signal]"),
         (["run", "law.py"], "law.py: is not valid TOML"),
         (["run", "e.toml", "--out", "law.py"], "law.py"),
-        (["run", "e.toml", "-m", "emulation", "--out", "law.py"], "law.py: this folder cannot be made"),
+        (["run", "e.toml", "-m", "emulation", "--out", "law.py"], "law.py: is a file, not a folder"),
         (["check", "gone.py"], "gone.py: there is no such file"),
         (["check", "e.toml"], "e.toml"),
         (["check", "law.py", "--sample-period", "0"], "must be more than 0"),
@@ -246,7 +246,7 @@ def test_progress_is_for_terminals(folder: Path) -> None:
     os.close(main)
     assert "simulation" in shown or "run" in shown
     only_json(on_terminal.stdout)
-    assert command("run", "e.toml", "--out", "out", "--json").stderr == ""
+    assert command("run", "e.toml", "--out", "another", "--json").stderr == ""
 
 
 def test_ctrl_c_during_the_imports_is_no_traceback() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -66,8 +67,8 @@ def ours(program: bytes | Path, variables: dict[int, float] | None = None) -> tu
 
 
 def calls(lines: list[str]) -> list[str]:
-    """Without the numbers of the lines, and without what ends every run."""
-    found = [line[6:] for line in lines]
+    """Without the numbers of the lines, the sign of a zero (that of a rounding), and what ends every run."""
+    found = [re.sub(r"-(0\.0000)\b", r"\1", line[6:]) for line in lines]
     while found and found[-1].endswith(END):
         found.pop()
     return found
