@@ -120,18 +120,25 @@ def run(
 def check(
     file: Annotated[Path, typer.Argument(help="A .py file with control(), derivatives(), ...; or a model file.")],
     sample_period: Annotated[float, typer.Option(help="Sample period that a call must fit into, s.")] = 0.001,
+    axes: Annotated[
+        int | None,
+        typer.Option(min=1, help="The controller is a coupled one: it gets arrays, one value per axis.", metavar="N"),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Say which interface a file fills, and whether it keeps it."""
     with refusals(), stdout_kept(json):
         if file.suffix == ".toml":
+            from rds.core.errors import InputError
             from rds.identification.run_model import check_model_file
 
+            if axes is not None:
+                raise InputError(f"--axes {axes} is for a coupled controller, and this is a model file", str(file))
             report = check_model_file(file, sample_period)
         else:
             from rds.checks import check_file
 
-            report = check_file(file, sample_period)
+            report = check_file(file, sample_period, coupled=axes is not None, axes=axes or 2)
     if json:
         print_json(report.to_json())
     else:

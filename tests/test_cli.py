@@ -47,6 +47,9 @@ METRICS = {"mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_ab
 def folder(alone: Path) -> Path:
     (alone / "e.toml").write_text(SIMULATION)
     (alone / "law.py").write_text(LAW)
+    (alone / "model.py").write_text(
+        "def derivatives(t, x, u, params):\n    return [x[1], 100.0 * (2.0 * u[0] - x[1])]\n"
+    )
     return alone
 
 
@@ -141,6 +144,8 @@ def test_stdout_is_the_json_s_whatever_the_student_prints(folder: Path, mode: st
         (["check", "gone.py"], "gone.py: there is no such file"),
         (["check", "e.toml"], "e.toml"),
         (["check", "law.py", "--sample-period", "0"], "must be more than 0"),
+        (["check", "model.py", "--axes", "2"], "it defines no control(t, r, y, state, params)"),
+        (["check", "e.toml", "--axes", "2"], "--axes 2 is for a coupled controller"),
         (["compare", "gone", "law.py"], "gone"),
         (["machine", "serve", "gone"], "there is no machine 'gone'; known machines: mini-cnc"),
         (["machine", "serve", "mini-cnc", "--interface", "gone"], "gone"),
@@ -185,6 +190,16 @@ def test_check(folder: Path) -> None:
     assert bad.returncode == 1
     assert "finite" in json.dumps(only_json(bad.stdout))
     assert "finite" in command("check", "bad.py").stdout
+
+
+def test_a_coupled_controller_is_checked_with_as_many_axes_as_are_said(folder: Path) -> None:
+    (folder / "law.py").write_text(
+        "def control(t, r, y, state, params):\n    x, y, z = r.position - y\n    return [x, y, z], state\n"
+    )
+    assert call("check", "law.py", "--axes", "3").exit_code == 0
+    two, one = call("check", "law.py", "--axes", "2"), call("check", "law.py")
+    assert (two.exit_code, one.exit_code) == (1, 1)
+    assert "not enough values to unpack (expected 3, got 2)" in two.stdout
 
 
 def test_compare(folder: Path) -> None:

@@ -26,6 +26,7 @@ from rds.core.types import Controller, Reference
 BUDGET = 2.0  # s for each pass over the run: a slow controller is judged by fewer samples
 _LEAST = 5  # samples, whatever they take
 _LARGE_ERROR = 100.0  # mm
+_SEVERAL = "it works with arrays of several axes: check it with `rds check --axes`, run it with `coupled = true`"
 
 
 def check_controller(
@@ -159,15 +160,14 @@ class _Run:
         if fault is not None:
             clause, said, remedy = fault
             if not self.axes and not self.calls and self._works_with_arrays():
-                remedy += "; or, as it works with arrays of several axes, check and run it as a coupled controller"
+                remedy += f"; or, as {_SEVERAL}"
             self.found.fault(clause, f"control() returned {said} at t = {t:.3f} s; {remedy}")
         return fault is None
 
     def _failed(self, error: BaseException, t: float, before: tuple[Any, ...]) -> None:
         said = student_error(error, self.source)
         if not self.axes and not self.calls and _is_about_form(error) and self._works_with_arrays():
-            remedy = "it works with arrays of several axes: check and run it as a coupled controller"
-            return self.found.fault(clauses.RUNS, f"control() fails with one axis's numbers: {said}; {remedy}")
+            return self.found.fault(clauses.RUNS, f"control() fails with one axis's numbers: {said}; {_SEVERAL}")
         if not self.calls:
             if self.subject.student.initial_state is None and _is_about_form(error):
                 said = f"control() fails with the empty state, and there is no initial_state: {said}"

@@ -23,6 +23,7 @@ from rds.checks.report import CheckReport, Fault
 from rds.core.blame import student_error
 from rds.core.errors import ContractError, InputError
 from rds.core.load import load_student
+from rds.core.signature import form
 
 _PASSES = 20  # the time limit holds this many passes over a run, and some
 
@@ -48,6 +49,8 @@ def run(request: dict[str, Any], result: TextIO) -> None:
     interface, path = "file", request["file"]
     try:
         student = load_student(path, validate=False)
+        if request["coupled"] and "controller" not in student.interfaces:
+            raise InputError(f"it is to be checked as a coupled controller, and it defines no {form('control')}", path)
         warnings = [
             Fault(clauses.OTHERS, f"{name}() is taken for a helper: {why}") for name, why in student.misfits.items()
         ]
