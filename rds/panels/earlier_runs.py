@@ -17,7 +17,12 @@ from rds.session.task import Task
 
 MOST = 6  # that one picture can show
 _SHOWN = 200
-_STATES = {State.WHOLE: "", State.GOES_ON: ", goes on", State.CUT_SHORT: ", cut short: its record can be opened"}
+_STATES = {
+    State.WHOLE: "",
+    State.GOES_ON: ", goes on",
+    State.SAVED_NOW: ", is being saved",
+    State.CUT_SHORT: ", cut short: its record can be opened",
+}
 
 
 class EarlierRuns:
@@ -60,8 +65,8 @@ class EarlierRuns:
         if len(chosen) > MOST:
             self.notice.say(f"{len(chosen)} runs are too many for one picture; choose at most {MOST}", "error")
             return
-        if going := [run.name for run in chosen if run.state is State.GOES_ON]:
-            self.notice.say(f"{going[0]} goes on; open it when it is over", "error")
+        if early := [run for run in chosen if run.state in (State.GOES_ON, State.SAVED_NOW)]:
+            self.notice.say(f"{early[0].name} {early[0].state}; open it when that is over (Look again)", "error")
             return
         self.notice.clear()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +18,7 @@ from rds.experiment.run import Run
 from rds.modes import load_mode
 from rds.results import Result
 from rds.runtime.plan import Plan
+from rds.session.saving import saving
 from rds.session.session import RUNS, Session
 from rds.session.task import Stopped, Task
 
@@ -59,26 +61,28 @@ class EquipmentRun:
         return self
 
     def _work(self, task: Task[Result]) -> Result:
-        try:
-            if self._prepare is not None:
-                self._tell(task, "checking your files")
-                self._prepare()
-            self._tell(task, "loading")
-            experiment = Experiment.from_table(self.table, self.session.folder)
-            self.plan = experiment.plan()
-            self._tell(task, "starting the loop" if self.real_time else "simulating")
-            run = experiment.start(out=self.folder)
-            self._run = run
-            if task.stopping:
-                run.stop()
-            running = "running" if self.real_time else "simulating"
-            # before the first sample the loop is still being started, and its note stays
-            self.result = run.wait(lambda taken, of: task.advance(taken, of, running if taken else ""))
-        finally:
-            self.session.give_machine_back(self)
-        task.note = "saving tables, pictures and the report"
-        self.files = save_with_report(self.result, self.folder, self.title)
-        return self.result
+        with contextlib.ExitStack() as held:
+            try:
+                if self._prepare is not None:
+                    self._tell(task, "checking your files")
+                    self._prepare()
+                self._tell(task, "loading")
+                experiment = Experiment.from_table(self.table, self.session.folder)
+                self.plan = experiment.plan()
+                self._tell(task, "starting the loop" if self.real_time else "simulating")
+                held.enter_context(saving(self.folder))
+                run = experiment.start(out=self.folder)
+                self._run = run
+                if task.stopping:
+                    run.stop()
+                running = "running" if self.real_time else "simulating"
+                # before the first sample the loop is still being started, and its note stays
+                self.result = run.wait(lambda taken, of: task.advance(taken, of, running if taken else ""))
+            finally:
+                self.session.give_machine_back(self)
+            task.note = "saving tables, pictures and the report"
+            self.files = save_with_report(self.result, self.folder, self.title)
+            return self.result
 
     def _tell(self, task: Task[Result], note: str) -> None:
         if task.stopping:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rds.core.errors import InputError
 from rds.runtime.desk_of_run import desk_of
 from rds.runtime.record import ENDING, NAME, PROCESSES
+from rds.session.saving import is_being_saved
 
 if TYPE_CHECKING:
     from rds.results import Result
@@ -22,6 +23,7 @@ class State(StrEnum):
 
     WHOLE = "whole"  # its results are saved
     GOES_ON = "goes on"  # its loop is running now, whoever started it
+    SAVED_NOW = "is being saved"  # its loop is over, its results are not there yet
     CUT_SHORT = "cut short"  # its host ended before it could save results: the record can be opened
 
 
@@ -66,7 +68,9 @@ def state_of(folder: Path) -> State | None:
         return State.GOES_ON
     if any((folder / f"result.{kind}").is_file() for kind in ("csv", "parquet", "mat")):
         return State.WHOLE
-    return State.CUT_SHORT if (folder / NAME).is_file() else None
+    if not (folder / NAME).is_file():
+        return None
+    return State.SAVED_NOW if is_being_saved(folder) else State.CUT_SHORT
 
 
 def ending(folder: Path) -> dict[str, Any]:

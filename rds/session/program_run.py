@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from rds.programs.report import save_run
 from rds.programs.run import PartProgram, ProgramRun, Status
 from rds.results import Result
 from rds.session.equipment_run import EquipmentRun
+from rds.session.saving import saving
 from rds.session.session import RUNS, Session
 from rds.session.task import Task
 
@@ -46,27 +48,29 @@ class ProgramWork(EquipmentRun):
         self._setup, self._controller, self._changes = setup, controller, changes
 
     def _work(self, task: Task[Result]) -> Result:
-        try:
-            if self._prepare is not None:
-                self._tell(task, "checking the controller's file")
-                self._prepare()
-            self._tell(task, "planning the program")
-            part = PartProgram(
-                self.file, self.session.machine, setup=self._setup, controller=self._controller, mode=self.mode
-            )
-            self.plan, self.prepared = part.plan(), part.prepared
-            self._tell(task, "starting the loop" if self.real_time else "simulating")
-            run = part.start(out=self.folder, changes=self._changes)
-            self._run = run
-            if task.stopping:
-                run.stop()
-            note = "running" if self.real_time else "simulating"
-            self.result = run.wait(lambda taken, of: task.advance(taken, max(of, taken), note))
-        finally:
-            self.session.give_machine_back(self)
-        task.note = "saving tables, pictures and the report"
-        self.files = save_run(self.result, part.prepared, self.folder)
-        return self.result
+        with contextlib.ExitStack() as held:
+            try:
+                if self._prepare is not None:
+                    self._tell(task, "checking the controller's file")
+                    self._prepare()
+                self._tell(task, "planning the program")
+                part = PartProgram(
+                    self.file, self.session.machine, setup=self._setup, controller=self._controller, mode=self.mode
+                )
+                self.plan, self.prepared = part.plan(), part.prepared
+                self._tell(task, "starting the loop" if self.real_time else "simulating")
+                held.enter_context(saving(self.folder))
+                run = part.start(out=self.folder, changes=self._changes)
+                self._run = run
+                if task.stopping:
+                    run.stop()
+                note = "running" if self.real_time else "simulating"
+                self.result = run.wait(lambda taken, of: task.advance(taken, max(of, taken), note))
+            finally:
+                self.session.give_machine_back(self)
+            task.note = "saving tables, pictures and the report"
+            self.files = save_run(self.result, part.prepared, self.folder)
+            return self.result
 
     # what a progress bar follows: waiting is no progress
 

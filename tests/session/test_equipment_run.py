@@ -12,6 +12,7 @@ from rds.core.errors import InputError
 from rds.results import open_result
 from rds.session import Session
 from rds.session.equipment import Equipment
+from rds.session.kept_runs import State
 from rds.session.live_values import LiveValues
 from rds.session.save_as import save_as
 
@@ -29,6 +30,25 @@ def test_a_simulation_leaves_its_files_and_its_traces(tmp_path: Path) -> None:
     assert len(run.new_rows()) == 0
     assert {"report", "csv", "mat", "parquet"} <= set(run.files)
     assert [kept.folder for kept in session.runs()] == [run.folder]
+
+
+def test_a_run_that_is_being_saved_is_not_cut_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def save(result: object, folder: Path, title: str) -> dict[str, Path]:
+        for early in folder.glob("result.*"):
+            early.unlink()
+        (folder / "record.rds").touch()  # as a loop against the clock leaves it
+        seen.extend(kept.state for kept in Session(tmp_path).runs())
+        return {}
+
+    monkeypatch.setattr("rds.session.equipment_run.save_with_report", save)
+    equipment = Equipment(Session(tmp_path), "control")
+    equipment.choices.set("duration", 0.01)
+    run = equipment.run().start()
+    assert run.wait(60) and run.error is None
+    assert seen == [State.SAVED_NOW]
+    assert [kept.state for kept in Session(tmp_path).runs()] == [State.CUT_SHORT]  # nothing was saved after all
 
 
 def test_a_students_fault_is_told_before_anything_runs(tmp_path: Path) -> None:
