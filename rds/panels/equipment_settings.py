@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import ipywidgets as widgets
 
@@ -26,11 +26,13 @@ class EquipmentSettings:
         self._equipment = equipment
         self._views: dict[str, FieldView] = {}
         self._groups = [_box() for _ in _GROUPS]
-        self._parameters = _box()
-        self._folded = widgets.Accordion([self._parameters], titles=("Parameters",), selected_index=None)
-        self._folded.add_class("rds-folded")
+        self._controllers, self._models = _Folded("Parameters"), _Folded("Parameters of the model")
         at = 1 + next(i for i, names in enumerate(_GROUPS) if "controller" in names)
-        self.widget = widgets.VBox([*self._groups[:at], self._folded, *self._groups[at:]])
+        after = 1 + next(i for i, names in enumerate(_GROUPS) if "model" in names)
+        groups = self._groups
+        self.widget = widgets.VBox(
+            [*groups[:at], self._controllers.widget, *groups[at:after], self._models.widget, *groups[after:]]
+        )
         self.widget.add_class("rds-side")
         equipment.choices.watch(lambda name: self._arrange())
         self._arrange()
@@ -54,10 +56,32 @@ class EquipmentSettings:
         # the parts stay in their places, so that nothing that is being typed elsewhere is drawn anew
         for box, names in zip(self._groups, _GROUPS, strict=True):
             _fill(box, [self._view(name) for name in names if name in shown])
-        parameters = self._equipment.parameters
-        _fill(self._parameters, [self._view(name) for name in parameters])
-        self._folded.titles = (f"Parameters ({len(parameters)})",)
-        self._folded.layout.display = "" if parameters else "none"
+        choices = self._equipment.choices
+        groups: tuple[tuple[_Folded, list[str]], ...] = (
+            (self._controllers, self._equipment.parameters),
+            (self._models, self._equipment.model_parameters),
+        )
+        for folded, names_of in groups:
+            changed = [name for name in names_of if choices[name] != choices.fields[name].default]
+            folded.show([self._view(name) for name in names_of], len(changed))
+
+
+class _Folded:
+    """Fields that most leave alone, folded away; the title says how many there are, and how many were changed."""
+
+    def __init__(self, title: str):
+        self._title = title
+        self._box = _box()
+        self.widget = widgets.Accordion([self._box], titles=(title,), selected_index=None)
+        self.widget.add_class("rds-folded")
+
+    def show(self, views: Sequence[FieldView], changed: int) -> None:
+        """Show these, if there are any."""
+        _fill(self._box, views)
+        title = f"{self._title} ({len(views)}{f', {changed} changed' if changed else ''})"
+        if self.widget.titles != (title,):
+            self.widget.titles = (title,)
+        self.widget.layout.display = "" if views else "none"
 
 
 def _box() -> widgets.Box:

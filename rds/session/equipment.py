@@ -5,6 +5,7 @@ The experiment is the same table that a TOML file would hold: what a panel runs,
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,13 @@ from rds.machines import Axis, Machine, load_machine
 from rds.session.build import Builds, Checked
 from rds.session.choices import Choices
 from rds.session.equipment_fields import (
+    OF_MODEL,
     POLE,
     PREFIX,
     USER,
     controllers,
     first_fields,
+    own_fields,
     parameter_fields,
     sizes,
     tracking_options,
@@ -44,6 +47,8 @@ class Equipment:
 
     def __post_init__(self) -> None:
         self.machine: Machine = load_machine(self.session.machine)
+        self._order: list[str] = []  # of the fields of parameters
+        self._of: dict[str, Path] = {}  # the student's file that has the parameters of a prefix
         self.choices: Choices = self.session.choices(f"equipment {self.kind}", first_fields(self.kind, self.machine))
         self._fit_system()
         self.choices.watch(self._chosen)
@@ -55,11 +60,13 @@ class Equipment:
 
     @property
     def parameters(self) -> list[str]:
-        """The names of the controller's parameters among the choices, in the library's order."""
-        if self.kind == "model":
-            return []
-        wanted = parameter_fields(self.choices["controller"], self.axis)
-        return [each.name for each in wanted if each.name in self.choices]
+        """The names of the controller's parameters among the choices: in the library's order, or in the file's."""
+        return [name for name in self._order if name.startswith(PREFIX) and name in self.choices]
+
+    @property
+    def model_parameters(self) -> list[str]:
+        """The names of the parameters of the student's model among the choices, in the file's order."""
+        return [name for name in self._order if name.startswith(OF_MODEL) and name in self.choices]
 
     @property
     def shown(self) -> list[str]:
@@ -94,7 +101,7 @@ class Equipment:
         if self.kind == "control":
             table["controller"] = self._controller()
         if "model_file" in self.shown:
-            table["model"] = {"file": self._file("model_file", "model")}
+            table["model"] = self._own("model_file", "model", self.model_parameters)
         if self.session.bus:
             table["bus"] = dict(self.session.bus)
         return table
@@ -118,24 +125,26 @@ class Equipment:
 
     def build(self) -> Task[list[Checked]]:
         """Begin to check the student's files; InputError where one is not named."""
+        self.fit_parameters()
         files, T = self.files(), self.choices["sample_period"]
 
         def work(task: Task[list[Checked]]) -> list[Checked]:
             checked = []
             for number, (role, path) in enumerate(files):
                 task.advance(number, len(files), f"checking {path.name}")
-                checked.append(self.builds.check(role, path, T))
+                checked.append(self.builds.check(role, path, T, task.pulse))
             return checked
 
         return self.session.work("build", work)
 
     def load(self) -> Task[str]:
         """Begin to make everything ready for a run, without running: a sentence about the samples and the machine."""
+        self.fit_parameters()
         files, T, table = self.files(), self.choices["sample_period"], self.table()
 
         def work(task: Task[str]) -> str:
             task.note = "checking your files"
-            self.builds.require(files, T)
+            self.builds.require(files, T, task.pulse)
             task.note = "loading"
             plan = Experiment.from_table(table, self.session.folder).plan()
             return f"loaded: {plan.samples} samples, {plan.T * 1e3:g} ms each; {machine_sentence(plan)}"
@@ -144,8 +153,9 @@ class Equipment:
 
     def run(self) -> EquipmentRun:
         """The run of what is chosen, to be started. Its files are checked first, where that was not done yet."""
+        self.fit_parameters()
         files, T, table = self.files(), self.choices["sample_period"], self.table()
-        return EquipmentRun(self.session, table, prepare=lambda: self.builds.require(files, T))
+        return EquipmentRun(self.session, table, prepare=lambda pulse: self.builds.require(files, T, pulse))
 
     def _shape(self) -> dict[str, Any]:
         chosen = self.choices
@@ -163,11 +173,17 @@ class Equipment:
     def _controller(self) -> dict[str, Any]:
         chosen = self.choices
         if chosen["controller"] == USER:
-            return {"file": self._file("controller_file", "controller")}
+            return self._own("controller_file", "controller", self.parameters)
         if POLE in chosen:
             return {"name": chosen["controller"]} | tracking_options(chosen.values())
         given = {name.removeprefix(PREFIX): chosen[name] for name in self.parameters}
         return {"name": chosen["controller"]} | {name: value for name, value in given.items() if value is not None}
+
+    def _own(self, name: str, what: str, parameters: list[str]) -> dict[str, Any]:
+        """A student's file, with the values that were put in place of its own."""
+        given = {each.partition(".")[2]: _plain(self.choices[each]) for each in parameters}
+        given = {key: value for key, value in given.items() if value is not None}
+        return {"file": self._file(name, what)} | ({"params": given} if given else {})
 
     def _file(self, name: str, what: str) -> str:
         given = str(self.choices[name]).strip()
@@ -178,22 +194,58 @@ class Equipment:
     def _chosen(self, name: str) -> None:
         if name in ("system", "controller"):
             self._fit_system()
+        elif name in ("controller_file", "model", "model_file", "mode"):
+            self.fit_parameters()
 
     def _fit_system(self) -> None:
         """What the chosen system and controller allow."""
         fields = self.choices.fields
         fitting = sizes(self.kind, self.machine, self.axis)
         self.choices.replace(each for each in fitting if each != fields[each.name])
-        if self.kind == "control":
-            if (fitting_laws := controllers(self.axis)) != fields["controller"]:
-                self.choices.replace([fitting_laws])
-            wanted = {each.name: each for each in parameter_fields(self.choices["controller"], self.axis)}
-            self.choices.remove([name for name in fields if name.startswith(PREFIX) and name not in wanted])
-            self.choices.replace(each for name, each in wanted.items() if fields.get(name) != each)
+        if self.kind == "control" and (fitting_laws := controllers(self.axis)) != fields["controller"]:
+            self.choices.replace([fitting_laws])
+        self.fit_parameters()
+
+    def fit_parameters(self) -> None:
+        """The parameters of what is chosen, as a student's file has them now.
+
+        What was put in place of a file's own value does not go over to another file.
+        """
+        own = self._own_files()
+        others = tuple(prefix for prefix in (PREFIX, OF_MODEL) if self._of.get(prefix) != own.get(prefix))
+        if others and self._order:
+            self.choices.remove([name for name in self.choices.fields if name.startswith(others)])
+        wanted = self._wanted(own)
+        self._of, self._order = own, list(wanted)
+        fields = self.choices.fields
+        self.choices.remove([name for name in fields if name.startswith((PREFIX, OF_MODEL)) and name not in wanted])
+        self.choices.replace(each for name, each in wanted.items() if fields.get(name) != each)
+
+    def _own_files(self) -> dict[str, Path]:
+        """The student's Python files that are chosen, by the prefix of their parameters."""
+        found = {}
+        for name, prefix in (("controller_file", PREFIX), ("model_file", OF_MODEL)):
+            if name in self.shown and (given := str(self.choices[name]).strip()).endswith(".py"):
+                found[prefix] = self.session.folder / given
+        return found
+
+    def _wanted(self, own: Mapping[str, Path]) -> dict[str, Field]:
+        """The fields of the parameters of the controller and of the model that are chosen, by name."""
+        found: list[Field] = []
+        if self.kind == "control" and self.choices["controller"] != USER:
+            found += parameter_fields(self.choices["controller"], self.axis)
+        for prefix, path in own.items():
+            found += own_fields(path, prefix)
+        return {each.name: each for each in found}
 
 
 _FILES = {"shape_file": "shape", "model_file": "model", "controller_file": "controller"}  # shown for what is the user's
 _ROLES = {"shape_file": "signal", "model_file": "model", "controller_file": "controller"}
+
+
+def _plain(number: float | None) -> float | int | None:
+    """A whole number as one: a file may count with it."""
+    return int(number) if number is not None and number == int(number) else number
 
 
 def _option(field: Field, value: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from rds.controllers import controller_module
@@ -10,10 +11,12 @@ from rds.controllers.tracking import OBSERVER_POLE, POLES
 from rds.core.options import Option
 from rds.machines import Axis, Machine
 from rds.session.fields import Choice, Field, Number, Text
+from rds.session.file_params import file_params
 from rds.session.formula import check_formula
 
 USER = "user"  # the choice of something that the student wrote
 PREFIX = "controller."  # of the fields of a controller's parameters
+OF_MODEL = "model."  # of those of a student's model
 SPINDLE = "rev/min"
 MODES = {
     "model": {
@@ -33,6 +36,7 @@ CONTROLLERS = {
 }
 MODELS = {"default": "Default", USER: "User-defined"}
 POLE, POLE_OFFSET, OBSERVER = f"{PREFIX}pole", f"{PREFIX}pole_imaginary", f"{PREFIX}observer_pole"
+_COMMENT = 40  # characters of a file's comment that stand beside a field
 # first values that every axis of the mini CNC can follow: (amplitude, frequency) by what is driven
 _FIRST = {"V": (2.0, 1.0), "mm": (5.0, 0.2), "°": (20.0, 0.2), SPINDLE: (200.0, 0.5)}
 
@@ -100,7 +104,7 @@ def sizes(kind: str, machine: Machine, axis: Axis) -> Iterable[Field]:
 
 
 def parameter_fields(controller: str, axis: Axis) -> Iterable[Field]:
-    """The parameters of one of the library's controllers; a user's own are in the user's file."""
+    """The parameters of one of the library's controllers; `own_fields` has those of a student's file."""
     if controller == USER:
         return
     options: Any = controller_module(controller).OPTIONS
@@ -109,6 +113,19 @@ def parameter_fields(controller: str, axis: Axis) -> Iterable[Field]:
         return
     for name, option in options.items():
         yield _parameter(name, option, axis.unit)
+
+
+def own_fields(path: Path, prefix: str) -> Iterable[Number]:
+    """The numbers in `params` of the student's file at `path`; empty fields leave them as the file has them."""
+    for name, value, comment in file_params(path):
+        yield Number(
+            f"{prefix}{name}",
+            f"{name}, {comment}" if 0 < len(comment) <= _COMMENT else name,
+            f"{comment or 'a parameter of your file'}; empty: as in {path.name}",
+            None,
+            optional=True,
+            when_empty=f"{value:.10g}",
+        )
 
 
 def tracking_options(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -34,6 +34,7 @@ class Number(Field):
     above: float = -inf
     whole: bool = False
     optional: bool = False  # empty text stands for None: the program's own choice
+    when_empty: str = "by itself"  # what stands in an empty optional field: who chooses then, and what
 
     def check(self, value: Any) -> float | int | None:
         """The number; text may have a decimal comma, blanks around it, and the unit behind it."""

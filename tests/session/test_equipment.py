@@ -101,6 +101,32 @@ def test_file_and_python_are_the_panels_run_sample_for_sample(tmp_path: Path, ki
             assert np.array_equal(run.result[name], again[name]), name
 
 
+def test_params_of_a_students_file_can_be_set_before_a_run(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        'params = {\n    "Kp": 20.0,  # V/mm\n    "n": 3,\n    "big": 2 * 3,\n    "on": True,\n}\n'
+    )
+    (tmp_path / "other.py").write_text(CONTROLLER)
+    equipment = choose(Equipment(Session(tmp_path), "control"), controller="user", controller_file="mine.py")
+    assert equipment.parameters == ["controller.Kp", "controller.n"]  # what the file computes, only running it tells
+    field = equipment.choices.fields["controller.Kp"]
+    assert (field.label, field.when_empty) == ("Kp, V/mm", "20")
+    assert equipment.table()["controller"] == {"file": "mine.py"}
+    choose(equipment, controller__Kp="12,5")
+    assert equipment.table()["controller"] == {"file": "mine.py", "params": {"Kp": 12.5}}
+    again = Equipment(Session(tmp_path), "control")
+    assert again.table() == equipment.table()  # as it was left
+    choose(equipment, controller_file="other.py")
+    assert equipment.parameters == ["controller.Kp"]
+    assert equipment.table()["controller"] == {"file": "other.py"}  # another file's value is its own
+    (tmp_path / "other.py").write_text("params = {'Ki': 1}\n" + CONTROLLER.partition("\n")[2])
+    equipment.fit_parameters()
+    assert equipment.parameters == ["controller.Ki"]
+    choose(equipment, model="user", model_file="mine.py", model__n=4)
+    assert repr(equipment.table()["model"]["params"]) == "{'n': 4}"  # which range() takes
+    choose(equipment, model="default")
+    assert equipment.model_parameters == [] and "model" not in equipment.table()
+
+
 def test_the_file_does_not_replace_another(tmp_path: Path) -> None:
     table = Equipment(Session(tmp_path), "control").table()
     write_toml(table, tmp_path / "a.toml")

@@ -122,7 +122,7 @@ def _text(value: Any) -> str:
 
 
 def _placeholder(field: Number) -> str:
-    return "by itself" if field.optional else field.range
+    return field.when_empty if field.optional else field.range
 
 
 def field_group(choices: Choices, names: list[str], title: str = "") -> widgets.VBox:
