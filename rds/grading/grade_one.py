@@ -56,6 +56,7 @@ class Opened:
         self._path, self._assignment, self._pool = path, assignment, pool
         self._stack = ExitStack()
         self._subjects: dict[tuple[str, int], Any] = {}
+        self._printed = ""  # by a process that could not be loaded
 
     def subject(self, number: int = 0) -> Answers:
         """The submission, loaded; further numbers are further processes of it."""
@@ -67,14 +68,18 @@ class Opened:
 
     def _get(self, kind: str, number: int) -> Any:
         if (kind, number) not in self._subjects:
-            made = self._stack.enter_context(self._pool.open(self._path, self._assignment.limits, kind))
+            try:
+                made = self._stack.enter_context(self._pool.open(self._path, self._assignment.limits, kind))
+            except SubmissionError as error:
+                self._printed += error.printed
+                raise
             self._subjects[kind, number] = made
         return self._subjects[kind, number]
 
     @property
     def output(self) -> str:
         """What it has printed, in all its processes."""
-        return "".join(subject.output for subject in self._subjects.values())
+        return "".join(subject.output for subject in self._subjects.values()) + self._printed
 
     def close(self) -> None:
         """End its processes."""

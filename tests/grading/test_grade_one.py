@@ -200,6 +200,12 @@ def test_what_it_prints_is_a_note(made: Make, pool: Pool, tmp_path: Path) -> Non
     assert found.status is Status.OK and "here I am" in found.notes[-1]
 
 
+def test_what_it_prints_before_it_fails_to_load_is_a_note(made: Make, pool: Pool, tmp_path: Path) -> None:
+    found = grade(made(HEAD + SINE + RMS), file(tmp_path, "print('as far as here')\nimport nowhere\n"), "ada", pool)
+    assert found.status is Status.FAILED_TO_LOAD
+    assert found.notes == ("It printed:\nas far as here\n",)
+
+
 @pytest.mark.filterwarnings("ignore:overflow")  # of the model, which is meant to
 def test_an_axis_that_runs_away_is_told(made: Make, tmp_path: Path) -> None:
     """The parent's own model diverges: no fault of the interface, and no value."""

@@ -69,6 +69,10 @@ class Subject:
         os.sched_setaffinity(0, place.own)
         try:
             self._load()
+        except SubmissionError as error:
+            self.close()
+            error.printed = self.output
+            raise
         except BaseException:
             self.close()
             raise
