@@ -1,55 +1,12 @@
-"""The help pages for a browser of this computer: files only, on the loopback address, under a path nobody guesses."""
+"""The help pages for a browser of this computer."""
 
 from __future__ import annotations
 
-import secrets
-import threading
-from functools import cache
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
-from typing import Any
+from rds.results.serve import FolderServer, server_of
 
 
-class HelpServer:
-    """Serves one folder until the process ends; `url(page)` is the address of a page in it."""
-
-    def __init__(self, folder: Path):
-        self._secret = secrets.token_urlsafe(12)
-        secret = self._secret
-
-        class Pages(SimpleHTTPRequestHandler):
-            """What lies in the folder, and nothing without the secret."""
-
-            def __init__(self, *args: Any):
-                super().__init__(*args, directory=str(folder))
-
-            def translate_path(self, path: str) -> str:
-                begin, _, rest = path.lstrip("/").partition("/")
-                return super().translate_path("/" + rest if begin == secret else "/-")
-
-            def list_directory(self, path: Any) -> None:
-                self.send_error(404)
-
-            def log_message(self, format: str, *args: Any) -> None:
-                """Nobody reads it."""
-
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), Pages)
-        self._server.daemon_threads = True
-        threading.Thread(target=self._server.serve_forever, name="rds help", daemon=True).start()
-
-    def url(self, page: str) -> str:
-        """Where the browser finds a page, such as "experiments.html"."""
-        return f"http://127.0.0.1:{self._server.server_address[1]}/{self._secret}/{page}"
-
-    def close(self) -> None:
-        """Serve no more."""
-        self._server.shutdown()
-        self._server.server_close()
-
-
-@cache
-def help_server() -> HelpServer:
+def help_server() -> FolderServer:
     """The one server of this process; builds the pages where that is still to do (some seconds)."""
     from rds.help.build import help_pages
 
-    return HelpServer(help_pages())
+    return server_of(help_pages())

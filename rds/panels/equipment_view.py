@@ -20,6 +20,7 @@ from rds.session.equipment import Equipment
 from rds.session.equipment_run import EquipmentRun
 
 TABS = ("Live", "Results", "Timing", "What runs", "Earlier runs")
+_STOPPED = "stopped; nothing was checked or loaded"
 LIVE, RESULTS, TIMING, WHAT, EARLIER = range(len(TABS))
 
 
@@ -123,6 +124,9 @@ class EquipmentView:
             button.disabled = not on
 
     def _built(self, task: Any) -> None:
+        if task.stopped:
+            self.notice.say(_STOPPED, "warning")
+            return
         if task.error is not None:
             self.notice.say(str(task.error), "error")
             return
@@ -132,7 +136,9 @@ class EquipmentView:
         self.tabs.selected_index = WHAT
 
     def _said(self, task: Any) -> None:
-        if task.error is not None:
+        if task.stopped:
+            self.notice.say(_STOPPED, "warning")
+        elif task.error is not None:
             self.notice.say(str(task.error), "error")
         elif task.result:
             self.notice.say(task.result, "warning" if "; but" in task.result else "good")
@@ -164,14 +170,14 @@ class EquipmentView:
     def _show(self, result: Result) -> None:
         """The loop is over; its files are still being written."""
         self._shown = result
-        self.results.show(result, self.run.folder if self.run else self.equipment.session.folder)
+        self.results.show(result)
         self.notice.say(*_verdict(result))
         if self.tabs.selected_index == LIVE:  # whoever looks at something else is left there
             self.tabs.selected_index = RESULTS
 
     def _reopened(self, results: list[Result], names: list[str], short: list[str]) -> None:
         if len(results) == 1:
-            self.results.show(results[0], self.equipment.session.folder / "runs" / names[0])
+            self.results.show(results[0])
             self.results.saved(self.equipment.session.folder / "runs" / names[0])
             self.notice.say(f"{names[0]}: {_verdict(results[0])[0]}", _verdict(results[0])[1])
         else:

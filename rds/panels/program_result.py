@@ -9,6 +9,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels.kit.figure import FigureView
+from rds.panels.result_actions import ResultActions
 from rds.results import html
 from rds.session.program_run import ProgramWork
 
@@ -23,11 +24,11 @@ class ProgramResult:
         """`go(line)` shows a line of the program."""
         self._shell, self._go = shell, go
         self.words = widgets.HTML(_EMPTY)
-        self.where = widgets.HTML()
+        self.actions = ResultActions(shell)
         self.path, self.along = FigureView(), FigureView()
         self.worst = widgets.HBox([])
         self.worst.add_class("rds-row")
-        self.widget = widgets.VBox([self.worst, self.words, self.where, self.path, self.along])
+        self.widget = widgets.VBox([self.worst, self.words, self.actions.widget, self.path, self.along])
 
     def show(self, work: ProgramWork) -> None:
         """Sentences, the worst lines, and pictures."""
@@ -48,21 +49,20 @@ class ProgramResult:
         self.worst.children = [
             self._button(line, error) for line, error, _ in worst_lines(result, result["contour_error"], _WORST)
         ]
-        self.where.value = "<p>its files are being written …</p>"
+        self.actions.writing()
         session, ticker = self._shell.session, self._shell.ticker
         self.path.draw(session, ticker, lambda: path(result, prepared))
         self.along.draw(session, ticker, lambda: along(result, prepared))
 
     def saved(self, work: ProgramWork) -> None:
         """Its files are written."""
-        self.where.value = (
-            f"<p>Saved in <code>{escape(str(work.folder))}</code>: <code>program.html</code> is the report, "
-            "<code>result.csv</code> all samples.</p>"
-        )
+        if work.result is not None:
+            self.actions.offer(work.result, work.folder, ("program.html", "result.csv"))
 
     def clear(self) -> None:
         """Nothing to show."""
-        self.words.value, self.where.value = _EMPTY, ""
+        self.words.value = _EMPTY
+        self.actions.clear()
         self.worst.children = []
         self.path.clear()
         self.along.clear()

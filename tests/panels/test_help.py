@@ -12,8 +12,8 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.help.build import _local, help_pages, page_file, sources
-from rds.help.serve import HelpServer
 from rds.panels import PANELS
+from rds.results.serve import FolderServer
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +22,8 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def server(pages: Path) -> Iterator[HelpServer]:
-    server = HelpServer(pages)
+def server(pages: Path) -> Iterator[FolderServer]:
+    server = FolderServer(pages)
     yield server
     server.close()
 
@@ -60,7 +60,7 @@ def test_a_folder_with_other_things_is_not_replaced(tmp_path: Path) -> None:
     assert (tmp_path / "thesis.txt").read_text() == "mine"
 
 
-def test_only_who_knows_the_path_reads_the_pages(server: HelpServer) -> None:
+def test_only_who_knows_the_path_reads_the_pages(server: FolderServer) -> None:
     with urllib.request.urlopen(server.url("experiments.html"), timeout=10) as answer:
         assert b"Experiments" in answer.read()
     base = server.url("").rsplit("/", 2)[0]

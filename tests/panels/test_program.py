@@ -117,7 +117,7 @@ def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(open_page: Call
     page.wait_for_selector('.rds-main :text("Where the contour error is largest")')
     page.click('.rds-main button:has-text("Line 2:")')
     page.wait_for_function(f"{SELECTED} === 'G1 X30 F120'")
-    page.wait_for_selector('.rds-main :text("Saved in")', timeout=SAVED)
+    page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
     assert re.search(r"override\s+1\s+2|override\s+1\s+", page.inner_text(".rds-main"))
 
 
@@ -147,6 +147,6 @@ def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], a
     page.wait_for_selector(VALID)
     page.click('button:text-is("Simulation")')
     page.click('button:text-is("Run")')
-    page.wait_for_selector('.rds-main :text("Saved in")', timeout=SAVED)
+    page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
     found = [each for each in Path(app.folder / "runs").iterdir() if (each / "program.html").is_file()]
     assert found
