@@ -7,11 +7,13 @@ import os
 import signal
 import subprocess
 import threading
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import IO
 
 _CHUNK = 65536
+_PULSE = 0.1  # s
 _KEPT = 400  # bytes of output, for the message
 _GRACE = 2.0  # s for the pipes to run dry after the end
 
@@ -38,8 +40,16 @@ class Ended:
     err: Output = field(default_factory=Output)
 
 
-def run_child(command: Sequence[str], time_limit: float, environment: Mapping[str, str]) -> Ended:
-    """Run `command` for `time_limit` s at most, with nothing on its stdin, and everything that it started."""
+def run_child(
+    command: Sequence[str],
+    time_limit: float,
+    environment: Mapping[str, str],
+    pulse: Callable[[], None] = lambda: None,
+) -> Ended:
+    """Run `command` for `time_limit` s at most, with nothing on its stdin, and everything that it started.
+
+    `pulse()` is called ten times a second meanwhile; what it raises ends the child.
+    """
     posix = os.name == "posix"
     process = subprocess.Popen(
         command,
@@ -56,9 +66,11 @@ def run_child(command: Sequence[str], time_limit: float, environment: Mapping[st
     for drain in drains:
         drain.start()
     try:
-        ended.code = process.wait(time_limit)
-    except subprocess.TimeoutExpired:
-        pass
+        deadline = time.monotonic() + time_limit
+        while ended.code is None and time.monotonic() < deadline:
+            pulse()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                ended.code = process.wait(_PULSE)
     finally:
         _end(process, posix)
         for drain in drains:

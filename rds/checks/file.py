@@ -8,7 +8,7 @@ import re
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -40,11 +40,13 @@ def check_file(
     axes: int = 2,
     time_limit: float = TIME_LIMIT,
     memory_limit: int = MEMORY_LIMIT,
+    pulse: Callable[[], None] = lambda: None,
 ) -> FileReport:
     """Check every interface that the file at `path` fills, for a loop of `sample_period` s.
 
     The file runs in a fresh interpreter that has `time_limit` s and `memory_limit` bytes. Code that hangs, crashes or
     exits is a fault in the report; what it prints is counted in a warning. A `coupled` controller gets `axes` axes.
+    `pulse()` is called ten times a second meanwhile: what it raises ends the check.
     This protects from accidents, not from attacks. Raises InputError, with file and line, for a file that is
     missing, cannot be read or run, or fills no interface.
     """
@@ -65,7 +67,7 @@ def check_file(
         }
         # -P: a file in the current folder is not to come before the standard library
         command = [sys.executable, "-P", "-m", "rds.checks.worker", json.dumps(request)]
-        ended = run_child(command, time_limit + _START_UP, os.environ | _ENVIRONMENT)
+        ended = run_child(command, time_limit + _START_UP, os.environ | _ENVIRONMENT, pulse)
         return _report(file, _events(result), ended, _place(trace, file))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import linecache
 import sysconfig
 from pathlib import Path
-from traceback import extract_tb
+from traceback import FrameSummary, extract_tb
 
 from rds.core.types import Source
 
@@ -27,7 +27,7 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
     if isinstance(exc, SyntaxError) and exc.filename:
         line = (exc.text or "").strip()
         return _sentence(f"{Path(exc.filename).name}, line {exc.lineno}", type(exc).__name__, exc.msg, line)
-    own = [frame for frame in extract_tb(exc.__traceback__) if _is_own(frame.filename, path)]
+    own = _own_frames(exc, path)
     if not own:
         return f"{type(exc).__name__}: {_text(exc)}"
     frame = own[-1]
@@ -37,12 +37,21 @@ def student_error(exc: BaseException, path_or_source: str | Path | Source | None
     return _sentence(where, type(exc).__name__, _text(exc), line)
 
 
+def is_students(exc: BaseException) -> bool:
+    """Whether `exc` was raised in or below a line that belongs neither to this package nor to any installed one."""
+    return bool(_own_frames(exc, None))
+
+
 def student_line(exc: BaseException, path: str | Path) -> int | None:
     """The number of the innermost line of the file `path` on the way to `exc`."""
     if isinstance(exc, SyntaxError) and exc.filename and Path(exc.filename) == Path(path):
         return exc.lineno
     numbers = [frame.lineno for frame in extract_tb(exc.__traceback__) if Path(frame.filename) == Path(path)]
     return numbers[-1] if numbers else None
+
+
+def _own_frames(exc: BaseException, path: str | Path | None) -> list[FrameSummary]:
+    return [frame for frame in extract_tb(exc.__traceback__) if _is_own(frame.filename, path)]
 
 
 def _is_own(filename: str, path: str | Path | None) -> bool:

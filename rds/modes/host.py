@@ -21,6 +21,7 @@ import numpy as np
 
 from rds.core.blame import STUDENT_ERRORS
 from rds.core.errors import ContractError, InputError
+from rds.core.interrupt import Endless, interruptible
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.blame import fault
@@ -86,14 +87,19 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
         attached = live.attach(plan, heed.desk, columns, units, recorded=recorded)
     elif heed.is_idle:
         loop = replace(loop, heed=None)
-    ending = None
+
+    def run() -> Ending:
+        ending = None
+        while ending is None:
+            ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+            if progress:
+                progress(loop.k, plan.samples)
+        return ending
+
     try:
         with attached:
-            while ending is None:
-                ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
-                if progress:
-                    progress(loop.k, plan.samples)
-    except STUDENT_ERRORS as error:
+            ending = run() if live is None else interruptible(run, lambda: live.was_stopped, lambda: len(recorded))
+    except (*STUDENT_ERRORS, Endless) as error:
         raise ContractError(fault(plan, error, loop.k)) from error
     values = np.frombuffer(recorded).reshape(-1, len(columns))
     return Rows(columns, units, values, ending, heed.reason, {}, changes=tuple(timed(heed.taken, plan.T)))

@@ -94,6 +94,11 @@ class Live:
                 self.desk.set("stop", 1.0)
 
     @property
+    def was_stopped(self) -> bool:
+        """Whether somebody has asked for the end."""
+        return self._stopped
+
+    @property
     def was_cut(self) -> bool:
         """Whether somebody has asked for the end at once."""
         return self._hard

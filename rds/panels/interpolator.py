@@ -129,6 +129,9 @@ class InterpolatorView:
             task = self.work.check()
 
             def ended() -> None:
+                if task.stopped:
+                    self.notice.say("stopped; nothing was checked", "warning")
+                    return
                 if task.error is not None or task.result is None:
                     self._failed(task.error)
                     return

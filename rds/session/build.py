@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
@@ -55,8 +55,11 @@ class Builds:
     _kept: dict[tuple[str, Path, float], tuple[str, Checked]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
 
-    def check(self, role: str, path: Path, T: float) -> Checked:
-        """Check the file at `path`, which stands for `role`, for a loop of `T` s. Takes seconds the first time."""
+    def check(self, role: str, path: Path, T: float, pulse: Callable[[], None] = lambda: None) -> Checked:
+        """Check the file at `path`, which stands for `role`, for a loop of `T` s. Takes seconds the first time.
+
+        `pulse()` is called ten times a second meanwhile: what it raises ends the check.
+        """
         data = _read(path)
         if isinstance(data, str):
             return Checked(role, path, "", (Mark(None, data),))
@@ -65,7 +68,7 @@ class Builds:
             before = self._kept.get(key)
         if before is not None and before[0] == digest:
             return before[1]
-        checked = _checked(role, path, data.decode("utf-8", "replace"), T)
+        checked = _checked(role, path, data.decode("utf-8", "replace"), T, pulse)
         with self._lock:
             self._kept[key] = digest, checked
         return checked
@@ -75,15 +78,15 @@ class Builds:
         with self._lock:
             return [checked for _, checked in self._kept.values()]
 
-    def require(self, files: Iterable[tuple[str, Path]], T: float) -> None:
-        """InputError naming the first file that will not do."""
+    def require(self, files: Iterable[tuple[str, Path]], T: float, pulse: Callable[[], None] = lambda: None) -> None:
+        """InputError naming the first file that will not do; `pulse` as in `check`."""
         for role, path in files:
-            checked = self.check(role, path, T)
+            checked = self.check(role, path, T, pulse)
             if not checked.ok:
                 raise InputError(checked.sentence)
 
 
-def _checked(role: str, path: Path, text: str, T: float) -> Checked:
+def _checked(role: str, path: Path, text: str, T: float, pulse: Callable[[], None]) -> Checked:
     try:
         if role == "signal":
             from rds.signals.rows import read_rows
@@ -95,15 +98,15 @@ def _checked(role: str, path: Path, text: str, T: float) -> Checked:
 
             read_model(path)
             return Checked(role, path, text)
-        return _python(role, path, text, T)
+        return _python(role, path, text, T, pulse)
     except InputError as error:
         return Checked(role, path, text, (_mark(str(error).removeprefix(f"{path}:").strip(), path, text, error.where),))
 
 
-def _python(role: str, path: Path, text: str, T: float) -> Checked:
+def _python(role: str, path: Path, text: str, T: float, pulse: Callable[[], None]) -> Checked:
     from rds.checks import check_file
 
-    report = check_file(path, T)
+    report = check_file(path, T, pulse=pulse)
     marks, notes = [], []
     for each in report.reports:
         if each.interface in (role, "file"):

@@ -79,7 +79,7 @@ class DataDesk:
             self.description = describe(path, mapping, lambda done, of: task.advance(done, of, "reading"))
             return self.description
 
-        return self.session.work(f"describe {path.name}", work)
+        return self.session.work(f"describe {path.name}", work, own_code=True)
 
     def keep_map(self, text: str) -> Path:
         """Write `text` as the map beside the chosen file, after it was tried; InputError says what is wrong in it."""
@@ -124,7 +124,7 @@ class DataDesk:
             self.fitted = tuple(logs)
             return self.estimate
 
-        return self.session.work(f"fit {path.name}", work)
+        return self.session.work(f"fit {path.name}", work, own_code=True)
 
     def write_model(self) -> Path:
         """Write the last estimate as a model file; InputError if there is none, or the file is another thing."""
@@ -157,7 +157,7 @@ class DataDesk:
             self.validation = validate(model, logs)
             return self.validation
 
-        return self.session.work(f"validate on {path.name}", work)
+        return self.session.work(f"validate on {path.name}", work, own_code=True)
 
     def _map(self) -> Path | None:
         name = self.choices["map"]

@@ -172,7 +172,7 @@ class Design:
     def check(self, path: Path) -> Task[Checked]:
         """Begin the check of a written file, as `rds check` does it."""
         T = self.choices["sample_period"]
-        return self.session.work("check", lambda task: self.builds.check("controller", path, T))
+        return self.session.work("check", lambda task: self.builds.check("controller", path, T, task.pulse))
 
     def try_it(self, path: Path) -> None:
         """Choose the file, the axis and the sample period in Equipment control."""

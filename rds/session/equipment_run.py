@@ -29,7 +29,8 @@ class EquipmentRun:
     """One run of `table`, the words of an experiment. `start()` returns at once, whatever has to be loaded first.
 
     It is work that a progress bar can follow: share, seconds_left, note, done, stop(). What goes wrong is in `error`
-    when it is over. `prepare()` is called first, beside the page (a check of the student's files).
+    when it is over. `prepare(pulse)` is called first, beside the page (a check of the student's files); `pulse` is of
+    `Builds.check`.
     """
 
     def __init__(
@@ -37,7 +38,7 @@ class EquipmentRun:
         session: Session,
         table: dict[str, Any],
         title: str | None = None,
-        prepare: Callable[[], None] | None = None,
+        prepare: Callable[[Callable[[], None]], None] | None = None,
     ):
         mode = str(table.get("mode", "simulation"))
         self.session, self.table = session, table
@@ -64,8 +65,7 @@ class EquipmentRun:
         with contextlib.ExitStack() as held:
             try:
                 if self._prepare is not None:
-                    self._tell(task, "checking your files")
-                    self._prepare()
+                    self._prepare(lambda: self._tell(task, "checking your files"))
                 self._tell(task, "loading")
                 experiment = Experiment.from_table(self.table, self.session.folder)
                 self.plan = experiment.plan()

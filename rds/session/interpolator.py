@@ -105,7 +105,9 @@ class Interpolating:
     def check(self) -> Task[list[Checked]]:
         """Begin to check the user's files, in a process of their own."""
         files, T = self.files(), self.choices["period"]
-        return self.session.work("check", lambda task: [self.builds.check("interpolator", path, T) for path in files])
+        return self.session.work(
+            "check", lambda task: [self.builds.check("interpolator", path, T, task.pulse) for path in files]
+        )
 
     def run(self) -> Task[Interpolation]:
         """Begin to interpolate. InputError for what can be seen to be wrong at once."""
@@ -122,7 +124,7 @@ class Interpolating:
             path = segments
             if files:
                 task.note = "checking your file"
-                self.builds.require([("interpolator", file) for file in files], T)
+                self.builds.require([("interpolator", file) for file in files], T, task.pulse)
             if program is not None:
                 task.note = "reading the program"
                 path, rests, self.notes = read_program(program, self.session.machine, T)
@@ -135,7 +137,7 @@ class Interpolating:
                 path, T, acceleration=acceleration, exact_stop=exact, rests=rests, lines=lines, arcs=arcs
             )
 
-        return self.session.work("interpolate", work)
+        return self.session.work("interpolate", work, own_code=bool(files))
 
     def save(self, done: Interpolation) -> Path:
         """Save the samples under the name that is chosen; InputError where there is such a file already."""

@@ -242,7 +242,8 @@ class Program:
             self.save()
         changes = [(0.0, "override", share)] if share != 1.0 else []
         changes += [] if self.choices["optional_stop"] else [(0.0, "optional_stop", 0.0)]
-        prepare = (lambda: self.builds.require(files, self.machine.sample_period)) if files else None
+        T = self.machine.sample_period
+        prepare = (lambda pulse: self.builds.require(files, T, pulse)) if files else None
         mode = str(self.choices["mode"])
         return ProgramWork(self.session, self.text.path, mode, self.setup(), controller, changes, prepare)
 

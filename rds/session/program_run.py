@@ -39,7 +39,7 @@ class ProgramWork(EquipmentRun):
         setup: Setup,
         controller: str,
         changes: list[tuple[float, str, float]],
-        prepare: Callable[[], None] | None = None,
+        prepare: Callable[[Callable[[], None]], None] | None = None,
     ):
         super().__init__(session, {"mode": mode}, f"{file.name}, {mode}", prepare)
         self.file, self.mode = file, mode
@@ -51,8 +51,7 @@ class ProgramWork(EquipmentRun):
         with contextlib.ExitStack() as held:
             try:
                 if self._prepare is not None:
-                    self._tell(task, "checking the controller's file")
-                    self._prepare()
+                    self._prepare(lambda: self._tell(task, "checking the controller's file"))
                 self._tell(task, "planning the program")
                 part = PartProgram(
                     self.file, self.session.machine, setup=self._setup, controller=self._controller, mode=self.mode

@@ -115,9 +115,15 @@ class Session:
 
     # work
 
-    def work(self, title: str, work: Callable[[Task[T]], T], on_stop: Callable[[], None] | None = None) -> Task[T]:
+    def work(
+        self,
+        title: str,
+        work: Callable[[Task[T]], T],
+        on_stop: Callable[[], None] | None = None,
+        own_code: bool = False,
+    ) -> Task[T]:
         """Begin long work; see Task."""
-        task = Task(title, work, on_stop)
+        task = Task(title, work, on_stop, own_code)
         with self._lock:
             self.tasks = [each for each in self.tasks if not each.done] + [task]
         return task.start()

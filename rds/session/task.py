@@ -7,25 +7,39 @@ import time
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
+from rds.core.blame import is_students, student_error
+from rds.core.errors import ContractError
+from rds.core.interrupt import Endless, interruptible
+
 T = TypeVar("T")
 
 
-class Stopped(Exception):
-    """Raised inside a task's work once somebody has asked it to end."""
+class Stopped(BaseException):
+    """Raised inside a task's work once somebody has asked it to end. No Exception, which the work may catch."""
+
+    def __init__(self) -> None:
+        super().__init__("stopped")
 
 
 class Task(Generic[T]):
     """One piece of work in a thread of its own: `work(task)` calls `task.advance(...)` now and then.
 
     `advance` raises Stopped once `stop()` was called; work that has a better way of ending hands in `on_stop`.
+    `own_code` says that a user's code is called in it, which is interrupted where it is if it does not end.
     """
 
-    def __init__(self, title: str, work: Callable[[Task[T]], T], on_stop: Callable[[], None] | None = None):
+    def __init__(
+        self,
+        title: str,
+        work: Callable[[Task[T]], T],
+        on_stop: Callable[[], None] | None = None,
+        own_code: bool = False,
+    ):
         self.title = title
         self.result: T | None = None
         self.error: BaseException | None = None
         self.note = ""  # what it is doing now
-        self._work, self._on_stop = work, on_stop
+        self._work, self._on_stop, self._own_code = work, on_stop, own_code
         self._share: float | None = None
         self._began: float | None = None
         self._ended: float | None = None
@@ -38,6 +52,10 @@ class Task(Generic[T]):
         self._began = time.monotonic()
         self._thread.start()
         return self
+
+    def pulse(self) -> None:
+        """Said by work that cannot tell how far it is. Raises Stopped when it should end."""
+        self.advance(0.0, 0.0)
 
     def advance(self, done: float, of: float, note: str = "") -> None:
         """Said by the work: how far it is. Raises Stopped when it should end."""
@@ -92,7 +110,12 @@ class Task(Generic[T]):
 
     def _go(self) -> None:
         try:
-            self.result = self._work(self)
+            if self._own_code:
+                self.result = interruptible(lambda: self._work(self), self._asked.is_set)
+            else:
+                self.result = self._work(self)
+        except Endless as error:
+            self.error = ContractError(student_error(error)) if is_students(error) else Stopped()
         except BaseException as error:
             self.error = error
         finally:

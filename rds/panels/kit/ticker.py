@@ -6,6 +6,8 @@ import asyncio
 import logging
 from collections.abc import Callable
 
+from rds.session.task import Stopped
+
 PERIOD = 0.1  # s
 
 
@@ -35,7 +37,7 @@ class Ticker:
         for call in tuple(self._calls):
             try:
                 call()
-            except Exception:
+            except (Exception, Stopped):
                 logging.getLogger(__name__).exception("a panel could not be brought up to date")
                 if call in self._calls:
                     self._calls.remove(call)

@@ -1,0 +1,61 @@
+"""Work with a user's code in it, which can be ended where it is: a loop without an end in it hears of no request."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+PATIENCE = 1.0  # s in which work that was asked to end may do so by itself
+_POLL = 0.05  # s
+
+
+class Endless(BaseException):
+    """Raised in a user's code that was asked to end and did not. No Exception, which such code may catch and go on."""
+
+    def __init__(self) -> None:
+        super().__init__("it was still here when it was asked to end; look for a loop without an end")
+
+
+def interruptible(
+    work: Callable[[], T],
+    asked: Callable[[], bool],
+    steps: Callable[[], Any] = lambda: None,
+    patience: float = PATIENCE,
+) -> T:
+    """`work()` in a thread of its own, and its answer or error.
+
+    Once `asked()` is true, and `steps()` has not changed for `patience` s, Endless is raised in it, at the line where
+    it is, until it ends. A single call into compiled code that takes long ends only when that returns.
+    """
+    answer: list[T] = []
+    errors: list[BaseException] = []
+
+    def go() -> None:
+        try:
+            answer.append(work())
+        except BaseException as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=go, name="rds interruptible", daemon=True)
+    thread.start()
+    last, since = steps(), time.monotonic()
+    while thread.is_alive():
+        thread.join(_POLL)
+        now, step = time.monotonic(), steps()
+        if step != last or not asked():
+            last, since = step, now
+        elif now - since > patience:
+            _raise_in(thread, Endless)
+            since = now
+    if answer:
+        return answer[0]
+    raise errors[0] if errors else Endless()  # none where it was interrupted once more while it ended
+
+
+def _raise_in(thread: threading.Thread, error: type[BaseException]) -> None:
+    if thread.ident is not None:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(error))
