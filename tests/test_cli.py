@@ -180,6 +180,19 @@ def test_a_fault_of_the_student_s_code_is_exit_code_2(folder: Path) -> None:
     assert not (folder / "out").exists()
 
 
+def test_a_class_of_the_student_s_that_fails_when_it_is_looked_at_is_told_with_its_line(folder: Path) -> None:
+    (folder / "odd.py").write_text("class Odd:\n    def __array__(self, *rest):\n        raise RuntimeError('odd')\n")
+    (folder / "model.py").write_text(
+        "from odd import Odd\ninitial_state = Odd()\ndef derivatives(t, x, u, params):\n    return [x[1], 0.0]\n"
+    )
+    (folder / "e.toml").write_text(SIMULATION + "[model]\nfile = 'model.py'\n")
+    done = call("run", "e.toml", "--out", "out")
+    assert (done.exit_code, done.stderr) == (
+        2,
+        "rds: odd.py, line 3, in __array__: RuntimeError: odd: `raise RuntimeError('odd')`\n",
+    )
+
+
 def test_check(folder: Path) -> None:
     good = command("check", "law.py", "--json")
     assert good.returncode == 0

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from rds.checks import clauses
-from rds.checks.values import is_real, shown
+from rds.checks.values import is_real
+from rds.core.values import shown
 
 
 def voltage_fault(answer: Any, axes: int = 0) -> tuple[str, str, str] | None:

@@ -17,11 +17,12 @@ from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
-from rds.checks.values import same, shown, size
+from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
+from rds.core.values import shown
 
 BUDGET = 2.0  # s for each pass over the run: a slow controller is judged by fewer samples
 _LEAST = 5  # samples, whatever they take

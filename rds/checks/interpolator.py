@@ -18,10 +18,11 @@ from rds.checks.rows import Trace, alternate, trace
 from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
 from rds.checks.track import follows_chord, judge_track
-from rds.checks.values import same, shown
+from rds.checks.values import same
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.signature import argument_fault
 from rds.core.types import Segment
+from rds.core.values import shown
 
 BUDGET = 3.0  # s for each segment
 _LEAST = 20  # rows, whatever they take

@@ -15,13 +15,14 @@ from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
-from rds.checks.values import same, shown
+from rds.checks.values import same
 from rds.checks.vectors import is_ragged, output_fault, vector_fault, vector_of
 from rds.core.adapt import as_model, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import RdsError
 from rds.core.signature import argument_fault
 from rds.core.types import Model
+from rds.core.values import shown
 
 BUDGET = 2.0  # s for each pass over the run
 SUBSTEPS = 2  # of RK4 in each sample: the check wants the path's kind, not its digits

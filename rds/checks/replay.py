@@ -9,9 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from rds.checks.values import same, shown
+from rds.checks.values import same
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.types import Source
+from rds.core.values import shown
 
 
 class Call(NamedTuple):

@@ -12,11 +12,11 @@ import numpy as np
 
 from rds.checks import clauses
 from rds.checks.paths import name_of
-from rds.checks.values import shown
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import RdsError
 from rds.core.geometry import length
 from rds.core.types import Segment, Source
+from rds.core.values import shown
 
 _ROWS_PER_ROW = 10  # how many times more rows than the feed rate asks for are still a slow start and stop
 _SPARE_ROWS = 5000

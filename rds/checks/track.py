@@ -8,9 +8,9 @@ from rds.checks import clauses
 from rds.checks.paths import chord_distances, distances, name_of, swept
 from rds.checks.report import Findings
 from rds.checks.rows import Trace
-from rds.checks.values import shown
 from rds.core.geometry import length, sweep
 from rds.core.types import ArcSegment
+from rds.core.values import shown
 
 PATH = 0.05  # mm: several counts of a mill's encoder, and several steps of a reference-pulse interpolator
 END = 0.05  # mm

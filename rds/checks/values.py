@@ -98,15 +98,6 @@ def size(value: Any, depth: int = 0) -> int:
     return size(own, depth + 1) if own else 1
 
 
-def shown(value: Any, length: int = 80) -> str:
-    """Its text, on one line and not longer than `length` characters."""
-    try:
-        text = " ".join(repr(value).split())
-    except Exception:  # a class of the student's may fail to print itself
-        text = f"a {type(value).__name__}"
-    return text if len(text) <= length else text[: length - 1] + "…"
-
-
 def is_real(value: Any) -> bool:
     """Whether it is one real number, as `float()` takes it: not a bool, nor text, nor an array with dimensions."""
     if isinstance(value, bool | np.bool_):

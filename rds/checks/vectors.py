@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rds.checks import clauses
-from rds.checks.values import shown
+from rds.core.values import shown
 
 
 def vector_of(answer: Any) -> np.ndarray | None:

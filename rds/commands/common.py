@@ -27,6 +27,7 @@ Channel = Annotated[
 @contextmanager
 def refusals() -> Iterator[None]:
     """Errors that a user can act on go to stderr as a sentence, with exit code 2."""
+    from rds.core.blame import is_students, student_error
     from rds.core.errors import RdsError
 
     try:
@@ -38,6 +39,11 @@ def refusals() -> Iterator[None]:
         place = f"{error.filename}: " if error.filename else ""
         remedy = "check that the folder can be written and that the disk has room"
         typer.echo(f"rds: {place}{error.strerror or error}; {remedy}", err=True)
+        raise typer.Exit(2) from error
+    except Exception as error:  # a class of the student's may fail wherever it is looked at
+        if not is_students(error):
+            raise
+        typer.echo(f"rds: {student_error(error)}", err=True)
         raise typer.Exit(2) from error
 
 

@@ -20,6 +20,7 @@ from rds.core.blame import STUDENT_ERRORS, student_error, student_line
 from rds.core.errors import ContractError, InputError
 from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
 from rds.core.types import Controller, Reference, Source
+from rds.core.values import own_copy, shown
 
 __all__ = ["StudentFile", "from_function", "from_namespace", "load_student", "student_error"]
 
@@ -49,7 +50,7 @@ class StudentFile:
 
     def parameters(self, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Its own copy of `params` with `overrides`; InputError for a key that `params` does not have."""
-        merged = copy.deepcopy(dict(self.params))
+        merged: dict[str, Any] = own_copy(dict(self.params), "params", self.source.path or self.source.name)
         for key, value in (overrides or {}).items():
             if key not in merged:
                 known = ", ".join(map(str, merged)) or "none"
@@ -62,10 +63,10 @@ class StudentFile:
         control = self.functions.get("control")
         if control is None:
             raise ContractError(f"no controller: it defines no {form('control')}", self.source.name)
-        merged = self.parameters(params)
+        merged, where = self.parameters(params), self.source.path or self.source.name
         if self.initial_state is None and not coupled:
             _needs_no_state(control, merged, self.source)
-        state = () if self.initial_state is None else copy.deepcopy(self.initial_state)
+        state = () if self.initial_state is None else own_copy(self.initial_state, "initial_state", where)
         return Controller(control, state, merged, self.source, coupled)
 
 
@@ -136,7 +137,7 @@ def _validate(student: StudentFile) -> None:
         kind = type(student.params).__name__
         where = student.source.path or student.source.name
         raise ContractError(
-            f"params is {student.params!r:.60} ({kind}); it must be a dict of defaults, as in {{'gain': 20.0}}", where
+            f"params is {shown(student.params)} ({kind}); it must be a dict of defaults, as in {{'gain': 20.0}}", where
         )
     for name, function in student.functions.items():
         if fault := argument_fault(name, function):

@@ -17,6 +17,7 @@ import numpy as np
 from rds.core.errors import ContractError, InputError
 from rds.core.integrate import SUBSTEPS, rk4
 from rds.core.types import Model, Source
+from rds.core.values import shown
 
 Function = Callable[..., Any]
 
@@ -122,8 +123,8 @@ def _vector(answer: Any, size: int, function: str, meaning: str) -> np.ndarray:
     vector = _flat(answer)
     if vector.size != size:
         raise ContractError(
-            f"{function}() returned {answer!r:.200}; it must return {meaning}, {size} number{'s' if size != 1 else ''} "
-            f"as the initial state has"
+            f"{function}() returned {shown(answer, 200)}; it must return {meaning}, "
+            f"{size} number{'s' if size != 1 else ''} as the initial state has"
         )
     return vector
 
@@ -157,7 +158,7 @@ def _output_by_student(x: Sequence[float], *, function: Function, params: Mappin
     answer = function(0.0, np.array(x, dtype=float), np.zeros(1), params)
     values = _flat(answer)
     if values.size == 0:
-        raise ContractError(f"output() returned {answer!r:.200}; it must return the measured position, one number")
+        raise ContractError(f"output() returned {shown(answer, 200)}; it must return the measured position, one number")
     return float(values[0])
 
 
@@ -165,7 +166,8 @@ def _initial_state(values: Sequence[float]) -> tuple[float, ...]:
     state = _flat(values)
     if state.size == 0 or not np.isfinite(state).all():
         raise InputError(
-            f"model: initial_state = {values!r} must hold finite numbers, such as [0.0, 0.0] for position and velocity"
+            f"model: initial_state = {shown(values, 200)} must hold finite numbers, such as [0.0, 0.0] for "
+            f"position and velocity"
         )
     return tuple(state.tolist())
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from rds.core.errors import ContractError
 from rds.core.types import Controller, Reference
+from rds.core.values import own_copy, shown
 from rds.interface import as_voltage
 from rds.runtime.loop import Law
 
@@ -71,7 +72,7 @@ def controlled(
     `params` are the controller's, in a table that may be changed while it runs.
     """
     control = controller.control
-    state = controller.initial_state
+    state = _first_state(controller)
     p, v, a = reference.columns()
     make = Reference._make
 
@@ -81,7 +82,7 @@ def controlled(
         y = positions[axis]
         answer = control(k * T, r, y, state, params)
         try:
-            u, state = answer
+            u, state = answer if type(answer) is tuple else _pair(answer)
             if type(u) is not float:
                 u = as_voltage(u)
             voltages.append(limit(u))
@@ -104,7 +105,7 @@ def coupled(
 ) -> Law:
     """Several axes under one controller that gets and gives arrays in axis order; `params` as of `controlled`."""
     control = controller.control
-    state = controller.initial_state
+    state = _first_state(controller)
     n = len(axes)
     # for each part of a reference, one column per axis
     parts = list(zip(*(reference.columns() for reference in references), strict=True))
@@ -116,8 +117,8 @@ def coupled(
         y = np.array([positions[axis] for axis in axes])
         answer = control(k * T, r, y.copy(), state, params)
         try:
-            u, state = answer
-            commands = np.asarray(u, dtype=float).reshape(n).tolist()
+            u, state = _pair(answer)
+            commands = _commands(u, n)
             voltages += [limit(value) for limit, value in zip(limits, commands, strict=True)]
         except (TypeError, ValueError, OverflowError, ContractError):
             raise BrokenContract(_fault(answer, k * T, ", ".join(names), n), controller.source.path) from None
@@ -138,12 +139,33 @@ def played(axis: int, signal: Sequence[float], limit: Callable[[Any], float]) ->
     return law
 
 
+def _first_state(controller: Controller) -> Any:
+    """A state of this run's own: one that is changed in place must not be the next run's, nor another axis's."""
+    return own_copy(controller.initial_state, "initial_state", controller.source.path)
+
+
+def _pair(answer: Any) -> Any:
+    """The answer, if it has an order: a dict or a set would be unpacked into its keys. TypeError otherwise."""
+    if not isinstance(answer, tuple | list):
+        raise TypeError
+    return answer
+
+
+def _commands(u: Any, n: int) -> list[float]:
+    """The `n` voltages of a coupled law, V; TypeError or ValueError for what is not that, such as texts."""
+    array = np.asarray(u)
+    if array.dtype.kind not in "fiu":
+        raise TypeError
+    values: list[float] = array.astype(float).reshape(n).tolist()
+    return values
+
+
 def _fault(answer: Any, t: float, axis: str, n: int = 1) -> str:
     wanted = "one finite number in V" if n == 1 else f"{n} finite numbers in V, one for each axis"
     if not isinstance(answer, tuple | list) or len(answer) != 2:
-        shown = f"control() returned {answer!r:.200} at t = {t:.3f} s (axis {axis})"
-        return f"{shown}; it must return (voltage, next_state) with a finite voltage in V"
+        said = f"control() returned {shown(answer, 200)} at t = {t:.3f} s (axis {axis})"
+        return f"{said}; it must return (voltage, next_state) with a finite voltage in V"
     return (
-        f"control() returned the voltage {answer[0]!r:.200} at t = {t:.3f} s (axis {axis}); "
+        f"control() returned the voltage {shown(answer[0], 200)} at t = {t:.3f} s (axis {axis}); "
         f"it must return (voltage, next_state) with the voltage {wanted}"
     )

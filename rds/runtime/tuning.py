@@ -9,6 +9,7 @@ from typing import Any
 
 from rds.core.options import Option
 from rds.core.types import Controller
+from rds.core.values import own_copy
 from rds.runtime.desk import Channel
 
 _ANY = Option("parameter of control()")
@@ -21,7 +22,7 @@ class Tuning:
     """
 
     def __init__(self, owner: str, controller: Controller, unit: str = "mm"):
-        self.params: dict[str, Any] = dict(controller.params)
+        self.params: dict[str, Any] = own_copy(dict(controller.params), "params", controller.source.path)
         self._retune = controller.retune
         self._values: dict[str, float] = {}
         self.channels: list[Channel] = []
@@ -57,11 +58,14 @@ class Tuning:
 
 def _numbers(params: Mapping[str, Any]) -> dict[str, Option]:
     """The plain numbers among a student's parameters."""
-    return {
-        name: _ANY
-        for name, value in params.items()
-        if isinstance(name, str) and isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-    }
+    return {name: _ANY for name, value in params.items() if isinstance(name, str) and _is_number(value)}
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:  # an int of hundreds of digits
+        return False
 
 
 def _unit(option: Option) -> str:

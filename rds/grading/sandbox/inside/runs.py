@@ -10,11 +10,11 @@ from dataclasses import replace
 from typing import Any
 
 from rds.checks.rows import iterate, row_of
-from rds.checks.values import shown
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import InputError
 from rds.core.load import StudentFile
 from rds.core.types import ArcSegment, LineSegment, Reference, Segment
+from rds.core.values import shown
 from rds.grading.sandbox import records
 from rds.grading.sandbox.inside import walls
 from rds.grading.sandbox.inside.channel import Channel
