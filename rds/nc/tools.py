@@ -74,23 +74,26 @@ def read_tools(path: Path) -> list[Tool]:
     Raises ProgramError with line and column for a word that is none of the table's, a line without T or P (LinuxCNC
     passes over the first and misreads the second), or a tool that comes twice.
     """
-    tools: list[Tool] = []
     try:
-        lines = path.read_bytes().decode("utf-8-sig", "replace").split("\n")  # as editors count them
+        text = path.read_bytes().decode("utf-8-sig", "replace")
     except OSError as error:
         raise ProgramError(
             f"the tool table cannot be read ({error.strerror}); check its path", file=str(path)
         ) from None
-    for line, text in enumerate(lines, start=1):
-        tool = _read_line(text, str(path), line)
+    return tools_of(text, str(path))
+
+
+def tools_of(table: str, file: str) -> list[Tool]:
+    """The tools of a table's text; `file` is where faults are said to be. Raises ProgramError as `read_tools` does."""
+    tools: list[Tool] = []
+    for line, text in enumerate(table.split("\n"), start=1):  # as editors count them
+        tool = _read_line(text, file, line)
         if tool is None:
             continue
         if any(tool.number == other.number for other in tools):
-            raise ProgramError(
-                "this tool comes twice; leave one line", file=str(path), line=line, word=f"T{tool.number}"
-            )
+            raise ProgramError("this tool comes twice; leave one line", file=file, line=line, word=f"T{tool.number}")
         if len(tools) >= _MOST:
-            raise ProgramError(f"more than {_MOST} tools; shorten the table", file=str(path), line=line)
+            raise ProgramError(f"more than {_MOST} tools; shorten the table", file=file, line=line)
         tools.append(tool)
     return tools
 

@@ -8,8 +8,6 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import RdsError
-from rds.nc.tools import Tool
 from rds.panels.kit.notice import Notice
 from rds.panels.path_view import PathView
 from rds.results import html
@@ -86,18 +84,3 @@ def _numbers(look: Look, program: Program) -> str:
         heads = ["axis", "least [mm]", "greatest [mm]", "travel [mm]", ""]
         parts.append(html.table(heads, rows, "Reach, machine coordinates"))
     return "".join(parts)
-
-
-def tool_table(program: Program) -> str:
-    """The tools of the table chosen; the sentence why not where it is wrong."""
-    if not program.choices["tools"]:
-        return "<p>No tool table is chosen: T M6, G43 and G41 need one. Save a .tbl file in your folder.</p>"
-    try:
-        tools: Sequence[Tool] = program.tools()
-    except RdsError as error:
-        return f'<p role="alert">✖ {escape(str(error))}</p>'
-    rows = [
-        [f"T{tool.number}", tool.pocket, f"{tool.diameter:g}", f"{tool.offset[2]:g}", tool.comment] for tool in tools
-    ]
-    heads = ["tool", "pocket", "diameter [mm]", "length Z [mm]", "comment"]
-    return html.table(heads, rows, f"Tools of {program.choices['tools']}")

@@ -8,14 +8,15 @@ import ipywidgets as widgets
 
 from rds.core.errors import InputError, RdsError
 from rds.panels.editor import Editor
-from rds.panels.kit.field import FieldView, field_group
+from rds.panels.kit.field import field_group
 from rds.panels.kit.notice import Notice
 from rds.panels.program_files import ProgramFiles
 from rds.panels.program_operator import Operator
-from rds.panels.program_preview import Preview, tool_table
+from rds.panels.program_preview import Preview
 from rds.panels.program_result import ProgramResult
 from rds.panels.program_status import status_html
 from rds.panels.strip import StripChart
+from rds.panels.tool_view import ToolView
 from rds.session.program import Program
 from rds.session.program_check import Look
 from rds.session.program_run import ProgramWork
@@ -43,7 +44,7 @@ class ProgramView:
         self.strip = StripChart(height=170)
         self.strip.layout.display = "none"
         self.result = ProgramResult(shell, self.editor.go)
-        self.tools = widgets.HTML()
+        self.tools = ToolView(self.program)
         self.program.choices.watch(self._chosen)
         self.widget = self._arranged()
         self._show_status()
@@ -54,12 +55,7 @@ class ProgramView:
     def _arranged(self) -> widgets.Widget:
         choices = self.program.choices
         settings = field_group(choices, ["controller", "optional_stop", "block_delete"])
-        again = widgets.Button(description="Look again", tooltip="Look for tool tables in the folder")
-        again.on_click(lambda _: self._refresh_tools())
-        table = widgets.HBox([FieldView(choices, "tools", buttons=False), again])
-        table.add_class("rds-row")
-        table.layout.align_items = "flex-end"
-        more = widgets.VBox([settings, table, self.tools])
+        more = widgets.VBox([settings, self.tools.widget])
         run = widgets.VBox([self.status, self.strip])
         self.tabs = widgets.Tab([self.preview.widget, run, self.result.widget, more], titles=TABS)
         self.tabs.add_class("rds-tabs")
@@ -94,18 +90,11 @@ class ProgramView:
                 self._opened()
             self.files.refresh()
         elif name == "tools":
-            self._show_tools()
-
-    def _refresh_tools(self) -> None:
-        self.program.refresh()
-        self._show_tools()
-
-    def _show_tools(self) -> None:
-        self.tools.value = tool_table(self.program)
+            self.tools.chosen()
 
     def _turned(self, change: Any) -> None:
         if change["new"] == SETTINGS:
-            self._refresh_tools()
+            self.tools.refresh()
 
     # ten times a second
 
