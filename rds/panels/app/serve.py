@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.panels import PANELS
 from rds.panels.app.page import FOLDER, MACHINE, PANEL
+from rds.panels.app.ready_kernel import ReadyKernel
 
 _HERE = Path(__file__).parent
 
@@ -19,10 +22,6 @@ def serve(folder: Path, machine: str, panel: str, port: int | None, browser: boo
 
     Only who has the address with its token gets in: a kernel runs whatever its page asks for.
     """
-    try:
-        from voila.app import Voila
-    except ImportError as error:
-        raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error
     if not folder.is_dir():
         raise InputError("is no folder; give the one with your files, or make it first", str(folder))
     load_machine(machine)
@@ -34,7 +33,27 @@ def serve(folder: Path, machine: str, panel: str, port: int | None, browser: boo
         MACHINE: machine,
         PANEL: panel,
     }
-    Voila.launch_instance(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, address)])
+    ready = ReadyKernel()  # imports while this process does
+    try:
+        launch = _server(ready)
+        launch(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, address)])
+    finally:
+        ready.close()
+
+
+def _server(ready: ReadyKernel) -> Callable[..., None]:
+    """Voilà, which takes its first kernel from `ready`; InputError where it is missing."""
+    # jsonschema does without this one, which compiles a grammar of addresses for a second that nothing here checks
+    sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
+    try:
+        from voila.app import Voila
+
+        from rds.panels.app.provisioner import offer
+    except ImportError as error:
+        raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error
+    offer(ready)
+    launch: Callable[..., None] = Voila.launch_instance
+    return launch
 
 
 def _options(port: int | None, browser: bool, address: str) -> list[str]:
@@ -46,7 +65,7 @@ def _options(port: int | None, browser: bool, address: str) -> list[str]:
         "VoilaConfiguration.preheat_kernel": True,  # the first page opens on a kernel that has loaded everything
         "VoilaConfiguration.default_pool_size": 1,
         "VoilaConfiguration.show_tracebacks": True,
-        "VoilaConfiguration.file_allowlist": [],
+        "VoilaConfiguration.file_allowlist": "$.",  # a pattern that no file fits
     }
     if port is not None:
         settings |= {"Voila.port": port, "Voila.port_retries": 0}
