@@ -18,7 +18,6 @@ from rds.session.task import Task
 
 if TYPE_CHECKING:
     from rds.nc.check import Setup
-    from rds.nc.tools import Tool
     from rds.session.program_check import Look
     from rds.session.program_run import ProgramWork
 
@@ -216,10 +215,6 @@ class Program:
     def refresh(self) -> None:
         """Look for tool tables that have come or gone."""
         self.choices.replace([_table_field(self.session.folder)])
-
-    def tools(self) -> list[Tool]:
-        """The tools of the table; InputError where it is wrong."""
-        return self.setup().tool_list()
 
     # running it
 
