@@ -15,6 +15,8 @@ def as_voltage(value: Any) -> float:
 
     Raises ContractError unless it is one finite real number (a float, an int, or a numpy scalar or array of one).
     """
+    if type(value) is float and isfinite(value):  # nearly always, and ten times as fast as the rest
+        return value
     number = value
     if getattr(value, "size", None) == 1 and getattr(getattr(value, "dtype", None), "kind", "") in ("f", "i", "u"):
         number = value.reshape(-1)[0].item()

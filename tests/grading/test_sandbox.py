@@ -83,6 +83,13 @@ def test_several_axes_get_and_give_arrays(pool: Pool, written: Callable[..., Pat
         assert subject.control(0.0, ((1.0, 2.0), (10.0, 20.0), (0.0, 0.0)), (0.5, 0.25)) == (20.5, 11.75)
 
 
+def test_finite_voltages_are_taken_whose_sum_is_not(pool: Pool, written: Callable[..., Path]) -> None:
+    law = "def control(t, r, y, state, params):\n    return [1.7e308, 1.7e308], state\n"
+    with pool.open(written(law, "")) as subject:
+        subject.begin_control(T=T, axes=("X", "Y"))
+        assert subject.control(0.0, ((0.0, 0.0),) * 3, (0.0, 0.0)) == (1.7e308, 1.7e308)
+
+
 def test_a_model_moves_as_it_does_outside(pool: Pool, written: Callable[..., Path]) -> None:
     path = written(MODEL, "")
     motion = start(student_model(load_student(path)), T)
