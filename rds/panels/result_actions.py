@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -18,6 +19,7 @@ from rds.results.serve import server_of
 from rds.session.email import check_address, mail_server, send_files
 from rds.session.fields import Text
 from rds.session.save_as import save_as
+from rds.session.task import Stopped, Task
 
 
 class ResultActions:
@@ -94,7 +96,11 @@ class ResultActions:
         files = [path for name in self._sent if (path := self._folder / name).is_file()]
         subject, folder = f"RDS: {self._folder.name}", self._session.folder
         text = f"Results of {self._folder.name}, sent from RDS.\n"
-        task = self._session.work("send", lambda task: send_files(mail_server(folder), to, subject, text, files))
+
+        def work(task: Task[str]) -> str:
+            return send_files(mail_server(folder), to, subject, text, files, lambda: task.stopping)
+
+        task = self._session.work("send", work)
         task.note = "sending"
         self.bar.follow(task, lambda: self._said(task))
 
@@ -102,9 +108,9 @@ class ResultActions:
         if task.error is None:
             self.notice.say(task.result, "good")
         else:
-            self.notice.say(str(task.error), "error")
-            if not isinstance(task.error, RdsError):
-                raise task.error
+            self.notice.say(str(task.error), "warning" if task.stopping else "error")
+            if not isinstance(task.error, RdsError | Stopped):
+                logging.getLogger(__name__).error("%s failed", task.title, exc_info=task.error)
 
 
 def _refuse(text: str) -> None:

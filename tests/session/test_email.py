@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import email
 import socket
+import threading
 from collections.abc import Iterator
 from email.policy import default
 from pathlib import Path
@@ -12,7 +14,7 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError, MachineError
-from rds.session.email import Server, mail_server, send_files
+from rds.session.email import Server, check_address, mail_server, send_files
 
 aiosmtpd_controller = pytest.importorskip(
     "aiosmtpd.controller", reason="aiosmtpd is not installed: pip install rds[dev]"
@@ -119,3 +121,57 @@ def test_a_wrong_set_up_is_told(tmp_path: Path, text: str, environment: dict[str
         (tmp_path / "email.toml").write_text(text)
     with pytest.raises(InputError, match=reason):
         mail_server(tmp_path, environment)
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["a(b@c.de", "undisclosed:a@b.de", "=?utf-8?q?x=0aBcc?=@b.de", "a@b.de\r\nBcc: x@y.de", "a@b.de\x00", "[a@b.de]",
+     "a@\ud800.de", "\u00e4@b.de", "a..b@c.de", "a@b..de", f"a@{'b' * 300}", 'a"b@c.de'],
+)  # fmt: skip
+def test_an_address_that_a_mail_program_could_take_for_another_is_refused(address: str) -> None:
+    with pytest.raises(InputError, match="is no e-mail address"):
+        check_address(address)
+
+
+@pytest.mark.parametrize("address", ["me@example.edu", "first.last+rds@lab-3.example.edu", "o'neil@localhost"])
+def test_ordinary_addresses_are_taken(address: str) -> None:
+    assert check_address(f" {address} ") == address
+
+
+@contextlib.contextmanager
+def dripping() -> Iterator[int]:
+    """A server whose greeting never ends: a line now and then. Its port."""
+    over = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            with contextlib.suppress(OSError):
+                line, _ = server.accept()
+                with line:
+                    while not over.wait(0.02):
+                        line.sendall(b"220-wait\r\n")
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield server.getsockname()[1]
+        over.set()
+        thread.join()
+
+
+def test_a_server_that_never_comes_to_the_point_is_left_in_time_and_at_once_when_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "result.csv").write_text("kept")
+    files = [tmp_path / "result.csv"]
+    with dripping() as port, pytest.raises(MachineError, match="it was stopped; the files are kept"):
+        send_files(Server("127.0.0.1", port, "lab@example.edu"), "me@example.edu", "s", "t", files, lambda: True)
+    monkeypatch.setattr("rds.session.email.LONGEST", 0.3)
+    with dripping() as port, pytest.raises(MachineError, match=r"took more than 0\.3 s"):
+        send_files(Server("127.0.0.1", port, "lab@example.edu"), "me@example.edu", "s", "t", files)
+
+
+@pytest.mark.parametrize("text", ["port = 587.5", "port = true", "user = 5"])
+def test_words_of_the_wrong_kind_are_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "email.toml").write_text(f'host = "h"\nsender = "lab@example.edu"\n{text}\n')
+    with pytest.raises(InputError, match=text.partition(" ")[0]):
+        mail_server(tmp_path, {"RDS_SMTP_PASSWORD": "x"})
