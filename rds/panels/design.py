@@ -10,6 +10,7 @@ import numpy as np
 
 from rds.core.errors import RdsError
 from rds.panels.design_charts import charts, details, key_numbers
+from rds.panels.kit.button import follow
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -77,7 +78,10 @@ class DesignView:
         self.replace_button.button_style = "warning"
         self.replace_button.layout.display = "none"
         self.try_button = _button("Try it", "Go to Equipment control with this file chosen", self._try)
-        row = widgets.HBox([self.write_button, self.replace_button, self.try_button])
+        self.picture_button = _button(
+            "Save a picture", "Poles and curves as a PNG file beside the controller's file", self._save_picture
+        )
+        row = widgets.HBox([self.write_button, self.replace_button, self.try_button, self.picture_button])
         row.add_class("rds-row")
         group = widgets.VBox([FieldView(self.design.choices, "file"), row])
         group.add_class("rds-group")
@@ -140,7 +144,8 @@ class DesignView:
         else:
             self._be_content()
             self._show(made)
-        self.write_button.disabled = self.try_button.disabled = self._made is None
+        for each in (self.write_button, self.try_button, self.picture_button):
+            each.disabled = self._made is None
 
     def _complain(self, sentence: str) -> None:
         self.notice.say(sentence, "error")
@@ -242,6 +247,28 @@ class DesignView:
             self.notice.say(str(error), "error")
         else:
             self.shell.open("equipment-control")
+
+    def _save_picture(self) -> None:
+        made, cloud, size = self._made, self._cloud, self.design.choices["step"]
+        if made is None or self.bar.busy:
+            return
+        self._complains = False
+
+        def work(task: Task[str]) -> str:
+            from rds.panels.design_picture import design_picture
+
+            task.note = "drawing"
+            return self.design.keep_picture(design_picture(made, size, cloud).png()).name
+
+        try:
+            self.design.file(self.design.choices["file"])
+        except RdsError as error:
+            self.notice.say(str(error), "error")
+            return
+        follow(self.bar, self.notice, lambda: self.shell.session.work("picture", work), self._pictured)
+
+    def _pictured(self, name: str) -> None:
+        self.notice.say(f"wrote {name}", "good")
 
     def _fit_to_write(self) -> bool:
         refused = [view.field.label for name, view in self._views.items() if name in self.design.shown and view.refused]

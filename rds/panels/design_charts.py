@@ -12,7 +12,7 @@ from rds.results.html import notes_list, table
 from rds.robustness.figures import MARGINS
 from rds.robustness.tracking_design import Cloud, StepResponse, TrackingDesign
 
-_BLUE, _RED, _GREY = "var(--rds-accent)", "var(--rds-warning)", "var(--rds-quiet)"
+ACCENT, ASIDE, QUIET = "var(--rds-accent)", "var(--rds-warning)", "var(--rds-quiet)"  # the page's own colours
 _SHORT = {
     "gain_margin": "gain margin",
     "modulus_margin": "least distance to −1",
@@ -35,7 +35,7 @@ def charts(design: TrackingDesign, size: float) -> list[Mapping[str, Any]]:
 def _steps(real: StepResponse, ideal: StepResponse) -> list[Mapping[str, Any]]:
     every = max(1, len(real.time) // _CURVE)
     t = real.time[::every]
-    goal = series([0.0, t[-1]], [real.size, real.size], "", _GREY, dash="2 3")
+    goal = series([0.0, t[-1]], [real.size, real.size], "", QUIET, dash="2 3")
     return [
         {
             "title": "Step",
@@ -43,15 +43,15 @@ def _steps(real: StepResponse, ideal: StepResponse) -> list[Mapping[str, Any]]:
             "y_label": "position [mm]",
             "series": [
                 goal,
-                series(t, ideal.position[::every], "no friction", _RED, dash="6 3"),
-                series(t, real.position[::every], "axis", _BLUE),
+                series(t, ideal.position[::every], "no friction", ASIDE, dash="6 3"),
+                series(t, real.position[::every], "axis", ACCENT),
             ],
         },
         {
             "title": "Voltage of the step",
             "x_label": "time [s]",
             "y_label": "voltage [V]",
-            "series": [series(t, real.voltage[::every], "", _BLUE)],
+            "series": [series(t, real.voltage[::every], "", ACCENT)],
         },
     ]
 
@@ -67,8 +67,8 @@ def _bode(w: np.ndarray, loop: np.ndarray) -> list[Mapping[str, Any]]:
             "y_label": "gain [dB]",
             "log": True,
             "series": [
-                series(ends, [0, 0], "", _GREY, dash="2 3"),
-                series(w, 20.0 * np.log10(np.abs(loop)), "", _BLUE),
+                series(ends, [0, 0], "", QUIET, dash="2 3"),
+                series(w, 20.0 * np.log10(np.abs(loop)), "", ACCENT),
             ],
         },
         {
@@ -77,7 +77,7 @@ def _bode(w: np.ndarray, loop: np.ndarray) -> list[Mapping[str, Any]]:
             "y_label": "phase [°]",
             "log": True,
             "y_step": 90,
-            "series": [series(ends, [-180, -180], "", _GREY, dash="2 3"), series(w, phase, "", _BLUE)],
+            "series": [series(ends, [-180, -180], "", QUIET, dash="2 3"), series(w, phase, "", ACCENT)],
         },
     ]
 
@@ -93,9 +93,9 @@ def _nyquist(loop: np.ndarray) -> Mapping[str, Any]:
         "x_range": [-2.5, 1.0],
         "y_range": [-1.5, 1.0],
         "series": [
-            series(np.cos(angle), np.sin(angle), "", _GREY, dash="2 3", width=1),
-            series([-1.0], [0.0], "−1", _RED, dots=True),
-            series(np.where(near, loop.real, np.nan), np.where(near, loop.imag, np.nan), "loop", _BLUE),
+            series(np.cos(angle), np.sin(angle), "", QUIET, dash="2 3", width=1),
+            series([-1.0], [0.0], "−1", ASIDE, dots=True),
+            series(np.where(near, loop.real, np.nan), np.where(near, loop.imag, np.nan), "loop", ACCENT),
         ],
     }
 
@@ -109,8 +109,8 @@ def _error(design: TrackingDesign) -> Mapping[str, Any]:
         "y_label": "gain [dB]",
         "log": True,
         "series": [
-            series([w[0], w[-1]], [0, 0], "", _GREY, dash="2 3"),
-            series(w, -20.0 * np.log10(np.abs(1.0 + loop)), "", _BLUE),
+            series([w[0], w[-1]], [0, 0], "", QUIET, dash="2 3"),
+            series(w, -20.0 * np.log10(np.abs(1.0 + loop)), "", ACCENT),
         ],
     }
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.machines import Machine, load_machine
+from rds.results.atomic import write_whole
 from rds.session.build import Builds, Checked
 from rds.session.choices import Choices
 from rds.session.design_fields import AXIS, LIBRARY, MODEL_FILE, PAIR, fields
@@ -168,6 +169,13 @@ class Design:
             observer_pole=self.choices["observer"],
             voltage_range=self.machine.converter.range,
         )
+
+    def keep_picture(self, png: bytes) -> Path:
+        """Write a picture beside the controller's file, under its name with a number that none has yet."""
+        file, number = self.file(self.choices["file"]), 1
+        while (path := file.with_name(f"{file.stem}-{number}.png")).exists():
+            number += 1
+        return write_whole(path, png)
 
     def check(self, path: Path) -> Task[Checked]:
         """Begin the check of a written file, as `rds check` does it."""

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+from rds.panels.design_picture import design_picture
+from rds.session import Session
+from rds.session.design import Design
 from tests.panels.conftest import App
 
 
@@ -110,6 +114,16 @@ def test_the_file_is_written_checked_asked_about_and_tried(open_page: Callable[.
     page.click('button:text-is("Try it")')
     page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
     page.wait_for_function("[...document.querySelectorAll('input')].some((each) => each.value == 'dragged.py')")
+
+
+def test_a_design_is_kept_as_a_picture_that_replaces_none(tmp_path: Path) -> None:
+    design = Design(Session(tmp_path))
+    picture = design_picture(design.now(), 1.0, None)
+    drawn = [axes for axes in picture.axes if axes.axison]
+    assert len(drawn) == 7 and all("[" in axes.get_xlabel() or "part" in axes.get_xlabel() for axes in drawn)
+    assert "-32 ± 24 i" in picture.get_suptitle()
+    names = [design.keep_picture(b"a picture").name for _ in range(2)]
+    assert names == ["my_tracking-1.png", "my_tracking-2.png"]
 
 
 def test_design_fits_the_screen_in_the_dark(open_page: Callable[..., Any]) -> None:
