@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Any
 
 from rds.core.errors import InputError
+
+_LONGEST_NAME = 255  # bytes of one part of a path, on every common file system
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,10 @@ class Number(Field):
             return None
         number = self._number(value)
         if not (isfinite(number) and self.low <= number <= self.high and number > self.above):
-            raise InputError(f"{self.label} must be {self.range}, not {value}")
+            raise InputError(f"{self.label} must be {self.range}, not {value!s:.60}")
         if self.whole:
             if number != int(number):
-                raise InputError(f"{self.label} must be a whole number{self._unit}, not {value}")
+                raise InputError(f"{self.label} must be a whole number{self._unit}, not {value!s:.60}")
             return int(number)
         return number
 
@@ -106,7 +109,7 @@ class Flag(Field):
 
 @dataclass(frozen=True)
 class Text(Field):
-    """Text of at most `longest` characters; `refuse(text)` may raise InputError."""
+    """Text of at most `longest` characters; `refuse(text)` may raise InputError. Without it, the text names a file."""
 
     placeholder: str = ""
     longest: int = 4096
@@ -116,8 +119,13 @@ class Text(Field):
         """The text."""
         if not isinstance(value, str) or len(value) > self.longest:
             raise InputError(f"{self.label} must be text of at most {self.longest} characters")
-        if self.refuse is not None and value:
-            self.refuse(value)
+        if bad := [c for c in value if unicodedata.category(c) in ("Cc", "Cs") and c not in "\t\n"]:
+            raise InputError(f"{self.label} holds a character that cannot be written, {bad[0]!r}; type it again")
+        if self.refuse is not None:
+            if value:
+                self.refuse(value)
+        elif any(len(part.encode()) > _LONGEST_NAME for part in value.split("/")):
+            raise InputError(f"{self.label} is longer than the name of a file can be, {_LONGEST_NAME} bytes")
         return value
 
 
@@ -130,7 +138,11 @@ class Several(Field):
 
     def check(self, value: Any) -> list[str]:
         """The keys; InputError for one that is not there, or too few."""
-        if not isinstance(value, Sequence) or isinstance(value, str) or any(key not in self.options for key in value):
+        if (
+            not isinstance(value, Sequence)
+            or isinstance(value, str)
+            or any(not isinstance(key, str) or key not in self.options for key in value)
+        ):
             raise InputError(f"{self.label} must be some of {', '.join(self.options)}, not {value!r:.60}")
         if len(set(value)) < self.least:
             raise InputError(f"{self.label} needs {self.least} or more of {', '.join(self.options)}")

@@ -106,3 +106,23 @@ def test_what_was_kept_and_will_not_do_any_more_is_said(tmp_path: Path) -> None:
 def test_a_damaged_file_of_choices_breaks_nothing(tmp_path: Path, content: str) -> None:
     (tmp_path / "session.json").write_text(content)
     assert Session(tmp_path).choices("model", [AMPLITUDE])["amplitude"] == 5.0
+
+
+@pytest.mark.parametrize("wrong", ["a\x00b", "a\rb", "a\ud800", "a\x1b[31m", "ä" * 200, "folder/" + "x" * 256])
+def test_text_that_can_name_no_file_is_refused(wrong: str) -> None:
+    with pytest.raises(InputError, match="File"):
+        Text("f", "File", "", "").check(wrong)
+
+
+def test_what_is_refused_is_quoted_only_in_part() -> None:
+    for wrong in ("9" * 5000, "x" * 5000):
+        with pytest.raises(InputError) as refusal:
+            AMPLITUDE.check(wrong)
+        assert len(str(refusal.value)) < 200
+
+
+def test_choices_kept_by_somebody_hostile_are_refused_in_words() -> None:
+    several = Several("s", "Several", "", [], {"a": "A"}, least=0)
+    for wrong in ([[1]], [{}], "a", {"a": 1}, 5, None):
+        with pytest.raises(InputError, match="Several must be some of"):
+            several.check(wrong)
