@@ -122,7 +122,9 @@ def check(
     sample_period: Annotated[float, typer.Option(help="Sample period that a call must fit into, s.")] = 0.001,
     axes: Annotated[
         int | None,
-        typer.Option(min=1, help="The controller is a coupled one: it gets arrays, one value per axis.", metavar="N"),
+        typer.Option(
+            min=1, max=64, help="The controller is a coupled one: it gets arrays, one value per axis.", metavar="N"
+        ),
     ] = None,
     json: Json = False,
 ) -> None:

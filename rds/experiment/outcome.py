@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.types import Ending, Model, Source
+from rds.core.values import shown
 from rds.experiment.bus_note import bus_note
 from rds.modes import load_mode
 from rds.modes.again import as_recorded
@@ -24,6 +25,8 @@ from rds.runtime.plan import Plan
 from rds.runtime.record import table
 from rds.runtime.stopwatch import TIMING_COLUMNS
 from rds.runtime.timing import Timing, judge, summary
+
+_LONGEST = 1024  # bits of an int that is kept as a number: beyond some thousand digits Python does not print it
 
 
 def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
@@ -117,7 +120,8 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
-    return value if isinstance(value, bool | int | float | str | None) else repr(value)[:200]
+    plain = isinstance(value, bool | float | str | None) or (isinstance(value, int) and value.bit_length() <= _LONGEST)
+    return value if plain else shown(value, 200)
 
 
 def _versions() -> dict[str, str]:

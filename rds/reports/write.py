@@ -25,7 +25,7 @@ def write(report: Report, folder: str | Path) -> list[Path]:
     """
     folder = Path(folder)
     pictures = {name: draw().png() for name, draw in report.figures.items()}
-    contents = {folder / f"{report.kind}.html": to_html(report, pictures).encode("utf-8")}
+    contents = {folder / f"{report.kind}.html": to_html(report, pictures).encode("utf-8", "backslashreplace")}
     for name, table in _named(report).items():
         contents[folder / f"{name}.csv"] = _csv(table)
     for name, png in pictures.items():

@@ -38,7 +38,9 @@ def writers(result: Result, path: Path) -> dict[Path, Callable[[BinaryIO], None]
             "metrics": result.metrics,
             "notes": result.notes,
         }
-        stream.write((json.dumps(text, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8"))
+        stream.write(
+            (json.dumps(text, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode("utf-8", "backslashreplace")
+        )
 
     return {path: table, sidecar(path): description}
 

@@ -45,7 +45,7 @@ def write_report(
     text = report(title, results, tables, notes, [_link(path, file) for file in files], sections)
 
     def write(stream: BinaryIO) -> None:
-        stream.write(text.encode("utf-8"))
+        stream.write(text.encode("utf-8", "backslashreplace"))
 
     write_files({path: write})
     return path

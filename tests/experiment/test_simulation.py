@@ -142,3 +142,21 @@ def test_every_public_name_is_there() -> None:
     assert set(rds.__all__) <= set(dir(rds))
     with pytest.raises(AttributeError, match="has no attribute 'Experment'"):
         rds.Experment  # noqa: B018
+
+
+def test_parameters_that_no_file_can_hold_are_kept_as_texts(tmp_path):
+    (tmp_path / "law.py").write_text(
+        "params = {'nan': float('nan'), 'long': 10**5000, 'big': 10**50, 'half': '\\ud800', 'P': 20.0}\n"
+        "def control(t, r, y, state, params):\n    return params['P'] * (r.position - y), state\n"
+    )
+    (tmp_path / "e.toml").write_text(
+        "axis = 'X'\nduration = 0.1\n[reference]\nkind = 'sinusoid'\namplitude = 1.0\nfrequency = 5.0\n"
+        "[controller]\nfile = 'law.py'\n"
+    )
+    from rds.experiment.report import run_and_save
+
+    _, files = run_and_save(tmp_path / "e.toml", None, tmp_path / "out", None)
+    for kind in ("csv", "mat", "parquet"):
+        kept = rds.open_result(files[kind]).meta["controller"]["X"]["params"]
+        assert {key: kept[key] for key in ("long", "big", "P")} == {"long": "a int", "big": 10**50, "P": 20.0}
+    assert "\\ud800" in files["report"].read_text()
