@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Protocol
@@ -78,8 +78,12 @@ class Opened:
 
     @property
     def output(self) -> str:
-        """What it has printed, in all its processes."""
-        return "".join(subject.output for subject in self._subjects.values()) + self._printed
+        """What it has printed, in all its processes; what it prints whenever it is loaded only once."""
+        texts, told = [], ""
+        for subject in self._subjects.values():
+            texts.append(subject.output.removeprefix(told))
+            told = told or subject.said_loading
+        return "".join([*texts, self._printed])
 
     def close(self) -> None:
         """End its processes."""
@@ -215,7 +219,7 @@ class _Work:
         needs = {need for criterion in self.criteria if case.name in criterion.cases for need in criterion.needs}
         for number in range(case.runs):
             run = case.run(opened, self.seed, number, needs)
-            self.runs.append(run)
+            self.runs.append(_without_words(run) if self._hides(case) else run)
             about = self.details.setdefault(case.name, {"runs": 0, "samples": 0, "faults": []})
             about["runs"] += 1
             about["samples"] += len(run.result)
@@ -270,6 +274,13 @@ class _Work:
                     worst = value, name
         assert worst is not None  # every criterion has a case, every case a run
         return criterion.score(*worst)
+
+
+def _without_words(run: CaseRun) -> CaseRun:
+    """The run without why its work was not counted: of a hidden case that could be what the submission saw of it."""
+    if run.counts is None or not run.counts.refused:
+        return run
+    return replace(run, counts=replace(run.counts, refused=f"{_HIDDEN}: its work could not be counted"))
 
 
 def _cut(text: str) -> str:

@@ -45,7 +45,7 @@ class TrustedFiles:
 class TrustedFile:
     """As `sandbox.Subject`, in this process. Each run that is begun loads the file afresh."""
 
-    output = ""  # it prints where its author sees it
+    output = said_loading = ""  # it prints where its author sees it
 
     def __init__(self, path: Path, kind: str):
         self._path, self._kind = path, kind

@@ -251,3 +251,21 @@ def test_what_it_says_of_a_hidden_case_is_for_the_instructor(made: Make, pool: P
     assert "ZeroDivisionError" in found.details["hidden_reason"]
     whole = grade(made('feedback = "all"\n' + text), spy, "ada", pool)
     assert "ZeroDivisionError" in whole.reason and "saw 7.125" in whole.notes[-1]
+
+
+def test_what_it_prints_while_it_is_loaded_is_told_once(made: Make, pool: Pool, tmp_path: Path) -> None:
+    told = SOLUTION.replace("    return", "    if t == 0.0: print('begun')\n    return")
+    text = HEAD + SINE + RMS + STEP
+    found = grade(made(text), file(tmp_path, "print('as it is loaded')\ninitial_state = 0\n" + told), "ada", pool)
+    assert found.notes == ("It printed:\nas it is loaded\nbegun\nbegun\nbegun\nbegun\n",)
+
+
+def test_what_it_says_while_a_hidden_case_is_counted_is_withheld(made: Make, pool: Pool, tmp_path: Path) -> None:
+    work = RMS.replace('"rms"', '"work"').replace("rms-error", "work").replace('"mm"', '"events"')
+    tells = "import sys\n" + SOLUTION.replace("    return", "    if sys.gettrace(): raise ValueError(r)\n    return")
+    found = grade(
+        made(HEAD + SINE.replace("[[case]]", "[[case]]\nvisible = false") + work), file(tmp_path, tells), "ada", pool
+    )
+    assert found.criteria[0].score == 0.0
+    assert "hidden" in found.criteria[0].sentence and "Reference" not in found.criteria[0].sentence
+    assert "Reference" in found.details["cases"]["sine"]["counts"][0]["refused"]

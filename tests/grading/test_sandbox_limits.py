@@ -9,7 +9,7 @@ import pytest
 
 from rds.core.types import Reference
 from rds.grading.grade import Status
-from rds.grading.sandbox import Limits, Pool, SubmissionError
+from rds.grading.sandbox import Limits, Pool, SandboxError, SubmissionError
 from rds.grading.sandbox.budget import Budget
 
 Written = Callable[..., Path]
@@ -126,3 +126,23 @@ def test_a_computer_that_stood_still_is_not_the_submissions_doing() -> None:
     turn = sum(budget.step(30.0) for _ in range(10))
     assert turn == pytest.approx(1.0)
     assert budget.fault(cpu=0.0, memory=0, turn=turn, turn_limit=2.0) is None
+
+
+def test_a_computer_without_memory_is_not_the_submissions_doing(
+    pool: Pool, written: Written, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the kernel ends for want of memory is graded again; what ends itself is not, whatever happened before."""
+    path = written("import os\ninitial_state = 0\ndef control(*_): os.kill(os.getpid(), 9)\n", "")
+    for happened, error in ((0, SubmissionError), (1, SandboxError)):
+        with pool.open(path) as subject:
+            subject.begin_control()
+            counted = subject._budget.ended_for_memory + happened
+            monkeypatch.setattr("rds.grading.sandbox.cell.ended_for_memory", lambda counted=counted: counted)
+            with pytest.raises(error):
+                subject.control(0.0, Reference(0.0, 0.0, 0.0), 0.0)
+
+
+def test_the_kernel_would_end_a_submission_first(pool: Pool, written: Written) -> None:
+    with pool.open(written("")) as subject:
+        assert subject._cell is not None
+        assert Path(f"/proc/{subject._cell._process}/oom_score_adj").read_text() == "1000\n"

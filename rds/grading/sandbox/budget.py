@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rds.grading.grade import Status
 from rds.grading.sandbox.limits import Limits
+from rds.grading.sandbox.processes import ended_for_memory
 
 FLOOD = 8  # times the limit of output: what one may print until it is ended
 _LONGEST_STEP = 0.1  # s: a computer that stood still for longer is not the submission's doing
@@ -23,6 +24,7 @@ class Budget:
     wall: float = 0.0
     cpu_before: float = 0.0  # of cells that have ended
     printed: int = 0  # bytes, those that were cut among them
+    ended_for_memory: int = field(default_factory=ended_for_memory)  # on this computer, before it began
 
     def step(self, seconds: float) -> float:
         """`seconds` more of the submission's turn, less what it waited for a processor; how many of them count."""

@@ -21,13 +21,13 @@ from rds.grading.sandbox.door import make_bell, make_memory
 from rds.grading.sandbox.errors import SandboxError, SubmissionError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.output import Output, printable
-from rds.grading.sandbox.processes import usage
+from rds.grading.sandbox.processes import ended_for_memory, usage
 from rds.grading.sandbox.supervise import Supervisor
 
 _START = 60.0  # s that the kernel may take for three forks on a busy computer
 _END = 2.0  # s until init has said how its child ended
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: written by the kernel, for the number spaces of the receiver
-_UNBLAMED = "its processes were ended from outside"
+_KILLED = f"ended {-signal.SIGKILL}"  # in init's words
 
 
 class Cell:
@@ -125,9 +125,14 @@ class Cell:
     @property
     def printed(self) -> str:
         """What it has printed so far."""
+        self.printed_so_far()
+        return self.output.text
+
+    def printed_so_far(self) -> tuple[bytes, int]:
+        """The same as bytes, as far as they are kept, and how many there were."""
         if not self.is_closed:
             self._supervisor.drain(self)
-        return self.output.text
+        return self.output.so_far
 
     def take_output(self) -> bool:
         """By the supervisor: read what was printed; False once nothing more can come."""
@@ -144,12 +149,19 @@ class Cell:
         self._end()
 
     def fail(self) -> NoReturn:
-        """It has ended, or cannot go on: close it and raise SubmissionError with the reason."""
+        """It has ended, or cannot go on: close it and raise SubmissionError with the reason.
+
+        SandboxError where somebody else has ended it: then the submission is to be graded again.
+        """
         said = self._last_words()
         verdict = self._verdict
         self.close()
         if said.startswith("broken"):
             raise SandboxError(f"the sandbox could not be put up: {said}")
+        if verdict is None and not said:
+            raise SandboxError("its sandbox was ended from outside, which no submission can do; grade it again")
+        if verdict is None and said == _KILLED and ended_for_memory() > self._budget.ended_for_memory:
+            raise SandboxError("the computer ran out of memory and ended processes; grade it again with fewer --jobs")
         raise SubmissionError(*(verdict or _blame(said)))
 
     def close(self) -> None:
@@ -206,8 +218,6 @@ def _blame(said: str) -> tuple[Status, str]:
     word, _, number = said.partition(" ")
     if word == "silent":
         return Status.BROKE_CONTRACT, "it closed the pipes to the grader"
-    if word != "ended":
-        return Status.KILLED, _UNBLAMED
     code = int(number)
     if code >= 0:
         return Status.KILLED, f"it ended its own process, with exit code {code}"

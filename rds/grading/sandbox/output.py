@@ -19,6 +19,7 @@ class Output:
         self._kept = bytearray()
         self._most, self._flood = most_bytes, flood_bytes
         self._seen = 0
+        self._from_byte, self._from_seen = 0, 0  # of what is shown
 
     def collect(self) -> bool:
         """Take what there is; False once nothing more can come."""
@@ -47,11 +48,20 @@ class Output:
         return self._seen
 
     @property
+    def so_far(self) -> tuple[bytes, int]:
+        """What was kept, and how many bytes were printed."""
+        return bytes(self._kept), self._seen
+
+    def skip(self) -> None:
+        """What was printed so far is shown elsewhere, and not again in `text`."""
+        self._from_byte, self._from_seen = len(self._kept), self._seen
+
+    @property
     def text(self) -> str:
         """What was kept, without control characters, and how much is missing."""
-        return printable(bytes(self._kept).decode(errors="replace")) + (
-            f"\n… {self._seen - self._most} bytes more were cut" if self._seen > self._most else ""
-        )
+        shown = bytes(self._kept[self._from_byte :])
+        missing = self._seen - self._from_seen - len(shown)
+        return printable(shown.decode(errors="replace")) + (f"\n… {missing} bytes more were cut" if missing else "")
 
 
 def printable(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from typing import NamedTuple
 
 _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
@@ -37,6 +38,12 @@ def usage(top: int, baseline: int = 0) -> Usage:
         memory += max(_resident(process) - baseline, 0)
         waiting += _children(process)
     return Usage(cpu, memory, count, _cpu(first, True, False), first[:1] == [b"R"])
+
+
+def ended_for_memory() -> int:
+    """How many processes the kernel has ended since it was started because there was no memory left."""
+    found = re.search(rb"^oom_kill (\d+)$", _read("/proc/vmstat"), re.MULTILINE)
+    return int(found[1]) if found else 0
 
 
 def _children(process: int) -> list[int]:

@@ -18,6 +18,7 @@ from rds.grading.sandbox.counts import Counts, count_again
 from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.limits import Limits
+from rds.grading.sandbox.output import printable
 from rds.grading.sandbox.place import Place
 from rds.grading.sandbox.run import Run, reason
 from rds.grading.sandbox.submission import Submission
@@ -59,6 +60,7 @@ class Subject:
         self._interpreter, self._supervisor, self._place = interpreter, supervisor, place
         self._budget = Budget(limits)
         self._printed: list[str] = []
+        self._said_loading = b"", 0  # what it printed when it was first loaded, and how many bytes that were
         self._cell: Cell | None = None
         self._is_fresh = False  # whether nothing of the submission's was run in the cell but its loading
         self.loaded = Loaded(())
@@ -193,6 +195,11 @@ class Subject:
             self._run, self._order = run, order
 
     @property
+    def said_loading(self) -> str:
+        """What it printed when it was loaded: `output` begins with it, and does not repeat it."""
+        return printable(self._said_loading[0].decode(errors="replace"))
+
+    @property
     def output(self) -> str:
         """What it has printed in the cells that have ended, and in this one so far."""
         return "".join([*self._printed, self._cell.printed if self._cell else ""])
@@ -240,7 +247,17 @@ class Subject:
             self._give_up(cell, Status.FAILED_TO_LOAD, "it wrote into the grader's pipe")
         names = tuple(name for name in defines if isinstance(name, str) and name.isidentifier())
         self.loaded = Loaded(names, params, answer.get("initial_state"), reason(problem) if problem else "")
+        self._tell_loading_once(cell)
         return cell
+
+    def _tell_loading_once(self, cell: Cell) -> None:
+        """What the file prints whenever it is loaded is told for the first time only."""
+        text, count = cell.printed_so_far()
+        known, known_count = self._said_loading
+        if count == known_count and known.startswith(text):  # what is over the limit is cut earlier each time
+            cell.output.skip()
+        elif not known_count:
+            self._said_loading = text, count
 
     def _answer(self, cell: Cell, order: Mapping[str, Any], seconds: float, blame: Status) -> dict[str, Any]:
         answer = cell.exchange(order, seconds)

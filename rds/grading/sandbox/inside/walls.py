@@ -21,6 +21,11 @@ _FILES = 64  # open at once
 _INODES = 256  # files in HOME
 
 
+def go_first() -> None:
+    """Where a computer has no memory left, the kernel ends this process and its children before all others."""
+    Path("/proc/self/oom_score_adj").write_text("1000")
+
+
 def enter(tmp_bytes: int) -> None:
     """Namespaces of its own for the children of this process; an empty HOME of `tmp_bytes`, and no /proc."""
     outer_user, outer_group = os.getuid(), os.getgid()

@@ -84,6 +84,7 @@ def _between(request: dict[str, Any], ends: Ends, baseline: int, calls: bytes, w
     """The process between the warm interpreter and init: it makes the namespaces and is gone."""
     try:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        walls.go_first()
         walls.enter(int(request["limits"]["file_bytes"]))
         if os.fork() == 0:
             _init(request, ends, baseline, calls, worker)
