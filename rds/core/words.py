@@ -52,6 +52,8 @@ class Words:
             raise InputError("is not UTF-8 text; save it as UTF-8", str(path)) from error
         except tomllib.TOMLDecodeError as error:
             raise InputError(f"is not valid TOML: {error}", str(path)) from error
+        except RecursionError as error:
+            raise InputError("has brackets within brackets a thousand deep; write it flatter", str(path)) from error
 
     def place(self, key: str | None = None) -> str:
         """File and line of a key of this table, as far as they are known."""

@@ -116,9 +116,10 @@ def _on_one_time(
         if main.time is None:
             raise InputError("it is not known when anything was measured; give [time]", mapping.time.place)
         grid = main.time
-    others = [part.time for part in parts.values() if part.time is not None and part.time is not grid]
-    if any(len(time) == 0 for time in others):
-        raise InputError("a column that the map names holds no values", str(table.path))
+    own = {name: part.time for name, part in parts.items() if part.time is not None and part.time is not grid}
+    for name, time in own.items():
+        _check_order(name, time, parts[name].second, table, second)
+    others = list(own.values())
     if not others:  # the times themselves are judged by time_base
         return grid, {name: part.values for name, part in parts.items()}
     first, last = max([grid[0], *(t[0] for t in others)]), grid[-1]
@@ -148,6 +149,24 @@ def _on_one_time(
             what = f"{name} was interpolated to the first file's times on straight lines, to {error:.3g} {part.unit}"
             findings.append(Finding("resampling", what))
     return grid_in, arrays
+
+
+def _check_order(name: str, time: np.ndarray, of_second: bool, table: Table, second: Second | None) -> None:
+    """InputError for times (s) that are not the rows' own, and cannot be looked up in: none, blank, or going back."""
+    where = str(second.table.path if of_second and second is not None else table.path)
+    if len(time) == 0:
+        raise InputError(f"the column of {name} holds no values", where)
+    blank = np.flatnonzero(~np.isfinite(time))
+    if len(blank):
+        raise InputError(f"the time of {name} has no number in sample {blank[0]}; repair it", where)
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    if len(back):
+        k = int(back[0]) + 1
+        raise InputError(
+            f"the time of {name} goes back at sample {k}, from {time[k - 1]:.9g} to {time[k]:.9g} s ({len(back)} such "
+            "steps); put the samples in order, and take one recording",
+            where,
+        )
 
 
 def _age(name: str, time: np.ndarray, grid: np.ndarray) -> Finding:

@@ -31,14 +31,17 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     Times are those that the recorder gave each frame, from the first frame on.
     """
     databases = [load_dbc(file) for file in dbc]
+    twice = _described_twice(databases, dbc)
     own = own_dbc() if not databases else None  # another bus may use the same identifiers for something else
     if own is not None:
         databases.append(load_dbc(own))
     times: dict[str, array[float]] = {}
     values: dict[str, array[float]] = {}
     units: dict[str, str | None] = {}
+    senders: dict[str, int] = {}  # the identifier of the frames that a column is from
     unknown: dict[int, int] = {}
     misfits = number = 0
+    misfit = ""  # the first one's reason
     start: float | None = None
     size = path.stat().st_size if path.is_file() else 0
     log = LogFile(path)
@@ -50,23 +53,34 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
         if message.is_error_frame or message.is_remote_frame:
             continue
         start = message.timestamp if start is None else start
+        if (message.arbitration_id, message.is_extended_id) in twice:
+            raise twice[message.arbitration_id, message.is_extended_id]
         try:
             signals = list(_signals(message, databases, cyclic=not dbc))
-        except ValueError:
-            misfits += 1
+        except ValueError as error:
+            misfits, misfit = misfits + 1, misfit or f"{message.arbitration_id:#x}: {error}"
             continue
         if not signals:
             unknown[message.arbitration_id] = unknown.get(message.arbitration_id, 0) + 1
         for name, unit, value in signals:
             if name not in times:
                 times[name], values[name], units[name] = array("d"), array("d"), unit
+                senders[name] = message.arbitration_id
+            elif senders[name] != message.arbitration_id:
+                raise InputError(
+                    f"{name} is in frames of {senders[name]:#x} and of {message.arbitration_id:#x}, and would be one "
+                    "column; rename one of the two messages in the DBC files",
+                    str(path),
+                )
             times[name].append(message.timestamp - start)
             values[name].append(value)
+    if not number:
+        raise InputError("it holds no frames; record it again or take another copy", str(path))
     if not times:
         seen = ", ".join(f"{identifier:#x}" for identifier in sorted(unknown)[:8]) or "none"
         raise InputError(
             f"none of its {number} frames is known (unknown identifiers: {seen}; {misfits} frames do not fit their "
-            f"description); give the DBC file that describes them: "
+            f"description{_first(misfit)}); give the DBC file that describes them: "
             f'dbc = "axes.dbc" under [bus] in {path.name}.map.toml',
             str(path),
         )
@@ -74,7 +88,7 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     if unknown:
         findings.append(Finding("frames", f"{sum(unknown.values())} frames of {len(unknown)} identifiers are unknown"))
     if misfits:
-        what = f"{misfits} frames do not fit the description of their message, and were left out"
+        what = f"{misfits} frames do not fit the description of their message, and were left out{_first(misfit)}"
         findings.append(Finding("frames", what, Gravity.WARNING))
     if log.skipped:
         findings.append(Finding("frames", f"{log.skipped} lines describe no frame"))
@@ -83,6 +97,27 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
         for name in sorted(times)
     }
     return Table(path, "can", columns, findings=tuple(findings))
+
+
+def _first(reason: str) -> str:
+    return f", the first {reason:.200}" if reason else ""
+
+
+def _described_twice(databases: Sequence[Any], files: Sequence[Path]) -> dict[tuple[int, bool], InputError]:
+    """By identifier and whether it is an extended one: what to say if such a frame is met, as it is two messages."""
+    seen: dict[tuple[int, bool], tuple[str, list[Any], Path]] = {}
+    found = {}
+    for database, path in zip(databases, files, strict=True):
+        for message in database.messages:
+            layout = [(s.name, s.start, s.length, s.byte_order, s.scale, s.offset, s.unit) for s in message.signals]
+            key = (message.frame_id, bool(message.is_extended_frame))
+            name, signals, earlier = seen.setdefault(key, (message.name, layout, path))
+            if (name, signals) != (message.name, layout):
+                what = f"identifier {message.frame_id:#x} is {message.name!r} there, and {name!r} in {earlier.name}"
+                found[key] = InputError(
+                    f"{what}, with other signals or names; remove one of the descriptions", str(path)
+                )
+    return found
 
 
 def _signals(message: can.Message, databases: Sequence[Any], cyclic: bool) -> Iterator[Signal]:

@@ -11,11 +11,16 @@ from rds.logs.steps import BEYOND_MEASURE
 from rds.logs.table import Column, Table
 from rds.logs.units import base, check_unit, dimension, factor, plain
 
-_LATE = 1e7  # s: times beyond are dates, whose digits a float64 keeps to 1 µs only: they are counted from the first
+_LATE = 1e7  # s: times beyond are dates, of which a float64 in s keeps 0.1 µs only: they are counted from the first
 
 
 def column_time(table: Table, about: TimeMap) -> np.ndarray:
     """The time of each row in s. InputError where nothing tells it, or its unit."""
+    if table.format == "can" and (about.rate is not None or about.column is not None):
+        given = f"rate = {about.rate:g}" if about.rate is not None else f"column = {about.column!r}"
+        raise InputError(
+            f"{table.path.name} is a bus log, whose times are those of receipt; leave {given} out", about.place
+        )
     if about.rate is not None:
         return np.arange(table.rows) / about.rate
     if about.column is None:
@@ -28,12 +33,12 @@ def column_time(table: Table, about: TimeMap) -> np.ndarray:
         )
     column = table.column(about.column, about.place)
     unit = _unit(column, about.unit, "time", about.place)
-    _check_size(column.values, f"time ({column.name!r})", about.place)
-    values = (
-        column.time if column.time is not None else (about.scale * column.values + about.offset) * factor(unit, "s")
-    )
-    if len(values) and abs(values[0]) > _LATE:
-        values = values - values[0]
+    second = factor(unit, "s")
+    values = (about.scale * column.values + about.offset) * second
+    _check_size(values, f"time ({column.name!r}, in s)", about.place)
+    finite = np.flatnonzero(np.isfinite(values))
+    if len(finite) and abs(values[finite[0]]) > _LATE:  # from the first row on, before digits are lost to its size
+        values = about.scale * (column.values - column.values[finite[0]]) * second
     return values
 
 

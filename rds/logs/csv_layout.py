@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ HEAD = 1 << 16  # bytes looked at
 COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
 BLANKS = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf"))
-_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
+_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Layout:
     names: tuple[str, ...]
     units: tuple[str | None, ...]
     words: frozenset[int]  # columns whose cells are no numbers
-    dates: frozenset[int]  # columns of dates and times of day
+    dates: Mapping[int, bool]  # columns of dates and times of day: whether their first one says its zone
     announced: int | None = None  # samples, where a comment says how many there should be
 
 
@@ -43,10 +43,11 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     """The layout of a text file; what is given is not guessed. InputError where there is no table of numbers."""
     lines, encoding = _head(path)
     choices = [delimiter] if delimiter else [*DELIMITERS.values()]
+    quoted = any('"' in line for line in lines)  # a comma may then be both; "1,234" is 1234 to many, so never by itself
     best: tuple[float, int, str, str, int] | None = None
     for mark in choices:
         for point in [decimal] if decimal else [".", ","]:
-            if mark == point:
+            if mark == point and not (decimal and quoted):
                 continue
             first, width, score = _data(lines, mark, point)
             # more numbers is better; then the delimiter that comes first in the table, then the decimal point
@@ -54,15 +55,16 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
                 best = (score, width, mark, point, first)
     if best is None:
         shown = next((line for line in lines if line.strip()), "")
-        raise InputError(
-            f"no lines of numbers were found in it (it begins {shown[:60]!r}); it needs columns of numbers, separated "
-            f"by commas, semicolons, tabs, bars or spaces",
-            str(path),
-        )
+        remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
+        if quoted and decimal is None:
+            remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
+        raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
     _, width, mark, point, first = best
+    first = _with_faulty_rows(lines, first, mark, point, width)
     names, units = _headings(lines, first, mark, point, width)
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
-    dates = frozenset(i for i in range(width) if any(_DATE.fullmatch(row[i]) for row in body[:1]))
+    stamps = {i: found for i in range(width) for row in body[:1] if (found := _DATE.fullmatch(row[i]))}
+    dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()}
     words = frozenset(
         i
         for i in range(width)
@@ -117,7 +119,10 @@ def _head(path: Path) -> tuple[list[str], str]:
         text = codecs.getincrementaldecoder("utf-8")().decode(data, whole)
     except UnicodeDecodeError:
         encoding, text = "cp1252", data.decode("cp1252", errors="replace")
-    lines = text.removeprefix("\ufeff").splitlines()
+    if "\r" in text and "\n" not in text:
+        raise InputError("its lines end in a carriage return alone, as on old Macs; save it with line feeds", str(path))
+    # not splitlines(): a form feed ends no line for the reader of the rows
+    lines = [line.rstrip("\r") for line in text.removeprefix("\ufeff").split("\n")]
     return (lines if whole or len(lines) < 2 else lines[:-1]), encoding
 
 
@@ -145,6 +150,18 @@ def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int,
     usual = [sum(fits[i] for _, fits in found) > 0.9 * len(found) - 1 for i in range(width)]
     first = next((n for n, fits in found if all(f or not u for f, u in zip(fits, usual, strict=True))), found[0][0])
     return first, width, float(numbers[width])
+
+
+def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> int:
+    """The first row below the heading, where rows right above `first` have a word in place of a number."""
+    at = first
+    while at > 0 and not is_comment(lines[at - 1]):
+        cells = split(lines[at - 1], delimiter)
+        if len(cells) != width or not any(is_number(cell, decimal) for cell in cells) or _are_units(cells):
+            break
+        at -= 1
+    heading = _heading_cells(lines[at - 1], delimiter, width) if at > 0 else None
+    return at if heading is not None else first
 
 
 def _headings(

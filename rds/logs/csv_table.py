@@ -12,7 +12,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.logs.csv_layout import BLANKS, Layout, is_number, sniff, split
 from rds.logs.log import Finding, Gravity
-from rds.logs.table import Column, Table
+from rds.logs.table import Column, Table, since_first
 from rds.logs.units import unit_of_name
 
 Progress = Callable[[int, int], None]
@@ -84,7 +84,8 @@ def _read(
 
     keys = [str(i) for i in range(len(layout.names))]
     types = {key: pa.string() if int(key) in words else pa.float64() for key in keys}
-    types |= {str(i): pa.timestamp("ns") for i in layout.dates - words}
+    dates = {i: zone for i, zone in layout.dates.items() if i not in words}
+    types |= {str(i): pa.timestamp("ns", tz="UTC" if zone else None) for i, zone in dates.items()}
 
     refused: list[Any] = []
 
@@ -126,7 +127,8 @@ def _read(
         stream.close()
     joined = {}
     for i in list(values):
-        joined[i] = np.concatenate(values.pop(i) or [np.empty(0)])
+        column = np.concatenate(values.pop(i) or [np.empty(0, dtype="datetime64[ns]" if i in dates else np.float64)])
+        joined[i] = since_first(column) if i in dates else column
     return joined, {i: texts.get(i, (0, "")) for i in words}, stream.remarks
 
 
@@ -171,12 +173,11 @@ class _Rows:
 
 
 def _numbers(cells: Any) -> np.ndarray:
-    """A batch's cells as float64, NaN for blanks; dates as s since 1970."""
+    """A batch's cells as float64, NaN for blanks; dates as they are."""
     import pyarrow as pa
 
     if pa.types.is_timestamp(cells.type):
-        stamps = cells.to_numpy(zero_copy_only=False).astype("datetime64[ns]")
-        return np.where(np.isnat(stamps), np.nan, stamps.astype(np.int64) * 1e-9)
+        return np.asarray(cells.to_numpy(zero_copy_only=False), dtype="datetime64[ns]")
     return np.asarray(cells.to_numpy(zero_copy_only=False), dtype=np.float64)
 
 

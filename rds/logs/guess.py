@@ -11,7 +11,7 @@ import numpy as np
 
 from rds.core.toml_text import toml_text
 from rds.logs.map import DIMENSIONS, SUFFIX, AxisMap, ColumnMap, LogMap, TimeMap
-from rds.logs.table import Column, Table
+from rds.logs.table import Column, Table, remedy
 from rds.logs.units import dimension
 from rds.results.units import default_unit
 
@@ -46,7 +46,8 @@ def guess(table: Table) -> Guess:
     """The map of a table, from names together with units. Nothing without a unit is ever guessed."""
     time, problem = _time(table)
     if problem:
-        return Guess(None, problem, is_log=problem[: len(_NO_LOG)] != _NO_LOG)
+        spoiled = _spoiled(table, "time")
+        return Guess(None, spoiled or problem, is_log=not spoiled and problem[: len(_NO_LOG)] != _NO_LOG)
     said = ["each signal has its own time of receipt"]
     if time:
         said = [f"time is {time!r} [{table.columns[time].unit}]"]
@@ -61,6 +62,10 @@ def guess(table: Table) -> Guess:
         axes[name] = AxisMap(name, {q: ColumnMap(c.name, place="the guessed map") for q, c in found.items()})
         said += [f"{q} of {name} is {c.name!r} [{c.unit}]" for q, c in found.items()]
     if doubts or not axes:
+        for quantity in ("command", "position"):
+            spoiled = _spoiled(table, quantity)
+            if spoiled and not any(_fitting(columns, quantity) for columns in groups.values()):
+                return Guess(None, spoiled, is_log=False)
         return Guess(None, "; ".join(doubts) or "no column tells a command and a position by its name and unit")
     return Guess(LogMap(TimeMap(time, place="the guessed map"), axes, said=tuple(said)), "")
 
@@ -70,7 +75,10 @@ def draft(table: Table) -> str:
     time, _ = _time(table)
     content: dict[str, object] = {}
     notes = [f"What the columns of {table.path.name} mean. Check every line: it is a draft, not knowledge."]
-    named = next((c.name for c in table.columns.values() if _role(c.name) == "time" and c.text is None), None)
+    columns = [c for c in table.columns.values() if c.text is None]
+    named = next((c.name for c in columns if _role(c.name) == "time"), None)
+    if named is None and not any(c.unit or _role(c.name) for c in columns):
+        named = next((c.name for c in columns if _rises(c.values)), None)
     if table.format != "can":
         time = time or named
         if time is not None:
@@ -129,7 +137,20 @@ def _time(table: Table) -> tuple[str | None, str]:
     unitless = [c.name for c in columns if _role(c.name) == "time"]
     if unitless and not in_time:
         return None, f"{unitless[0]!r} may be the time, but nothing gives its unit; give it in a map"
+    if columns and not any(c.unit or _role(c.name) for c in columns):
+        names = ", ".join(c.name for c in columns[:5]) + (" ..." if len(columns) > 5 else "")
+        return None, f"nothing tells what {names} are, and in which units; say it in a map"
     return None, _no_series(columns, in_time)
+
+
+def _spoiled(table: Table, quantity: str) -> str:
+    """That the column which tells by its name and unit that it is the quantity has a word among its numbers, or ""."""
+    for c in table.columns.values():
+        if c.text is not None and _role(c.name) == quantity and (c.unit is None or dimension(c.unit) is not None):
+            row, cell = c.text
+            where = f"holds {cell!r:.60} in data row {row + 1}"
+            return f"{quantity} is {c.name!r}, as it seems, and {where}; {remedy(cell)}"
+    return ""
 
 
 def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:

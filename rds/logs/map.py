@@ -132,11 +132,14 @@ class LogMap:
         )
         for part in (table, bus, words):
             part.done()
-        if made.second is None:
-            for axis in made.axes.values():
-                for column in axis.columns.values():
-                    if column.second:
-                        raise InputError("second = true, and there is no [second] table with the file", column.place)
+        seconds = [column for axis in made.axes.values() for column in axis.columns.values() if column.second]
+        if seconds and made.second is None:
+            raise InputError("second = true, and there is no [second] table with the file", seconds[0].place)
+        if made.second is not None and not seconds:
+            raise InputError(
+                "no column is of the second file; say of those that are: second = true, or leave [second] out",
+                made.second.place,
+            )
         return made
 
 
@@ -183,7 +186,7 @@ def _unit(words: Words, quantity: str) -> str | None:
 def _time(words: Words | None, path: str) -> TimeMap:
     if words is None:
         return TimeMap(place=path)
-    rate = words.number("rate", 0.0, "Hz", 0.0, 1e9) or None
+    rate = words.number("rate", None, "Hz", 1e-6, 1e9) if "rate" in words else None
     column = words.text("column")
     if rate is not None and column is not None:
         raise words.fault("rate", "is for a file without a column of time; give one of rate and column")
@@ -199,6 +202,9 @@ def _time(words: Words | None, path: str) -> TimeMap:
         place=words.place(),
     )
     words.done()
+    for key in ("unit", "scale", "offset"):
+        if column is None and key in words:
+            raise words.fault(key, 'is of a column of numbers, and none is named; add column = "...", or remove it')
     return made
 
 

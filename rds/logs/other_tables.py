@@ -11,7 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.logs.log import Finding
-from rds.logs.table import Column, Table
+from rds.logs.table import Column, Table, since_first
 from rds.logs.units import unit_of_name
 from rds.results.units import split_heading
 
@@ -57,9 +57,9 @@ def read_mat(path: Path) -> Table:
 
 
 def _parts(name: str, values: Any) -> Iterator[tuple[str, np.ndarray | None]]:
-    if not isinstance(values, np.ndarray):
-        return
-    if values.dtype.names and values.size == 1:
+    if not isinstance(values, np.ndarray):  # a sparse matrix, an object of a class
+        yield name, None
+    elif values.dtype.names and values.size == 1:
         for field in values.dtype.names:
             yield from _parts(f"{name}.{field}", values.reshape(-1)[0][field])
     elif values.dtype.kind not in "fiub" or values.size == 0:
@@ -75,14 +75,18 @@ def _parts(name: str, values: Any) -> Iterator[tuple[str, np.ndarray | None]]:
 
 
 def read_parquet(path: Path) -> Table:
-    """The numeric columns of a Parquet file; units from a field's metadata (`unit`) or its name."""
+    """The numeric columns of a Parquet file; units from a field's metadata (`unit`) or its name.
+
+    Dates are s from the first one, durations s.
+    """
     from pyarrow import parquet
 
     from rds.results.parquet_file import read
 
     values, _ = read(path)
     schema = parquet.read_schema(path)
-    columns = {}
+    dates = _dates(path)
+    columns = {name: Column(name, "s", array) for name, array in dates.items()}
     for name, array in values.items():
         short, unit = split_heading(name)
         if short in columns:
@@ -92,6 +96,28 @@ def read_parquet(path: Path) -> Table:
         columns[short] = Column(short, unit_of_name(short) if unit is None else unit, array.astype(np.float64))
     if not columns:
         raise InputError("it holds no columns of numbers", str(path))
-    left_out = [name for name in schema.names if name not in values]
+    left_out = [name for name in schema.names if name not in values and name not in dates]
     words = f"left out, as they hold no numbers: {', '.join(left_out)}"
     return Table(path, "parquet", columns, findings=(Finding("columns", words),) if left_out else ())
+
+
+def _dates(path: Path) -> dict[str, np.ndarray]:
+    """The columns of dates (s from the first one) and durations (s); pandas keeps a time index so."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    found = {}
+    try:
+        for field in parquet.read_schema(path):
+            if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type):
+                is_date = pa.types.is_timestamp(field.type)
+                column = parquet.read_table(path, columns=[field.name]).column(0)
+                exact = column.cast(pa.timestamp("ns") if is_date else pa.duration("ns")).to_numpy()
+                if is_date:
+                    found[field.name] = since_first(exact.astype("datetime64[ns]"))
+                else:
+                    spans = exact.astype("timedelta64[ns]")
+                    found[field.name] = np.where(np.isnat(spans), np.nan, spans.astype(np.int64) * 1e-9)
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise InputError(f"its dates cannot be read ({error}); take another copy") from error
+    return found

@@ -82,7 +82,13 @@ def table_of(path: Path, mapping: LogMap | None, progress: Progress | None = Non
 
     if mapping is None:
         return read_table(path, progress=progress)
-    return read_table(path, mapping.delimiter, mapping.decimal, mapping.dbc, progress)
+    table = read_table(path, mapping.delimiter, mapping.decimal, mapping.dbc, progress)
+    where = str(mapping.path or path)
+    if mapping.dbc and table.format != "can" and mapping.second is None:
+        raise InputError(f"[bus] dbc is for a bus log, and {path.name} is none; remove it", where)
+    if (mapping.delimiter or mapping.decimal) and table.format != "csv":
+        raise InputError(f"[table] is for text, and {path.name} is none; remove it", where)
+    return table
 
 
 def guessed(table: Table) -> LogMap:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,8 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.logs.log import Finding
+
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,22 @@ class Table:
         if found.text is not None:
             row, cell = found.text
             raise InputError(
-                f"column {name!r} holds {cell!r:.60} in its data row {row + 1}; every cell must be a "
-                "number: repair it or choose another column",
+                f"column {name!r} holds {cell!r:.60} in its data row {row + 1}; {remedy(cell)}",
                 str(self.path),
             )
         return found
+
+
+def remedy(cell: str) -> str:
+    """What to do about a cell that is no number."""
+    if _DECIMAL_COMMA.fullmatch(cell):
+        return 'every cell must be a number: if this is a decimal comma, say decimal = "comma" under [table] in a map'
+    return "every cell must be a number: repair it or choose another column"
+
+
+def since_first(stamps: np.ndarray) -> np.ndarray:
+    """Dates (datetime64[ns], NaT where there is none) as s from the first one, exact to 1 ns; NaN for NaT."""
+    known = np.flatnonzero(~np.isnat(stamps))
+    if not len(known):
+        return np.full(len(stamps), np.nan)
+    return np.where(np.isnat(stamps), np.nan, (stamps - stamps[known[0]]).astype(np.int64) * 1e-9)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from rds.core.errors import InputError
 from rds.logs.guess import draft, guess
@@ -13,6 +14,14 @@ from rds.logs.map import LogMap
 from rds.logs.read_log import read_log
 from rds.logs.tables import read_table
 from tests.logs.data_files import MAP, axis, write
+
+SECOND = """[second]
+file = "b.csv"
+offset = 0.0
+[second.time]
+column = "t"
+unit = "s"
+"""
 
 
 def saved(folder: Path, text: str) -> Path:
@@ -45,7 +54,12 @@ def saved(folder: Path, text: str) -> Path:
         (MAP.replace("command = ", "comand = "), 5, "axis X needs command"),
         (MAP.replace('unit = "mm"', "second = true"), 7, "there is no [second] table"),
         (MAP + '[second]\nfile = "b.csv"\n', 8, "nothing says how the two clocks agree"),
+        (MAP + SECOND, 8, "no column is of the second file"),
+        (MAP.replace('column = "time"\nunit = "s"', "rate = 0"), 3, "rate = 0 must be from 1e-06"),
+        (MAP.replace('column = "time"', "rate = 1000.0"), 4, "time.unit = 's' is of a column of numbers"),
+        (MAP.replace('column = "time"\nunit = "s"', "scale = 2.0"), 3, "time.scale = 2.0 is of a column of numbers"),
         ("a = [", None, "not valid TOML"),
+        ("a = " + "[" * 5000 + "]" * 5000, None, "brackets within brackets"),
     ],
 )
 def test_maps_that_are_refused(tmp_path: Path, text: str, line: int | None, sentence: str) -> None:
@@ -138,3 +152,24 @@ def test_the_draft_is_a_map_that_can_be_pasted(tmp_path: Path) -> None:
     (tmp_path / "log.csv.map.toml").write_text(draft(read_table(path)))
     (log,) = read_log(path)
     assert np.allclose(log.position, axis()["position"], atol=1e-11)
+
+
+def test_a_dbc_is_refused_for_a_text(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", axis(200))
+    with pytest.raises(InputError, match=r"dbc is for a bus log, and log\.csv is none"):
+        read_log(path, saved(tmp_path, '[bus]\ndbc = "axes.dbc"\n' + MAP))
+
+
+def test_the_layout_of_a_text_is_refused_for_a_mat_file(tmp_path: Path) -> None:
+    savemat(tmp_path / "log.mat", axis(200))
+    mapping = saved(tmp_path, '[table]\ndelimiter = "tab"\n' + MAP)
+    with pytest.raises(InputError, match=r"\[table\] is for text, and log.mat is none"):
+        read_log(tmp_path / "log.mat", mapping)
+
+
+def test_columns_without_headings_get_a_draft_with_their_time(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.column_stack(list(axis(200).values())), delimiter=",")
+    found = guess(read_table(path))
+    assert found.is_log and found.problem.startswith("nothing tells what column 1, column 2, column 3 are")
+    assert 'column = "column 1"' in draft(read_table(path))

@@ -1,0 +1,83 @@
+"""Columns of bus logs: never two signals in one, never times out of order, and a reason for what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import can
+import pytest
+
+from rds.core.errors import InputError
+from rds.logs.log import Log
+from rds.logs.read_log import read_log
+from tests.logs.data_files import axis
+from tests.logs.test_formats import DBC
+
+MAP = """
+[bus]
+dbc = ["a.dbc", "b.dbc"]
+[axis.X]
+command = "Drive.Voltage"
+position = "Encoder.Position"
+"""
+Frame = tuple[float, int, bytes]
+
+
+def frames(shift: int = 0, samples: int = 200) -> list[Frame]:
+    """Time (s), identifier and data of a drive's and an encoder's frames."""
+    made, found = axis(samples), list[Frame]()
+    for t, u, y in zip(made["time"].tolist(), made["voltage"], made["position"], strict=True):
+        found.append((t, 256 + shift, round(u * 1000).to_bytes(2, "little", signed=True) + bytes(6)))
+        found.append((t + 1e-4, 257 + shift, round(y * 1000).to_bytes(4, "little", signed=True) + bytes(4)))
+    return found
+
+
+def logged(folder: Path, sent: Iterable[Frame], second: str = "", mapping: str = MAP) -> Log:
+    with can.CanutilsLogWriter(folder / "bus.log") as writer:
+        for t, identifier, data in sent:
+            writer(can.Message(timestamp=1e3 + t, arbitration_id=identifier, data=data, is_extended_id=False))
+    (folder / "a.dbc").write_text(DBC)
+    (folder / "b.dbc").write_text(second or DBC)
+    (folder / "bus.log.map.toml").write_text(mapping)
+    (log,) = read_log(folder / "bus.log")
+    return log
+
+
+def test_messages_of_one_name_are_never_one_column(tmp_path: Path) -> None:
+    second = DBC.replace("BO_ 256", "BO_ 512").replace("BO_ 257", "BO_ 513")
+    assert len(logged(tmp_path, frames(), second)) == 200
+    with pytest.raises(InputError, match=r"Drive\.Voltage is in frames of 0x100 and of 0x200"):
+        logged(tmp_path, sorted(frames() + frames(256)), second)
+
+
+def test_an_identifier_with_two_descriptions_is_refused(tmp_path: Path) -> None:
+    assert len(logged(tmp_path, frames(), DBC)) == 200
+    with pytest.raises(InputError, match=r"b\.dbc: identifier 0x101 is 'Encoder' there, and 'Encoder' in a\.dbc"):
+        logged(tmp_path, frames(), DBC.replace("0|32@1- (0.001,0)", "0|32@1- (0.01,0)"))
+
+
+def test_commands_out_of_order_are_refused(tmp_path: Path) -> None:
+    sent = frames()
+    sent[100], sent[102] = sent[102], sent[100]
+    with pytest.raises(InputError, match=r"the time of command goes back at sample 51, from 0\.051"):
+        logged(tmp_path, sent)
+
+
+@pytest.mark.parametrize("line", ["rate = 1000.0", 'column = "Drive.Voltage"'])
+def test_a_time_of_its_own_is_refused(tmp_path: Path, line: str) -> None:
+    with pytest.raises(InputError, match="is a bus log, whose times are those of receipt; leave"):
+        logged(tmp_path, frames(), mapping=f"[time]\n{line}\n{MAP}")
+
+
+def test_the_first_frame_that_does_not_fit_says_why(tmp_path: Path) -> None:
+    sent = frames()
+    sent[-1] = (*sent[-1][:2], b"ab")
+    log = logged(tmp_path, sent)
+    assert len(log) == 199
+    assert any("1 frames do not fit" in f.what and "the first 0x101: Wrong data size" in f.what for f in log.findings)
+
+
+def test_a_log_without_frames_says_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it holds no frames"):
+        logged(tmp_path, [])

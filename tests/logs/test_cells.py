@@ -1,0 +1,54 @@
+"""Cells and lines that are no rows of numbers: the column and the row are named, and none is lost without a word."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.logs.describe import describe
+from rds.logs.read_log import read_log
+from tests.logs.data_files import axis, headed, write
+
+
+@pytest.mark.parametrize(("row", "column"), [(0, 2), (150, 2), (150, 0), (199, 1)])
+def test_a_word_among_the_numbers_is_named_with_its_column_and_row(tmp_path: Path, row: int, column: int) -> None:
+    path = write(tmp_path / "log.csv", headed(axis(200)))
+    lines = path.read_text().splitlines()
+    cells = lines[row + 1].split(",")
+    cells[column] = "mean"
+    lines[row + 1] = ",".join(cells)
+    path.write_text("\n".join(lines) + "\n")
+    what = ("time is 'time'", "command is 'voltage'", "position is 'position'")[column]
+    with pytest.raises(InputError, match=f"{what}, as it seems, and holds 'mean' in data row {row + 1}"):
+        read_log(path)
+
+
+def test_quoted_decimal_commas_between_commas_are_numbers_where_the_map_says_so(tmp_path: Path) -> None:
+    made = axis(400)
+    path = tmp_path / "log.csv"
+    rows = [",".join(f'"{v:.4f}"'.replace(".", ",") for v in row) for row in zip(*made.values(), strict=True)]
+    path.write_text("\n".join([",".join(headed(made)), *rows]) + "\n")
+    with pytest.raises(InputError, match='decimal = "comma" under'):
+        read_log(path)  # "1,234" is also how many write 1234
+    (tmp_path / "log.csv.map.toml").write_text(
+        '[table]\ndecimal = "comma"\n[time]\ncolumn = "time"\n[axis.X]\ncommand = "voltage"\nposition = "position"\n'
+    )
+    (log,) = read_log(path)
+    assert np.allclose(log.position, made["position"], atol=1e-9) and np.allclose(log.time, made["time"], atol=1e-9)
+
+
+def test_a_form_feed_above_the_table_costs_no_row(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", headed(axis(200)))
+    path.write_text("page 1\x0cof the recorder\n" + path.read_text())
+    (log,) = read_log(path)
+    assert len(log) == 200 and log.time[0] == 0.0
+
+
+def test_lines_of_old_macs_are_refused_with_a_remedy(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", headed(axis(200)))
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r"))
+    with pytest.raises(InputError, match="carriage return alone, as on old Macs; save it with line feeds"):
+        describe(path)

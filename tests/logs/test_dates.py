@@ -1,0 +1,63 @@
+"""Dates and times since 1970: counted from the first row, with the digits that the file has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rds.core.errors import InputError
+from rds.logs.read_log import read_log
+from tests.logs.data_files import axis, headed
+
+BEGIN = np.datetime64("2024-10-27T00:59:59.900", "ns")
+
+
+def stamps(samples: int) -> np.ndarray:
+    return BEGIN + np.arange(samples) * np.timedelta64(1, "ms")
+
+
+@pytest.mark.parametrize("zone", ["", "Z", "+02:00"])
+def test_dates_in_text_keep_every_digit(tmp_path: Path, zone: str) -> None:
+    made = headed(axis(300))
+    rows = [f"{at}{zone},{u:g},{y:.9g}" for at, u, y in zip(stamps(300), *list(made.values())[1:], strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,voltage [V],position [mm]", *rows]) + "\n")
+    (log,) = read_log(tmp_path / "log.csv")
+    assert np.allclose(log.time, made["time [s]"], atol=1e-12, rtol=0.0)
+
+
+@pytest.mark.parametrize(("unit", "per_second", "worst"), [("s", 1.0, 3e-7), ("us", 1e6, 1e-12), ("ns", 1e9, 3e-7)])
+def test_seconds_since_1970_in_any_unit(tmp_path: Path, unit: str, per_second: float, worst: float) -> None:
+    made = axis(300)
+    time = np.rint((1.7e9 + made["time"]) * per_second) if unit != "s" else 1.7e9 + made["time"]
+    rows = [f"{t!r},{u:g},{y:.9g}" for t, u, y in zip(time.tolist(), made["voltage"], made["position"], strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join([f"time [{unit}],voltage [V],position [mm]", *rows]) + "\n")
+    (log,) = read_log(tmp_path / "log.csv")
+    assert np.allclose(log.time, made["time"], atol=worst, rtol=0.0)
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_the_time_index_of_pandas_is_the_time(tmp_path: Path, unit: str) -> None:
+    made = headed(axis(300))
+    frame = pd.DataFrame({name: values for name, values in made.items() if name != "time [s]"})
+    for index in (stamps(300), stamps(300) - BEGIN):
+        frame.index = pd.Index(index.astype(f"{index.dtype.str[1:3]}[{unit}]"))
+        frame.to_parquet(tmp_path / "log.parquet")
+        (log,) = read_log(tmp_path / "log.parquet")
+        assert np.allclose(log.time, made["time [s]"], atol=1e-12, rtol=0.0)
+
+
+def test_a_missing_date_is_a_blank_and_one_out_of_reach_is_refused(tmp_path: Path) -> None:
+    made = headed(axis(300))
+    del made["time [s]"]
+    time = stamps(300)
+    time[7] = np.datetime64("NaT")
+    pd.DataFrame(made | {"time": time}).to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(InputError, match="time has no number in sample 7"):
+        read_log(tmp_path / "log.parquet")
+    far = np.full(300, "9999-01-01", dtype="datetime64[ms]")
+    pd.DataFrame(made | {"time": far}).to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(InputError, match="its dates cannot be read"):
+        read_log(tmp_path / "log.parquet")
