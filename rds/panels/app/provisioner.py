@@ -1,29 +1,31 @@
-"""Where Jupyter gets the kernels of the page from: the first is ready, the others are started as always."""
+"""Where Jupyter gets the kernels of the page from: forks of a process that is ready, or new ones as always."""
 
 from __future__ import annotations
 
+import asyncio
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from jupyter_client.provisioning import KernelProvisionerFactory, LocalProvisioner
 
-from rds.panels.app.ready_kernel import ReadyKernel
+from rds.panels.app.ready_kernels import ReadyKernels
 
 NAME = "rds-ready"  # as kernel.json names it
 
 
 class ReadyProvisioner(LocalProvisioner):
-    """A local kernel: the process that is ready if there is one, else a new one."""
+    """A local kernel."""
 
-    def __init__(self, ready: ReadyKernel, **traits: Any):
+    def __init__(self, ready: ReadyKernels, **traits: Any):
         super().__init__(**traits)
         self._ready = ready
 
     async def launch_kernel(self, cmd: list[str], **kwargs: Any) -> Any:
         """Jupyter's word for starting the process; gives what connects to it."""
         cwd = kwargs.get("cwd") or Path.cwd()
-        process = self._ready.take(cmd, kwargs.get("env", {}), cwd)
+        # beside the loop: the first one waits until everything is imported
+        process: Any = await asyncio.to_thread(self._ready.start, cmd, kwargs.get("env", {}), cwd)
         if process is None:
             return await super().launch_kernel(cmd, **kwargs)
         self.process = process
@@ -37,7 +39,7 @@ class _Entry:
 
     name = NAME
 
-    def __init__(self, ready: ReadyKernel):
+    def __init__(self, ready: ReadyKernels):
         self._ready = ready
 
     def load(self) -> Any:
@@ -45,6 +47,6 @@ class _Entry:
         return partial(ReadyProvisioner, self._ready)
 
 
-def offer(ready: ReadyKernel) -> None:
+def offer(ready: ReadyKernels) -> None:
     """Let this process's kernels of the specification `rds` come from here."""
     KernelProvisionerFactory.provisioners[NAME] = _Entry(ready)  # type: ignore[assignment]

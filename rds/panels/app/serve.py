@@ -12,7 +12,7 @@ from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.panels import PANELS
 from rds.panels.app.page import FOLDER, MACHINE, PANEL
-from rds.panels.app.ready_kernel import ReadyKernel
+from rds.panels.app.ready_kernels import ReadyKernels
 
 _HERE = Path(__file__).parent
 
@@ -33,7 +33,7 @@ def serve(folder: Path, machine: str, panel: str, port: int | None, browser: boo
         MACHINE: machine,
         PANEL: panel,
     }
-    ready = ReadyKernel()  # imports while this process does
+    ready = ReadyKernels()  # imports while this process does
     try:
         launch = _server(ready)
         launch(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, address)])
@@ -41,8 +41,8 @@ def serve(folder: Path, machine: str, panel: str, port: int | None, browser: boo
         ready.close()
 
 
-def _server(ready: ReadyKernel) -> Callable[..., None]:
-    """Voilà, which takes its first kernel from `ready`; InputError where it is missing."""
+def _server(ready: ReadyKernels) -> Callable[..., None]:
+    """Voilà, which takes its kernels from `ready`; InputError where it is missing."""
     # jsonschema does without this one, which compiles a grammar of addresses for a second that nothing here checks
     sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
     try:

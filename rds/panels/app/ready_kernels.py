@@ -1,0 +1,151 @@
+"""Kernels from a process that has imported what every page needs: each is a fork of it, there at once.
+
+Importing IPython and the panels takes about as long as importing the server. So the process is started first, and both
+import at the same time. Then it waits, with one thread of Python and no loop: the server sends a line of JSON for each
+kernel that it wants, and gets a line with the number of its process. The end of the channel ends it, and its kernels.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+LAUNCHER = ["-m", "ipykernel_launcher"]  # after the interpreter: how Jupyter starts such a kernel otherwise
+_LONGEST = 64  # bytes of a process's number
+
+
+class ForkedKernel:
+    """What Jupyter uses of `subprocess.Popen`, for a process that is somebody else's child."""
+
+    stdin = stdout = stderr = None
+
+    def __init__(self, pid: int):
+        """ProcessLookupError if it has ended already."""
+        self.pid = pid
+        self.returncode: int | None = None
+        self._handle = os.pidfd_open(pid)
+
+    def poll(self) -> int | None:
+        """None while it runs; then 0, because its exit code is its parent's to know."""
+        if self.returncode is None and self._ended(0.0):
+            self.returncode = 0
+            os.close(self._handle)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end, at most `timeout` s: subprocess.TimeoutExpired after that."""
+        if self.returncode is None and not self._ended(timeout):
+            raise subprocess.TimeoutExpired(f"kernel {self.pid}", timeout or 0.0)
+        return self.poll() or 0
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless it has ended."""
+        if self.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                signal.pidfd_send_signal(self._handle, number)
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """End it."""
+        self.send_signal(signal.SIGKILL)
+
+    def _ended(self, timeout: float | None) -> bool:
+        poll = select.poll()
+        poll.register(self._handle, select.POLLIN)
+        return bool(poll.poll(None if timeout is None else timeout * 1e3))
+
+
+class ReadyKernels:
+    """The server's end of it. Where the system has no handles of processes (other than Linux), it has no kernels."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        if not hasattr(os, "pidfd_open"):
+            return
+        self._channel, theirs = socket.socketpair()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", __name__, str(theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                cwd=Path(__file__).parent,  # not the student's folder, whose files would be found before the libraries
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,  # Ctrl-C is the server's
+            )
+
+    def start(self, command: Sequence[str], env: Mapping[str, str], cwd: str | Path) -> ForkedKernel | None:
+        """The kernel that `command` would start; None if it cannot come from here."""
+        if self._process is None or list(command[1:3]) != LAUNCHER:
+            return None
+        told = {"arguments": list(command[3:]), "env": dict(env), "cwd": str(cwd)}
+        try:
+            self._channel.sendall(json.dumps(told).encode() + b"\n")
+            answer = self._channel.recv(_LONGEST)  # a number is too short to come in parts
+            return ForkedKernel(int(answer)) if answer else None
+        except OSError:  # the process has died, or the kernel has
+            return None
+
+    def close(self) -> None:
+        """End it; kernels that Jupyter has not ended by then end within a second."""
+        process, self._process = self._process, None
+        if process is not None:
+            self._channel.close()
+            process.terminate()
+            process.wait()
+
+
+def main() -> None:
+    """What the process does, with the number of its end of the channel as its argument."""
+    del sys.path[0]  # the folder of this file; a kernel puts the one that it works in there
+    channel = socket.socket(fileno=int(sys.argv[1]))
+    try:
+        from ipykernel.kernelapp import IPKernelApp
+    except ImportError:  # the server says what is not installed
+        return
+    with contextlib.suppress(Exception):  # whatever it is, the page says so
+        from rds.panels import PANELS, shell  # noqa: F401
+
+        for name in PANELS.names():
+            PANELS.module(name)
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # a kernel that has ended is gone at once
+    parent = os.getpid()
+    told = _fork_for_each(channel)
+    if told is not None and os.getppid() == parent:
+        options = [*told["arguments"], f"--IPKernelApp.parent_handle={parent}"]  # it ends with its parent
+        IPKernelApp.launch_instance(argv=options)
+
+
+def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:
+    """In each forked process what it was told, ready to be a kernel; None in this one, at the end of the channel."""
+    with channel, channel.makefile("r", encoding="utf-8") as lines:
+        for line in lines:
+            pid = os.fork()
+            if pid == 0:
+                told: dict[str, Any] = json.loads(line)
+                break
+            channel.sendall(f"{pid}\n".encode())
+        else:
+            return None
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    os.setsid()
+    os.environ.clear()
+    os.environ.update(told["env"])
+    os.chdir(told["cwd"])
+    if (numpy := sys.modules.get("numpy")) is not None:
+        numpy.random.seed()  # or all kernels would draw the same
+    return told
+
+
+if __name__ == "__main__":
+    main()
