@@ -47,5 +47,7 @@ class Editor(anywidget.AnyWidget):
         self.send({"kind": "go", "line": line})
 
     def _asked(self, _: Any, content: Any, __: Any) -> None:
-        if content == {"kind": "save"}:
+        """A save brings the text along: a change of `text` may still be on its way."""
+        if isinstance(content, dict) and content.get("kind") == "save" and isinstance(content.get("text"), str):
+            self.text = content["text"]
             self._on_save()

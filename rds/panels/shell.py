@@ -41,7 +41,7 @@ class Shell:
         self.help_page = "readme"
         self.on_help: Callable[[str], None] | None = None  # turns the help to a page, once its panel is there
         self._notice = Notice()
-        self._heard: list[Message] = []
+        self._heard: list[Message] = list(session.messages)  # what was said before there was a page
         self._title = widgets.HTML()
         self._title.add_class("rds-title")
         self._title.layout.flex = "1 1 0"

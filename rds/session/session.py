@@ -91,7 +91,7 @@ class Session:
             kept = json.loads(path.read_text())
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             self.say(f"{path} cannot be read ({error}); panels begin with their defaults", "warning")
             return {}
         if not isinstance(kept, dict):

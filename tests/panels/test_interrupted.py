@@ -79,3 +79,20 @@ def test_a_kernel_that_dies_leaves_the_record_and_no_claim(
     session.take_machine("a run after it", object())  # whoever died holds nothing
     page = open_page(on=app)
     page.wait_for_selector('.rds-notice:has-text("was cut short")')
+
+
+def test_a_click_does_not_overtake_what_was_typed_before_it(app: App, open_page: Callable[..., Any]) -> None:
+    page = open_page("Equipment control")
+    page.click('button:visible:text-is("View model")')
+    page.click(':text("Show as file")')
+    name = page.locator('input[placeholder="experiment.toml"]')
+    amplitude = page.locator('.rds-field:has(.rds-label:has-text("Amplitude")) input')
+    for last in (21, 22, 23, 24, 25):  # a change that the kernel has not taken holds up those behind it
+        name.fill(f"typed-{last}.toml")
+        for value in ("2", "3", "4"):
+            amplitude.fill(value)
+            amplitude.press("Enter")
+        amplitude.fill(str(last))
+        page.click('button:visible:text-is("Save the file")')
+        written = wait_for(lambda file=app.folder / f"typed-{last}.toml": file.is_file() and file.read_text())
+        assert f"amplitude = {last}.0" in written, written

@@ -110,3 +110,13 @@ def test_runs_of_the_folder_and_what_became_of_them(tmp_path: Path) -> None:
     found = {run.name: run.state for run in session.runs()}
     assert found == {"first": State.WHOLE, "second": State.CUT_SHORT}
     assert len(next(run for run in session.runs() if run.name == "first").open()) == 100
+
+
+@pytest.mark.parametrize("content", [b"{", b"\xff\xfe\x00", b"[" * 100_000, b"\xef\xbb\xbf{}"])
+def test_kept_choices_that_cannot_be_read_are_said_to_whoever_opens_the_page(content: bytes, tmp_path: Path) -> None:
+    from rds.panels.shell import Shell
+
+    (tmp_path / "session.json").write_bytes(content)
+    shell = Shell(Session(tmp_path))
+    shell.ticker.tick()
+    assert any("panels begin with their defaults" in getattr(each, "value", "") for each in shell.widget.children)

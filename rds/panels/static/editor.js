@@ -123,7 +123,7 @@ function render({ model, el }) {
   area.addEventListener("scroll", redraw);
   area.addEventListener("keydown", (event) => {
     event.stopPropagation(); // JupyterLab has shortcuts of its own
-    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "s") { event.preventDefault(); send(); model.send({ kind: "save" }); }
+    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "s") { event.preventDefault(); send(); model.send({ kind: "save", text: area.value }); }
   });
   model.on("change:text", () => {
     if (timer || model.get("text") === area.value) return; // what is being typed counts
