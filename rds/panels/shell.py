@@ -35,7 +35,7 @@ class Shell:
 
     def __init__(self, session: Session, panel: str = "menu"):
         self.session = session
-        self.ticker = Ticker()
+        self.ticker = Ticker(lambda text: self.say(text, "error"))
         self.panels: dict[str, Any] = {}
         self.here = ""
         self.help_page = "readme"
@@ -80,6 +80,9 @@ class Shell:
             self.say(self.session.emergency_stop(), "warning")
         except RdsError as error:
             self.say(str(error), "error")
+        except Exception as error:  # nobody may believe that the machine was stopped
+            logging.getLogger(__name__).exception("emergency stop")
+            self.say(f"emergency stop failed: {error}; cut the power", "error")
 
     def _built(self, module: ModuleType) -> Any:
         try:

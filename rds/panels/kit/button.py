@@ -20,14 +20,19 @@ def button(text: str, tip: str, act: Callable[[], Any], notice: Notice, primary:
     """A button that calls `act()`; what it refuses is said in `notice`."""
     made = widgets.Button(description=text, tooltip=tip, button_style="primary" if primary else "")
 
-    def clicked(_: Any) -> None:
-        try:
-            act()
-        except RdsError as error:
-            notice.say(str(error), "error")
-
-    made.on_click(clicked)
+    made.on_click(lambda _: attempt(text, act, notice))
     return made
+
+
+def attempt(what: str, act: Callable[[], Any], notice: Notice) -> None:
+    """Call `act()`; what it refuses, and whatever else goes wrong in it, is said in `notice`."""
+    try:
+        act()
+    except RdsError as error:
+        notice.say(str(error), "error")
+    except Exception as error:
+        logging.getLogger(__name__).exception("%s failed", what)
+        notice.say(f"{what} failed: {error}", "error")
 
 
 def follow(bar: WorkBar, notice: Notice, begin: Callable[[], Task[T]], show: Callable[[T], Any]) -> None:

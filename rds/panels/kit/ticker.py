@@ -9,6 +9,7 @@ from collections.abc import Callable
 from rds.session.task import Stopped
 
 PERIOD = 0.1  # s
+PATIENCE = 20  # failures one after the other before a call is given up
 
 
 class Ticker:
@@ -17,7 +18,10 @@ class Ticker:
     In the kernel's own thread, so that what it changes is never changed by a handler at the same time.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, given_up: Callable[[str], None] = lambda text: None) -> None:
+        """`given_up(sentence)` hears of a call that is not made again."""
+        self._given_up = given_up
+        self._failures: dict[Callable[[], None], int] = {}  # since it went well last
         self._calls: list[Callable[[], None]] = []
         self._task: asyncio.Task[None] | None = None
 
@@ -33,14 +37,17 @@ class Ticker:
         return remove
 
     def tick(self) -> None:
-        """Once, now. A call that fails is not made again; its error goes to the log."""
+        """Once, now. A call that fails again and again is not made any more; its errors go to the log."""
         for call in tuple(self._calls):
             try:
                 call()
-            except (Exception, Stopped):
+                self._failures.pop(call, None)
+            except (Exception, Stopped) as error:
                 logging.getLogger(__name__).exception("a panel could not be brought up to date")
-                if call in self._calls:
+                self._failures[call] = self._failures.get(call, 0) + 1
+                if self._failures[call] >= PATIENCE and call in self._calls:
                     self._calls.remove(call)
+                    self._given_up(f"a part of this page stands still, because {error}; reload the page")
 
     def _begin(self) -> None:
         if self._task is not None and not self._task.done():

@@ -1,0 +1,56 @@
+"""Parts of the page without a browser: what goes wrong in them is said there, and stops nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.panels.kit.button import button
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.ticker import PATIENCE, Ticker
+from rds.panels.shell import Shell
+from rds.session import Session
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(InputError("give <b>more</b>"), "give &lt;b&gt;more&lt;/b&gt;"), (OSError(28, "No space left"), "Save failed")],
+)
+def test_whatever_a_button_meets_is_said_beside_it_and_as_text(error: Exception, said: str) -> None:
+    def act() -> None:
+        raise error
+
+    notice = Notice()
+    button("Save", "", act, notice).click()
+    assert said in notice.value and "<b>more" not in notice.value
+
+
+def test_an_emergency_stop_that_fails_in_any_way_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = Session(tmp_path)
+    shell = Shell(session)
+
+    def fails() -> str:
+        raise ValueError("the adapter is unplugged")
+
+    monkeypatch.setattr(session, "emergency_stop", fails)
+    shell.emergency_stop()
+    said = [getattr(each, "value", "") for each in shell.widget.children]
+    assert any("the adapter is unplugged; cut the power" in each for each in said)
+
+
+def test_one_failure_of_a_part_of_the_page_does_not_end_it_and_many_are_said() -> None:
+    told: list[str] = []
+    calls: list[int] = []
+    ticker = Ticker(told.append)
+
+    def shaky() -> None:
+        calls.append(1)
+        if len(calls) == 1 or len(calls) > 3:
+            raise OSError("the disk is away")
+
+    ticker.add(shaky)
+    for _ in range(3 + PATIENCE + 5):
+        ticker.tick()
+    assert len(calls) == 3 + PATIENCE and "the disk is away; reload the page" in told[0] and len(told) == 1
