@@ -42,6 +42,7 @@ def tracking(
             observer_pole=observer_pole,
             voltage_range=voltage_range,
         )
+    _warn(model)
     if json:
         print_json({"file": str(out), "tau": designed.tau, "K": designed.K, "left_out": list(designed.left_out)})
         return
@@ -63,6 +64,14 @@ def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
             raise InputError("--machine is for --axis; a model file says what the axis is")
         return linear_axis_of(model)
     return linear_axis_of_machine(load_machine(machine or "mini-cnc"), str(axis))
+
+
+def _warn(model: Path | None) -> None:
+    """Repeat what the fit said against using its parameters at all."""
+    from rds.identification.model_file import read_model
+
+    for sentence in read_model(model).unusable() if model is not None else []:
+        typer.echo(f"warning: {model}: {sentence}", err=True)
 
 
 def _poles(text: str) -> list[complex]:
@@ -88,6 +97,7 @@ def machine_from(
 
         write_machine(out, model, base, axis)
         made = load_machine(str(out)).axis(axis)
+    _warn(model)
     if json:
         print_json({"file": str(out), "axis": axis, "model": made.model, "machine": made.machine})
     else:

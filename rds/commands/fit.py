@@ -53,7 +53,11 @@ def fit(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Estimate a model's parameters from logs. With --split the exit code is that of the validation."""
+    """Estimate a model's parameters from logs, and say how far to trust them.
+
+    The exit code is 1 where the parameters are not to be used, and says so; with --split, also where the validation
+    fails.
+    """
     with refusals(), stdout_kept(json):
         from rds.core.errors import InputError
         from rds.identification.fit import fit as fit_model
@@ -80,7 +84,7 @@ def fit(
         _show(estimate, validation)
         for path in files[:1] if report is None else [*files[: 1 if out else 0], report / "fit.html"]:
             typer.echo(f"{'model file' if path == out else 'report'}: {path}")
-    raise typer.Exit(validation.exit_code if validation else 0)
+    raise typer.Exit(1 if estimate.unusable() else validation.exit_code if validation else 0)
 
 
 def _options(

@@ -155,12 +155,13 @@ def _moved(
 
 def _idle(logs: Sequence[Log], begun: Mapping[str, float]) -> dict[str, Idle]:
     """Friction of a direction in which no log moves by more than noise and the encoder's steps may do."""
-    from rds.identification.smoothing import motion_of, travel
+    from rds.identification.smoothing import motion_of
+    from rds.logs.motion import travel
 
     fastest = max(float(np.abs(motion_of(log).velocity).max()) for log in logs)
     found = {}
     for name, other, way in (("friction_plus", "friction_minus", 1.0), ("friction_minus", "friction_plus", -1.0)):
-        if any(travel(log, way) > HARDLY * motion_of(log).noise for log in logs):
+        if any(travel(log.position, way) > HARDLY * motion_of(log).noise for log in logs):
             continue
         # by sign of K, the largest voltage that drives that way
         sign = way if begun["K"] >= 0.0 else -way

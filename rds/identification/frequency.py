@@ -21,10 +21,11 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.options import Option, check_known
-from rds.identification.estimate import Estimate
+from rds.identification.estimate import UNUSABLE, Estimate
 from rds.identification.frequency_response import FrequencyResponse, frequency_response, output_rate
 from rds.identification.made_estimate import made_estimate
 from rds.identification.regression import regress
+from rds.identification.smoothing import motion_of
 from rds.identification.structure import Structure
 from rds.logs.log import Log
 
@@ -33,6 +34,8 @@ OPTIONS = {"period": Option("period of a command that repeats, s; found in the d
 _LEAST_LINES = 3
 _FLOOR = 1e-3  # of the response: how exactly a line may be believed, however quiet
 _COHERENT = 0.9  # a median coherence below it deserves a warning
+_ENOUGH = 20_000  # samples to tell friction from
+_LOST = 15.0  # per cent: a gain that friction makes smaller by more is none of the axis's
 
 
 def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Estimate:
@@ -81,6 +84,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         max(2 * lines - len(names), 1),
         untold=untold,
         warnings=_warnings(logs, responses, values, chi, is_rate),
+        judged=is_rate or all(map(_direction, logs)),  # without the friction of a reversing axis, no free run is right
         details={
             "misfit": chi,
             "period": period,
@@ -201,12 +205,7 @@ def _warnings(
                 "linearly (noise, friction, or another input); raise the amplitude"
             )
         if not is_rate and _direction(log) == 0.0:
-            size = float(np.sqrt(2.0) * np.std(output_rate(log, False)[1]))
-            said.append(
-                f"{log.name}: the axis reverses, so Coulomb friction F makes K and tau too small by a factor of about "
-                f"1/(1 + 4F/(π·{size:.3g} mm/s)), and no coherence shows it: {_loss(size):.0f} % for F = 0.4 mm/s. Add "
-                "an offset that keeps the axis moving one way, or take --method simulation"
-            )
+            said.append(_of_reversing(log))
     if chi > 4.0:
         said.append(
             f"the response is {np.sqrt(chi):.1f} standard errors off the model on average: this axis is not of first "
@@ -221,9 +220,25 @@ def _warnings(
     return said
 
 
-def _loss(size: float) -> float:
-    """By how much K comes out too small, per cent, for friction of 0.4 mm/s at a velocity amplitude of `size` mm/s."""
-    return 100.0 * (1.0 - 1.0 / (1.0 + 4.0 * 0.4 / (np.pi * size)))
+def _of_reversing(log: Log) -> str:
+    """What friction takes from K and τ of an axis that reverses, by the friction that a free run tells."""
+    from rds.identification import simulation_error
+    from rds.identification.axis_structure import make
+
+    size = float(np.sqrt(2.0) * np.std(motion_of(log).velocity))
+    said = (
+        f"{log.name}: the axis reverses, so Coulomb friction F makes K and tau too small by a factor of about "
+        f"1/(1 + 4F/(π·{size:.3g} mm/s)), and no coherence shows it"
+    )
+    try:
+        found = simulation_error.estimate([log.part(0, min(len(log), _ENOUGH))], make(), {}).values()
+        friction = 0.5 * (found["friction_plus"] - found["friction_minus"])
+        loss = 100.0 * (1.0 - 1.0 / (1.0 + 4.0 * friction / (np.pi * size)))
+        said += f": some {loss:.2g} % here, where F is about {friction:.2g} mm/s"
+        said += f": {UNUSABLE}" if loss > _LOST else ""
+    except InputError:  # then there is more to say against the log than this
+        pass
+    return f"{said}. Add an offset that keeps the axis moving one way, or take --method simulation"
 
 
 def _told(response: FrequencyResponse) -> dict[str, Any]:

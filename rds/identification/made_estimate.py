@@ -13,6 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter
 from rds.identification.fitted_stretch import fitted_stretch
+from rds.identification.free_run_doubts import other_doubts
 from rds.identification.initial_state import estimate_start
 from rds.identification.kstep import ahead, errors_of
 from rds.identification.structure import Structure
@@ -35,10 +36,12 @@ def made_estimate(
     relative_error_percent: float | None = None,
     details: Mapping[str, Any] | None = None,
     states: Sequence[tuple[float, ...]] | None = None,
+    judged: bool = True,
 ) -> Estimate:
     """The estimate with `values` in the structure's order; `covariance` is of those, `freedom` for Student's t.
 
-    `states` are the logs' initial states where the method has estimated them; else they are estimated here.
+    `states` are the logs' initial states where the method has estimated them, by the free run; else they are estimated
+    here, and the free run of each log in open loop is `judged`: it sees what no method's own intervals count.
     Parameters that the structure says are given have no error. InputError for values outside the structure's bounds.
     """
     values = {name: float(values[name]) for name in structure.parameters}
@@ -70,7 +73,10 @@ def made_estimate(
     said += warnings
     for number, log in enumerate(logs):
         state = None if states is None else states[number]
-        begun[log.name], free_run[log.name], predictions[log.name] = _runs(structure, log, values, state)
+        begun[log.name], modelled = _run(structure, log, values, state)
+        free_run[log.name], predictions[log.name] = _errors(structure, log, modelled)
+        if judged and states is None and not log.closed_loop:
+            said += other_doubts(structure, log, log.position - modelled, method)
         if log.closed_loop:
             said.append(
                 f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
@@ -110,16 +116,20 @@ def _check_bounds(structure: Structure, name: str, value: float, method: str) ->
         )
 
 
-def _runs(
+def _run(
     structure: Structure, log: Log, values: Mapping[str, float], state: tuple[float, ...] | None
-) -> tuple[tuple[float, ...], Errors, Mapping[int, Errors]]:
+) -> tuple[tuple[float, ...], np.ndarray]:
+    """The initial state, and the free run from there (samples,)."""
     if state is None:
         few = slice(0, min(len(log), _START))
         state = estimate_start(structure, values, log.time[few], log.command[few], log.position[few])
     with np.errstate(all="ignore"):
-        modelled = np.asarray(structure.respond(log.time, log.command, state, values), dtype=float)
+        return state, np.asarray(structure.respond(log.time, log.command, state, values), dtype=float)
+
+
+def _errors(structure: Structure, log: Log, modelled: np.ndarray) -> tuple[Errors, Mapping[int, Errors]]:
+    """Of the free run, and of predictions ahead with it."""
     if not np.isfinite(modelled).all():
-        lost = Errors(-np.inf, np.inf, np.inf, structure.output_unit)
-        return state, lost, {}
+        return Errors(-np.inf, np.inf, np.inf, structure.output_unit), {}
     free_run = errors_of(log.position, modelled, structure.output_unit)
-    return state, free_run, ahead(log.position, modelled, structure.output_unit)
+    return free_run, ahead(log.position, modelled, structure.output_unit)

@@ -25,7 +25,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.toml_text import toml_text
 from rds.core.words import Words
-from rds.identification.estimate import Errors, Estimate, Parameter
+from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter
 from rds.results.atomic import write_whole
 
 FORMAT = 1
@@ -69,6 +69,10 @@ class ModelFile:
     def units(self) -> dict[str, str]:
         """The parameters' units by name."""
         return {name: parameter.unit for name, parameter in self.parameters.items()}
+
+    def unusable(self) -> list[str]:
+        """The fit's warnings that leave nothing to believe in."""
+        return [sentence for sentence in self.warnings if UNUSABLE in sentence]
 
     def fitted_on(self) -> tuple[str, ...]:
         """SHA-256 of the files that it was fitted to: data it must not be validated on alone."""

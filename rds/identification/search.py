@@ -16,7 +16,7 @@ import numpy as np
 from rds.identification.problem import Problem
 from rds.identification.residuals import effective_samples
 from rds.identification.smoothing import motion_of
-from rds.identification.solve import Solution, least_squares
+from rds.identification.solve import Solution, least_squares, tells_all
 from rds.identification.structure import Idle, Start, Structure
 from rds.logs.log import Log
 
@@ -124,7 +124,7 @@ def _search(problem: Problem, starts: Iterable[Start]) -> Found:
             best = solution
         if again and best.converged:
             break  # what is left is not for want of a better start
-        if best.converged and _explains(problem, best):
+        if best.converged and tells_all(best.triangle) and _explains(problem, best):
             break
     assert best is not None
     if not best.converged and tried > 1:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rds.logs.log import Log
+from rds.logs.motion import noise as noise_of
 
 _LONGEST = 0.05  # of a log: the widest difference that a velocity is taken over
 _SLOW = 0.03  # of the highest speed: slower is taken for rest
@@ -28,7 +29,7 @@ def motion_of(log: Log) -> Motion:
     """Differences of the position over as few samples as noise permits."""
     y, t = log.position, log.time
     step = log.resolution or 0.0
-    noise = max(_noise(y), step / np.sqrt(12.0))
+    noise = max(noise_of(y), step / np.sqrt(12.0))
     moves = bool(np.ptp(y) > max(2.5 * step, _STILL * noise))
     half, longest = 1, max(1, int(_LONGEST * len(y) / 2))
     while True:
@@ -38,21 +39,6 @@ def motion_of(log: Log) -> Motion:
         if uncertain <= _NOISY * fastest or 2 * half > longest:
             return Motion(noise, velocity, max(2.0 * uncertain, _SLOW * fastest), moves)
         half *= 2
-
-
-def travel(log: Log, way: float) -> float:
-    """The farthest that the log's position moves forward (`way` = 1) or backward (-1), noise included."""
-    y = way * log.position
-    return float((y - np.minimum.accumulate(y)).max())
-
-
-def _noise(y: np.ndarray) -> float:
-    """From third differences, in which a smooth motion leaves next to nothing; the median leaves out jolts."""
-    if len(y) < 8:
-        return 0.0
-    third = np.diff(y, 3)  # 1, 3, 3, 1: the variance is 20 times the noise's
-    robust = 1.4826 * float(np.median(np.abs(third)))
-    return (robust or float(np.sqrt(np.mean(third**2)))) / np.sqrt(20.0)
 
 
 def _difference(t: np.ndarray, y: np.ndarray, half: int) -> np.ndarray:

@@ -91,13 +91,14 @@ def least_squares(problem: Problem, start: np.ndarray, most: int | None = None) 
     # The dogleg needs little more than half the free runs of the reflective method, but ends anywhere where a direction
     # is not told, and may stay at a bound.
     quick = search("dogbox")
-    if quick.converged and not quick.at_bound.any() and _tells_all(quick.triangle):
+    if quick.converged and not quick.at_bound.any() and tells_all(quick.triangle):
         return quick
     sure = search("trf")
     return sure if sure.squares <= quick.squares else quick
 
 
-def _tells_all(triangle: np.ndarray) -> bool:
+def tells_all(triangle: np.ndarray) -> bool:
+    """Whether every direction of the free numbers shows in the residuals."""
     R = triangle[:, :-1]
     size = np.linalg.norm(R, axis=0)
     return bool(size.all() and np.linalg.cond(R / size) < _SINGULAR)

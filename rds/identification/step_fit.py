@@ -91,10 +91,12 @@ def _check_windows(logs: Sequence[Log], windows: Windows, is_rate: bool) -> None
             "--method simulation",
             where,
         )
-    if len({round(window.voltage, 6) for _, window in windows}) < 2 and not is_rate:
+    if not is_rate and all(
+        len({round(window.voltage, 6) for _, window in windows if window.way == way}) < 2 for way in (1, -1)
+    ):
         raise InputError(
-            "all steps end at the same voltage, which tells no gain apart from friction; log steps to two voltages or "
-            "more in each direction",
+            "the steps of each direction all end at one voltage, which tells no gain apart from friction; log steps to "
+            "two voltages or more in each direction",
             where,
         )
 

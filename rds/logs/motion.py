@@ -48,6 +48,24 @@ def motion(log: Log) -> Motion:
     return Motion(width, command, speed, noise)
 
 
+def noise(values: np.ndarray) -> float:
+    """The standard deviation of the noise on a smooth motion, quantization included; 0 for fewer than 8 values.
+
+    From third differences, in which the motion leaves next to nothing; the median leaves out jolts.
+    """
+    if len(values) < 8:
+        return 0.0
+    third = np.diff(values, 3)  # 1, 3, 3, 1: the variance is 20 times the noise's
+    robust = 1.4826 * float(np.median(np.abs(third)))
+    return (robust or float(np.sqrt(np.mean(third**2)))) / np.sqrt(20.0)
+
+
+def travel(position: np.ndarray, way: float) -> float:
+    """The farthest that a position moves forward (`way` = 1) or backward (-1), noise included."""
+    y = way * position
+    return float((y - np.minimum.accumulate(y)).max())
+
+
 def correlation(a: np.ndarray, b: np.ndarray) -> float:
     """Of two series, -1 to 1; 0 where one is constant."""
     a, b = a - a.mean(), b - b.mean()

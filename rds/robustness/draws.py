@@ -2,8 +2,8 @@
 
 From a fit: the normal distribution of the estimate, N(θ̂, Σ), kept within its confidence region (θ - θ̂)ᵀ Σ⁻¹ (θ - θ̂)
 <= χ²_p(level), p being the number of parameters that have a variance, and within what is physically possible; what
-falls outside is drawn again. From ranges: uniform and independent. Draw k of a seed is always the same, however many
-are drawn.
+falls outside is drawn again. Σ is the fit's covariance, widened to its intervals (`uncertain`). From ranges: uniform
+and independent. Draw k of a seed is always the same, however many are drawn.
 """
 
 from __future__ import annotations

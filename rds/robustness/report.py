@@ -68,8 +68,8 @@ def parameter_rows(found: AxisSummary) -> list[list[float | str | None]]:
 
 PARAMETER_COLUMNS = ("parameter", "estimate", "in the worst draw", "deviation", "rank correlation", "unit")
 PARAMETER_NOTE = (
-    "Deviation: in standard errors (of ranges: in halves of the range). Rank correlation (Spearman's) with the largest "
-    "tracking error: 1 when the error always grows with the parameter, -1 when it always falls."
+    "Deviation: in standard deviations of the draws (of ranges: in halves of the range). Rank correlation (Spearman's) "
+    "with the largest tracking error: 1 when the error always grows with the parameter, -1 when it always falls."
 )
 
 

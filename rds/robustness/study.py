@@ -141,6 +141,7 @@ def _estimate(task: Task, runs: int, jobs: int, obstacle: str) -> str:
 
 def _notes(task: Task, obstacle: str | None) -> tuple[str, ...]:
     notes = [] if obstacle is None else [f"not compiled: {obstacle}"]
+    notes += [f"axis {axis.name}: {sentence}" for axis in task.axes for sentence in axis.doubts]
     fixed = {axis.name: [name for name in axis.spread.names if name not in axis.spread.varied] for axis in task.axes}
     notes += [f"axis {axis}: {', '.join(names)} the same in every draw" for axis, names in fixed.items() if names]
     return tuple(notes)

@@ -28,7 +28,7 @@ class AxisSummary:
     failed: int
     worst: int | None  # the draw with the largest tracking error
     worst_values: dict[str, float]
-    deviations: dict[str, float]  # of the worst draw: in standard errors, or halves of the range
+    deviations: dict[str, float]  # of the worst draw: in standard deviations of the draws, or halves of the range
     drivers: dict[str, float | None]  # rank correlation of each parameter with the largest error
     nominal_values: dict[str, float]
     parameter_units: dict[str, str]

@@ -21,6 +21,7 @@ from rds.models.student import student_model
 from rds.robustness.draws import LEVEL, Spread, check_covariance
 from rds.runtime.plan import AxisPlan
 
+_NORMAL = 1.959964  # standard errors to either side hold 95 % of the normal distribution
 Ranges = Mapping[str, Mapping[str, tuple[float, float]]]  # per axis and parameter: lowest, highest
 
 
@@ -33,6 +34,7 @@ class Uncertain:
     base: Model
     made: Structure | None = None  # of a model file with a library structure
     student: StudentFile | None = None
+    doubts: tuple[str, ...] = ()  # of the fit: why its parameters are not to be used at all
 
     def model(self, values: Mapping[str, float]) -> Model:
         """The model with these values, the others as in the experiment. InputError for what is impossible."""
@@ -59,20 +61,34 @@ def uncertain(axis: AxisPlan, ranges: Mapping[str, tuple[float, float]] | None, 
         raise InputError("it changed while it was read; start again", file.path)
     made = None if file is None or file.is_student else checked_structure(file)
     student = _student(model, file)
+    doubts = () if file is None else tuple(file.unusable())
     if ranges:
-        return Uncertain(axis.axis.name, _by_ranges(axis, file, ranges), model, made, student)
+        return Uncertain(axis.axis.name, _by_ranges(axis, file, ranges), model, made, student, doubts)
     if file is None:
         raise InputError(
             f"axis {axis.axis.name}: nothing says how uncertain its model is; give a fitted model ([model] with "
             '`file = "fitted.toml"`, or --model), or ranges (--ranges)'
         )
     low, high = _bounds(made, file)
-    spread = Spread(
-        tuple(file.parameters), np.array(list(file.values().values())), file.units(), file.covariance, low, high, level
-    )
-    spread = replace(spread, where=file.path)
+    values = np.array(list(file.values().values()))
+    spread = Spread(tuple(file.parameters), values, file.units(), file.covariance, low, high, level, file.path)
     check_covariance(spread, file)
-    return Uncertain(axis.axis.name, spread, model, made, student)
+    return Uncertain(axis.axis.name, replace(spread, covariance=_widened(file)), model, made, student, doubts)
+
+
+def _widened(file: ModelFile) -> np.ndarray:
+    """The covariance of normal draws whose 95 % are the file's intervals: those of few independent samples are wider.
+
+    Student's t has no covariance to draw from where it has few degrees of freedom, and the intervals say it all.
+    """
+    low, high, error = (
+        np.array([getattr(parameter, key) for parameter in file.parameters.values()])
+        for key in ("low", "high", "std_error")
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        wider = 0.5 * (high - low) / (_NORMAL * error)
+    wider = np.where(wider > 1.0, wider, 1.0)  # 1 where the file states no interval (nan), too
+    return file.covariance * np.outer(wider, wider)
 
 
 def _student(model: Model, file: ModelFile | None) -> StudentFile | None:

@@ -34,13 +34,17 @@ def write_made(
     share: float = 0.02,
     structure: str = "axis",
     units: Mapping[str, str] = UNITS,
+    reach: float = 2.0,
 ) -> Path:
-    """A model file with these values, each with a standard error of `share` of its size, correlated by a half."""
+    """A model file with these values, each with a standard error of `share` of its size, correlated by a half.
+
+    Intervals go `reach` standard errors to either side.
+    """
     errors = {name: share * abs(value) for name, value in values.items()}
     scale = np.array(list(errors.values()))
     covariance = np.outer(scale, scale) * (0.5 + 0.5 * np.eye(len(scale)))
     parameters = {
-        name: Parameter(value, errors[name], value - 2 * errors[name], value + 2 * errors[name], units[name])
+        name: Parameter(value, errors[name], value - reach * errors[name], value + reach * errors[name], units[name])
         for name, value in values.items()
     }
     made = Estimate(structure, options, "simulation", parameters, covariance, (), {}, {}, {}, ())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,15 @@ def test_the_report_is_a_page_with_a_picture_for_each_log(tmp_path: Path) -> Non
     page = (tmp_path / "page" / "fit.html").read_text()
     assert page.count("<img") == 2 and "To doubt" in page
     assert sorted(path.name for path in (tmp_path / "page").glob("*.png")) == ["fit-1.png", "fit-2.png"]
+
+
+def test_parameters_that_are_not_to_be_used_are_exit_code_1_and_what_uses_them_says_so(tmp_path: Path) -> None:
+    good, file = axis_log(X), tmp_path / "x.toml"
+    code, _, err = run(csv(tmp_path / "x.csv", replace(good, position=-good.position)), "-s", "axis", "-o", file)
+    assert code == 1 and "moves against its command" in err
+    words = ["machine", "from", str(file), "--axis", "X", "-o", str(tmp_path / "m.toml")]
+    used = CliRunner().invoke(app, words)
+    assert used.exit_code == 0 and "do not use these parameters" in used.stderr
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,24 @@ def test_milliseconds_for_seconds_are_suspected() -> None:
     assert "no time constant" in said(replace(log, time=log.time * 1e6))
 
 
+def test_an_option_of_which_nothing_shows_is_to_be_left_out() -> None:
+    found = fit([axis_log(X, seconds=3.0, seed=3)], make(("delay",)))
+    assert found.parameters["delay"].value < 1e-9
+    (sentence,) = [warning for warning in found.warnings if warning.startswith("delay = ")]
+    assert "these data show nothing of it; fit without that option" in sentence
+
+
+def test_a_search_that_ends_in_a_valley_of_endless_gain_is_not_the_last() -> None:
+    """Gain and friction grew without end from the first start here, and tau settled at twice what it is."""
+    quick = X | {"tau": 0.001}
+    t = np.arange(10_000) * 0.001
+    u = 4.0 * np.sign(np.sin(2.0 * np.pi * t * 4.0 / t[-1] * 2.0 + 1e-9))
+    y = np.round(make().respond(t, u, (0.3, 0.0), quick) / 0.001) * 0.001
+    found = fit([Log("square", t, u, y, resolution=0.001)], make())
+    for name, value in quick.items():
+        assert abs(found.parameters[name].value - value) < 3.0 * found.parameters[name].std_error, name
+
+
 def test_a_direction_that_never_occurs_is_not_told() -> None:
     t = np.arange(5000) * 0.001
     log = forward(2.5 + np.sin(9.0 * t) + np.sin(23.0 * t))

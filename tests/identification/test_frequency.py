@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats
 
 from rds.core.errors import InputError
+from rds.identification.estimate import UNUSABLE
 from rds.identification.fit import fit
 from rds.identification.frequency import model_response
 from rds.identification.frequency_plot import bode_picture
@@ -87,9 +88,11 @@ def test_friction_biases_as_its_describing_function_says_and_no_coherence_shows_
     assert estimate.values()["K"] / K == pytest.approx(predicted, abs=0.035)
     assert estimate.values()["tau"] / TAU == pytest.approx(predicted, abs=0.04)
     assert np.median(estimate.details["responses"]["X"]["coherence"]) > 0.999
-    assert any("Coulomb friction" in warning for warning in estimate.warnings)
+    (warning,) = [warning for warning in estimate.warnings if "Coulomb friction" in warning]
+    assert "some 10 % here, where F is about 0.38 mm/s" in warning and UNUSABLE not in warning
     slow = fit([axis_log(multisine(2.0, 0.5, 0.5, 60.0))], structure("axis"), "frequency")
     assert slow.values()["K"] / K < 0.8
+    assert slow.unusable()
     free = fit([axis_log(BOTH_WAYS, friction=0.0)], structure("axis"), "frequency")
     assert free.values()["K"] == pytest.approx(K, rel=0.002)
     kept = fit([axis_log(ONE_WAY)], structure("axis"), "frequency")

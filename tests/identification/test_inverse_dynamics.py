@@ -119,6 +119,21 @@ def test_standard_errors_are_those_that_repetition_shows() -> None:
         assert 0.8 * spread < claimed < 2.5 * spread  # rather too large: the model's own bias is in the residual too
 
 
+@pytest.mark.parametrize(("noise", "step", "unusable"), [(0.005, 0.001, False), (0.0, 0.05, True)])
+def test_a_free_run_shows_what_noise_and_a_coarse_encoder_do_and_no_interval_counts(
+    noise: float, step: float, unusable: bool
+) -> None:
+    draw, good = np.random.default_rng(0), simulated(stairs())
+    y = np.round((good.position + noise * draw.standard_normal(len(good))) / step) * step
+    found = fit([replace(good, position=y, resolution=step)], structure("axis"), "inverse-dynamics")
+    off = found.values()["tau"] - TRUTH["tau"]
+    assert abs(off) > 3.0 * found.parameters["tau"].std_error
+    assert any("mislead the method inverse-dynamics" in warning for warning in found.warnings)
+    assert bool(found.unusable()) == unusable
+    held = fit([replace(good, position=y, resolution=step, closed_loop=True)], structure("axis"), "inverse-dynamics")
+    assert not any("mislead" in warning for warning in held.warnings)  # there a free run drifts anyway
+
+
 def test_several_logs_are_one_regression() -> None:
     one = simulated(stairs(), 1)
     other = replace(simulated(stairs(), 2), name="second")

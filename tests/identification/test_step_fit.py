@@ -108,6 +108,11 @@ def test_a_square_voltage_turns_at_every_step_and_is_enough_with_two_sizes() -> 
     assert estimate.values()["tau"] == pytest.approx(9.943e-3, rel=0.03)
 
 
+def test_one_voltage_each_way_tells_no_gain() -> None:
+    with pytest.raises(InputError, match=r"each direction all end at one voltage.*two voltages or more"):
+        fit([axis_log(1, [2.0, -2.0] * 4)], structure("axis"), "step")
+
+
 def test_steps_to_one_speed_forward_tell_no_friction_backward() -> None:
     estimate = fit([axis_log(2, [0.0, 2.0, 0.0, 3.0, 0.0, 4.0])], structure("axis"), "step")
     assert estimate.untold == ("friction_minus: no step ends in motion backward",)
@@ -136,7 +141,7 @@ def test_what_it_cannot_do_is_refused_with_a_remedy() -> None:
         fit([sine], structure("axis"), "step")
     with pytest.raises(InputError, match="take --method simulation"):
         fit([axis_log(0, VOLTAGES)], structure("axis", ("stribeck",)), "step")
-    with pytest.raises(InputError, match="same voltage"):
+    with pytest.raises(InputError, match="end at one voltage"):
         fit([axis_log(0, [0.0, 2.0])], structure("axis"), "step")
     with pytest.raises(InputError, match="no step to fit"):
         fit([replace(sine, command=np.zeros(4000))], structure("spindle"), "step")

@@ -21,6 +21,7 @@ from rds.robustness.draws import Spread, draws
 from rds.robustness.margins import linear_law, loop_margins
 from rds.robustness.report import write_study
 from rds.robustness.summary import sentences, summaries, to_json
+from rds.robustness.uncertain import uncertain
 from tests.identification.model_files import X, Y, write_made
 
 FULL = X | {"stribeck": 0.1, "stribeck_velocity": 0.8, "delay": 0.0017, "backlash": 0.003, "dead_zone": 0.1}
@@ -68,6 +69,17 @@ def test_in_python_the_figures_are_those_of_the_compiled_loop(
     assert np.allclose(in_python.figures, study(library, 6, seed=2).figures, rtol=1e-12)
     assert len(said) == 1 and "for 6 runs on 2 processes" in said[0] and "library's controllers" in said[0]
     assert any("not compiled" in note for note in in_python.notes)
+
+
+def test_draws_spread_as_wide_as_intervals_from_few_samples(tmp_path: Path) -> None:
+    """Student's t with 4 degrees of freedom: 2.78 standard errors to either side, where 1.96 are normal."""
+    spreads = []
+    for reach in (1.959964, 2.776):
+        file = write_made(tmp_path / f"{reach}.toml", X, reach=reach)
+        plan = experiment(tmp_path, model=str(file)).plan("simulation")
+        spreads.append(uncertain(plan.axes[0], None).spread.covariance)
+    normal, few = spreads
+    assert few == pytest.approx(normal * (2.776 / 1.959964) ** 2, rel=1e-5)
 
 
 def test_a_draw_is_the_same_among_few_and_many(tmp_path: Path) -> None:

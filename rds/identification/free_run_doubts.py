@@ -1,0 +1,94 @@
+"""What a free run beside the measurement says against the parameters, in sentences with numbers and units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rds.identification.estimate import UNUSABLE
+from rds.identification.smoothing import Motion, motion_of
+from rds.identification.structure import Structure
+from rds.logs.log import Log
+
+_POOR = 90.0  # per cent: a model that fits worse does not explain the motion
+_MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
+_LITTLE = 100.0  # times the measurement's noise: with less motion than that, a fit is not told by much
+_WHITE = 2.576  # 99 % band, in units of 1/√N
+_LAGS = (1, 10, 100)
+_OR_HELD = ". Where a controller held the axis (closed_loop in the map), that alone lets a free run drift away"
+
+
+def fitted_doubts(structure: Structure, log: Log, error: np.ndarray) -> list[str]:
+    """Doubts where the free run is what was fitted; `error` is measurement minus free run (samples,)."""
+    motion, size, unit = motion_of(log), _rms(error), structure.output_unit
+    said = [*_little(log, motion, unit), *_poor(log, motion, error)]
+    if motion.noise > 0.0 and size > _MISSED * motion.noise:
+        said.append(
+            f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / motion.noise:.3g} times the measurement's "
+            f"noise ({motion.noise:.2g} {unit}): the machine does something that structure {_named(structure)} lacks. "
+            "The intervals count the residuals' correlation, but not that the parameters make up for what is missing"
+        )
+    return said + _coloured(log, motion, error)
+
+
+def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str) -> list[str]:
+    """Doubts where `method` fitted something else, and no controller held the axis: then the free run judges it."""
+    if not np.isfinite(error).all():
+        return [f"{log.name}: the free run leaves the finite numbers: {UNUSABLE}; compare with --method simulation"]
+    motion, size, unit = motion_of(log), _rms(error), structure.output_unit
+    said = [*_little(log, motion, unit), *_poor(log, motion, error)]
+    if motion.noise > 0.0 and size > _MISSED * motion.noise:
+        said.append(
+            f"{log.name}: the free run of these parameters is {size:.3g} {unit} off (RMS), {size / motion.noise:.3g} "
+            f"times the measurement's noise ({motion.noise:.2g} {unit}). Either structure {_named(structure)} lacks "
+            f"something, or noise, encoder or sampling mislead the method {method}, which no interval counts: compare "
+            f"with --method simulation{'' if log.closed_loop is False else _OR_HELD}"
+        )
+    return said
+
+
+def _little(log: Log, motion: Motion, unit: str) -> list[str]:
+    reach = float(np.ptp(log.position))
+    if reach >= _LITTLE * motion.noise:
+        return []
+    return [
+        f"{log.name}: the axis moves by {reach:.3g} {unit} in all, only {reach / motion.noise:.0f} times the "
+        f"measurement's noise ({motion.noise:.2g} {unit}): intervals hold for errors that are small beside the motion, "
+        "and may be too narrow here; record more motion"
+    ]
+
+
+def _poor(log: Log, motion: Motion, error: np.ndarray) -> list[str]:
+    spread = float(log.position.std())
+    fit = 100.0 * (1.0 - float(error.std()) / spread) if spread > 0.0 else 0.0
+    if not (fit < _POOR and _rms(error) > _MISSED * motion.noise):
+        return []
+    return [
+        f"{log.name}: the free run explains {fit:.1f} % of the motion only: {UNUSABLE}; look at the "
+        "data with `rds data describe` (columns, signs, units), and try other options or structures"
+    ]
+
+
+def _coloured(log: Log, motion: Motion, error: np.ndarray) -> list[str]:
+    e = error - error.mean()
+    power = float(e @ e)
+    correlation = {lag: float(e[lag:] @ e[:-lag]) / power for lag in _LAGS if lag < len(e) // 4 and power > 0.0}
+    band = _WHITE / np.sqrt(len(error))
+    beyond = {lag: value for lag, value in correlation.items() if abs(value) > 2.0 * band}
+    if not beyond or (motion.noise > 0.0 and _rms(error) <= _MISSED * motion.noise):
+        return []
+    values = ", ".join(f"{value:.2f} at {lag}" for lag, value in beyond.items())
+    return [
+        f"{log.name}: the residuals are not white (autocorrelation {values} samples' distance; 99 % band "
+        f"±{band:.3f}): parameters that fit this log may not fit another"
+    ]
+
+
+def _rms(error: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def _named(structure: Structure) -> str:
+    name = Path(structure.name).name
+    return f"{name} with {', '.join(structure.options)}" if structure.options else name
