@@ -19,7 +19,7 @@ _SLOWEST = 5  # of the class that are listed
 _STYLE = f"""<style>
 .cards {{ display: flex; flex-wrap: wrap; gap: 1rem 2.5rem; }} .cards figure {{ margin: 0; max-width: 412px; }}
 figcaption {{ font-weight: 600; }} td, p {{ overflow-wrap: anywhere; }} td {{ max-width: 28rem; }}
-td.number {{ white-space: nowrap; }}
+td.number, td.status {{ white-space: nowrap; }} td.reason {{ min-width: 22rem; }}
 {histogram.STYLE}</style>"""
 
 
@@ -150,8 +150,8 @@ def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) ->
     ]
     numbers = "".join(f'<td class="number">{each}</td>' for each in cells)
     return (
-        f"<tr><td>{_name(grade.student, links)}</td><td>{escape(str(grade.status))}</td>{numbers}"
-        f"<td>{escape(one_line(grade.reason, 300))}</td></tr>"
+        f'<tr><td>{_name(grade.student, links)}</td><td class="status">{escape(str(grade.status))}</td>{numbers}'
+        f'<td class="reason">{escape(one_line(grade.reason, 300))}</td></tr>'
     )
 
 

@@ -11,7 +11,7 @@ from html import escape
 
 from rds.grading import band_bar
 from rds.grading.assignment import Assignment
-from rds.grading.cases.case import Case, CaseRun
+from rds.grading.cases.case import CaseRun
 from rds.grading.criterion import Criterion
 from rds.grading.feedback_plots import case_picture
 from rds.grading.grade import Band, CriterionScore, Grade, Status
@@ -129,7 +129,7 @@ def _runs(
         beside = [run for run in solution if run.case == case.name]
         picture = case_picture(of_case, beside, case.title)
         if picture is not None:
-            has_own = beside and not same_plants and _is_drawn(case)
+            has_own = beside and not same_plants and case.is_drawn
             own = " The reference solution ran on a plant of its own." if has_own else ""
             caption = escape(picture.caption + own)
             parts.append(
@@ -141,11 +141,6 @@ def _runs(
     hidden = 0 if shows_all else sum(not case.is_visible for case in assignment.cases)
     left_out = f'<p class="note">Hidden cases, not shown: {hidden}.</p>' if hidden else ""
     return f"<section><h2>Your runs</h2>{''.join(parts)}{left_out}</section>"
-
-
-def _is_drawn(case: Case) -> bool:
-    """Whether the plant of the case, or its noise, is every student's own."""
-    return bool(getattr(case, "noise", 0.0)) or any(plant.spread.names for plant in getattr(case, "plants", ()))
 
 
 def _notes(grade: Grade) -> str:

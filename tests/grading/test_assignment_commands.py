@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import Result as Ran
@@ -11,6 +12,8 @@ from typer.testing import CliRunner
 
 from rds.cli import app
 from rds.grading.assignment import read_assignment
+from rds.grading.cases.case import CaseRun
+from rds.grading.cases.control import ControlCase
 from rds.grading.check_assignment import IDLE, check_assignment
 from rds.grading.sandbox import Pool
 from rds.grading.self_check import self_check
@@ -118,6 +121,24 @@ def test_an_unfit_assignment_does_not(text: str, solution: str, said: str, tmp_p
     found = check_assignment(read_assignment(assignment_in(tmp_path, text, solution)), TrustedFiles(), 2)
     assert not found.ok
     assert any(said in fault for fault in found.faults), found.faults
+
+
+def test_what_is_the_same_for_everybody_is_run_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = SINE.replace('"sine"', '"drawn"') + '[case.vary]\ntau = "±10 %"\n'
+    text = HEAD + SINE + drawn + RMS + RMS.replace('"rms"', '"varied"').replace('"sine"', '"drawn"')
+    assignment = read_assignment(assignment_in(tmp_path, text))
+    ran, run = [], ControlCase.run
+
+    def counted(case: ControlCase, *arguments: Any) -> CaseRun:
+        ran.append(case.name)
+        return run(case, *arguments)
+
+    monkeypatch.setattr(ControlCase, "run", counted)
+    same, varied = check_assignment(assignment, TrustedFiles(), 5).criteria
+    assert same.least == same.largest and varied.least is not None and varied.largest is not None
+    assert varied.least < varied.largest
+    # for the first student, once more, and for what does nothing; the drawn one for the four others too
+    assert (ran.count("sine"), ran.count("drawn")) == (3, 7)
 
 
 def test_an_assignment_without_a_solution_cannot_be_checked(tmp_path: Path, pool: Pool) -> None:

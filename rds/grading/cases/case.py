@@ -97,6 +97,10 @@ class Case(Protocol):
     def can_be_linearized(self) -> bool: ...
 
     @property
+    def is_drawn(self) -> bool:
+        """Whether its plants or its noise are each student's own: else its runs are the same for everybody."""
+
+    @property
     def files(self) -> tuple[str, ...]:
         """That it reads, counted from the assignment's folder."""
 

@@ -64,6 +64,11 @@ class ControlCase:
         """Whether there is one axis, with a model whose linear part is known, and no program."""
         return len(self.plan.axes) == 1 and self.prepared is None and linear_model(self.plants[0].base) is not None
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether a plant or the noise is drawn for each student."""
+        return bool(self.noise) or any(plant.spread.names for plant in self.plants)
+
     def run(self, submitted: Submitted, seed: int, number: int, needs: Iterable[str] = ()) -> CaseRun:
         """The closed loop of run `number`; the linearized loop takes three more runs of the same motion."""
         plan, subjects = self.plan, self._begin(submitted)

@@ -46,6 +46,11 @@ class ModelCase:
     runs = property(lambda self: self.common.runs)
     can_be_linearized = False
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether a plant or the noise is drawn for each student."""
+        return bool(self.noise) or any(plant.spread.names for plant in self.plants)
+
     def run(self, submitted: Submitted, seed: int, number: int, needs: Iterable[str] = ()) -> CaseRun:
         """The free run of the model on run `number`'s data, from its own initial state."""
         data = self.data if self.data is not None else self._measured(seed, number)

@@ -43,6 +43,7 @@ class SegmentCase:
     runs = 1
     unit = "mm"
     can_be_linearized = False
+    is_drawn = False
 
     def run(self, submitted: Submitted, seed: int, number: int, needs: Iterable[str] = ()) -> CaseRun:
         """The rows of the segment."""
