@@ -18,6 +18,7 @@ from typing import Any
 
 from rds.core.blame import STUDENT_ERRORS, student_error, student_line
 from rds.core.errors import ContractError, InputError
+from rds.core.folder_kept import folder_kept
 from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
 from rds.core.types import Controller, Reference, Source
 from rds.core.values import own_copy, shown
@@ -239,7 +240,7 @@ def _run(text: str, file: Path) -> dict[str, Any]:
     module.__file__ = str(file)
     sys.modules[module.__name__] = module  # dataclasses and pickle look it up there
     try:
-        with _siblings(file.parent):
+        with _siblings(file.parent), folder_kept():
             exec(compile(text, str(file), "exec", dont_inherit=True), module.__dict__)
     except BaseException as error:
         del sys.modules[module.__name__]
@@ -287,7 +288,8 @@ def _load_error(error: BaseException, file: Path) -> InputError:
     if isinstance(error, SystemExit):
         return InputError(f"it ends the program while it loads: {said}; remove the exit", where)
     if isinstance(error, ModuleNotFoundError):
-        remedy = f"install {error.name}, or put {error.name}.py next to the file"
+        remedy = f"install {error.name}, or put {error.name}.py next to the file (where files are graded, "
+        remedy += "only numpy, scipy and control are there)"
     else:
         remedy = 'correct it, or move what is not a definition under `if __name__ == "__main__":`'
     return InputError(f"it fails while it loads: {said}; {remedy}", where)

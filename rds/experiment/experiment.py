@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import ContractError, InputError, MachineError, RdsError
+from rds.core.folder_kept import folder_kept
 from rds.core.types import Ending
 from rds.core.words import Words
 from rds.experiment.folder import new_folder, require_writable
@@ -182,7 +183,9 @@ class Experiment:
             folder = new_folder(plan.names, plan.mode) if load_mode(plan.mode).real_time else None
 
         def work(live: Live | None, progress: Progress | None) -> Result:
-            return self._finished(plan, known, self._rows(plan, folder, progress, live), folder, out)
+            with folder_kept():
+                rows = self._rows(plan, folder, progress, live)
+            return self._finished(plan, known, rows, folder, out)
 
         return self._handle(plan, folder, work)
 

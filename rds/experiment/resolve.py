@@ -15,6 +15,7 @@ from rds.bus.dialects import DEFAULT, dialect_names
 from rds.bus.fault_file import read_faults
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
+from rds.core.folder_kept import folder_kept
 from rds.core.words import Words
 from rds.experiment.parts import Setting, make_controller, make_drive, make_model
 from rds.machines import Axis, Machine, load_machine
@@ -30,6 +31,7 @@ PERIODS = (1e-6, 1000.0)  # s: the shortest and the longest sample period
 AXIS_WORDS = ("reference", "signal", "controller", "model")
 
 
+@folder_kept()
 def resolve(
     words: Words, folder: Path, mode_name: str | None = None, program: Program | None = None
 ) -> tuple[Plan, dict[str, Any]]:

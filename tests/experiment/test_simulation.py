@@ -160,3 +160,21 @@ def test_parameters_that_no_file_can_hold_are_kept_as_texts(tmp_path):
         kept = rds.open_result(files[kind]).meta["controller"]["X"]["params"]
         assert {key: kept[key] for key in ("long", "big", "P")} == {"long": "a int", "big": 10**50, "P": 20.0}
     assert "\\ud800" in files["report"].read_text()
+
+
+def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> None:
+    (alone / "elsewhere").mkdir()
+    change = "os.chdir(os.path.join(os.path.dirname(__file__), 'elsewhere'))"
+    (alone / "law.py").write_text(
+        f"import os\n{change}\ndef control(t, r, y, state, params):\n    {change}\n    return r.position - y, state\n"
+    )
+    (alone / "e.toml").write_text(
+        "axis = 'X'\nduration = 0.1\n[reference]\nkind = 'sinusoid'\namplitude = 1.0\nfrequency = 5.0\n"
+        "[controller]\nfile = 'law.py'\n"
+    )
+    from rds.experiment.report import run_and_save
+
+    for out in (Path("out"), None):
+        _, files = run_and_save(Path("e.toml"), None, out, None)
+        assert files["report"].exists() and Path.cwd() == alone.resolve()
+    assert not list((alone / "elsewhere").iterdir())
