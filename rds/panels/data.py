@@ -21,6 +21,14 @@ TITLE = "Data"
 SUMMARY = "Describe logged data, fit a model to them, and validate it on others"
 HELP = "data"
 
+_FIRST = (
+    '<div class="rds-hint"><p>From logged data to a model that can be trusted:</p><ol>'
+    "<li><b>Data</b>: choose a log of an axis (its voltage and its position over time), or a folder under "
+    "<code>runs/</code>; <i>Describe</i> says what it holds, and what is doubtful.</li>"
+    "<li><b>Fit</b>: <i>Fit</i> estimates the parameters of the structure that you choose.</li>"
+    "<li><b>Validate</b>: try the model on other data than it was fitted to.</li></ol>"
+    "<p>No log yet? Run a <i>System test</i> in Equipment model: its run is one.</p></div>"
+)
 _SIGNS = {"fault": "✖", "warning": "⚠", "note": "ℹ"}
 
 
@@ -35,9 +43,11 @@ class DataView:
     def __init__(self, shell: Any):
         self.shell, self.desk = shell, DataDesk(shell.session)
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
-        self.text, self.figure = widgets.HTML(), FigureView()
+        self.text, self.figure = widgets.HTML(_FIRST), FigureView()
         self.text.add_class("rds-scroll")
-        self._known = widgets.Dropdown(options=[("files of the folder …", "")], tooltip="What the folder holds")
+        self._known = widgets.Dropdown(
+            options=[("files of the folder …", "")], tooltip="What the folder holds", layout={"width": "auto"}
+        )
         self._known.observe(self._picked, "value")
         self._upload = widgets.FileUpload(description="Import a file", tooltip="Copy a file into the folder")
         self._upload.observe(self._imported, "value")

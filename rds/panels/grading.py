@@ -21,6 +21,17 @@ SUMMARY = "For instructors: grade a folder of submissions, see the class, export
 HELP = "grading"
 
 
+_FIRST = (
+    '<div class="rds-hint"><p>For instructors. To grade a class:</p><ol>'
+    "<li>Name the folder of the assignment, and the folder or zip with what was handed in.</li>"
+    "<li><i>Check assignment</i>: its solution gets full marks, an empty file none.</li>"
+    "<li>Name a new folder for the grades, then <i>Grade</i>. Stop when you like: <i>Go on</i> grades the rest.</li>"
+    "<li><i>Export</i> writes the gradebook of your platform.</li></ol>"
+    "<p>Help at the top says how an assignment is written. Students try their own file with "
+    "<code>rds grade self</code>.</p></div>"
+)
+
+
 def build(shell: Any) -> widgets.Widget:
     """The panel."""
     return GradingView(shell).widget
@@ -32,7 +43,7 @@ class GradingView:
     def __init__(self, shell: Any):
         self.shell, self.desk = shell, GradingDesk(shell.session)
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
-        self.table = widgets.HTML()
+        self.table = widgets.HTML(_FIRST)
         self._said = widgets.HTML()
         self._run = self._button("Grade", "Grade all submissions, or go on with those that are left", self.grade, True)
         batch = self._group(

@@ -66,8 +66,10 @@ class ResultActions:
         choices = self._session.choices(
             "results",
             [
-                Text("save_as", "Save as", "a name that ends with .csv, .mat or .parquet", "", "first.csv"),
-                Text("send_to", "E-mail to", "addresses, separated by commas", "", "me@example.edu", refuse=_refuse),
+                Text("save_as", "Save as", "a name that ends with .csv, .mat or .parquet", "", "e.g. first.csv"),
+                Text(
+                    "send_to", "E-mail to", "addresses, separated by commas", "", "e.g. me@example.edu", refuse=_refuse
+                ),
             ],
         )
         save = widgets.Button(description="Save", tooltip="Save the result's table under this name, with its units")

@@ -76,11 +76,15 @@ class ResultView:
         if not summary:
             self.timing_numbers.value = "<p>A simulation runs in virtual time: there is no timing to judge.</p>"
             return
-        rows = [[stage, *(summary[stage][key] for key in _STAGES)] for stage in _STAGE_NAMES if stage in summary]
+        rows = [
+            [words, *(summary[stage][key] for key in _STAGES)]
+            for stage, words in _STAGE_NAMES.items()
+            if stage in summary
+        ]
         late = f"{summary.get('late')} of {summary.get('samples')} samples late, {summary.get('discarded')} discarded"
         self.timing_numbers.value = (
             html.verdict_line(result, "Timing")
-            + html.table(["stage", "median [µs]", "99 % [µs]", "99.9 % [µs]", "longest [µs]"], rows)
+            + html.table(["part of a sample", "median [µs]", "99 % [µs]", "99.9 % [µs]", "longest [µs]"], rows)
             + f"<p>{escape(late)}</p>"
         )
         from rds.results.plots_timing import timing
@@ -95,7 +99,12 @@ class ResultView:
             self.validation.value = f"<h3>Does the model hold?</h3>{''.join(parts)}"
 
 
-_STAGE_NAMES = ("lateness", "io", "compute", "model")
+_STAGE_NAMES = {
+    "lateness": "lateness (of the system)",
+    "io": "I/O (on the bus)",
+    "compute": "compute (the controller)",
+    "model": "model",
+}
 
 
 def _metrics(results: Mapping[str, Result]) -> str:

@@ -87,7 +87,8 @@ def verdict_line(result: Result, label: str = "") -> str:
     kind = result.verdict if result.verdict in ("met", "missed", "void") else "other"
     reason = str(result.meta.get("verdict_reason") or "")
     lead = f"{escape(label)}: " if label else ""
-    return f'<p class="verdict {kind}">{lead}<strong>{escape(str(result.verdict))}</strong> {escape(reason)}</p>'
+    because = escape(f": {reason}") if reason else ""
+    return f'<p class="verdict {kind}">{lead}<strong>{escape(str(result.verdict))}</strong>{because}</p>'
 
 
 def notes_list(notes: Iterable[str]) -> str:

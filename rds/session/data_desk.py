@@ -165,16 +165,18 @@ class DataDesk:
 
 
 def _fields() -> Iterable[Field]:
-    yield Text("file", "File with logged data", "CSV, MAT, Parquet, a bus log, or the folder of a run", "", "log.csv")
+    yield Text(
+        "file", "File with logged data", "CSV, MAT, Parquet, a bus log, or the folder of a run", "", "e.g. log.csv"
+    )
     yield Text("map", "Map of its columns", "TOML file; empty: FILE.map.toml beside it, or guessed", "", "by itself")
     yield Choice("structure", "Structure", "which model is fitted", "axis", STRUCTURES)
-    yield Text("structure_file", "Own file", "a Python file with derivatives() and params", "", "my_model.py")
+    yield Text("structure_file", "Own file", "a Python file with derivatives() and params", "", "e.g. my_model.py")
     yield Several("options", "With", "what else the structure has (axis only)", [], OPTIONS, least=0)
     yield Choice("method", "Method", "how it is fitted", "", METHODS)
     yield Text(
         "model", "Model file", "the fitted model is written here; every mode takes it", "fitted.toml", "fitted.toml"
     )
-    yield Text("validation_file", "Validate on", "a file with other data than those of the fit", "", "other.csv")
+    yield Text("validation_file", "Validate on", "a file with other data than those of the fit", "", "e.g. other.csv")
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -55,7 +55,7 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
     board = machine.converter
     converter = (f"± {board.range:g} V", f"{board.bits} bit")
     live = mode in ("implementation", "system-test", "model-validation")
-    model = Block("model", f"Model of {axis.name}", (words.get("model", "default"),), column + 1)
+    model = Block("model", f"Model of {axis.name}", _model(table, axis, words), column + 1)
     encoder = Block("encoder", "Encoder", (f"{axis.resolution:g} {axis.unit} per count",), column + 2)
     measured = f"y [{axis.unit}]"
     if live:
@@ -95,6 +95,16 @@ def _source(table: Mapping[str, Any], axis: Axis, controlled: bool) -> Block:
         offset = f"about {shape['offset']:g} {unit}" if shape.get("offset") else ""
         lines = (shape["kind"], f"{shape['amplitude']:g} {unit}, {shape['frequency']:g} Hz", offset)
     return Block("source", "Reference" if controlled else "Voltage signal", tuple(filter(None, lines)), 0)
+
+
+def _model(table: Mapping[str, Any], axis: Axis, words: Mapping[str, str]) -> tuple[str, ...]:
+    """The student's file, or the machine's own model with its numbers."""
+    own = axis.model
+    if "model" in table or "name" not in own:
+        return (words.get("model", "default"),)
+    numbers = [f"τ {float(own['tau']) * 1e3:.3g} ms"] if "tau" in own else []
+    numbers += [f"K {float(own['K']):.4g}"] if "K" in own else []
+    return (str(own["name"]).replace("-", " "), ", ".join(numbers))
 
 
 def _controller(table: Mapping[str, Any], words: Mapping[str, str]) -> tuple[str, ...]:

@@ -55,7 +55,7 @@ def first_fields(kind: str, machine: Machine) -> Iterable[Field]:
         f"columns of time [s] and value [{'V' if kind == 'model' else 'unit of the axis'}], or such as "
         f"3*sin(2*pi*0.5*t)",
         "",
-        "signal.csv or 3*sin(2*pi*0.5*t)",
+        "e.g. 3*sin(2*pi*0.5*t)",
         refuse=_refuse_signal,
     )
     yield from sizes(kind, machine, machine.axes[first])
@@ -65,11 +65,13 @@ def first_fields(kind: str, machine: Machine) -> Iterable[Field]:
         "File of the model",
         "a Python file with derivatives() or advance(), or a model file of `rds fit`",
         "",
-        "my_model.py",
+        "e.g. my_model.py",
     )
     if kind == "control":
         yield controllers(machine.axes[first])
-        yield Text("controller_file", "File of the controller", "a Python file with control()", "", "my_controller.py")
+        yield Text(
+            "controller_file", "File of the controller", "a Python file with control()", "", "e.g. my_controller.py"
+        )
     yield Number("duration", "Final time", "how long it runs", 10.0, unit="s", above=0.0, high=3600.0)
     yield Number(
         "sample_period",

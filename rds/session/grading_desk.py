@@ -141,11 +141,15 @@ def _said(words: list[str]) -> str:
 
 
 def _fields() -> Iterable[Field]:
-    yield Text("assignment", "Assignment", "its folder, with assignment.toml", "", "assignments/tracking")
-    yield Text("submissions", "Submissions", "their folder, or the zip as the platform exports it", "", "submitted")
-    yield Text("out", "Grades", "a new folder for grades and feedback, or that of a batch to go on with", "", "grades")
+    yield Text("assignment", "Assignment", "its folder, with assignment.toml", "", "e.g. assignments/tracking")
+    yield Text(
+        "submissions", "Submissions", "their folder, or the zip as the platform exports it", "", "e.g. submitted"
+    )
+    yield Text(
+        "out", "Grades", "a new folder for grades and feedback, or that of a batch to go on with", "", "e.g. grades"
+    )
     yield Number("jobs", "Jobs", "processes side by side", None, low=1, high=256, whole=True, optional=True)
-    yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "tcp://host:8786")
+    yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tcp://host:8786")
     yield Choice("to", "Gradebook", "what grades are exported to", "nbgrader", GRADEBOOKS)
     yield Text("gradebook", "Your gradebook", "as downloaded from Canvas or Moodle; nbgrader's gradebook.db", "", "")
 

@@ -172,7 +172,7 @@ def test_a_gain_changes_while_it_runs_and_a_run_is_stopped(at: Callable[..., Equ
     control.saved()
     control.page.wait_for_selector('td:text-is("25"):visible')
     control.tab("Timing")
-    control.page.wait_for_selector('td:text-is("lateness"):visible')
+    control.page.wait_for_selector('td:has-text("lateness"):visible')
     control.page.wait_for_selector(".rds-figure canvas:visible")
 
 

@@ -13,8 +13,8 @@ from rds.core.errors import RdsError
 from rds.panels.kit.ticker import Ticker
 from rds.session.session import Session
 
-DPI = 88
-WIDTH = 8.2  # inches: as wide as what is beside the settings on a screen of 1280
+DPI = 94  # on the page: letters that can be read on a projector
+WIDTH = 7.6  # inches: as wide as what is beside the settings on a screen of 1280, or of 1024
 
 
 class FigureView(widgets.VBox):

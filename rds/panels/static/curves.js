@@ -2,6 +2,7 @@
 // `charts` comes from the kernel: title, axes with units, and series of x and y.
 
 const SVG = "http://www.w3.org/2000/svg";
+const LEAST = 245; // px of a chart: narrower, its title and its legend have no room beside each other
 const MARGIN = { left: 56, right: 10, top: 24, bottom: 38 };
 
 function render({ model, el }) {
@@ -36,7 +37,7 @@ function render({ model, el }) {
   function draw() {
     if (!el.isConnected || !box.clientWidth) return;
     box.replaceChildren();
-    const charts = model.get("charts"), columns = Math.min(model.get("columns"), charts.length) || 1;
+    const charts = model.get("charts"), columns = Math.max(Math.min(model.get("columns"), charts.length, Math.floor(box.clientWidth / LEAST)), 1);
     const w = Math.floor((box.clientWidth - 8 * (columns - 1)) / columns), h = model.get("height");
     for (const chart of charts) one(chart, w, h);
   }

@@ -19,6 +19,9 @@ function render({ model, el }) {
   let speed = 1; // of the replay; 1 with `follows` is live
   let plot = null;
   let dirty = false;
+  let hovered = false; // the mouse points at a time
+  box.addEventListener("mouseenter", () => { hovered = true; });
+  box.addEventListener("mouseleave", () => { hovered = false; dirty = true; });
 
   const pause = button("Pause", "Hold the picture; recording goes on");
   const slow = button("Slow motion", "Replay at a quarter of the speed from here");
@@ -46,6 +49,7 @@ function render({ model, el }) {
   }
   const first = () => (columns.length && columns[0].length ? columns[0][0] : 0);
   const last = () => (columns.length && columns[0].length ? columns[0][columns[0].length - 1] : 0);
+  const right = () => Math.max(end, first() + model.get("window")); // a run that has just begun grows from the left
   const ink = (name, fallback) => getComputedStyle(el).getPropertyValue(name).trim() || fallback;
 
   function build() {
@@ -55,11 +59,12 @@ function render({ model, el }) {
     const text = ink("--rds-text", "#222"), grid = { stroke: ink("--rds-grid", "#ddd"), width: 1 };
     const scaled = (trace) => trace.scale || trace.unit;
     const units = [...new Set(traces.map(scaled))];
-    const scales = { x: { time: false, range: () => [end - model.get("window"), end] } };
+    const scales = { x: { time: false, range: () => [right() - model.get("window"), right()] } };
     units.forEach((unit) => { scales[unit] = { auto: true }; });
     const axes = [{ stroke: text, grid, label: "time [s]", labelSize: 20, size: 34 }];
     units.forEach((unit, i) => axes.push({
-      scale: unit, stroke: text, grid: i ? { show: false } : grid, side: i ? 1 : 3, size: 58, labelSize: 18,
+      scale: unit, stroke: text, grid: i ? { show: false } : grid, side: i ? 1 : 3, labelSize: 18,
+      size: (u, shown) => 16 + 7.5 * Math.max(2, ...(shown || []).map((each) => String(each ?? "").length)),
       label: axisLabel(traces.filter((trace) => scaled(trace) === unit)),
     }));
     const series = [{ label: "time [s]", value: (u, v) => (v == null ? "–" : v.toFixed(3)) }];
@@ -93,6 +98,8 @@ function render({ model, el }) {
   function draw() {
     if (!plot) return;
     plot.setData(shown());
+    const newest = plot.data[0].length - 1; // the legend has the values at the right edge, unless the mouse asks for others
+    if (newest >= 0 && !hovered) plot.setLegend({ idx: newest });
     if (last() > first()) scrub.value = 1000 * (end - first()) / (last() - first());
     const state = follows ? "live" : speed ? `${speed}×` : "paused";
     clock.textContent = `${end.toFixed(2)} s, ${state}`;
