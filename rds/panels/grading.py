@@ -69,6 +69,9 @@ class GradingView:
         self._name_button()
         if self.desk.started():
             self.show()
+        if (task := self.desk.going_on()) is not None:
+            self._follow(task, self._graded)
+            self.notice.say("a batch that was begun earlier goes on; Stop ends it after what is being graded")
 
     def check(self) -> None:
         """Try the assignment itself."""
@@ -76,12 +79,11 @@ class GradingView:
 
     def grade(self) -> None:
         """Begin or go on."""
+        self._begin(self.desk.grade, self._graded)
 
-        def ended(count: int) -> None:
-            self.notice.say(f"{count} submissions are graded", "good")
-            self.show()
-
-        self._begin(self.desk.grade, ended)
+    def _graded(self, count: int) -> None:
+        self.notice.say(f"{count} submissions are graded", "good")
+        self.show()
 
     def show(self) -> None:
         """The class as it stands."""
@@ -121,9 +123,13 @@ class GradingView:
             return
         self.notice.clear()
         self._said.value = ""
+        self._follow(task, show)
 
+    def _follow(self, task: Task[Any], show: Callable[[Any], None]) -> None:
         def ended() -> None:
-            if task.error is not None:
+            if task.stopped:
+                self.notice.say("stopped", "warning")
+            elif task.error is not None:
                 self.notice.say(str(task.error), "error")
             elif task.stopping:
                 self.show()

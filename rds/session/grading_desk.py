@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +20,11 @@ from rds.session.choices import Choices
 from rds.session.fields import Choice, Field, Number, Text
 from rds.session.session import Session
 from rds.session.task import Task
+
+try:
+    from fcntl import LOCK_EX, LOCK_NB, flock
+except ImportError:  # Windows: a batch that goes on is not found again
+    flock = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from rds.grading.export import Written
@@ -30,7 +37,10 @@ GRADEBOOKS = {
     "gradescope": "Gradescope",
     "prairielearn": "PrairieLearn",
 }
+LOCK = ".grading.lock"  # in the session's folder: locked while a batch goes on, with its process and folder in it
+LOG = ".grading.log"  # what that batch says on stderr
 _LOOKS = 0.2  # s between looks at the journal
+_ENDS_IN = 10.0  # s that a check may take to end once it was asked to
 
 
 @dataclass
@@ -54,12 +64,13 @@ class GradingDesk:
     def check(self) -> Task[str]:
         """Try the assignment itself: what `rds grade check` says."""
         assignment = self._path("assignment", "the assignment's folder")
-        return self.session.work("check the assignment", lambda task: _said(["check", str(assignment)]))
+        return self.session.work("check the assignment", lambda task: _said(["check", str(assignment)], task.pulse))
 
     def grade(self) -> Task[int]:
         """Begin, or go on with what is in the folder; the answer is how many are graded.
 
-        Stopping lets what is being graded end; the rest can be graded later, as after a kill.
+        Stopping lets what is being graded end; the rest can be graded later, as after a kill. The batch goes on if the
+        page ends: `going_on` finds it again. The task's error says where another batch of this folder goes on.
         """
         words = [
             *("run", str(self._path("assignment", "the assignment's folder"))),
@@ -68,7 +79,15 @@ class GradingDesk:
             *(["--scheduler", self.choices["scheduler"]] if self.choices["scheduler"] else []),
             *(["--resume"] if self.started() else []),
         ]
-        batch = _Batch(words, self.out)
+        batch = _Batch(self.session.folder)
+        out = self.out
+        return self.session.work("grade", lambda task: batch.begin(words, out, task), batch.stop)
+
+    def going_on(self) -> Task[int] | None:
+        """A batch that a page of this folder has begun and that goes on, to be followed or stopped; None: none does."""
+        batch = _Batch(self.session.folder)
+        if not batch.find():
+            return None
         return self.session.work("grade", batch.follow, batch.stop)
 
     def finished(self) -> Finished:
@@ -92,33 +111,88 @@ class GradingDesk:
 
 
 class _Batch:
-    """`rds grade run` as a process: it goes on if this page ends."""
+    """`rds grade run` as a process that goes on if this page ends. It holds the lock, so that others find it."""
 
-    def __init__(self, words: list[str], out: Path):
-        self._words, self._out = words, out
-        self._process: subprocess.Popen[str] | None = None
+    def __init__(self, folder: Path):
+        self._lock, self._log = folder / LOCK, folder / LOG
+        self._process = 0
+        self._child: subprocess.Popen[bytes] | None = None
+        self._out = folder
 
-    def stop(self) -> None:
-        if self._process is not None and self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
-
-    def follow(self, task: Task[int]) -> int:
-        command = [sys.executable, "-m", "rds", "grade", *self._words]
-        self._process = process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-            start_new_session=True,
-        )  # fmt: skip
-        assert process.stderr is not None
+    def begin(self, words: list[str], out: Path, task: Task[int]) -> int:
+        """Start it, and follow it to its end."""
+        self._out = out
+        with self._claimed() as lock, self._log.open("wb") as log:
+            self._child = subprocess.Popen(
+                [sys.executable, "-m", "rds", "grade", *words],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=log,  # a pipe that nobody reads would hold it up, and end it with this page
+                start_new_session=True,
+                pass_fds=(lock,) if os.name == "posix" else (),
+            )
+            self._process = self._child.pid
+            os.write(lock, json.dumps({"process": self._process, "out": str(out)}).encode())
         if task.stopping:
             self.stop()
-        while process.poll() is None:
+        return self.follow(task)
+
+    def find(self) -> bool:
+        """Whether one goes on that another page has begun."""
+        try:
+            said = json.loads(self._lock.read_text())
+            self._process, self._out = int(said["process"]), Path(said["out"])
+        except (OSError, ValueError, KeyError, TypeError):
+            return False
+        return self._goes_on()
+
+    def stop(self) -> None:
+        """Let what is being graded end."""
+        if self._process and self._goes_on():
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.kill(self._process, signal.SIGINT)
+
+    def follow(self, task: Task[int]) -> int:
+        """Until its end; how many submissions are graded then."""
+        while self._goes_on():
             done, of = progress(self._out)
             task.advance(done, of, f"{done} of {of} submissions" if of else "reading the submissions")
             time.sleep(_LOOKS)
-        said = process.stderr.read().strip()
-        if process.returncode not in (0, 1, 130):
-            raise InputError(said.removeprefix("rds: ") or f"grading ended with code {process.returncode}")
-        return progress(self._out)[0]
+        done, of = progress(self._out)
+        code = self._child.returncode if self._child is not None else 0 if done == of else 2
+        if code not in (0, 1, 130) and not task.stopping:
+            said = self._log.read_text(errors="replace").strip()
+            raise InputError(said.removeprefix("rds: ") or f"grading ended with code {code}")
+        return done
+
+    def _goes_on(self) -> bool:
+        if self._child is not None:
+            return self._child.poll() is None
+        try:
+            with self._claimed():
+                return False
+        except InputError:
+            return flock is not None
+
+    @contextlib.contextmanager
+    def _claimed(self) -> Iterator[int]:
+        """The lock's file, empty; InputError where a batch holds it, or it cannot be written."""
+        try:
+            descriptor = os.open(self._lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror}", str(self._lock)) from error
+        try:
+            if flock is not None:
+                try:
+                    flock(descriptor, LOCK_EX | LOCK_NB)
+                except OSError:
+                    raise InputError(
+                        "a batch of this folder goes on already: wait for it, or reload the page and stop it"
+                    ) from None
+            os.truncate(descriptor, 0)
+            yield descriptor
+        finally:
+            os.close(descriptor)
 
 
 def progress(out: Path) -> tuple[int, int]:
@@ -131,13 +205,33 @@ def progress(out: Path) -> tuple[int, int]:
     return 0, 0
 
 
-def _said(words: list[str]) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "rds", "grade", *words], capture_output=True, text=True, check=False, timeout=600
-    )
-    if done.returncode == 2:
-        raise InputError(done.stderr.strip().removeprefix("rds: "))
-    return done.stdout + done.stderr
+def _said(words: list[str], pulse: Callable[[], None]) -> str:
+    """What a command of `rds grade` says; InputError where it refuses. What `pulse()` raises ends it."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rds", "grade", *words],
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=err,
+            start_new_session=True,
+        )
+        try:
+            while process.poll() is None:
+                pulse()
+                time.sleep(_LOOKS)
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)  # so that it takes its sandbox away
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(_ENDS_IN)
+                process.kill()
+                process.wait()
+        for stream in (out, err):
+            stream.seek(0)
+        said, refused = out.read().decode(errors="replace"), err.read().decode(errors="replace")
+    if process.returncode == 2:
+        raise InputError(refused.strip().removeprefix("rds: "))
+    return said + refused
 
 
 def _fields() -> Iterable[Field]:

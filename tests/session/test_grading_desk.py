@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -49,3 +52,59 @@ def test_the_worst_come_first() -> None:
         return Grade(student, Status.OK, "", score, 10.0, score, ())
 
     assert [row[0] for row in rows([grade("ada", 10.0), grade("zoe", 0.0), grade("ben", 0.0)])] == ["ben", "zoe", "ada"]
+
+
+SLOW = """
+import json, os, signal, sys, time
+signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+sys.stderr.write("a warning\\n" * 20_000)  # more than a pipe holds
+open(sys.argv[1], "w").write("begun")
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def slow_grading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """In place of `rds grade`: a process that says much, and ends when it is interrupted. The file that it makes."""
+    import subprocess
+
+    real, begun = subprocess.Popen, tmp_path / "begun"
+
+    def popen(command: list[str], **options: Any) -> Any:
+        return real([command[0], "-c", SLOW, str(begun)], **options)
+
+    monkeypatch.setattr("rds.session.grading_desk.subprocess.Popen", popen)
+    return begun
+
+
+def until(there: Callable[[], object]) -> None:
+    deadline = time.monotonic() + 20.0
+    while not there():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_a_batch_goes_on_without_its_page_and_another_finds_and_stops_it(slow_grading: Path, tmp_path: Path) -> None:
+    desk = GradingDesk(Session(tmp_path))
+    assert desk.going_on() is None
+    for name in ("assignment", "submissions", "out"):
+        desk.choices.set(name, name)
+    first = desk.grade()
+    until(slow_grading.exists)
+    other = GradingDesk(Session(tmp_path))
+    second = other.grade()
+    assert second.wait(20) and "a batch of this folder goes on already" in str(second.error)
+    again = other.going_on()
+    assert again is not None and not again.wait(0.3)
+    again.stop()
+    assert again.wait(20) and again.error is None
+    assert first.wait(20) and first.error is None and other.going_on() is None
+
+
+def test_a_check_of_an_assignment_is_stopped(slow_grading: Path, tmp_path: Path) -> None:
+    desk = GradingDesk(Session(tmp_path))
+    desk.choices.set("assignment", "assignment")
+    task = desk.check()
+    until(slow_grading.exists)
+    task.stop()
+    assert task.wait(20) and task.stopped
