@@ -24,14 +24,18 @@ _CHECK = 16  # hex digits
 class Journal:
     """Opened by one process at a time. `rows` are the finished ones, in the order in which they were written.
 
-    `was_torn` says whether a half-written last line was cut off. InputError if another process has it, or a line in
-    it is damaged.
+    `was_torn` says whether a half-written last line was cut off. InputError if another process has it, a line in it is
+    damaged, or it cannot be written.
     """
 
     def __init__(self, path: Path):
         self.path = path
         self.was_torn = False
-        self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror}; choose another place", str(path)) from error
         try:
             try:
                 fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -47,11 +51,15 @@ class Journal:
             raise
 
     def append(self, row: Mapping[str, Any]) -> None:
-        """One row, on the disk when this returns."""
+        """One row, on the disk when this returns. InputError where the system refuses to write."""
         data = line(row)
-        while data:
-            data = data[os.write(self._fd, data) :]
-        os.fsync(self._fd)
+        try:
+            while data:
+                data = data[os.write(self._fd, data) :]
+            os.fsync(self._fd)
+        except OSError as error:  # what is there of the line is cut off when the journal is opened again
+            said = f"cannot be written: {error.strerror}; make room, and go on with --resume: what is graded is kept"
+            raise InputError(said, str(self.path)) from error
 
     def close(self) -> None:
         """Let others have it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import random
@@ -18,7 +19,7 @@ from rds.core.errors import InputError
 from rds.grading.batch import BatchOutcome, run_batch
 from rds.grading.batch import run as run_module
 from rds.grading.grade import Grade, Status
-from rds.grading.journal import read_journal
+from rds.grading.journal import Journal, read_journal
 from rds.grading.sandbox import SandboxError, available
 from rds.spread import Outcome
 from tests.grading.batches import ASSIGNMENT, law, notebook, put
@@ -264,3 +265,31 @@ def test_a_worker_that_dies_is_replaced(place: Path, tmp_path: Path) -> None:
 
     found = run_batch(place / "task", handed_in, tmp_path / "out", jobs=1, progress=kill_one)
     assert killed and {grade.status for grade in found.grades.values()} == {Status.OK}
+
+
+def test_of_two_graders_of_one_folder_the_second_changes_nothing(place: Path, tmp_path: Path) -> None:
+    """Also where both found it empty: the record is that of the one whose grades are there."""
+    handed_in, out = put(tmp_path / "in", {"ada.py": law()}), tmp_path / "out"
+    with Journal(out / "journal.jsonl"), pytest.raises(InputError, match="another rds grade run"):
+        run_batch(place / "task", handed_in, out, jobs=1)
+    assert [path.name for path in out.iterdir()] == ["journal.jsonl"]
+    assert run_batch(place / "task", handed_in, out, jobs=1).graded_now == 1  # ended before it had begun: free again
+
+
+def test_a_disk_that_is_full_loses_nothing(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    handed_in, out = put(tmp_path / "in", {"ada.py": law(), "ben.py": "x"}), tmp_path / "out"
+    write = os.write
+
+    def full(descriptor: int, data: bytes) -> int:
+        if b'"student": "ben"}' in data:
+            if len(data) < 100:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return write(descriptor, data[:-50])
+        return write(descriptor, data)
+
+    with monkeypatch.context() as patch, pytest.raises(InputError, match=r"No space left.*--resume"):
+        patch.setattr("rds.grading.journal.os.write", full)
+        run_batch(place / "task", handed_in, out, jobs=1)
+    assert [row["student"] for row in read_journal(out / "journal.jsonl")] == ["ada"]
+    found = run_batch(place / "task", handed_in, out, jobs=1, resume=True)
+    assert found.graded_now == 1 and found.grades["ben"].status is Status.FAILED_TO_LOAD

@@ -65,11 +65,12 @@ def run_batch(
         {each.row.student: each.row.time.isoformat() for each in rows if each.row.time},
         intake.layout,
     )
-    if (out / FILE).exists():
-        check_same(read_record(out), record, out)
-    record.write(out)
     notes = [f"not a submission, and left alone: {name}" for name in intake.ignored]
-    with Journal(out / JOURNAL) as journal:
+    with Journal(out / JOURNAL) as journal:  # from here on nobody else writes into this folder
+        if (out / FILE).exists():
+            _check_free(out, resume)
+            check_same(read_record(out), record, out)
+        record.write(out)
         if journal.was_torn:
             say("the last line of the journal was only half written, and was cut off: that submission is graded again")
         keep(rows)
@@ -124,8 +125,13 @@ def _check_free(out: Path, resume: bool) -> None:
         raise InputError("is not a folder; name another place", str(out))
     if (out / FILE).exists():
         raise InputError("holds a batch already; go on with it by --resume, or name a new folder", str(out))
-    if any(not path.name.startswith(".") for path in out.iterdir()):
+    if any(not path.name.startswith(".") and not _is_empty_journal(path) for path in out.iterdir()):
         raise InputError("is not empty, and holds no batch; name a new folder", str(out))
+
+
+def _is_empty_journal(path: Path) -> bool:
+    """What is left of a batch that was ended before it had begun."""
+    return path.name == JOURNAL and path.is_file() and path.stat().st_size == 0
 
 
 class _Batch:
