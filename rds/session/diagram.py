@@ -101,7 +101,8 @@ def _model(table: Mapping[str, Any], axis: Axis, words: Mapping[str, str]) -> tu
     """The student's file, or the machine's own model with its numbers."""
     own = axis.model
     if "model" in table or "name" not in own:
-        return (words.get("model", "default"),)
+        given = table.get("model", {}).get("params", {})
+        return (words.get("model", "default"), *(f"{name} {value:g}" for name, value in given.items()))[:4]
     numbers = [f"τ {float(own['tau']) * 1e3:.3g} ms"] if "tau" in own else []
     numbers += [f"K {float(own['K']):.4g}"] if "K" in own else []
     return (str(own["name"]).replace("-", " "), ", ".join(numbers))
@@ -110,6 +111,7 @@ def _model(table: Mapping[str, Any], axis: Axis, words: Mapping[str, str]) -> tu
 def _controller(table: Mapping[str, Any], words: Mapping[str, str]) -> tuple[str, ...]:
     given = {name: value for name, value in table["controller"].items() if name not in ("name", "file")}
     poles = given.pop("poles", None)
+    given |= given.pop("params", {})  # of a student's file
     lines = [words.get("controller", "")]
     if poles:
         lines.append(f"poles {poles[0][0]:g} ± {abs(poles[0][1]):g}i 1/s")

@@ -113,6 +113,8 @@ def test_params_of_a_students_file_can_be_set_before_a_run(tmp_path: Path) -> No
     assert equipment.table()["controller"] == {"file": "mine.py"}
     choose(equipment, controller__Kp="12,5")
     assert equipment.table()["controller"] == {"file": "mine.py", "params": {"Kp": 12.5}}
+    drawn = diagram(equipment.table(), equipment.machine, equipment.words())
+    assert next(block for block in drawn.blocks if block.name == "controller").lines == ("mine.py", "Kp 12.5")
     again = Equipment(Session(tmp_path), "control")
     assert again.table() == equipment.table()  # as it was left
     choose(equipment, controller_file="other.py")
@@ -123,6 +125,8 @@ def test_params_of_a_students_file_can_be_set_before_a_run(tmp_path: Path) -> No
     assert equipment.parameters == ["controller.Ki"]
     choose(equipment, model="user", model_file="mine.py", model__n=4)
     assert repr(equipment.table()["model"]["params"]) == "{'n': 4}"  # which range() takes
+    drawn = diagram(equipment.table(), equipment.machine, equipment.words())
+    assert next(block for block in drawn.blocks if block.name == "model").lines == ("mine.py", "n 4")
     choose(equipment, model="default")
     assert equipment.model_parameters == [] and "model" not in equipment.table()
 
