@@ -28,6 +28,14 @@ from rds.grading.unit_tests import share_passed
 
 _LONGEST_OUTPUT = 4000  # characters of what it printed, in the notes
 _HIDDEN = "in a case that is hidden"
+_ENDED = {
+    Status.MISSING: "nothing was handed in",
+    Status.REFUSED: "the file was not opened",
+    Status.FAILED_TO_LOAD: "the file could not be loaded",
+    Status.TIMED_OUT: "the file had taken too long before",
+    Status.KILLED: "the file had been ended before",
+}
+"""Why nothing more is run. What it was in full is the grade's reason, and need not be said at every criterion."""
 
 
 class Opener(Protocol):
@@ -169,7 +177,8 @@ class _Work:
         self._told = ""  # of a hidden case: what went wrong
         self._failed: dict[str, str] = {}  # by case: why
         self._tested: dict[str, float] = {}  # by criterion: the value of unit tests
-        self._stopped = ""
+        self._untested: dict[str, str] = {}  # by criterion: why its tests came to no end
+        self._stopped: Status | None = None
 
     def go(self, path: Path, pool: Opener, is_hidden: bool) -> None:
         """Run what is visible, or what is hidden, of the cases and unit tests that the criteria need."""
@@ -211,7 +220,7 @@ class _Work:
             try:
                 self._tested[criterion.name] = share_passed(criterion.tests, opened)
             except SubmissionError as error:
-                self._blame(error, f"{criterion.title}: ", self._hides(criterion))
+                self._untested[criterion.name] = self._blame(error, f"{criterion.title}: ", self._hides(criterion))
                 if self._stopped:
                     return
 
@@ -240,7 +249,7 @@ class _Work:
         if error.status in (Status.MISSING, Status.REFUSED):
             self.was_opened = False
         if error.status is not Status.BROKE_CONTRACT:
-            self._stopped = said
+            self._stopped = error.status
         return said if is_hidden else error.reason
 
     def scores(self) -> tuple[CriterionScore, ...]:
@@ -252,19 +261,22 @@ class _Work:
                 found[criterion.name] = criterion.without(found[criterion.name], found[missed[0]].title)
         return tuple(found.values())
 
+    def _ended(self) -> str:
+        return self.reason if self._stopped is None else _ENDED.get(self._stopped, str(self._stopped))
+
     def _score(self, criterion: Criterion) -> CriterionScore:
         """The worst of all runs of all its cases."""
         if criterion.tests:
             value = self._tested.get(criterion.name)
             if value is None:
-                return criterion.nothing(self._stopped or self.reason)
+                return criterion.nothing(self._untested.get(criterion.name) or self._ended())
             return criterion.score(float(f"{value:.9g}"), "")
         worst: tuple[float, str] | None = None
         for name in criterion.cases:
             case = self.assignment.case(name)
             runs = [run for run in self.runs if run.case == name]
             if name in self._failed or len(runs) < case.runs:
-                return criterion.nothing(self._failed.get(name) or self._stopped or self.reason, name)
+                return criterion.nothing(self._failed.get(name) or self._ended(), name)
             for run in runs:
                 try:
                     value = criterion.measure(run)

@@ -162,6 +162,17 @@ def test_what_cannot_be_graded_has_no_points_and_a_reason(
     assert found.score == 0.0 and found.max_score == 15.0
     assert [each.band for each in found.criteria] == [Band.NONE, Band.NONE]
     assert all("could not be measured" in each.sentence for each in found.criteria)
+    if status is Status.FAILED_TO_LOAD:  # why is said once, by the grade
+        assert {each.sentence.partition(": ")[2] for each in found.criteria} == {"the file could not be loaded."}
+
+
+def test_what_ended_it_is_said_where_it_happened(made: Make, pool: Pool, tmp_path: Path) -> None:
+    law = "def control(t, r, y, state, params):\n    return os._exit(3) if r.position == 1.0 else 0.0, state\n"
+    found = grade(made(HEAD + STEP + SINE + RMS), file(tmp_path, f"import os\n{law}"), "ada", pool)
+    assert found.status is Status.KILLED and found.reason.startswith("case step: ")
+    settling, rms = found.criteria
+    assert "with exit code 3" in settling.sentence
+    assert rms.sentence.endswith("could not be measured: the file had been ended before.")
 
 
 def test_a_file_that_is_not_there_or_a_link(made: Make, pool: Pool, tmp_path: Path) -> None:
