@@ -87,8 +87,8 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def open_page(browser: Any, app: App, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
-    """Open a page, at a panel by its title; fails the test if anything asked another host for anything.
+def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[[int, int], Any]]:
+    """An empty page of this width and height, px; fails the test if it asked another host for anything.
 
     A screenshot of each page is kept at the end of the test, in $RDS_SCREENSHOTS or a temporary folder.
     """
@@ -99,22 +99,33 @@ def open_page(browser: Any, app: App, request: pytest.FixtureRequest) -> Iterato
         if not re.match(r"(https?|wss?)://(127\.0\.0\.1|localhost)[:/]|data:|blob:|about:", message.url):
             abroad.append(message.url)
 
-    def show(panel: str | None = None, on: App | None = None, width: int = 1280, height: int = 800) -> Any:
+    def make(width: int, height: int) -> Any:
         page = browser.new_page(viewport={"width": width, "height": height})
         page.set_default_timeout(PATIENCE)
         page.on("request", asked)
-        page.goto((on or app).url)
-        page.wait_for_selector(".rds-app .rds-nav button")
-        if panel is not None:
-            page.click(f'.rds-nav button:text-is("{panel}")')
-            page.wait_for_selector(f'.rds-title h1:text-is("{panel}")')
         pages.append(page)
         return page
 
-    yield show
+    yield make
     ARTIFACTS.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"\W+", "-", request.node.name).strip("-")
     for number, page in enumerate(pages):
         page.screenshot(path=ARTIFACTS / f"{name}-{number}.png")
         page.close()
     assert not abroad, f"the page asked other hosts: {abroad}"
+
+
+@pytest.fixture
+def open_page(new_page: Callable[[int, int], Any], app: App) -> Callable[..., Any]:
+    """Open a page of the app, or of another one, at a panel by its title."""
+
+    def show(panel: str | None = None, on: App | None = None, width: int = 1280, height: int = 800) -> Any:
+        page = new_page(width, height)
+        page.goto((on or app).url)
+        page.wait_for_selector(".rds-app .rds-nav button")
+        if panel is not None:
+            page.click(f'.rds-nav button:text-is("{panel}")')
+            page.wait_for_selector(f'.rds-title h1:text-is("{panel}")')
+        return page
+
+    return show
