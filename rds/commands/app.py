@@ -19,6 +19,11 @@ def app(
 ) -> None:
     """Open the panels as a web page of this machine, until Ctrl-C."""
     with refusals():
-        from rds.panels.app.serve import serve
+        from rds.core.errors import InputError
 
-        serve(folder, machine, panel, port, browser)
+        try:
+            from rds.panels.app.serve import serve
+
+            serve(folder, machine, panel, port, browser)
+        except ModuleNotFoundError as error:
+            raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error

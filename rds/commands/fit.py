@@ -72,6 +72,7 @@ def fit(
             fitted, rest = _split(found) if split else (found, [])
             if (method or made.default_method) == "simulation":
                 options["progress"] = bar("fitting")
+                _say_if_slow(made)
             estimate = fit_model(fitted, made, method, options)
         validation = _validated(estimate, rest) if split else None
         files = _write(out, report, estimate, fitted, made, validation)
@@ -85,6 +86,14 @@ def fit(
         for path in files[:1] if report is None else [*files[: 1 if out else 0], report / "fit.html"]:
             typer.echo(f"{'model file' if path == out else 'report'}: {path}")
     raise typer.Exit(1 if estimate.unusable() else validation.exit_code if validation else 0)
+
+
+def _say_if_slow(made: Structure) -> None:
+    """A note on stderr where the kernels of a structure of the package are not compiled."""
+    from rds.motion.compiling import COMPILED
+
+    if not COMPILED and not made.name.endswith(".py"):
+        typer.echo("rds: note: numba is missing, so this fit may take minutes: pip install 'rds[fast]'", err=True)
 
 
 def _options(

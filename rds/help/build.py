@@ -30,7 +30,7 @@ def sources() -> dict[str, Path]:
     """The documents by name; InputError where the package was installed without them."""
     for folder in (_HERE / "docs", _HERE.parents[1] / "docs"):  # installed, or a checkout
         if (folder / "experiments.md").is_file():
-            found = {path.stem: path for path in sorted(folder.glob("*.md"))}
+            found = {path.stem.lower(): path for path in sorted(folder.glob("*.md"))}
             for name in ("README", "CHANGELOG"):
                 beside = (folder if folder.parent == _HERE else folder.parent) / f"{name}.md"
                 if beside.is_file():
