@@ -6,6 +6,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from rds.results.colours import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
 
@@ -46,6 +47,13 @@ class Picture(Figure):
 
     def __init__(self, height: float, width: float = WIDTH):
         super().__init__(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
+
+    def draw(self, renderer: Any) -> None:
+        """Names are the user's: a $ in them is a $, and not the beginning of a formula, which may be a wrong one."""
+        for text in self.findobj(Text):
+            if "$" in text.get_text() and "\\mathdefault" not in text.get_text():  # which numbers at ticks hold
+                text.set_parse_math(False)
+        super().draw(renderer)
 
     def png(self) -> bytes:
         """The picture as PNG, 128 pixels per inch."""

@@ -104,27 +104,28 @@ class Jog:
             raise
 
     def _dialect(self, interface: str, channel: str) -> str:
-        """What the modules speak; where none are on the built-in bus, simulated ones are started for this jogging."""
+        """What the modules speak; where none answers on the built-in bus, simulated ones are started for this jogging."""
         from rds.bus.address import channels
         from rds.bus.dialects import DEFAULT, is_served
         from rds.bus.server_process import end_server, start_server
 
-        if interface == BUILTIN and channel not in channels():
-            self._server = start_server(DEFAULT, self.machine.path, channel)
-            self._ends.append(weakref.finalize(self, end_server, self._server))
-            return DEFAULT
         refused = None
-        for dialect in SPEAKS:
-            try:
-                if is_served(dialect, self.machine, interface, channel):
-                    return dialect
-            except InputError as error:
-                refused = error
+        if interface != BUILTIN or channel in channels():
+            for dialect in SPEAKS:
+                try:
+                    if is_served(dialect, self.machine, interface, channel):
+                        return dialect
+                except InputError as error:
+                    refused = error
         if refused is not None:
             raise InputError(
                 f"the modules on {bus_name(interface, channel)} speak no dialect that can be jogged "
                 f"({', '.join(SPEAKS)}); serve the machine in one of these"
             ) from refused
+        if interface == BUILTIN:  # a bus that outlives its modules for a moment included
+            self._server = start_server(DEFAULT, self.machine.path, channel)
+            self._ends.append(weakref.finalize(self, end_server, self._server))
+            return DEFAULT
         raise MachineError(f"no module of {self.machine.name} answers on {bus_name(interface, channel)}; switch it on")
 
     def end(self) -> None:

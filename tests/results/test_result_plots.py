@@ -130,6 +130,14 @@ def test_what_cannot_be_drawn_is_refused(result: Result) -> None:
         Result({"time": [0.0]}, meta={"axes": ["X"], "sample_period": 1}).plot()
 
 
+def test_a_name_with_dollars_is_no_formula_and_numbers_at_ticks_are() -> None:
+    picture = plots_overlay.modes(MODES[:2], ["a $\\bad{$ name", "$_"])
+    picture.axes[0].set_yscale("log")
+    picture.png()
+    assert [text.get_parse_math() for text in picture.legends[0].get_texts()].count(False) >= 2
+    assert all(label.get_parse_math() for label in picture.axes[0].get_yticklabels())
+
+
 def test_pictures_are_drawn_in_any_thread_and_show_themselves(result: Result) -> None:
     with ThreadPoolExecutor(4) as pool:
         pictures = list(pool.map(lambda _: result.plot()._repr_png_(), range(4)))

@@ -119,6 +119,13 @@ def test_a_hold_lasts_as_long_as_it_is_renewed_and_goals_follow_each_other() -> 
     assert orders.wanted(21.0) is None
 
 
+def test_the_machine_is_taken_again_at_once_while_its_bus_outlives_its_modules(jog: Jog) -> None:
+    jog.end()
+    task = jog.begin()
+    assert task.wait(PATIENCE)
+    assert task.error is None and jog.ready
+
+
 def test_what_has_no_position_is_not_jogged() -> None:
     assert list(jog_axes(load_machine("mini-cnc"))) == ["X", "Y", "Z"]
     assert list(jog_axes(load_machine("mrmt-oacs"))) == ["X", "Z", "A"]
