@@ -56,7 +56,7 @@ def make(options: Sequence[str] = ()) -> Structure:
         respond=respond,
         options=tuple(options),
         sensitivities=sensitivities,
-        as_model=None if per_direction else as_model,
+        as_model=as_model,
         start=_Start(tuple(options)),
         given=force_gain,
         default_method="inverse-dynamics",  # a free run drifts in closed loop
@@ -121,15 +121,27 @@ def _floats(values: np.ndarray) -> np.ndarray:
 
 
 def as_model(values: Mapping[str, float]) -> dict[str, Any]:
-    """The library's linear axis that moves the same: tau, K and friction in mm/s; InputError where there is none."""
+    """The library's axis that moves the same: tau, K and friction in mm/s; InputError where there is none.
+
+    With friction per direction, tau and K are those of the mean of both.
+    """
     rates, _ = _of_kernel(values)
-    b, plus, minus, r, _ = rates
-    if not (r > 0.0 and plus >= 0.0 and minus >= 0.0):
+    b, plus, minus, r_plus, r_minus = rates
+    if not (r_plus > 0.0 and r_minus > 0.0 and plus >= 0.0 and minus >= 0.0):
+        needs = "F_v > 0 and an offset smaller than F_c" if "F_c" in values else "F_v_plus and F_v_minus greater than 0"
         raise InputError(
-            "this axis-mass is no linear axis: that needs F_v > 0 and an offset smaller than F_c; it moves by itself, "
-            "or without limit"
+            f"this axis-mass is no linear axis: that needs {needs}; it moves by itself, or without "
+            "limit: fit `--structure axis`"
         )
-    return {"name": "linear-axis", "tau": 1.0 / r, "K": b / r, "friction_plus": plus / r, "friction_minus": -minus / r}
+    r = 0.5 * (r_plus + r_minus)
+    table = {"name": "linear-axis", "tau": 1.0 / r, "K": b / r, "friction_plus": plus / r, "friction_minus": -minus / r}
+    if "F_c" in values:
+        return table
+    return table | {
+        "name": "directional-axis",
+        "viscous_plus": r_plus / r - 1.0,
+        "viscous_minus": r_minus / r - 1.0,
+    }
 
 
 class _Start:

@@ -27,6 +27,7 @@ LEFT_OUT = {
     "dead_zone": "the dead zone of the amplifier, which acts as more friction",
     "offset": "the amplifier's offset: a constant error remains, as there is no integral",
     "delay": "the delay, which takes phase margin",
+    "viscous_plus": "viscous friction that differs by direction: tau and K are those of the mean of both",
 }
 
 

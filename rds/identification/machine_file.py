@@ -35,9 +35,15 @@ def write_machine(path: str | Path, model: ModelFile | str | Path, base: str, ax
         )
     run_model(file, unit=unit)  # whatever will not do is said here
     table = library_table(checked_structure(file), file.values())
+    known = {field.name for field in fields(MachineParameters)}
+    if unknown := [name for name in table if name not in {"name", *known}]:
+        raise InputError(
+            f"its {' and '.join(unknown)} no machine is made of; fit it without {', '.join(file.options)}, or take the "
+            'model file in experiments ([model] file = "...")',
+            file.path,
+        )
     data: dict[str, Any] = tomllib.loads(Path(machine.path).read_text(encoding="utf-8"))
     data["name"] = path.stem
-    known = {field.name for field in fields(MachineParameters)}
     data["axis"][axis] |= {"model": table, "machine": {key: v for key, v in table.items() if key in known}}
     header = f"{machine.name} with axis {axis} as estimated: {Path(file.path).name}, SHA-256 {file.sha256[:16]}..."
     write_whole(path, toml_text(data, header).encode())

@@ -16,6 +16,7 @@ from rds.identification.structure import Structure
 from rds.identification.structures import structure
 from rds.models import library_model
 from rds.models.machine_model import MachineAxisMotion
+from rds.models.spindle import SpindleMotion
 from rds.models.student import student_model
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def check_model_file(path: str | Path, sample_period: float = 0.001) -> FileRepo
     from rds.checks import FileReport, check_model
 
     model = replace(run_model(read_model(path)), source=Source(Path(path).name))
-    delay = model.params.get("delay", 0.0) if model.motion is MachineAxisMotion else 0.0
+    delay = model.params.get("delay", 0.0) if model.motion in (MachineAxisMotion, SpindleMotion) else 0.0
     if delay:  # the voltages that wait are states, as many as there are samples in the delay
         model = replace(model, params={**model.params, "delay": 0.0})
     report = check_model(model, sample_period)
@@ -84,8 +85,6 @@ def library_table(made: Structure, values: Mapping[str, float]) -> dict[str, Any
         table = made.as_model(values)
         if table["name"] != "linear-axis" or table["friction_plus"] >= 0.0 >= table["friction_minus"]:
             return table
-    if made.name != "axis":
-        raise InputError(f"{_named(made)} has no model that runs; fit it as `--structure axis`")
     table = dict(values)
     if "friction" in table:
         table["friction_plus"] = table.pop("friction")

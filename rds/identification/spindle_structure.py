@@ -41,7 +41,7 @@ def make(options: Sequence[str] = ()) -> Structure:
         respond=respond,
         options=tuple(options),
         sensitivities=sensitivities,
-        as_model=None if options else as_model,
+        as_model=as_model,
         state_names=("speed",),
         start=_Start(tuple(options)),
         output_unit="rev/min",
@@ -72,7 +72,7 @@ def _answer(
 
 def as_model(values: Mapping[str, float]) -> dict[str, Any]:
     """The library's spindle with these parameters."""
-    return {"name": "spindle", "tau": values["tau"], "K": values["K"]}
+    return {"name": "spindle", **values}
 
 
 class _Start:

@@ -14,6 +14,7 @@ LIBRARY = Registry(
         "linear-axis": "rds.models.linear_axis",
         "spindle": "rds.models.spindle",
         "machine-axis": "rds.models.machine_model",
+        "directional-axis": "rds.models.directional_axis",
     },
 )
 

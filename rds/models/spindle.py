@@ -1,12 +1,14 @@
 """The spindle: a first-order speed loop, solved exactly.
 
-    τ v̇ + v = K u        v in rev/min, u in V
+    τ v̇ + v = K (u(t - L) + u₀)        v in rev/min, u in V
 
-Over a period T of constant voltage, v⁺ = K u + (v - K u) e^(-T/τ).
+Over a time h of constant voltage, v⁺ = K u + (v - K u) e^(-h/τ). The offset u₀ is what friction of a spindle that turns
+one way takes; the dead time L need not be a whole number of samples.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from math import exp
 from typing import Any
@@ -14,28 +16,54 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.core.options import Option, read_options
 from rds.core.types import Model, Source
+from rds.models.machine_model import split_delay
 
 PARAMETERS = {
     "tau": Option("time constant, s", more_than=0.0),
     "K": Option("gain, (rev/min)/V"),
+    "offset": Option("voltage that acts beside the command, V"),
+    "delay": Option("dead time from a command to its effect, s", at_least=0.0),
 }
+_NEUTRAL = {"offset": 0.0, "delay": 0.0}
 
 
-def advance(x: Sequence[float], u: float, T: float, params: Mapping[str, Any]) -> tuple[float]:
-    """The exact response over `T` s: state (speed, rev/min) and constant voltage `u` V in, state out."""
-    final = params["K"] * u
-    return (final + (x[0] - final) * exp(-T / params["tau"]),)
+def coefficients(params: Mapping[str, Any], T: float) -> tuple[float, float, float, float]:
+    """What `sampled` needs after its first three arguments, for samples of `T` s."""
+    _, left = split_delay(params["delay"], T)
+    return params["K"], params["offset"], exp(-left / params["tau"]), exp(-(T - left) / params["tau"])
+
+
+def sampled(speed, before, now, K, offset, first, rest):
+    """The speed after one sample: the voltage `before` acts while its part decays to `first`, `now` for the rest."""
+    if first < 1.0:
+        final = K * (before + offset)
+        speed = final + (speed - final) * first
+    final = K * (now + offset)
+    return final + (speed - final) * rest
+
+
+def advance(x: Sequence[float], u: float, T: float, params: Mapping[str, Any]) -> tuple[float, ...]:
+    """The exact response over `T` s: state and constant voltage `u` V in, state out.
+
+    The state is the speed (rev/min) and, with a delay, the voltages that still wait, latest first; those that are not
+    there are 0 V.
+    """
+    whole, left = split_delay(params["delay"], T)
+    waiting = (u, *x[1:])
+    before, now = (waiting[at] if at < len(waiting) else 0.0 for at in (whole + 1, whole))
+    return (sampled(x[0], before, now, *coefficients(params, T)), *waiting[: whole + (1 if left else 0)])
 
 
 class SpindleMotion:
     """The spindle in motion in a loop with a fixed sample period: `contracts.Motion`."""
 
-    __slots__ = ("_K", "_decay", "speed")
+    __slots__ = ("_constants", "_waiting", "speed")
 
     def __init__(self, model: Model, T: float):
         self.speed = float(model.initial_state[0])
-        self._K = model.params["K"]
-        self._decay = exp(-T / model.params["tau"])
+        self._constants = coefficients(model.params, T)
+        whole, _ = split_delay(model.params["delay"], T)
+        self._waiting = deque([0.0] * (whole + 2), maxlen=whole + 2)  # oldest first: before, now, ...
 
     def read(self) -> float:
         """Speed, rev/min."""
@@ -43,16 +71,16 @@ class SpindleMotion:
 
     def write(self, voltage: float) -> None:
         """Move on by one sample of constant `voltage`, V."""
-        final = self._K * voltage
-        self.speed = final + (self.speed - final) * self._decay
+        self._waiting.append(voltage)
+        self.speed = sampled(self.speed, self._waiting[0], self._waiting[1], *self._constants)
 
 
 def make(**params: Any) -> Model:
-    """The spindle with the given `tau` (s) and `K` ((rev/min)/V), at rest.
+    """The spindle at rest with the given `tau` (s) and `K` ((rev/min)/V), and, if not 0, `offset` (V) and `delay` (s).
 
     Raises InputError for an unknown, missing or impossible parameter.
     """
-    values = read_options(params, PARAMETERS, "spindle")
+    values = _NEUTRAL | read_options(params, PARAMETERS, "spindle")
     for name, option in PARAMETERS.items():
         if name not in values:
             raise InputError(f"spindle needs {name} ({option.meaning})")

@@ -10,11 +10,23 @@ import pytest
 
 import rds
 from rds.core.errors import InputError
+from rds.identification.design import linear_axis_of
+from rds.identification.machine_file import write_machine
 from rds.identification.model_file import read_model
-from rds.identification.run_model import run_model
+from rds.identification.run_model import check_model_file, run_model
+from rds.identification.structures import structure
+from rds.machines import load_machine
 from tests.identification.model_files import UNITS, X, write_made
 
 FULL = X | {"stribeck": 0.1, "stribeck_velocity": 0.8, "delay": 0.0017, "backlash": 0.003, "dead_zone": 0.1}
+MASS_UNITS = {
+    "M": "kg",
+    "F_v_plus": "N·s/m",
+    "F_v_minus": "N·s/m",
+    "F_c_plus": "N",
+    "F_c_minus": "N",
+    "force_gain": "N/V",
+}
 OPTIONS = ("stribeck", "dead-zone", "delay", "backlash")
 TRACKED: dict[str, Any] = {
     "axis": "X",
@@ -57,6 +69,42 @@ def test_a_friction_the_same_both_ways_with_an_offset(tmp_path: Path) -> None:
     assert model.params["friction_minus"] == pytest.approx(-0.5)
     model = run_model(read_model(write_made(tmp_path / "y.toml", values | {"offset": 0.5}, ("offset",))))
     assert (model.params["offset"], model.params["friction_minus"]) == (0.5, -0.4)  # it creeps: no plain axis does
+
+
+def test_a_spindle_runs_with_the_offset_and_dead_time_that_were_fitted(tmp_path: Path) -> None:
+    values = {"tau": 0.08, "K": 1000.0, "offset": -0.04, "delay": 0.0021}
+    units = {"tau": "s", "K": "(rev/min)/V", "offset": "V", "delay": "s"}
+    file = write_made(tmp_path / "s.toml", values, ("offset", "delay"), structure="spindle", units=units)
+    assert check_model_file(file).ok
+    run = rds.Experiment(axis="spindle", duration=0.4, signal=rds.square(3.0, 2.0), model=str(file), mode="system-test")
+    speed = run.run("simulation")["spindle_measured"][249]
+    assert speed == pytest.approx(2960.0 * (1.0 - np.exp(-0.2469 / 0.08)), abs=5.0)  # the converter's step is 5 mV
+    machine = load_machine(str(write_machine(tmp_path / "m.toml", file, "mini-cnc", "spindle")))
+    assert machine.axis("spindle").machine == values
+
+
+def test_friction_that_differs_by_direction_runs_as_it_was_fitted(tmp_path: Path) -> None:
+    """The structure's own solution, a controller for the mean of both directions, and no machine of it."""
+    values = dict(zip(MASS_UNITS, (95.0, 166.0, 240.0, 20.1, 20.6, 35.15), strict=True))
+    made = structure("axis-mass", ("per-direction",))
+    file = write_made(tmp_path / "m.toml", values, ("per-direction",), structure="axis-mass", units=MASS_UNITS)
+    model = run_model(read_model(file))
+    t = np.arange(4000) * 1e-3
+    u, x, positions = np.round(3.0 * np.sin(7.0 * t) + np.sin(2.0 * t), 2), model.initial_state, []
+    for voltage in u.tolist():
+        positions.append(x[0])
+        x = model.advance(x, voltage, 1e-3, model.params)
+    np.testing.assert_allclose(positions, made.respond(t, u, (0.0, 0.0), values), atol=1e-9)
+    assert check_model_file(file).ok
+    assert model.params["tau"] == pytest.approx(95.0 / 203.0) and model.params["K"] == pytest.approx(35150.0 / 203.0)
+    assert any("differs by direction" in sentence for sentence in linear_axis_of(file).left_out)
+    with pytest.raises(InputError, match=r"no machine is made of.*without per-direction"):
+        write_machine(tmp_path / "machine.toml", file, "mini-cnc", "X")
+    free = write_made(
+        tmp_path / "f.toml", values | {"F_v_plus": 0.0}, ("per-direction",), structure="axis-mass", units=MASS_UNITS
+    )
+    with pytest.raises(InputError, match="F_v_plus and F_v_minus greater than 0"):
+        run_model(read_model(free))
 
 
 STUDENT = """\

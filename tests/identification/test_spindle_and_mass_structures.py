@@ -94,7 +94,7 @@ def test_the_spindle_is_that_of_the_library() -> None:
     for k, time in enumerate(t):
         expected.append(x[0])
         if k + 1 < len(t):
-            x = spindle.advance(x, u[k], t[k + 1] - time, values)
+            x = spindle.advance(x, u[k], t[k + 1] - time, spindle.make(**values).params)
     assert np.abs(structure("spindle").respond(t, u, (10.0,), values) - expected).max() < 1e-9
 
 

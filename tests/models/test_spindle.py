@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import InputError
+from rds.identification.structures import structure
 from rds.models import library_model, model_names
 
 
@@ -31,6 +32,22 @@ def test_motion_follows_the_first_order_response():
     np.testing.assert_allclose(speeds, 5000.0 * (1 - np.exp(-np.arange(400) * 1e-3 / 0.08)), atol=1e-8)
 
 
+@given(delay=floats(0.0, 0.01), offset=floats(-1.0, 1.0))
+def test_offset_and_dead_time_are_those_that_a_fit_finds(delay: float, offset: float) -> None:
+    """A voltage that is held acts `delay` later, be that whole samples or not; motion and `advance` agree."""
+    values = {"tau": 0.08, "K": 1000.0, "offset": offset, "delay": delay}
+    t, u = np.arange(60) * 1e-3, np.r_[0.0, 5.0 * np.sin(np.arange(1, 60))]
+    spindle = library_model("spindle", **values)
+    motion, x, speeds = spindle.motion(spindle, 1e-3), spindle.initial_state, []
+    for voltage in u.tolist():
+        assert x[0] == motion.read()
+        speeds.append(x[0])
+        x = spindle.advance(x, voltage, 1e-3, spindle.params)
+        motion.write(voltage)
+    fitted = structure("spindle", ("offset", "delay")).respond(t, u, (0.0,), values)
+    np.testing.assert_allclose(speeds, fitted, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     "params, fault",
     [
@@ -47,6 +64,6 @@ def test_bad_parameters_are_refused(params, fault):
 
 
 def test_unknown_model_lists_the_known_ones():
-    with pytest.raises(InputError, match="no model 'lathe'; known models: linear-axis, spindle, machine-axis"):
+    with pytest.raises(InputError, match="no model 'lathe'; known models: linear-axis, spindle, machine-axis, "):
         library_model("lathe")
-    assert model_names() == ["linear-axis", "spindle", "machine-axis"]
+    assert model_names() == ["linear-axis", "spindle", "machine-axis", "directional-axis"]
