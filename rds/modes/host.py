@@ -68,7 +68,14 @@ def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = Non
         assert directory is not None
         # The folder first: two runs for one folder are told so before a machine is started.
         with _folder(directory) as lock, machine_behind(plan) as reached:
-            return _in_target(reached, directory, lock, progress, live or Live())
+            try:
+                return _in_target(reached, directory, lock, progress, live or Live())
+            except OSError as error:
+                raise InputError(
+                    f"this run could not be recorded to its end ({error.strerror or error}); look whether the disk is "
+                    "full, or the folder was taken away while it went on; what is there can be opened",
+                    str(directory),
+                ) from error
     return _here(plan, progress, live)
 
 

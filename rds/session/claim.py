@@ -22,16 +22,25 @@ class Claim:
     """The right to use a machine from this folder, until `release` or the end of the process, however it ends."""
 
     def __init__(self, folder: Path, what: str):
-        """Take it; InputError that says who has it."""
+        """Take it; InputError that says who has it, or that the folder cannot be written to."""
         self._note = folder / ".machine.json"
-        self._descriptor = os.open(folder / ".machine.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        lock = folder / ".machine.lock"
+        try:
+            self._descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        except OSError as error:
+            raise InputError(
+                f"cannot be written ({error.strerror}), and what uses the machine writes here; free some space, or "
+                "choose a folder that can be written to",
+                str(lock),
+            ) from error
         try:
             if flock is not None:
                 flock(self._descriptor, LOCK_EX | LOCK_NB)
         except BlockingIOError:
             os.close(self._descriptor)
             raise InputError(f"the machine is in use by another page: {holder(folder)}; stop it there first") from None
-        write_whole(self._note, json.dumps({"what": what, "process": os.getpid(), "since": time.time()}).encode())
+        with contextlib.suppress(InputError):  # a full disk: others are not told what for
+            write_whole(self._note, json.dumps({"what": what, "process": os.getpid(), "since": time.time()}).encode())
 
     def release(self) -> None:
         """Give it back; a second call does nothing."""

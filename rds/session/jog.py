@@ -104,7 +104,7 @@ class Jog:
             raise
 
     def _dialect(self, interface: str, channel: str) -> str:
-        """What the modules speak; where none answers on the built-in bus, simulated ones are started for this jogging."""
+        """What the modules speak; where none answers on the built-in bus, simulated ones are started for it."""
         from rds.bus.address import channels
         from rds.bus.dialects import DEFAULT, is_served
         from rds.bus.server_process import end_server, start_server

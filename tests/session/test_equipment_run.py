@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from pathlib import Path
 
@@ -127,3 +128,20 @@ def test_a_run_that_is_stopped_at_once_gives_the_machine_back(alone: Path) -> No
     run.stop()
     assert run.wait(60) and session.machine_user is None
     assert run.stopped_early or (run.result is not None and run.result.meta["ending"] == "stopped")
+
+
+@pytest.mark.realtime
+def test_a_folder_that_is_taken_away_during_a_run_is_said_so(alone: Path) -> None:
+    session = Session(alone)
+    equipment = Equipment(session, "control")
+    equipment.choices.set("mode", "emulation")
+    equipment.choices.set("duration", 60.0)
+    run = equipment.run().start()
+    deadline = time.monotonic() + 30.0
+    while not (run.share or run.done):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    shutil.rmtree(run.folder)
+    run.stop()
+    assert run.wait(30) and isinstance(run.error, InputError) and run.folder.name in str(run.error)
+    assert session.machine_user is None

@@ -120,3 +120,26 @@ def test_kept_choices_that_cannot_be_read_are_said_to_whoever_opens_the_page(con
     shell = Shell(Session(tmp_path))
     shell.ticker.tick()
     assert any("panels begin with their defaults" in getattr(each, "value", "") for each in shell.widget.children)
+
+
+def test_a_folder_that_is_full_or_gone_refuses_in_words_and_holds_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise InputError("No space left on device")
+
+    folder = tmp_path / "files"
+    folder.mkdir()
+    session, user = Session(folder), object()
+    with monkeypatch.context() as patched:
+        patched.setattr("rds.session.claim.write_whole", full)
+        session.take_machine("a run", user)  # what it is for is not told to others: no reason not to run
+    session.give_machine_back(user)
+    session.take_machine("another", user)
+    session.give_machine_back(user)
+    for each in folder.iterdir():
+        each.unlink()
+    folder.rmdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        session.take_machine("a run", user)
+    assert session.machine_user is None
