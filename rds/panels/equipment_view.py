@@ -56,6 +56,9 @@ class EquipmentView:
         main.add_class("rds-main")
         self.widget = widgets.HBox([self.settings.widget, main])
         self.widget.add_class("rds-columns")
+        equipment.choices.watch(self._chosen)
+        self._stale = False  # whether something was chosen since what runs was shown
+        shell.ticker.add(self._tick)
         self._shown: Result | None = None
         self._end_look: Callable[[], None] = lambda: None
 
@@ -184,6 +187,15 @@ class EquipmentView:
             self.results.overlay(results, short)
             self.notice.say(f"{len(results)} runs over each other")
         self.tabs.selected_index = RESULTS
+
+    def _chosen(self, name: str) -> None:
+        self._stale = True
+
+    def _tick(self) -> None:
+        """What runs is shown as it is chosen now, while one looks at it."""
+        if self._stale and self.tabs.selected_index == WHAT:
+            self._stale = False
+            self.what.refresh()
 
     def _turned(self, change: Any) -> None:
         """Tabs that cost something are filled when they are looked at."""

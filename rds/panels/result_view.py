@@ -108,7 +108,10 @@ _STAGE_NAMES = {
 
 
 def _metrics(results: Mapping[str, Result]) -> str:
-    """The metrics as a table: a row per run and axis, a column per metric and unit."""
+    """The metrics as a table: a row per run and axis, a column per metric and unit.
+
+    The name of a run, which says its axis, stands for both where it has but one.
+    """
     cells: dict[tuple[str, str], dict[str, Any]] = {}
     for name, result in results.items():
         axes, metrics = html.metrics_rows(result)
@@ -117,5 +120,9 @@ def _metrics(results: Mapping[str, Result]) -> str:
                 if value is not None:
                     cells.setdefault((name, axis), {})[title] = value
     columns = list(dict.fromkeys(title for row in cells.values() for title in row))
-    rows = [[f"{name} {axis}".strip(), *(row.get(title) for title in columns)] for (name, axis), row in cells.items()]
+    alone = {name for name in results if sum(name == of for of, _ in cells) == 1}
+    rows = [
+        [name if name and name in alone else f"{name} {axis}".strip(), *(row.get(title) for title in columns)]
+        for (name, axis), row in cells.items()
+    ]
     return html.table(["", *columns], rows) if rows else ""

@@ -20,6 +20,7 @@ _MODES: dict[str, dict[str, Any]] = {
     "emulation": {"color": GREEN, "linewidth": 1.5, "linestyle": (0, (4, 3))},
 }
 _ROW_HEIGHT = 2.7  # inches
+_NARROWEST = 7.4  # inches that a legend has, also where the picture is made narrower to fit beside settings
 
 
 def modes(results: Sequence[Result], labels: Sequence[str] | None = None) -> Picture:
@@ -51,9 +52,11 @@ def modes(results: Sequence[Result], labels: Sequence[str] | None = None) -> Pic
         dress(left, quantity(axis, unit), x)
         dress(right, f"{axis} tracking error [{unit}]", x)
         right.axhline(0.0, color=GREY, linewidth=0.8)
-        legend(right, columns=1 + len(results))
+        legend(right, columns=_beside(right.get_legend_handles_labels()[1], _NARROWEST / 2.0))
     handles, texts = grid[0, 0].get_legend_handles_labels()
-    picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
+    picture.legend(
+        handles, texts, loc="outside upper left", ncols=_beside(texts, _NARROWEST), frameon=False, fontsize="small"
+    )
     picture.align_ylabels()
     return picture
 
@@ -83,6 +86,11 @@ def comparison(compared: Comparison) -> Picture:
         legend(right)
     picture.align_ylabels()
     return picture
+
+
+def _beside(texts: Sequence[str], width: float) -> int:
+    """How many entries of a legend have room beside each other in `width` inches."""
+    return max(1, min(len(texts), int(width / (0.45 + 0.075 * max(map(len, texts), default=0)))))
 
 
 def _reference(axes: Any, results: Sequence[Result], axis: str) -> None:

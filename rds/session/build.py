@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
 
+from rds.checks.report import Fault
 from rds.core.errors import InputError
 
 LARGEST = 1 << 20  # bytes of a file that is shown and checked
@@ -110,14 +111,19 @@ def _python(role: str, path: Path, text: str, T: float, pulse: Callable[[], None
     marks, notes = [], []
     for each in report.reports:
         if each.interface in (role, "file"):
-            marks += [_mark(str(fault), path, text) for fault in each.faults]
-            marks += [_mark(str(warning), path, text, fault=False) for warning in each.warnings]
+            marks += [_mark(_words(fault), path, text) for fault in each.faults]
+            marks += [_mark(_words(warning), path, text, fault=False) for warning in each.warnings]
             notes += [*each.notes, *([f"time per call: {each.timing}"] if each.timing else [])]
-    marks += [_mark(str(warning), path, text, fault=False) for warning in report.warnings]
+    marks += [_mark(_words(warning), path, text, fault=False) for warning in report.warnings]
     if role not in report.interfaces and not marks:
         what = " and ".join(report.interfaces)
         marks.append(Mark(None, f"it holds a {what}, not a {role}; name the file of your {role}"))
     return Checked(role, path, text, tuple(marks), tuple(notes))
+
+
+def _words(fault: Fault) -> str:
+    """What is wrong first: a rule that stands before it reads as if it were kept."""
+    return f"{fault.message} (rule: {fault.clause})"
 
 
 def _mark(text: str, path: Path, source: str, where: str | None = None, fault: bool = True) -> Mark:

@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rds.bus.dialects import DEFAULT
 from rds.bus.link import BUILTIN, bus_name
 from rds.core.errors import InputError, MachineError, RdsError
 from rds.machines import Machine, load_machine, machine_names
@@ -37,6 +38,7 @@ class MachineDesk:
             "machine", "Machine", "Whose modules are simulated, or are on the bus", session.machine, machines
         )
         self.choices = session.choices("machine", [which, *SERVED, *STEP])
+        self.choices.watch(self._fit_dialect)
         self.tuning = session.choices("module tuning", TUNING)
         self.rows: list[dict[str, Any]] = []
         self.data: dict[int, dict[str, Any]] = {}
@@ -44,6 +46,15 @@ class MachineDesk:
         self._server: subprocess.Popen[bytes] | None = None
         self._task: Task[Any] | None = None
         self._end: weakref.finalize[Any, Any] | None = None
+
+    def _fit_dialect(self, name: str) -> None:
+        """Modules that a machine's file describes are distributed ones: what they say of themselves is the point."""
+        if name != "machine":
+            return
+        with contextlib.suppress(InputError):  # of a file that will not do: said when it is used
+            described = all(axis.module for axis in self.machine.axes.values())
+            if described or self.choices["dialect"] == DESCRIBES_ITSELF:
+                self.choices.set("dialect", DESCRIBES_ITSELF if described else DEFAULT)
 
     # where
 

@@ -138,6 +138,14 @@ def test_a_name_with_dollars_is_no_formula_and_numbers_at_ticks_are() -> None:
     assert all(label.get_parse_math() for label in picture.axes[0].get_yticklabels())
 
 
+def test_the_names_of_many_runs_have_room_above_them() -> None:
+    picture = plots_overlay.modes([MODES[0]] * 6, [f"04:36:1{i} X implementation" for i in range(6)])
+    picture.set_figwidth(7.6)  # beside the settings of a panel
+    picture.draw_without_rendering()
+    drawn = [picture.legends[0], picture.axes[1].get_legend()]
+    assert all(box.x0 >= 0.0 and box.x1 <= picture.bbox.width for box in (each.get_window_extent() for each in drawn))
+
+
 def test_pictures_are_drawn_in_any_thread_and_show_themselves(result: Result) -> None:
     with ThreadPoolExecutor(4) as pool:
         pictures = list(pool.map(lambda _: result.plot()._repr_png_(), range(4)))

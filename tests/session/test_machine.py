@@ -157,3 +157,12 @@ def test_a_monitor_listens_until_it_is_ended(desk: MachineDesk) -> None:
     assert "kbit/s" in monitor.headline
     task.stop()
     assert done(task).snapshot.frames > 10
+
+
+def test_a_machine_of_modules_that_describe_themselves_speaks_their_dialect(tmp_path: Path) -> None:
+    desk = MachineDesk(Session(tmp_path))
+    before = desk.choices["dialect"]
+    desk.choices.set("machine", "mrmt-oacs")
+    assert desk.choices["dialect"] == "oacs"
+    desk.choices.set("machine", "mini-cnc")
+    assert desk.choices["dialect"] == before
