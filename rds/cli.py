@@ -25,6 +25,7 @@ from rds.commands import (
     grade_export,
     grade_run,
     interpolate,
+    jog,
     modules,
     nc,
     reports,
@@ -53,6 +54,7 @@ bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
 app.command()(modules.scan)
 app.command()(estop.estop)
+app.command()(jog.jog)
 app.command()(reports.report)
 app.command()(fit.fit)
 app.command()(excite.excite)
@@ -119,7 +121,9 @@ def run(
 @app.command()
 def check(
     file: Annotated[Path, typer.Argument(help="A .py file with control(), derivatives(), ...; or a model file.")],
-    sample_period: Annotated[float, typer.Option(help="Sample period that a call must fit into, s.")] = 0.001,
+    sample_period: Annotated[
+        float, typer.Option(help="Sample period that a call must fit into, s.", max=1000.0)
+    ] = 0.001,
     axes: Annotated[
         int | None,
         typer.Option(

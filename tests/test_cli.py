@@ -165,7 +165,8 @@ def test_bad_input_is_exit_code_2_and_a_sentence(folder: Path, arguments: list[s
 
 
 def test_bad_usage_is_exit_code_2(folder: Path) -> None:
-    for arguments in (["run"], ["fly"], ["run", "e.toml", "--jsn"], ["machine"], []):
+    forever = ["nc", "time", "part.ngc", "--sample-period", "inf"]
+    for arguments in (["run"], ["fly"], ["run", "e.toml", "--jsn"], ["machine"], [], forever):
         done = command(*arguments)
         assert done.returncode == 2, arguments
         assert "Traceback" not in done.stderr

@@ -210,7 +210,7 @@ def time(
     with_: With = None,
     max_jumps: MaxJumps = None,
     sample_period: Annotated[
-        float | None, typer.Option(help="Sample period, s; by default the machine's.", min=1e-6)
+        float | None, typer.Option(help="Sample period, s; by default the machine's.", min=1e-6, max=1000.0)
     ] = None,
     profile: ProfileName = "planned",
     json: Json = False,

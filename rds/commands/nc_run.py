@@ -48,6 +48,8 @@ def run(
 ) -> None:
     """Run a program on all axes and the spindle; report following and contour error by program line.
 
+    The motion is the planned one, with look-ahead; `rds nc time --profile` compares others.
+
     In a terminal, while it runs in real time: space holds and goes on, + and - change the feed, h moves home, q stops.
     Elsewhere `rds nc operate` does the same.
     """

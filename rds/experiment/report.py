@@ -11,7 +11,7 @@ from rds.experiment.experiment import Experiment
 from rds.experiment.folder import new_folder
 from rds.modes.host import Progress
 from rds.results import Result
-from rds.results.files import save_all
+from rds.results.files import saved_files
 from rds.results.report import write_report
 
 METRICS = ("mean_error", "std_error", "mean_abs_error", "std_abs_error", "max_abs_error", "rms_error", "fit_percent")
@@ -34,8 +34,11 @@ def _new_folder(experiment: Experiment, mode: str | None) -> Path:
 
 
 def save_with_report(result: Result, folder: Path, title: str, beside: Sequence[Path] = ()) -> dict[str, Path]:
-    """Tables, one plot per axis, and the report, which also links what is `beside` it; each file's path by its kind."""
-    files = save_all(result, folder)
+    """One plot per axis and the report, which also links what is `beside` it; each file's path by its kind.
+
+    The tables are in `folder` already: the run has saved them there before anything else could go wrong.
+    """
+    files = saved_files(folder)
     for axis in result.axes:
         files[f"plot_{axis}"] = folder / f"{axis}.png"
         result.plot(axis).savefig(files[f"plot_{axis}"])

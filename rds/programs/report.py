@@ -29,7 +29,7 @@ _WAITED = {
 
 
 def save_run(result: Result, prepared: Prepared, folder: Path) -> dict[str, Path]:
-    """Save the result, its pictures and reports in `folder`; each file's path by its kind."""
+    """Save pictures and reports beside the tables in `folder`; each file's path by its kind."""
     written = write(program_report(result, prepared), folder)
     for pattern in ("*.csv", "*.png"):  # a table that an earlier run had and this one has not
         for left in set(folder.glob(f"{KIND}-{pattern}")) - set(written):

@@ -50,6 +50,12 @@ def save_all(result: Result, directory: str | Path) -> dict[str, Path]:
     return {path.suffix.removeprefix("."): path for path in writers}
 
 
+def saved_files(directory: str | Path) -> dict[str, Path]:
+    """What `save_all` has left in `directory`: the paths by kind."""
+    directory = Path(directory)
+    return {suffix.removeprefix("."): directory / f"{_STEM}{suffix}" for suffix in (*_FORMATS, ".json")}
+
+
 def open_result(path: str | Path) -> Result:
     """The result saved at `path`: a file of any format, or a directory that holds one result.
 

@@ -178,3 +178,19 @@ def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> No
         _, files = run_and_save(Path("e.toml"), None, out, None)
         assert files["report"].exists() and Path.cwd() == alone.resolve()
     assert not list((alone / "elsewhere").iterdir())
+
+
+def test_a_run_s_tables_are_written_once(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rds.experiment.report import run_and_save
+    from rds.results import files as results
+
+    written, save = [], results.save_all
+    monkeypatch.setattr(results, "save_all", lambda result, folder: written.append(folder) or save(result, folder))
+    (alone / "e.toml").write_text(
+        "axis = 'X'\nduration = 0.1\nmode = 'simulation'\n[reference]\nkind = 'sinusoid'\n"
+        "amplitude = 1.0\nfrequency = 5.0\n[controller]\nname = 'p'\n"
+    )
+    _, files = run_and_save(Path("e.toml"), None, Path("out"), None)
+    assert written == [Path("out")]
+    assert all(path.is_file() for path in files.values())
+    assert set(files) == {"csv", "json", "mat", "parquet", "plot_X", "report"}

@@ -193,7 +193,7 @@ def test_a_machine_without_coolant_says_so(part: Path) -> None:
 
 def test_the_report_says_where_it_is_worst(part: Path, tmp_path: Path) -> None:
     program = PartProgram(part)
-    result = program.run(changes=[(0.5, "hold", 1), (1.0, "hold", 0)])
+    result = program.run(changes=[(0.5, "hold", 1), (1.0, "hold", 0)], out=tmp_path / "out")
     files = save_run(result, program.prepared, tmp_path / "out")
     page = files["program"].read_text()
     worst = result.meta["program"]["contour_error"]

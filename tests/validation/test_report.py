@@ -182,6 +182,7 @@ def test_a_run_that_validates_carries_its_verdict_into_report_and_files(tmp_path
     result = validated(experiment.plan(), result_of(square(4.0)))
     assert result.validation["X"].candidate.estimated == tuple(X)  # of the file's record, not the values alone
     assert result.meta["validation"]["X"]["logs"]["this run"]["free_run"]["fit_percent"] > 99.9
+    result.save(tmp_path / "out")
     files = save_with_report(result, tmp_path / "out", "validation")
     assert "Validation of the model of X" in files["report"].read_text()
     reopened = Result.open(tmp_path / "out")
