@@ -2,7 +2,7 @@
 // The kernel sends rows of float64: time, then one value per trace. The page keeps them all, so that pausing,
 // slow motion and scrubbing back cost the kernel nothing.
 
-const STEP_MS = 100;
+const STEP_MS = 80; // a little more often than rows come
 
 function render({ model, el }) {
   const style = document.createElement("style");
