@@ -23,12 +23,12 @@ class ProgramResult:
     def __init__(self, shell: Any, go: Callable[[int], None]):
         """`go(line)` shows a line of the program."""
         self._shell, self._go = shell, go
-        self.words = widgets.HTML(_EMPTY)
+        self.words, self.tables = widgets.HTML(_EMPTY), widgets.HTML()
         self.actions = ResultActions(shell)
         self.path, self.along = FigureView(), FigureView()
         self.worst = widgets.HBox([])
         self.worst.add_class("rds-row")
-        self.widget = widgets.VBox([self.worst, self.words, self.actions.widget, self.path, self.along])
+        self.widget = widgets.VBox([self.worst, self.words, self.path, self.along, self.tables, self.actions.widget])
 
     def show(self, work: ProgramWork) -> None:
         """Sentences, the worst lines, and pictures."""
@@ -41,11 +41,11 @@ class ProgramResult:
             return
         report = program_report(result, prepared)
         found = "".join(f"<p>{escape(sentence)}</p>" for sentence in report.findings)
-        tables = "".join(
+        self.tables.value = "".join(
             html.table(each.columns, each.shown(), each.title, each.note)
             for each in (*report.tables[1:], report.tables[0])
         )
-        self.words.value = html.verdict_line(result, "Timing") + found + tables
+        self.words.value = html.verdict_line(result, "Timing") + found
         self.worst.children = [
             self._button(line, error) for line, error, _ in worst_lines(result, result["contour_error"], _WORST)
         ]
@@ -61,7 +61,7 @@ class ProgramResult:
 
     def clear(self) -> None:
         """Nothing to show."""
-        self.words.value = _EMPTY
+        self.words.value, self.tables.value = _EMPTY, ""
         self.actions.clear()
         self.worst.children = []
         self.path.clear()

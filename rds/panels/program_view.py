@@ -63,7 +63,7 @@ class ProgramView:
         left, right = widgets.VBox([self.editor]), widgets.VBox([self.tabs])
         left.add_class("rds-program-left")
         right.add_class("rds-main")
-        columns = widgets.HBox([left, right])
+        columns = self._columns = widgets.HBox([left, right])
         columns.add_class("rds-columns")
         view = widgets.VBox([self.files.widget, self.operator.widget, self.notice, columns])
         view.add_class("rds-program")
@@ -93,6 +93,8 @@ class ProgramView:
             self.tools.chosen()
 
     def _turned(self, change: Any) -> None:
+        # pictures are wider than what else stands beside the text
+        (self._columns.add_class if change["new"] == RESULT else self._columns.remove_class)("rds-program-wide")
         if change["new"] == SETTINGS:
             self.tools.refresh()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from html import escape
 from typing import Any
 
 import ipywidgets as widgets
@@ -101,8 +100,8 @@ class ToolView:
             return
         try:
             self.table.value = _tools(file.tools(), file.name)
-        except ProgramError as error:
-            self.table.value = f'<p role="alert">✖ {escape(str(error))}</p>'
+        except ProgramError:
+            self.table.value = ""  # the editor says what is wrong, and where
 
     def _save(self) -> None:
         file = self._file

@@ -48,7 +48,8 @@ class ToolFile:
         try:
             self.tools()
         except ProgramError as error:
-            return [Mark(error.line, error.column, len(error.word), error.reason)]
+            text = f"{error.word}: {error.reason}" if error.word else error.reason
+            return [Mark(error.line, error.column, len(error.word), text)]
         return []
 
     def save(self) -> None:

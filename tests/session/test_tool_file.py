@@ -24,7 +24,7 @@ def test_a_fault_is_marked_at_its_word_and_not_saved(tmp_path: Path) -> None:
     table = ToolFile(tmp_path, "mine.tbl")
     table.text = "T1 P1 D6\nT2 P2 Dx\n"
     (mark,) = table.marks()
-    assert (mark.line, mark.column, mark.length) == (2, 7, 2)
+    assert (mark.line, mark.column, mark.length) == (2, 7, 2) and mark.text.startswith("Dx: is no word")
     with pytest.raises(InputError, match=r"mine.tbl:2:7: Dx: is no word of a tool table"):
         table.save()
     assert not table.path.exists()
