@@ -24,9 +24,10 @@ from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.late import days_late
 from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.sandbox.limits import Limits
-from rds.grading.unit_tests import share_passed
+from rds.grading.unit_tests import UnitTest, failing
 
 _LONGEST_OUTPUT = 4000  # characters of what it printed, in the notes
+_MOST_CALLS = 3  # of failing tests, in a sentence
 _HIDDEN = "in a case that is hidden"
 _ENDED = {
     Status.MISSING: "nothing was handed in",
@@ -176,7 +177,7 @@ class _Work:
         self.output = {False: "", True: ""}  # what it printed: where all is visible, and in hidden cases
         self._told = ""  # of a hidden case: what went wrong
         self._failed: dict[str, str] = {}  # by case: why
-        self._tested: dict[str, float] = {}  # by criterion: the value of unit tests
+        self._failing: dict[str, list[UnitTest]] = {}  # by criterion: its tests that do not pass
         self._untested: dict[str, str] = {}  # by criterion: why its tests came to no end
         self._stopped: Status | None = None
 
@@ -218,7 +219,7 @@ class _Work:
                     return
         for criterion in tested:
             try:
-                self._tested[criterion.name] = share_passed(criterion.tests, opened)
+                self._failing[criterion.name] = failing(criterion.tests, opened)
             except SubmissionError as error:
                 self._untested[criterion.name] = self._blame(error, f"{criterion.title}: ", self._hides(criterion))
                 if self._stopped:
@@ -267,10 +268,7 @@ class _Work:
     def _score(self, criterion: Criterion) -> CriterionScore:
         """The worst of all runs of all its cases."""
         if criterion.tests:
-            value = self._tested.get(criterion.name)
-            if value is None:
-                return criterion.nothing(self._untested.get(criterion.name) or self._ended())
-            return criterion.score(float(f"{value:.9g}"), "")
+            return self._score_tests(criterion)
         worst: tuple[float, str] | None = None
         for name in criterion.cases:
             case = self.assignment.case(name)
@@ -286,6 +284,19 @@ class _Work:
                     worst = value, name
         assert worst is not None  # every criterion has a case, every case a run
         return criterion.score(*worst)
+
+    def _score_tests(self, criterion: Criterion) -> CriterionScore:
+        """The share of tests passed, and which are not."""
+        missed = self._failing.get(criterion.name)
+        if missed is None:
+            return criterion.nothing(self._untested.get(criterion.name) or self._ended())
+        share = 100.0 * (len(criterion.tests) - len(missed)) / len(criterion.tests)
+        score = criterion.score(float(f"{share:.9g}"), "")
+        if not missed:
+            return score
+        more = f" and {len(missed) - _MOST_CALLS} more" if len(missed) > _MOST_CALLS else ""
+        calls = ", ".join(test.call for test in missed[:_MOST_CALLS])
+        return replace(score, sentence=f"{score.sentence} Not passed: {calls}{more}.")
 
 
 def _without_words(run: CaseRun) -> CaseRun:

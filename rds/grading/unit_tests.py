@@ -13,6 +13,8 @@ from rds.grading.cases.case import Submitted
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
 
+_LONGEST_CALL = 80  # characters of the arguments
+
 
 @dataclass(frozen=True)
 class UnitTest:
@@ -22,6 +24,12 @@ class UnitTest:
     args: tuple[Any, ...]
     expected: Any
     tolerance: float
+
+    @property
+    def call(self) -> str:
+        """The call in words, without what is expected of it."""
+        said = ", ".join(map(repr, self.args))
+        return f"{self.function}({said if len(said) <= _LONGEST_CALL else said[:_LONGEST_CALL] + '…'})"
 
     def passes(self, submitted: Submitted) -> bool:
         """Whether it does; a function that fails or is not there does not. SubmissionError if it cannot go on."""
@@ -54,9 +62,9 @@ def is_near(answer: Any, expected: Any, tolerance: float) -> bool:
     return type(answer) is type(expected) and bool(answer == expected)
 
 
-def share_passed(tests: Sequence[UnitTest], submitted: Submitted) -> float:
-    """Per cent."""
-    return 100.0 * sum(test.passes(submitted) for test in tests) / len(tests)
+def failing(tests: Sequence[UnitTest], submitted: Submitted) -> list[UnitTest]:
+    """Those that the submission does not pass. SubmissionError if it cannot go on."""
+    return [test for test in tests if not test.passes(submitted)]
 
 
 def read_tests(words: Words) -> tuple[UnitTest, ...]:

@@ -112,7 +112,9 @@ def test_functions_are_called_and_judged_here(tmp_path: Path, pool: Pool) -> Non
     folder = assignment_in(tmp_path, text, right)
     assert both(read_assignment(folder), folder / "solution.py", pool).score == 8.0
     (folder / "some.py").write_text("def double(x): return 2 * x\ndef word(): return 1 / 0\n")
-    assert both(read_assignment(folder), folder / "some.py", pool).score == 2.0  # a list twice is no doubled list
+    some = both(read_assignment(folder), folder / "some.py", pool)
+    assert some.score == 2.0  # a list twice is no doubled list
+    assert some.criteria[0].sentence.endswith(" Not passed: double([1.0, 2.0]), word(), truth().")
     (folder / "cheat.py").write_text(equal + "def double(x): return E()\nword = truth = lambda: E()\n")
     assert both(read_assignment(folder), folder / "cheat.py", pool).score == 0.0
 
