@@ -150,13 +150,19 @@ class Jog:
 
     def step(self, axis: str, direction: int) -> None:
         """Move by the step chosen. InputError where that leaves the travel."""
-        known, by = self._axis(axis), direction * float(self.choices["step"])
-        goal, (low, high) = self.positions.get(axis, 0.0) + by, known.travel
+        self.go(axis, self.positions.get(axis, 0.0) + direction * float(self.choices["step"]))
+
+    def go(self, axis: str, goal: float, speed: float | None = None) -> None:
+        """Move to a position, at `speed` or that which is chosen. InputError where it is out of the travel."""
+        known = self._axis(axis)
+        low, high = known.travel
         if not low <= goal <= high:
             raise InputError(
                 f"{axis} would leave its travel, {low:g} to {high:g} {known.unit}, at {goal:.3f}; choose a smaller step"
             )
-        self._order(goals=[[axis, goal]])
+        if speed is not None:
+            speed = Number("speed", "Speed", "", unit=f"{known.unit}/s", above=0.0, high=known.speed).check(speed)
+        self._order(goals=[[axis, goal]], speed=speed)
 
     def home(self) -> None:
         """All axes to their zero, or the end of the travel next to it, one after the other, Z first."""
@@ -168,13 +174,15 @@ class Jog:
             raise InputError(f"there is no axis {name!r} to jog; there are {', '.join(self.axes)}")
         return self.axes[name]
 
-    def _order(self, **order: Any) -> None:
+    def _order(self, *, speed: float | None = None, **order: Any) -> None:
         loop = self._loop
         if not self.ready or loop is None or loop.stdin is None:
             raise InputError(self.error or "the machine is not taken yet: press Take the machine first")
         try:
             with self._lock:
-                loop.stdin.write(json.dumps(order | {"speed": self.choices["speed"]}) + "\n")
+                loop.stdin.write(
+                    json.dumps(order | {"speed": self.choices["speed"] if speed is None else speed}) + "\n"
+                )
                 loop.stdin.flush()
         except OSError as error:
             raise MachineError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -12,7 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from rds.cli import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.session import Session
@@ -129,3 +132,18 @@ def test_the_machine_is_taken_again_at_once_while_its_bus_outlives_its_modules(j
 def test_what_has_no_position_is_not_jogged() -> None:
     assert list(jog_axes(load_machine("mini-cnc"))) == ["X", "Y", "Z"]
     assert list(jog_axes(load_machine("mrmt-oacs"))) == ["X", "Z", "A"]
+
+
+def test_an_axis_is_moved_from_the_command_line_as_from_the_panel(alone: Path) -> None:
+    runner = CliRunner()
+    done = runner.invoke(app, ["jog", "X", "--by", "1", "--speed", "10", "--json"])
+    assert done.exit_code == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert said == {"axis": "X", "position": pytest.approx(1.0, abs=0.01), "unit": "mm"}
+    for words, why in (
+        (["X"], "neither is given"),
+        (["X", "--by", "1", "--to", "1"], "both are given"),
+        (["X", "--to", "999"], "would leave its travel"),
+    ):
+        refused = runner.invoke(app, ["jog", *words, "--json"])
+        assert refused.exit_code == 2 and why in refused.stderr and not refused.stdout
