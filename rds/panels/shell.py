@@ -14,6 +14,7 @@ import ipywidgets as widgets
 
 from rds.core.errors import RdsError
 from rds.panels import PANELS
+from rds.panels.keys import Keys
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
 from rds.panels.presence import Presence
@@ -52,7 +53,9 @@ class Shell:
         self._place.add_class("rds-panel")
         body = widgets.HBox([nav, self._place])
         body.add_class("rds-body")
-        self.widget = widgets.VBox([Presence(self._shown), widgets.HTML(_style()), self._head(), self._notice, body])
+        self.widget = widgets.VBox(
+            [Presence(self._shown), Keys(), widgets.HTML(_style()), self._head(), self._notice, body]
+        )
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
         self.ticker.add(self._show_messages)

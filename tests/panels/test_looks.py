@@ -1,0 +1,41 @@
+"""What everybody must be able to see and reach: on a projector, without a mouse, before anything is typed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rds.panels.kit.figure import DPI, WIDTH
+
+CONTROLLER = """params = {"Kp": 20.0}  # V/mm
+
+
+def control(t, r, y, state, params):
+    return params["Kp"] * (r.position - y), state
+"""
+
+
+def test_a_projector_of_1024_and_the_keyboard_alone(open_page: Callable[..., Any], app: Any) -> None:
+    (app.folder / "looked_at.py").write_text(CONTROLLER)
+    page = open_page("Equipment control", width=1024, height=768)
+    nav, side = page.locator(".rds-nav").bounding_box(), page.locator(".rds-side:visible").bounding_box()
+    assert nav["y"] + nav["height"] <= side["y"] and side["x"] < 20  # panels are chosen in a row on top
+    main = page.locator(".rds-main:visible").bounding_box()
+    assert main["width"] >= WIDTH * DPI and main["x"] + main["width"] <= 1024  # as wide as a figure
+
+    controller = page.locator('.rds-field:visible:has-text("Controller") select').first
+    controller.focus()
+    assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    controller.select_option(label="User-defined")
+    file = page.locator('.rds-field:visible:has-text("File of the controller") input')
+    file.fill("looked_at.py")
+    file.press("Enter")
+    header = page.locator('.jupyter-widget-Collapse-header[tabindex="0"]:visible:has-text("Parameters (1)")')
+    header.wait_for()
+    header.focus()
+    page.keyboard.press("Enter")
+    page.wait_for_selector('.jupyter-widget-Collapse-header[aria-expanded="true"]:visible')
+    gain = page.locator('.rds-field:visible:has-text("Kp, V/mm") input')
+    assert gain.input_value() == "" and gain.get_attribute("placeholder") == "20"
+    style = "getComputedStyle(document.querySelector('.rds-field input[placeholder]'), '::placeholder').fontStyle"
+    assert page.evaluate(style) == "italic"  # the file's value, not one that was typed
