@@ -86,7 +86,7 @@ def _total(grade: Grade) -> str:
     if grade.status is not Status.OK:
         parts.append(
             f'<p class="verdict missed"><strong>{escape(str(grade.status))}</strong> '
-            f"{escape(_WHAT_IT_MEANS[grade.status])} {escape(one_line(grade.reason, 1000))}</p>"
+            f"{escape(_WHAT_IT_MEANS[grade.status])}<br>{escape(one_line(grade.reason, 1000))}</p>"
         )
     return "".join(parts)
 
