@@ -12,10 +12,8 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.registry import Registry
 from rds.identification.estimate import Estimate
-from rds.identification.structure import Structure
+from rds.identification.structure import SPEED, Structure
 from rds.logs.log import Log
-
-SPEED = "rev/min"  # of a structure whose output is a speed
 
 METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Estimate`
     "method",

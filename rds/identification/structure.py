@@ -14,6 +14,8 @@ from rds.core.options import Option
 if TYPE_CHECKING:
     from rds.logs.log import Log
 
+SPEED = "rev/min"  # of a structure whose output is a speed
+
 
 class Response(Protocol):
     """A structure's answer to the commands `u` (V) held from each of the times `t` (s) to the next.

@@ -96,7 +96,7 @@ def not_compiled(plan: Plan, models: list[Model]) -> str | None:
     """Why the loops cannot be compiled, in a sentence; None if they can."""
     for axis, model in zip(plan.axes, models, strict=True):
         if model.source.name not in COMPILED_MODELS or model.source.path is not None:
-            return f"axis {axis.axis.name}: only the library's axis models can be compiled"
+            return f"axis {axis.axis.name}: only {' and '.join(COMPILED_MODELS)} can be compiled"
     plain = linear_axis.make(tau=1.0, K=1.0)  # stands for all models that compile
     return obstacle(replace(plan, axes=tuple(replace(axis, model=plain) for axis in plan.axes)))
 

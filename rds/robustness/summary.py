@@ -74,10 +74,7 @@ def sentences(study: Study) -> list[str]:
     """What to know of each axis, in words."""
     said = []
     for found in summaries(study):
-        unstable = (
-            f"{found.unstable} of {len(study.figures)} loops are unstable" if found.unstable else "all loops stable"
-        )
-        line = f"{found.axis}: {unstable}"
+        line = f"{found.axis}: {_stability(found, len(study.figures))}"
         if found.worst is not None:
             error = found.figures["max_error"]["worst"]
             size = "diverges" if error is None else f"has an error of up to {error:.4g} {found.unit}"
@@ -91,6 +88,14 @@ def sentences(study: Study) -> list[str]:
     if len(study.reasons) > 3:
         said.append(f"{len(study.reasons)} draws could not be run")
     return said
+
+
+def _stability(found: AxisSummary, runs: int) -> str:
+    if found.unstable:
+        return f"{found.unstable} of {runs} loops are unstable"
+    if found.figures["pole_radius"]["worst"] is None:
+        return "no run diverged; there is no linear loop to tell poles and margins of"
+    return "all loops stable"
 
 
 def _axis(study: Study, number: int) -> AxisSummary:

@@ -71,6 +71,15 @@ def test_a_search_that_ends_in_a_valley_of_endless_gain_is_not_the_last() -> Non
         assert abs(found.parameters[name].value - value) < 3.0 * found.parameters[name].std_error, name
 
 
+def test_a_direction_in_which_the_axis_only_creeps_is_said() -> None:
+    """Intervals were found too narrow where one way is some fifty noises long and the other is not."""
+    t = np.arange(4000) * 0.001
+    u = np.where((t > 1.0) & (t < 1.3), -0.17, 2.0 + np.sin(9.0 * t) + np.sin(23.0 * t))
+    y = np.round(make().respond(t, u, (0.0, 0.0), X), 3)
+    text = said(Log("creeps", t, u, y, resolution=0.001))
+    assert "moves backward by 0.0" in text and "may be too narrow here" in text and "moves forward" not in text
+
+
 def test_a_direction_that_never_occurs_is_not_told() -> None:
     t = np.arange(5000) * 0.001
     log = forward(2.5 + np.sin(9.0 * t) + np.sin(23.0 * t))
