@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,21 @@ def test_a_kernel_that_is_not_of_this_kind_is_started_as_always(ready: ReadyKern
     assert ready.start(["julia", "-i", "kernel.jl"], os.environ, alone) is None
     ready.close()
     assert ready.start([sys.executable, *LAUNCHER, "-f", "connection.json"], os.environ, alone) is None
+
+
+def test_pages_that_ask_at_the_same_time_have_a_kernel_each(ready: ReadyKernels, alone: Path) -> None:
+    def start(number: int) -> ForkedKernel | None:
+        command = [sys.executable, *LAUNCHER, "-f", str(alone / f"connection{number}.json")]
+        return ready.start(command, os.environ, alone)
+
+    with ThreadPoolExecutor() as pool:
+        kernels = [kernel for kernel in pool.map(start, range(3)) if kernel is not None]
+    try:
+        told = [Path(f"/proc/{kernel.pid}/stat").read_text().split() for kernel in kernels]
+        assert len({fields[0] for fields in told}) == 3 and len({fields[3] for fields in told}) == 1
+    finally:
+        for kernel in kernels:
+            kernel.kill()
 
 
 def test_kernels_end_with_the_server(ready: ReadyKernels, alone: Path) -> None:

@@ -15,12 +15,15 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 LAUNCHER = ["-m", "ipykernel_launcher"]  # after the interpreter: how Jupyter starts such a kernel otherwise
 _LONGEST = 64  # bytes of a process's number
+_PATIENCE = 60.0  # s for the imports, on a busy computer
 
 
 class ForkedKernel:
@@ -72,6 +75,8 @@ class ReadyKernels:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
+        self._answers = False
+        self._turn = threading.Lock()  # pages may ask at the same time
         if not hasattr(os, "pidfd_open"):
             return
         self._channel, theirs = socket.socketpair()
@@ -83,22 +88,32 @@ class ReadyKernels:
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,  # Ctrl-C is the server's
             )
+        self._channel.settimeout(_PATIENCE)
+        self._answers = True
 
     def start(self, command: Sequence[str], env: Mapping[str, str], cwd: str | Path) -> ForkedKernel | None:
         """The kernel that `command` would start; None if it cannot come from here."""
-        if self._process is None or list(command[1:3]) != LAUNCHER:
+        if list(command[1:3]) != LAUNCHER:
             return None
         told = {"arguments": list(command[3:]), "env": dict(env), "cwd": str(cwd)}
+        with self._turn:
+            if not self._answers:
+                return None
+            try:
+                self._channel.sendall(json.dumps(told).encode() + b"\n")
+                answer = self._channel.recv(_LONGEST)  # a number is too short to come in parts
+            except OSError:
+                answer = b""
+            self._answers = bool(answer)  # it has died, or hangs: what it says later is nobody's
         try:
-            self._channel.sendall(json.dumps(told).encode() + b"\n")
-            answer = self._channel.recv(_LONGEST)  # a number is too short to come in parts
             return ForkedKernel(int(answer)) if answer else None
-        except OSError:  # the process has died, or the kernel has
+        except OSError:  # the kernel has ended already
             return None
 
     def close(self) -> None:
         """End it; kernels that Jupyter has not ended by then end within a second."""
         process, self._process = self._process, None
+        self._answers = False
         if process is not None:
             self._channel.close()
             process.terminate()
@@ -130,7 +145,9 @@ def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:
     """In each forked process what it was told, ready to be a kernel; None in this one, at the end of the channel."""
     with channel, channel.makefile("r", encoding="utf-8") as lines:
         for line in lines:
-            pid = os.fork()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)  # numpy's threads, which have no work yet
+                pid = os.fork()
             if pid == 0:
                 told: dict[str, Any] = json.loads(line)
                 break
