@@ -113,14 +113,14 @@ def row_of(row: Any, axes: int) -> np.ndarray | tuple[str, str]:
     if not isinstance(row, tuple | list | np.ndarray) or len(row) != 3:
         return clauses.ROWS, _REMEDY
     try:
-        values = np.array([np.atleast_1d(np.asarray(part)) for part in row])
+        values = np.array([np.array(part, ndmin=1) for part in row])
     except ValueError:
         return clauses.AXES, f"position, velocity and acceleration are {axes} numbers each, one for each axis"
     if values.dtype.kind not in "fiu":
         return clauses.ROWS, f"position, velocity and acceleration are {axes} numbers each, one for each axis"
     if values.shape != (3, axes):
         return clauses.AXES, f"position, velocity and acceleration are {axes} numbers each, one for each axis"
-    if not np.isfinite(values).all():
+    if not np.logical_and.reduce(np.isfinite(values), axis=None):  # as `all`, which is written in Python
         return clauses.FINITE, "look for a division by zero, a root or a logarithm"
     return values.astype(float)
 

@@ -273,7 +273,8 @@ def test_what_it_prints_while_it_is_loaded_is_told_once(made: Make, pool: Pool, 
 
 def test_what_it_says_while_a_hidden_case_is_counted_is_withheld(made: Make, pool: Pool, tmp_path: Path) -> None:
     work = RMS.replace('"rms"', '"work"').replace("rms-error", "work").replace('"mm"', '"events"')
-    tells = "import sys\n" + SOLUTION.replace("    return", "    if sys.gettrace(): raise ValueError(r)\n    return")
+    counted = "resource.getrlimit(resource.RLIMIT_NPROC)[0] == 1"
+    tells = SOLUTION.replace("    return", f"    if {counted}: raise ValueError(r)\n    return") + "import resource\n"
     found = grade(
         made(HEAD + SINE.replace("[[case]]", "[[case]]\nvisible = false") + work), file(tmp_path, tells), "ada", pool
     )

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from rds.core.types import Reference
-from rds.grading.sandbox import Counts, Pool
+from rds.core.types import LineSegment, Reference
+from rds.grading.sandbox import Counts, Limits, Pool
 
 Written = Callable[..., Path]
 WORK = """
@@ -71,10 +71,101 @@ def test_who_reaches_for_the_counter_gets_no_count(attack: str, said: str, pool:
 
 
 def test_who_answers_otherwise_while_it_is_counted_gets_no_count(pool: Pool, written: Written) -> None:
-    text = "import sys\ninitial_state = ()\ndef control(t, r, y, state, params):\n"
-    text += "    return float(sys.gettrace() is None), state\n"
+    text = "import resource\ninitial_state = ()\ndef control(t, r, y, state, params):\n"
+    text += "    return float(resource.getrlimit(resource.RLIMIT_NPROC)[0]), state\n"
     found = counts(pool, written(text, ""), samples=2)
     assert found == Counts(2, None, "at t = 0.000 s it answered otherwise while it was counted")
+
+
+FORGED = {
+    "sys is patched": """
+import sys
+kept = []
+sys.settrace = sys.setprofile = kept.append
+sys.gettrace = sys.getprofile = lambda: kept[-1]
+""",
+    "the counter is another": """
+import sys
+for name, module in list(sys.modules.items()):
+    if name.startswith("rds.grading.sandbox"):
+        for word in ("counted", "Counted", "counter", "_counted", "_codes"):
+            if hasattr(module, word): setattr(module, word, lambda *a: None)
+""",
+    "what is told is another": """
+import json, os
+dumps, write = json.dumps, os.write
+json.dumps = lambda value, *a, **k: dumps({**value, "events": 1} if "events" in value else value, *a, **k)
+os.write = lambda number, data: write(number, bytes(data).replace(b'"events"', b'"nothing"'))
+""",
+    "numbers are others": """
+import builtins
+builtins.float = lambda *a: 0.5
+builtins.RuntimeError = KeyError
+""",
+    "it looks whether it is counted": """
+import sys
+if sys.gettrace() or sys.getprofile(): control = lambda t, r, y, state, params: (min(abs(r.position - y), 1.0), state)
+""",
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_what_is_patched_while_it_is_loaded_lowers_no_count(name: str, pool: Pool, written: Written) -> None:
+    work = WORK.replace("ROUNDS", "10")
+    forged = counts(pool, written(work, FORGED[name]), samples=10)
+    assert (forged.events or 0) >= (counts(pool, written(work, ""), samples=10).events or 0) > 10 * 10 * 2
+
+
+def test_who_answers_in_place_of_the_counter_gets_no_count(pool: Pool, written: Written) -> None:
+    """It finds the pipes and goes on by itself, but nobody has told it the seal."""
+    text = """
+import os, resource, struct
+initial_state = ()
+def control(t, r, y, state, params):
+    if resource.getrlimit(resource.RLIMIT_NPROC)[0] == 1:
+        there = [number for number in range(3, 64) if is_open(number)]
+        for k in range(2): os.write(there[1], struct.pack("<QQd", k, 0, 1.0)); os.read(there[0], 48)
+        os.write(there[1], struct.pack("<QQd", (1 << 64) - 1, 0, 1.0))
+        os._exit(0)
+    return 1.0, state
+def is_open(number):
+    try: os.fstat(number)
+    except OSError: return False
+    return True
+"""
+    assert counts(pool, written(text, ""), samples=2) == Counts(
+        2, None, "while it was counted: it wrote into the grader's pipe"
+    )
+
+
+def test_work_that_is_put_off_is_counted(pool: Pool, written: Written) -> None:
+    """In what an answer does when it is looked at, and in rows that are all made at once."""
+    text = """
+initial_state = ()
+class Later(float):
+    def __float__(self):
+        for n in range(100): pass
+        return 1.0
+def control(t, r, y, state, params): return Later(1.0), state
+def interpolate(segment, T, params):
+    rows = []
+    for n in range(100): rows.append(([0.1], [0.0], [0.0]))
+    return rows
+"""
+    path = written(text, "")
+    assert (counts(pool, path, samples=5).events or 0) > 5 * 100
+    with pool.open(path, kind="interpolator") as subject:
+        assert len(list(subject.rows(LineSegment((0.0,), (1.0,), 1.0), 1e-3))) == 100
+        assert (subject.counts.events or 0) > 2 * 100
+
+
+def test_a_counted_run_may_not_take_much_longer_than_the_first(pool: Pool, written: Written) -> None:
+    """Not ten times the limits, where the run itself took a hundredth of them."""
+    with pool.open(written(""), Limits(cpu_seconds=30.0)) as subject:
+        subject.begin_control()
+        subject.control(0.0, Reference(0.0, 0.0, 0.0), 0.0)
+        assert subject.counts.events
+        assert 30.0 <= subject._generous().cpu_seconds < 100.0
 
 
 def test_models_and_interpolators_are_counted_too(pool: Pool, written: Written) -> None:

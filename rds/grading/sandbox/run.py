@@ -22,13 +22,17 @@ Sample = tuple[tuple[float, ...], tuple[float, ...]]
 class Run:
     """A run of `what` (control, model, rows) with samples of `T` s, begun in `cell`. `k` is the next sample.
 
-    With `through_door` question and answer go through shared memory, else through the cell's pipes.
+    With `through_door` question and answer go through shared memory, else through the cell's pipes. A counted run's
+    answers carry a `seal`.
     """
 
-    def __init__(self, cell: Cell, what: str, layout: records.Layout, T: float, through_door: bool = False):
+    def __init__(
+        self, cell: Cell, what: str, layout: records.Layout, T: float, through_door: bool = False, seal: int = 0
+    ):
         self.cell, self.what, self.layout, self.T = cell, what, layout, T
         self.k = 0
         self.has_ended = False
+        self._seal, self._ok = seal, records.OK ^ seal
         self._asked: list[tuple[float, ...]] = []
         self._answered: list[tuple[float, ...]] = []
         self._door: Door | None = None
@@ -49,8 +53,8 @@ class Run:
         except Closed:
             cell.fail()
         # a sum is finite only if all its parts are; the other way round it may only be too large
-        if answer[0] != k or answer[1] != records.OK or not isfinite(sum(answer)):
-            self._judge(answer[0], answer[1], all(map(isfinite, answer)))
+        if answer[0] != k or answer[1] != self._ok or not isfinite(sum(answer)):
+            self._judge(answer[0], answer[1] ^ self._seal, all(map(isfinite, answer)))
         cell.turn += 1
         self.k = k + 1
         given = answer[2:]
@@ -85,16 +89,17 @@ class Run:
         """What was asked and answered so far, of the first `most` samples."""
         return list(zip(self._asked[:most], self._answered[:most], strict=True))
 
-    def total(self) -> dict[str, Any]:
-        """After the last sample of a counted run: what its counter says."""
+    def total(self) -> int:
+        """After the last sample of a counted run: its events; -1 where the counter was found gone."""
         self.cell.turn += 1
         try:
-            self._exchange(records.TOTAL, (0.0,) * self.layout.asks)
+            number, code, told, *_ = self._exchange(records.TOTAL, (0.0,) * self.layout.asks)
         except Closed:
             self.cell.fail()
-        told = self.cell.frame()
+        if number != records.TOTAL or code != self._ok or not isfinite(told):
+            self.give_up("it wrote into the grader's pipe")
         self.cell.turn += 1
-        return told if isinstance(told, dict) else {}
+        return int(told)
 
     def _judge(self, number: int, code: int, is_finite: bool) -> None:
         if number == self.k and code == records.OK and is_finite:

@@ -1,86 +1,113 @@
-"""Counting the work of a call in events of the interpreter: lines, calls, returns, calls of compiled functions.
+"""Counting the work of a run in events of the interpreter: lines, calls, returns, calls of compiled functions.
 
 The same input gives the same count, on a busy computer too. What one compiled function does inside counts as one.
+
+The count is begun before the submission is loaded, and kept in closures that nothing a submission can import, patch or
+be handed leads to: what it does to `sys`, `os`, `json` or to this package comes too late. Each answer carries a seal
+that only these closures and the grader know, so that nobody else can answer for them.
 """
 
 from __future__ import annotations
 
+import os
 import resource
 import sys
-from collections.abc import Callable
-from types import FrameType
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from types import CodeType, FrameType, ModuleType
+from typing import Any, NamedTuple
 
+from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.inside import kernel
-from rds.grading.sandbox.inside.channel import Channel
+from rds.grading.sandbox.records import OK, TOTAL, Layout
 
-_FORBIDDEN = frozenset({"sys.settrace", "sys.setprofile", "sys._current_frames", "sys._getframe", "os.fork"})
-_FORBIDDEN_PREFIXES = ("gc.", "ctypes.", "_thread.")
-
-
-class Count:
-    """Events so far. `around` wraps a function so that its events are counted."""
-
-    def __init__(self) -> None:
-        self.events = 0
-        self.is_whole = True  # false once the tracer was found gone
-
-    def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """`function`, counted."""
-        return function
-
-    def tell(self, channel: Channel) -> None:
-        """Say what was counted."""
-        channel.tell({"events": self.events, "is_whole": self.is_whole})
+_NEVER = frozenset({"sys.settrace", "sys.setprofile", "sys._current_frames", "sys._current_exceptions", "os.fork"})
+_NEVER_BEGINS = ("gc.", "ctypes.", "_thread.")
+_NOT_IN_RUNS = frozenset({"sys._getframe"})  # while it is loaded, named tuples look for their module by it
+_FRAMES = frozenset({"tb_frame", "gi_frame", "cr_frame", "ag_frame"})
 
 
-class _Tracing(Count):
-    def __init__(self) -> None:
-        super().__init__()
-        self._guard = _Guard()
-        sys.addaudithook(self._guard)
+class Counted(NamedTuple):
+    """One run's count. `begin` it before the submission's first work, `stop` it before anything is explained.
 
-    def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        events, guard = 0, self._guard
-        # by these names, which a submission cannot exchange
-        settrace, setprofile, gettrace, getprofile = sys.settrace, sys.setprofile, sys.gettrace, sys.getprofile
+    `receive` takes the next question (number, doubles), `send` gives its answer (number, code, doubles), `total` the
+    answer to the question TOTAL: the events, or -1 where the counter was found gone.
+    """
 
-        def line(frame: FrameType, event: str, arg: Any) -> Any:
-            nonlocal events
+    begin: Callable[[], None]
+    receive: Callable[[], tuple[Any, ...]]
+    send: Callable[..., None]
+    total: Callable[[], None]
+    stop: Callable[[], None]
+
+
+def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequence[ModuleType]) -> Counted:
+    """Count from now on. The modules `own` ask and answer, and are not counted themselves."""
+    # by these names, which a submission cannot exchange
+    settrace, setprofile, gettrace, getprofile = sys.settrace, sys.setprofile, sys.gettrace, sys.getprofile
+    read, write, identity, as_float, refusal = os.read, os.write, id, float, RuntimeError
+    unpack, pack, asked, answered = layout.question.unpack, layout.answer.pack, layout.question.size, layout.answer.size
+    padding = [0.0] * (layout.answers - 1)
+    codes = {code: None for module in (*own, sys.modules[__name__]) for code in _codes(module)}
+    uncounted = frozenset(map(identity, codes))
+    events, before, runs, is_open = 0, 0, False, False
+
+    def line(frame: FrameType, event: str, arg: Any) -> Any:
+        nonlocal events
+        if identity(frame.f_code) in uncounted:
+            return None
+        events += 1
+        return line
+
+    def call(frame: FrameType, event: str, arg: Any) -> None:
+        nonlocal events
+        if identity(frame.f_code) not in uncounted:
             events += 1
-            return line
 
-        def call(frame: FrameType, event: str, arg: Any) -> None:
-            nonlocal events
-            events += 1
+    def guard(event: str, args: tuple[Any, ...]) -> None:
+        """Audit hook, which nobody can take away again."""
+        if is_open:
+            return
+        is_frame = event == "object.__getattr__" and args[1] in _frames
+        if event in _never or event.startswith(_begins) or (runs and (event in _in_runs or is_frame)):
+            raise refusal(f"{event} is not allowed in a run whose work is counted")
 
-        def counted(*args: Any) -> Any:
-            nonlocal events
-            events = 0
-            setprofile(call)
-            settrace(line)
-            guard.is_closed = True
-            try:
-                return function(*args)
-            finally:
-                guard.is_closed = False
-                self.is_whole = self.is_whole and gettrace() is line and getprofile() is call
-                settrace(None)
-                setprofile(None)
-                self.events += events
+    _never, _begins, _in_runs, _frames = _NEVER, _NEVER_BEGINS, _NOT_IN_RUNS, _FRAMES
 
-        return counted
+    def begin() -> None:
+        nonlocal before, runs
+        before, runs = events, True
 
+    def receive() -> tuple[Any, ...]:
+        data = read(questions, asked)
+        while len(data) != asked:
+            part = read(questions, asked - len(data))
+            if not part:
+                raise Closed
+            data += part
+        return unpack(data)
 
-class _Guard:
-    """Audit hook: while a submission's work is counted, it may not reach for the counter, nor work elsewhere."""
+    def send(number: int, code: int, *values: float) -> None:
+        if write(answers, pack(number, code ^ seal, *values)) != answered:
+            raise Closed
 
-    def __init__(self) -> None:
-        self.is_closed = False
+    def total() -> None:
+        is_whole = gettrace() is line and getprofile() is call
+        send(TOTAL, OK, as_float(events - before) if is_whole else -1.0, *padding)
 
-    def __call__(self, event: str, args: tuple[Any, ...]) -> None:
-        if self.is_closed and (event in _FORBIDDEN or event.startswith(_FORBIDDEN_PREFIXES)):
-            raise RuntimeError(f"{event} is not allowed in a run whose work is counted")
+    def stop() -> None:
+        nonlocal is_open
+        is_open = True
+        settrace(None)
+        setprofile(None)
+
+    found = Counted(begin, receive, send, total, stop)
+    sys.gettrace = sys.getprofile = lambda: None  # it looks like a run that is not counted
+    sys.addaudithook(guard)
+    is_open = True
+    setprofile(call)
+    settrace(line)
+    is_open = False
+    return found
 
 
 def work_alone() -> None:
@@ -88,6 +115,18 @@ def work_alone() -> None:
     kernel.limit(resource.RLIMIT_NPROC, 1)
 
 
-def counter(is_on: bool) -> Count:
-    """A counter for one run; it counts only if `is_on`."""
-    return _Tracing() if is_on else Count()
+def _codes(module: ModuleType) -> Iterator[CodeType]:
+    """The code of all functions and methods that a module defines, and of those inside them."""
+    for value in [*vars(module).values()]:
+        if getattr(value, "__module__", None) == module.__name__:
+            for each in [value, *vars(value).values()] if isinstance(value, type) else [value]:
+                code = getattr(getattr(each, "__func__", each), "__code__", None)
+                if isinstance(code, CodeType):
+                    yield from _with_inner(code)
+
+
+def _with_inner(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from _with_inner(each)

@@ -17,15 +17,15 @@ from rds.core.types import ArcSegment, LineSegment, Reference, Segment
 from rds.core.values import shown
 from rds.grading.sandbox import records
 from rds.grading.sandbox.inside import walls
-from rds.grading.sandbox.inside.channel import Channel
-from rds.grading.sandbox.inside.counting import Count
+from rds.grading.sandbox.inside.channel import Channel, Receive, Send
+from rds.grading.sandbox.inside.counting import Counted
 from rds.interface import as_voltage
 from rds.models.student import student_model
 from rds.modes.parts import start
 from rds.runtime.laws import LiveReference, controlled, coupled
 
 
-def control(channel: Channel, student: StudentFile, order: dict[str, Any], count: Count) -> None:
+def control(channel: Channel, student: StudentFile, order: dict[str, Any], counted: Counted | None = None) -> None:
     """A controller of `order["axes"]` axes, in lock step."""
     axes = int(order["axes"])
     layout = records.control_layout(axes)
@@ -35,7 +35,6 @@ def control(channel: Channel, student: StudentFile, order: dict[str, Any], count
         controller = student.controller(coupled=axes > 1, params=order["params"])
         if order["initial_state"] is not None:
             controller = replace(controller, initial_state=order["initial_state"])
-        controller = replace(controller, control=count.around(controller.control))
         params, names = dict(controller.params), [str(name) for name in order["names"]]
         if axes == 1:
             law = controlled(0, names[0], controller, references[0], order["T"], as_voltage, params)
@@ -43,21 +42,20 @@ def control(channel: Channel, student: StudentFile, order: dict[str, Any], count
             each = range(axes)
             law = coupled(each, names, controller, references, order["T"], [as_voltage] * axes, params)
     except (InputError, *STUDENT_ERRORS) as error:
-        return _refuse(channel, error, student)
+        return _refuse(channel, error, student, counted)
     channel.tell({"begun": True})
-    receive, send = channel.records(layout, order["through_door"])
+    receive, send = _begun(channel, layout, order, counted)
     while True:
         values = receive()
         k = values[0]
-        if k == records.TOTAL:
-            send(k, records.OK, *[0.0] * axes)
-            return count.tell(channel)
+        if counted and k == records.TOTAL:
+            return counted.total()
         voltages: list[float] = []
         try:
             law(k, take(values), [], voltages)
         except (InputError, *STUDENT_ERRORS) as error:
             send(k, records.FAULT, *[0.0] * axes)
-            return _explain(channel, error, student, k * order["T"])
+            return _explain(channel, error, student, k * order["T"], counted)
         send(k, records.OK, *voltages)
 
 
@@ -88,55 +86,52 @@ def _all_axes(references: Sequence[LiveReference]) -> Take:
     return take
 
 
-def model(channel: Channel, student: StudentFile, order: dict[str, Any], count: Count) -> None:
+def model(channel: Channel, student: StudentFile, order: dict[str, Any], counted: Counted | None = None) -> None:
     """A model in motion: voltage in, output after that sample out."""
+    receive, send = _begun(channel, records.MODEL, order, counted)
     try:
         motion = start(student_model(student, order["params"]), order["T"])
-        write, read = count.around(motion.write), count.around(motion.read)
+        write, read = motion.write, motion.read
         first = as_voltage(read())
     except (InputError, *STUDENT_ERRORS) as error:
-        return _refuse(channel, error, student)
+        return _refuse(channel, error, student, counted)
     channel.tell({"begun": True, "output": first})
-    receive, send = channel.records(records.MODEL, order["through_door"])
     while True:
         k, voltage = receive()
-        if k == records.TOTAL:
-            send(k, records.OK, 0.0)
-            return count.tell(channel)
+        if counted and k == records.TOTAL:
+            return counted.total()
         try:
             write(voltage)
             output = float(read())
         except (InputError, *STUDENT_ERRORS) as error:
             send(k, records.FAULT, 0.0)
-            return _explain(channel, error, student, k * order["T"])
+            return _explain(channel, error, student, k * order["T"], counted)
         send(k, records.OK, output)
 
 
-def rows(channel: Channel, student: StudentFile, order: dict[str, Any], count: Count) -> None:
+def rows(channel: Channel, student: StudentFile, order: dict[str, Any], counted: Counted | None = None) -> None:
     """An interpolator's rows, a block at each question."""
     segment = _segment(order["segment"])
     axes = len(segment.start)
     layout = records.rows_layout(axes)
+    receive, send = _begun(channel, layout, order, counted)
     try:
         given = iterate(student.functions["interpolate"](segment, order["T"], student.parameters(order["params"])))
         if isinstance(given, str):
             raise InputError(f"interpolate() returned {given}")
     except (InputError, *STUDENT_ERRORS) as error:
-        return _refuse(channel, error, student)
+        return _refuse(channel, error, student, counted)
     channel.tell({"begun": True})
-    following: Callable[[], Any] = count.around(lambda: next(given, None))
-    receive, send = channel.records(layout, through_door=False)
     taken = 0
     while True:
         (k,) = receive()
-        if k == records.TOTAL:
-            send(k, records.OK, *[0.0] * layout.answers)
-            return count.tell(channel)
+        if counted and k == records.TOTAL:
+            return counted.total()
         block: list[float] = []
         code = records.OK
         for _ in range(records.ROWS):
             try:
-                row = following()
+                row = next(given, None)
                 if row is None:
                     code = records.END
                     break
@@ -145,11 +140,28 @@ def rows(channel: Channel, student: StudentFile, order: dict[str, Any], count: C
                     raise InputError(f"row {taken} is {shown(row)}; {values[1]}")
             except (InputError, *STUDENT_ERRORS) as error:
                 send(k, records.FAULT, *[0.0] * layout.answers)
-                return _explain(channel, error, student, taken * order["T"])
+                return _explain(channel, error, student, taken * order["T"], counted)
             block += values.ravel().tolist()
             taken += 1
         padding = [0.0] * (records.ROWS * 3 * axes - len(block))
         send(k, code, float(len(block) // (3 * axes)), *block, *padding)
+
+
+def layout_of(order: dict[str, Any]) -> records.Layout:
+    """The records of a run that is ordered so."""
+    if order["op"] == "control":
+        return records.control_layout(int(order["axes"]))
+    return records.MODEL if order["op"] == "model" else records.rows_layout(len(order["segment"]["start"]))
+
+
+def _begun(
+    channel: Channel, layout: records.Layout, order: dict[str, Any], counted: Counted | None
+) -> tuple[Receive, Send]:
+    """What questions and answers go through; what is counted is so from now on."""
+    if counted is None:
+        return channel.records(layout, order["through_door"])
+    counted.begin()
+    return counted.receive, counted.send
 
 
 def _segment(data: dict[str, Any]) -> Segment:
@@ -157,11 +169,15 @@ def _segment(data: dict[str, Any]) -> Segment:
     return ArcSegment(**fields) if fields.pop("kind") == "arc" else LineSegment(**fields)
 
 
-def _refuse(channel: Channel, error: BaseException, student: StudentFile) -> None:
+def _refuse(channel: Channel, error: BaseException, student: StudentFile, counted: Counted | None) -> None:
+    if counted:
+        counted.stop()
     channel.tell({"error": _said(error, student)})
 
 
-def _explain(channel: Channel, error: BaseException, student: StudentFile, t: float) -> None:
+def _explain(channel: Channel, error: BaseException, student: StudentFile, t: float, counted: Counted | None) -> None:
+    if counted:
+        counted.stop()
     said = _said(error, student)
     channel.tell({"error": said if f"t = {t:.3f}" in said else f"at t = {t:.3f} s: {said}"})
 

@@ -6,6 +6,7 @@ import base64
 import importlib.util
 import random
 import sys
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -19,10 +20,12 @@ from rds.core.signature import INTERFACES, form
 from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.inside import runs, walls
 from rds.grading.sandbox.inside.channel import Channel
-from rds.grading.sandbox.inside.counting import counter, work_alone
+from rds.grading.sandbox.inside.counting import Counted, counted, work_alone
 from rds.grading.sandbox.inside.plain import NotPlain, plain
 
 _RUNS = {"control": runs.control, "model": runs.model, "rows": runs.rows}
+_OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.interface.converter", "rds.runtime.laws")
+"""Modules that ask a submission at each sample, besides `runs`: their work is not the submission's."""
 
 
 def main(questions: int, answers: int, door: list[int]) -> int:
@@ -34,11 +37,10 @@ def main(questions: int, answers: int, door: list[int]) -> int:
     np.random.seed(0)
     try:
         order = channel.ask()
-        if order["counted"]:
-            work_alone()
         file = Path(walls.HOME) / order["name"]
         file.write_bytes(base64.b64decode(order["text"]))
-        loaded = _load(channel, order["kind"], file)
+        count = _counted(questions, answers, order.pop("counted"))
+        loaded = _load(channel, order["kind"], file, count)
         if loaded is None:
             return 0
         while True:
@@ -46,16 +48,26 @@ def main(questions: int, answers: int, door: list[int]) -> int:
             if order["op"] == "call":
                 _call(channel, loaded, order, file)
             elif order["op"] in _RUNS and isinstance(loaded, StudentFile):
-                _RUNS[order["op"]](channel, loaded, order, counter(order.get("counted", False)))
+                _RUNS[order["op"]](channel, loaded, order, count)
     except Closed:
         return 0
 
 
-def _load(channel: Channel, kind: str, file: Path) -> StudentFile | ModuleType | None:
+def _counted(questions: int, answers: int, order: dict[str, Any] | None) -> Counted | None:
+    """The count of the run that `order` announces, sealed by its number; None if nothing is to be counted."""
+    if order is None:
+        return None
+    work_alone()
+    return counted(questions, answers, runs.layout_of(order), order["seal"], [runs, *map(import_module, _OWN)])
+
+
+def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> StudentFile | ModuleType | None:
     """Run the file and tell what it defines; None if it cannot be used."""
     try:
         loaded = _functions(file) if kind == "functions" else _interface(kind, file)
     except (InputError, *STUDENT_ERRORS) as error:
+        if count:
+            count.stop()
         said = str(error) if isinstance(error, InputError) else student_error(error, file)
         channel.tell({"error": said.replace(f"{walls.HOME}/", "")[:2000]})
         return None
