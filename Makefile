@@ -24,8 +24,7 @@ test: $(DONE) ## ruff, mypy, then the tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest --part together -n auto $(ARGS) || test $$? -eq 5  # 5: ARGS chose none of these
-	$(BIN)/pytest --part alone $(ARGS) || test $$? -eq 5
+	$(BIN)/pytest -n auto --dist loadgroup $(ARGS)
 
 bench: $(DONE) ## measure speed and latency, beside other programs where they are installed (minutes)
 	$(BIN)/python -m benchmarks $(ARGS)

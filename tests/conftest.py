@@ -21,31 +21,17 @@ settings.load_profile("judge" if os.environ.get("CI") else "search")
 
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
-# The folders whose tests may run side by side: they start no loop, hub or machine, or ask nothing of its timing.
-TOGETHER = {
-    *("checks", "controllers", "core", "experiment", "grading", "identification", "interface", "interpolators", "logs"),
-    *("models", "motion", "nc", "paths", "reports", "results", "robustness", "session", "signals", "spread"),
-    "validation",
-}
 
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks at the groups
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that wait for real time run one after the other, and those in a browser: beside each other they starve.
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--part` chooses the tests that may run beside each other, or those that may not."""
-    parser.addoption("--part", choices=("together", "alone"), help="tests that may run beside others, or the rest")
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests of the other part."""
-    part, here = config.getoption("--part"), Path(__file__).parent
-    if part is None:
-        return
-
-    def is_chosen(item: pytest.Item) -> bool:
-        together = item.path.relative_to(here).parts[0] in TOGETHER and "realtime" not in item.keywords
-        return together == (part == "together")
-
-    config.hook.pytest_deselected(items=[item for item in items if not is_chosen(item)])
-    items[:] = [item for item in items if is_chosen(item)]
+    A module whose tests share what is long to make says `pytestmark = pytest.mark.xdist_group(...)` itself.
+    """
+    for item in items:
+        group = "panels" if "panels" in item.path.parts else "realtime"
+        if group == "panels" or "realtime" in item.keywords:
+            item.add_marker(pytest.mark.xdist_group(group))
 
 
 @pytest.fixture
