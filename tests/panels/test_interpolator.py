@@ -12,6 +12,10 @@ BROKEN = (
 )
 
 
+PAINTED = """() => [...document.querySelectorAll(".rds-figure canvas")].some(
+    (each) => each.width && each.getContext("2d").getImageData(0, 0, each.width, each.height).data.some(Boolean))"""
+
+
 def _type(page: Any, label: str, text: str) -> None:
     field = page.locator(f'.rds-field:has(.rds-label:has-text("{label}")) input')
     field.fill(text)
@@ -25,7 +29,7 @@ def _go(page: Any, done: str = '.rds-notice-good:has-text("done:")') -> None:
 
 def _turn_to(page: Any, picture: str) -> None:
     page.click(f'.widget-toggle-buttons button:text-is("{picture}")')
-    page.wait_for_selector(".rds-figure canvas")
+    page.wait_for_function(PAINTED)  # by the kernel; the picture of the page is to be looked at
 
 
 def test_an_arc_with_its_errors_magnified(open_page: Callable[..., Any], app: App) -> None:
@@ -41,7 +45,6 @@ def test_an_arc_with_its_errors_magnified(open_page: Callable[..., Any], app: Ap
     page.wait_for_selector('.rds-notice-good:has-text("arc.csv")')
     assert (app.folder / "arc.csv").is_file()
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
-    page.wait_for_timeout(1000)  # the canvas is painted by the kernel; this picture is to be looked at
 
 
 def test_a_table_of_segments_and_what_it_refuses(open_page: Callable[..., Any]) -> None:
@@ -110,4 +113,3 @@ def test_refusals_beside_their_fields(open_page: Callable[..., Any]) -> None:
     _type(page, "End", "10, 0")
     _go(page)
     _turn_to(page, "Path")
-    page.wait_for_timeout(1000)  # this picture is to be looked at
