@@ -131,7 +131,8 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
     if len(table) < _LEAST * len(form.names):
         raise InputError(
             f"of {len(table) + still} rows after decimation, {still} are at rest: {len(table)} are left for "
-            f"{len(form.names)} parameters, too few; log a longer or livelier motion, or lower --decimation",
+            f"{len(form.names)} parameters, too few; log a longer or livelier motion, or keep more rows, as with "
+            "--set decimation=1",
             ", ".join(log.name for log in logs),
         )
     lengths = [len(block) for block in blocks]
@@ -192,8 +193,8 @@ def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[
     least = 2 * settings.drop + 4 * settings.decimation * len(form.names)
     if len(log) < max(least, 40):
         raise InputError(
-            f"it has {len(log)} samples, and this filter needs {max(least, 40)} or more; raise the cut-off, or take "
-            "--method simulation",
+            f"it has {len(log)} samples, and this filter needs {max(least, 40)} or more; raise the cut-off (--set "
+            "cutoff=HZ), or take --method simulation",
             log.source or log.name,
         )
     b, a = butter(settings.order, 2.0 * settings.cutoff * T)

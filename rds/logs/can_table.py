@@ -23,6 +23,7 @@ from rds.logs.table import Column, Table
 
 Progress = Callable[[int, int], None]
 Signal = tuple[str, str | None, float]
+_LINES = (".asc", ".log", ".trc", ".csv")  # formats of lines, uncompressed
 
 
 def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = None) -> Table:
@@ -85,6 +86,9 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
             str(path),
         )
     findings = []
+    if path.suffix.lower() in _LINES and not _ends(path):
+        what = "its last line has no end: the recording was cut there, and its last frame may be wrong"
+        findings.append(Finding("cut", what, Gravity.WARNING))
     if unknown:
         findings.append(Finding("frames", f"{sum(unknown.values())} frames of {len(unknown)} identifiers are unknown"))
     if misfits:
@@ -97,6 +101,13 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
         for name in sorted(times)
     }
     return Table(path, "can", columns, findings=tuple(findings))
+
+
+def _ends(path: Path) -> bool:
+    """Whether the last line of a text is whole."""
+    with open(path, "rb") as stream:
+        stream.seek(-1, 2)
+        return stream.read() in b"\r\n"
 
 
 def _first(reason: str) -> str:

@@ -328,6 +328,11 @@ def _second(words: Words | None, folder: Path) -> SecondMap | None:
     delimiter, decimal = _layout(words)
     offset = words.number("offset", None, "s", -1e9, 1e9) if "offset" in words else None
     drift = words.number("drift", None, "s per s", -0.1, 0.1) if "drift" in words else None
+    if drift is not None and offset is None:
+        raise words.fault("drift", "is given without offset; give both, or neither and let them be estimated")
+    for key in ("relation", "window"):
+        if offset is not None and key in words:
+            raise words.fault(key, "is for an offset that is estimated, and offset is given; remove one of the two")
     same = words.inner("same")
     first = second = None
     if same is not None:

@@ -50,8 +50,6 @@ def read_second(first: Table, mapping: LogMap) -> Second:
         )
     except InputError as error:
         raise InputError(str(error), about.place) from error
-    if about.drift is not None:
-        raise InputError("drift is given without offset; give both, or neither and let them be estimated", about.place)
     period = float(np.median(np.diff(own_time)))
     worst = max(alignment.uncertainty(float(at)) for at in (other_time[0], other_time[-1]))
     what = (

@@ -78,6 +78,14 @@ def test_the_first_frame_that_does_not_fit_says_why(tmp_path: Path) -> None:
     assert any("1 frames do not fit" in f.what and "the first 0x101: Wrong data size" in f.what for f in log.findings)
 
 
+def test_a_log_that_ends_in_a_line_is_cut(tmp_path: Path) -> None:
+    assert not [f for f in logged(tmp_path, frames()).findings if f.kind == "cut"]
+    whole = (tmp_path / "bus.log").read_bytes()
+    (tmp_path / "bus.log").write_bytes(whole[:-3])
+    (log,) = read_log(tmp_path / "bus.log")
+    assert [f.gravity for f in log.findings if f.kind == "cut"] == ["warning"]
+
+
 def test_a_log_without_frames_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="it holds no frames"):
         logged(tmp_path, [])

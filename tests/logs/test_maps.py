@@ -55,6 +55,8 @@ def saved(folder: Path, text: str) -> Path:
         (MAP.replace('unit = "mm"', "second = true"), 7, "there is no [second] table"),
         (MAP + '[second]\nfile = "b.csv"\n', 8, "nothing says how the two clocks agree"),
         (MAP + SECOND, 8, "no column is of the second file"),
+        (MAP + SECOND.replace("offset = 0.0", "drift = 1e-6"), 10, "drift = 1e-06 is given without offset"),
+        (MAP + SECOND.replace("offset", "window = 1.0\noffset"), 10, "window = 1.0 is for an offset that is estimated"),
         (MAP.replace('column = "time"\nunit = "s"', "rate = 0"), 3, "rate = 0 must be from 1e-06"),
         (MAP.replace('column = "time"', "rate = 1000.0"), 4, "time.unit = 's' is of a column of numbers"),
         (MAP.replace('column = "time"\nunit = "s"', "scale = 2.0"), 3, "time.scale = 2.0 is of a column of numbers"),
