@@ -137,6 +137,7 @@ def test_stdout_is_the_json_s_whatever_the_student_prints(folder: Path, mode: st
     [
         (["run", "gone.toml"], "gone.toml: cannot be read: No such file"),
         (["run", "e.toml", "--mode", "fly"], "unknown mode 'fly'; known modes: simulation"),
+        (["run", "e.toml", "--mode", ""], "unknown mode ''; known modes: simulation"),
         (["run", "e.toml", "--mode", "system-test"], "give [signal]"),
         (["run", "law.py"], "law.py: is not valid TOML"),
         (["run", "e.toml", "--out", "law.py"], "law.py"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,8 +32,11 @@ def tracking(
 ) -> None:
     """The general tracking controller with its observer, as a file of your own."""
     with refusals():
+        from rds.core.errors import InputError
         from rds.identification.design import write_tracking
 
+        if voltage_range == inf:
+            raise InputError("--voltage-range = inf V must be a finite number; a converter has a range")
         designed = _axis(model, axis, machine)
         write_tracking(
             out,
@@ -63,7 +67,7 @@ def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
         if machine is not None:
             raise InputError("--machine is for --axis; a model file says what the axis is")
         return linear_axis_of(model)
-    return linear_axis_of_machine(load_machine(machine or "mini-cnc"), str(axis))
+    return linear_axis_of_machine(load_machine("mini-cnc" if machine is None else machine), str(axis))
 
 
 def _warn(model: Path | None) -> None:

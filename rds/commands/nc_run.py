@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _HELP = "space hold and go on, + and - feed, h home, q stop"
 _LOOK = 0.1  # s between two looks at a run
 _STEP = 0.1  # of the override, by one key
+_LEAST_OVERRIDE = 0.1  # per cent: an hour becomes six weeks
 _STATES = ("runs", "held", "stops", "waits for the tool", "dwells", "waits for the spindle", "goes home", "is over")
 
 
@@ -61,10 +62,9 @@ def run(
         from rds.programs.report import save_run
         from rds.programs.run import PartProgram
 
-        if override == 0.0:
-            raise InputError(
-                "--override 0 never moves; begin with more, and hold with space or `rds nc operate --hold`"
-            )
+        if override < _LEAST_OVERRIDE:
+            said = f"--override {override:g} never moves, or as good as never; begin with {_LEAST_OVERRIDE:g} or more"
+            raise InputError(f"{said}, and hold with space or `rds nc operate --hold`")
         if out is not None:  # before the program is checked and planned, which may take a while
             require_writable(out)
         experiment = Path(controller) if controller is not None and controller.endswith(".toml") else None

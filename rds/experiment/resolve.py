@@ -43,7 +43,7 @@ def resolve(
     words.text("title")
     machine = _machine(words, folder)
     written = words.choice("mode", "simulation", mode_names())
-    mode = load_mode(mode_name or written)
+    mode = load_mode(written if mode_name is None else mode_name)
     T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
     samples = _samples(words, T) if program is None else program.samples
     words.flag("compiled", False)

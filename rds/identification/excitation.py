@@ -126,7 +126,7 @@ def make_task(
     length = _OPTIONS["duration"].check(duration, "duration", "excite")
     extra = _OPTIONS["noise"].check(noise, "noise", "excite")
     found = machine.axis(axis)
-    samples = round(length / machine.sample_period)
+    samples = round(min(length / machine.sample_period, 1e18))  # infinity is not rounded
     if not 100 <= samples <= _MOST_SAMPLES:
         raise InputError(
             f"excite: duration = {length:g} s makes {samples} samples; take 100 to {_MOST_SAMPLES} of "

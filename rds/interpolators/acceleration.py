@@ -45,10 +45,13 @@ class Acceleration:
 
     def weights(self, T: float) -> np.ndarray:
         """Kᵢ / Σ Kᵢ for samples of `T` s; InputError for a filter out of all measure."""
-        given = np.array(self.multipliers) if self.multipliers else LIBRARY.module(self.name).weights(T, self.params)
-        if len(given) > _MOST:
-            raise InputError(f"acceleration {self.name!r} takes {len(given)} samples of {T:g} s; give a shorter time")
-        return given / given.sum()
+        samples = len(self.multipliers) or max(self.params.values()) / T  # all options are times
+        if samples <= _MOST:  # else they are not even made
+            given = np.array(self.multipliers or LIBRARY.module(self.name).weights(T, self.params))
+            if len(given) <= _MOST:
+                return given / given.sum()
+            samples = len(given)
+        raise InputError(f"acceleration {self.name!r} takes {samples:.6g} samples of {T:g} s; give a shorter time")
 
 
 def make_acceleration(name: str, *, multipliers: Sequence[float] = (), **options: Any) -> Acceleration:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.blame import STUDENT_ERRORS, student_error
-from rds.core.errors import ContractError
+from rds.core.errors import ContractError, InputError
 from rds.core.geometry import length
 from rds.core.load import StudentFile, load_student
 from rds.core.options import read_options
@@ -22,6 +22,7 @@ from rds.interpolators.division import Method, check_steps
 from rds.interpolators.reference_word import Steps, steps
 
 Rows = Iterator[tuple[np.ndarray, ...]]
+_MOST = 2_000_000  # rows of a segment, which are held in memory
 _ROWS_PER_ROW, _SPARE_ROWS = 10, 5000  # a slow start and stop are still allowed
 
 
@@ -54,7 +55,11 @@ class Interpolator:
 
         Raises ContractError where a user's function breaks its interface; `rds check` names every fault.
         """
-        most = _ROWS_PER_ROW * int(length(segment) / segment.feed_rate / T) + _SPARE_ROWS
+        expected = length(segment) / segment.feed_rate / T
+        if not expected <= _MOST:
+            said = f"a segment of {length(segment):g} mm at {segment.feed_rate:g} mm/s makes {expected:.3g} samples"
+            raise InputError(f"{said} of {T:g} s, more than {_MOST}; give a longer sample period or a shorter path")
+        most = _ROWS_PER_ROW * int(expected) + _SPARE_ROWS
         axes = len(segment.start)
         rows: list[np.ndarray] = []
         with_errors = self._errors(segment)

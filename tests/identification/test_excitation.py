@@ -92,6 +92,8 @@ def test_a_signal_that_does_not_move_the_axis_tells_nothing(task: Task) -> None:
 
 
 def test_what_cannot_be_is_refused_with_a_remedy(task: Task) -> None:
+    with pytest.raises(InputError, match=r"duration = 1e\+308 s makes 1000000000000000000 samples"):
+        make_task(task.machine, "X", task.structure, task.values, 1e308)
     with pytest.raises(InputError, match=r"duration = 0\.05 s makes 50 samples"):
         make_task(task.machine, "X", task.structure, task.values, 0.05)
     with pytest.raises(InputError, match="no axis 'Q'"):

@@ -117,5 +117,8 @@ def test_the_commands(tmp_path: Path) -> None:
     assert "axis X as in" in said("machine", "from", model, "--axis", "X", "-o", machine)
     wrong = ["design", "tracking", model, "-o", str(tmp_path / "d.py"), "--poles"]
     assert "must be two poles" in said(*wrong, "a,b", code=2) and "not stable" in said(*wrong, "4,-5", code=2)
+    endless = said("design", "tracking", model, "-o", str(tmp_path / "d.py"), "--voltage-range", "inf", code=2)
+    assert "--voltage-range = inf V must be a finite number" in endless
+    assert not (tmp_path / "d.py").exists()
     (tmp_path / "bad.toml").write_text("x = [")
     assert "not valid TOML" in said("check", str(tmp_path / "bad.toml"), code=2)
