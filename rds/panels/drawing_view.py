@@ -111,7 +111,8 @@ class DrawingView:
         drawing = self.drawing
         found = drawing.latest
         if found is None or drawing.refusal:
-            self.verdict.say(drawing.refusal, "error")
+            waits = drawing.choices["source"] != CELLS and not drawing.choices["picture"]  # nothing is wrong yet
+            self.verdict.say(drawing.refusal, "note" if waits else "error")
             self.cells.outline([])
             self.figure.clear()
             return

@@ -42,7 +42,8 @@ class ToolView:
         self.save_button = button(
             "Save table", "Write the table (Ctrl-S); a program is checked anew with it", self._save, self.notice
         )
-        self._edit = widgets.VBox([self.editor, _row(self.save_button, self.state)])
+        self._shown = (self.editor, _row(self.save_button, self.state))
+        self._edit = widgets.VBox([])  # nothing of it is on the page before a table is open
         self.widget = widgets.VBox([choose, _row(self._name, begin), self._edit, self.notice, self.table])
         self.chosen()
 
@@ -72,7 +73,7 @@ class ToolView:
 
     def _open(self, file: ToolFile | None) -> None:
         self._file = file
-        self._edit.layout.display = "none" if file is None else ""
+        self._edit.children = () if file is None else self._shown
         self.editor.text = "" if file is None else file.text
         self._look()
 

@@ -81,7 +81,7 @@ def test_a_picture_of_the_folder_is_traced(open_page: Callable[..., Any], app: A
     image.fromarray(np.where(disc, 0, 255).astype(np.uint8)).save(path)
     page = opened(open_page)
     page.click('button:text-is("Picture")')
-    page.wait_for_selector(f'{BAD}:has-text("choose a picture")')
+    page.wait_for_selector('.rds-verdict .rds-notice-note:has-text("choose a picture")')
     with page.expect_file_chooser() as chooser:
         page.click('.rds-side button:has-text("Take a picture")')
     chooser.value.set_files(path)
