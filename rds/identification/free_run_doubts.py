@@ -39,7 +39,9 @@ def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str)
     if not np.isfinite(error).all():
         return [f"{log.name}: the free run leaves the finite numbers: {UNUSABLE}; compare with --method simulation"]
     motion, size, unit = motion_of(log), _rms(error), structure.output_unit
-    said = [*_little(log, motion, unit), *_poor(log, motion, error)]
+    # forces are right in a closed loop as well, whose free run drifts; the other methods are for open loops
+    is_open = log.closed_loop is False or method != "inverse-dynamics"
+    said = [*_little(log, motion, unit), *_poor(log, motion, error, is_open)]
     if motion.noise > 0.0 and size > _MISSED * motion.noise:
         said.append(
             f"{log.name}: the free run of these parameters is {size:.3g} {unit} off (RMS), {size / motion.noise:.3g} "
@@ -70,13 +72,16 @@ def _too_small(log: Log, way: str, reach: float, how: str, noise: float, unit: s
     )
 
 
-def _poor(log: Log, motion: Motion, error: np.ndarray) -> list[str]:
+def _poor(log: Log, motion: Motion, error: np.ndarray, is_open: bool = True) -> list[str]:
     spread = float(log.position.std())
     fit = 100.0 * (1.0 - float(error.std()) / spread) if spread > 0.0 else 0.0
     if not (fit < _POOR and _rms(error) > _MISSED * motion.noise):
         return []
+    verdict = (
+        UNUSABLE if is_open else "unless a controller held it (closed_loop in the map), they are not the axis's own"
+    )
     return [
-        f"{log.name}: the free run explains {fit:.1f} % of the motion only: {UNUSABLE}; look at the "
+        f"{log.name}: the free run of these parameters explains {fit:.1f} % of the motion only: {verdict}; look at the "
         "data with `rds data describe` (columns, signs, units), and try other options or structures"
     ]
 

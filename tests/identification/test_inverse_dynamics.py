@@ -125,12 +125,15 @@ def test_a_free_run_shows_what_noise_and_a_coarse_encoder_do_and_no_interval_cou
 ) -> None:
     draw, good = np.random.default_rng(0), simulated(stairs())
     y = np.round((good.position + noise * draw.standard_normal(len(good))) / step) * step
-    found = fit([replace(good, position=y, resolution=step)], structure("axis"), "inverse-dynamics")
+    log = replace(good, position=y, resolution=step, closed_loop=False)
+    found = fit([log], structure("axis"), "inverse-dynamics")
     off = found.values()["tau"] - TRUTH["tau"]
     assert abs(off) > 3.0 * found.parameters["tau"].std_error
     assert any("mislead the method inverse-dynamics" in warning for warning in found.warnings)
     assert bool(found.unusable()) == unusable
-    held = fit([replace(good, position=y, resolution=step, closed_loop=True)], structure("axis"), "inverse-dynamics")
+    unknown = fit([replace(log, closed_loop=None)], structure("axis"), "inverse-dynamics")
+    assert not unknown.unusable() and any("closed_loop in the map" in warning for warning in unknown.warnings)
+    held = fit([replace(log, closed_loop=True)], structure("axis"), "inverse-dynamics")
     assert not any("mislead" in warning for warning in held.warnings)  # there a free run drifts anyway
 
 
