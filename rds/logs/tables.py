@@ -44,6 +44,9 @@ def read_table(
         else:
             known = ", ".join((*TEXTS, ".mat", ".parquet", *BUSES))
             raise InputError(f"there is no log of the ending {ending!r}; known: {known}")
+        unprintable = next((name for name in table.columns if not name.isprintable()), None)
+        if unprintable is not None:  # it would command the terminal that it is shown on
+            raise InputError(f"column {unprintable!r} has characters in its name that are no text; rename it")
         with open(path, "rb") as stream:
             return replace(table, sha256=hashlib.file_digest(stream, "sha256").hexdigest())
     except InputError as error:

@@ -52,3 +52,10 @@ def test_lines_of_old_macs_are_refused_with_a_remedy(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"\n", b"\r"))
     with pytest.raises(InputError, match="carriage return alone, as on old Macs; save it with line feeds"):
         describe(path)
+
+
+def test_a_heading_that_would_command_the_terminal_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", headed(axis(200)))
+    path.write_text(path.read_text().replace("voltage", "\x1b[31mvoltage"))
+    with pytest.raises(InputError, match=r"column '\\x1b\[31mvoltage' has characters in its name"):
+        describe(path)
