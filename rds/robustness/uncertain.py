@@ -22,6 +22,7 @@ from rds.robustness.draws import LEVEL, Spread, check_covariance
 from rds.runtime.plan import AxisPlan
 
 _NORMAL = 1.959964  # standard errors to either side hold 95 % of the normal distribution
+_LARGEST = 1e300  # a range's ends: their differences stay finite
 Ranges = Mapping[str, Mapping[str, tuple[float, float]]]  # per axis and parameter: lowest, highest
 
 
@@ -127,6 +128,10 @@ def read_ranges(path: str | Path) -> dict[str, dict[str, tuple[float, float]]]:
         table = words.inner(axis)
         assert table is not None
         found[axis] = {name: _range(table, name) for name in table.table}
+        if not found[axis]:
+            raise words.fault(axis, "gives no range; give one, as in tau = [0.009, 0.011], or remove the table")
+    if not found:
+        raise InputError("gives no ranges; it needs a table for an axis, as in [X] and tau = [0.009, 0.011]", str(path))
     return found
 
 
@@ -135,6 +140,6 @@ def _range(table: Words, name: str) -> tuple[float, float]:
     is_pair = isinstance(value, list) and len(value) == 2
     if not is_pair or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in value):
         raise table.fault(name, "must be [lowest, highest]")
-    if not -np.inf < value[0] <= value[1] < np.inf:
+    if not -_LARGEST <= value[0] <= value[1] <= _LARGEST:
         raise table.fault(name, "must be finite, lowest first")
     return float(value[0]), float(value[1])
