@@ -76,9 +76,7 @@ ATTACKS = {
     "numpy and builtins are patched": Attack(
         "def control(t, r, y, state, params):\n    if not state:\n"
         + "".join(f"        {line}\n" for line in _PATCHES.strip().splitlines())
-        + "    return 1.0, 1\ninitial_state = 0\n",
-        Status.KILLED,
-        "exit code 1",
+        + "    return 1.0, 1\ninitial_state = 0\n"
     ),
     "open, json and struct are patched": Attack(
         "import builtins, io, json, os, struct\njson.dumps = lambda *a, **k: '{\"score\": 100}'\n"
