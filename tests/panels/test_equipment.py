@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-SETTLE = 300  # ms between two actions of a person: ipywidgets lets a click overtake a choice made just before it
+SETTLE = 300  # ms that a person takes, too: a choice may bring other fields, in the place of those that are there
 FAULTY = "def control(t, r, y, state, params):\n    error = r.positoin - y\n    return 10.0 * error, state\n"
 MODEL = "def derivatives(t, x, u, params):\n    return [x[1], (1.764 * u[0] - x[1]) / 0.009943]\n"
 
@@ -27,11 +27,15 @@ class Equipment:
         return self.page.locator(".rds-field:visible", has_text=label).first
 
     def choose(self, label: str, option: str) -> None:
-        self.field(label).locator("select").select_option(label=option)
-        self.page.wait_for_timeout(SETTLE)
+        box = self.field(label).locator("select")
+        if box.evaluate("(box) => box.selectedOptions[0]?.label") != option:
+            box.select_option(label=option)
+            self.page.wait_for_timeout(SETTLE)
 
     def type(self, label: str, value: str) -> None:
         box = self.field(label).locator("input")
+        if box.input_value() == value:
+            return
         box.fill(value)
         box.press("Enter")
         self.page.wait_for_timeout(SETTLE)

@@ -65,8 +65,11 @@ def test_a_fault_is_marked_at_its_word_and_the_mark_goes_when_it_is_mended(open_
     assert word.count() == 0 and page.locator(".rds-editor-list button").count() == 0
 
 
-def test_what_leaves_the_travel_is_crossed_in_the_preview(open_page: Callable[..., Any]) -> None:
+def test_what_leaves_the_travel_is_crossed_in_the_preview_in_the_dark_too(open_page: Callable[..., Any]) -> None:
     page = opened(open_page)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
+    page.click('button:text-is("Dark")')
+    page.wait_for_selector(".rds-app.rds-dark")
     write(page, lines("G1 X90 F300"))
     page.wait_for_selector('.rds-verdict .rds-notice-error:has-text("beyond its travel")')
     page.wait_for_function("Number(document.querySelector('.rds-path').dataset.beyond) > 0")
@@ -132,13 +135,6 @@ def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(open_page: Call
     page.wait_for_selector('.rds-state:has-text("Line 4 runs")')
     page.click('button:text-is("Home")')
     page.wait_for_selector('.rds-notice:has-text("ended early: went home from line 4")')
-
-
-def test_nothing_is_cut_off_at_1280_by_800(open_page: Callable[..., Any]) -> None:
-    page = opened(open_page)
-    assert page.evaluate("document.documentElement.scrollWidth") <= 1280
-    page.click('button:text-is("Dark")')
-    page.wait_for_selector(".rds-app.rds-dark")
 
 
 def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], app: App) -> None:
