@@ -149,7 +149,7 @@ def test_another_unit_is_the_same_speed(tmp_path: Path) -> None:
 
 
 def test_long_work_ends_when_it_is_asked_to(tmp_path: Path) -> None:
-    panel = make(tmp_path, kind="linear", end="150, 0", feed=10.0, period=1e-5)
+    panel = make(tmp_path, kind="linear", end="150, 0", feed=600.0, period=1e-5)
     task = panel.run()
     task.stop()
     assert task.wait(20) and task.stopped
