@@ -17,21 +17,35 @@ from rds.session import Session
 from rds.session.kept_runs import State, state_of
 from tests.panels.conftest import App
 
-LONG = 30.0  # s that the runs of these tests would take
+LONG = 60.0  # s of a run that is stopped
+RELOADED = 20.0  # s of one that is waited for, and still goes on when a busy computer has reloaded its page
+ORPHANED = 12.0  # s of one that is waited for, whose kernel is killed at its beginning
 PATIENCE = 120.0  # s
 
 
+@pytest.fixture(scope="module")
+def busy_app(start_app: Callable[..., App], tmp_path_factory: pytest.TempPathFactory) -> App:
+    """An app for the runs of these tests alone."""
+    folder = tmp_path_factory.mktemp("busy")
+    (folder / "session.json").write_text(json.dumps({"equipment control": {"mode": "emulation"}}))
+    return start_app(folder)
+
+
 @pytest.fixture
-def running(start_app: Callable[..., App], open_page: Callable[..., Any], tmp_path: Path) -> tuple[App, Any, Path]:
-    """A page in the middle of an emulation, and the run's folder."""
-    kept = {"equipment control": {"mode": "emulation", "duration": LONG}}
-    (tmp_path / "session.json").write_text(json.dumps(kept))
-    app = start_app(tmp_path)
-    page = open_page("Equipment control", on=app)
-    page.click('button:visible:text-is("Run")')
-    folder = wait_for(lambda: next(iter((tmp_path / "runs").glob("*")), None))
-    wait_for(lambda: state_of(folder) is State.GOES_ON)
-    return app, page, folder
+def begin(busy_app: App, open_page: Callable[..., Any]) -> Callable[[float], tuple[App, Any, Path]]:
+    """A page in the middle of an emulation of so many seconds, and the run's folder."""
+
+    def run(duration: float) -> tuple[App, Any, Path]:
+        runs = busy_app.folder / "runs"
+        before = set(runs.glob("*"))
+        page = open_page("Equipment control", on=busy_app)
+        page.fill('.rds-field:has(.rds-label:has-text("Final time")) input', f"{duration:g}")
+        page.click('button:visible:text-is("Run")')
+        folder = wait_for(lambda: next(iter(set(runs.glob("*")) - before), None))
+        wait_for(lambda: state_of(folder) is State.GOES_ON)
+        return busy_app, page, folder
+
+    return run
 
 
 def wait_for(look: Callable[[], Any]) -> Any:
@@ -43,21 +57,23 @@ def wait_for(look: Callable[[], Any]) -> Any:
     raise AssertionError("it did not come about")
 
 
-def test_a_reload_during_a_run_loses_nothing(running: tuple[App, Any, Path], open_page: Callable[..., Any]) -> None:
-    app, page, folder = running
-    page.reload()
-    page.wait_for_selector(".rds-app .rds-nav button")
-    wait_for(lambda: state_of(folder) is not State.GOES_ON)  # to its safe end, whoever looks
+def test_a_reload_during_a_run_loses_nothing(begin: Callable[..., Any]) -> None:
+    _, page, folder = begin(RELOADED)
+    page.reload()  # its kernel goes on until the run is kept
+    page.wait_for_selector('.rds-notice:has-text("a run goes on")')
+    wait_for(lambda: state_of(folder) is State.WHOLE)
     result = open_result(folder)
-    assert len(result) > 100 and abs(result["X_voltage"]).max() <= 10.0
-    again = open_page(on=app)
-    again.wait_for_selector('.rds-notice:has-text("was cut short")')
+    assert result.meta["ending"] == "done" and len(result) == RELOADED * 1000
+    page.click('.rds-nav button:text-is("Equipment control")')
+    page.click('.lm-TabBar-tab:visible:has-text("Earlier runs")')
+    earlier = page.locator("select[multiple]:visible option").first
+    assert earlier.inner_text().endswith(folder.name.partition("-")[2].partition("-")[2])
 
 
 def test_a_second_page_finds_the_machine_in_use_and_can_stop_it(
-    running: tuple[App, Any, Path], open_page: Callable[..., Any]
+    begin: Callable[..., Any], open_page: Callable[..., Any]
 ) -> None:
-    app, _, folder = running
+    app, _, folder = begin(LONG)
     second = open_page("Equipment control", on=app)
     second.wait_for_selector('.rds-notice:has-text("goes on")')
     second.click('button:visible:text-is("Run")')
@@ -68,13 +84,13 @@ def test_a_second_page_finds_the_machine_in_use_and_can_stop_it(
 
 
 def test_a_kernel_that_dies_leaves_the_record_and_no_claim(
-    running: tuple[App, Any, Path], open_page: Callable[..., Any]
+    begin: Callable[..., Any], open_page: Callable[..., Any]
 ) -> None:
-    app, _, folder = running
+    app, _, folder = begin(ORPHANED)
     wait_for(lambda: len(open_result(folder)) > 300 if (folder / "record.rds").is_file() else False)
     os.kill(json.loads((app.folder / ".machine.json").read_text())["process"], signal.SIGKILL)
     wait_for(lambda: state_of(folder) is State.CUT_SHORT)
-    assert len(open_result(folder)) > 300
+    assert len(open_result(folder)) == ORPHANED * 1000  # the loop has gone on to its end
     session = Session(app.folder)
     session.take_machine("a run after it", object())  # whoever died holds nothing
     page = open_page(on=app)

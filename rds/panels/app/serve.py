@@ -15,6 +15,7 @@ from rds.panels.app.page import FOLDER, MACHINE, PANEL
 from rds.panels.app.ready_kernels import ReadyKernels
 
 _HERE = Path(__file__).parent
+LEFT = 60  # s after which a kernel ends that no browser shows and that has nothing to say: nothing goes on in it
 
 
 def serve(folder: Path, machine: str, panel: str, port: int | None, browser: bool, address: str = "127.0.0.1") -> None:
@@ -46,13 +47,12 @@ def _server(ready: ReadyKernels) -> Callable[..., None]:
     # jsonschema does without this one, which compiles a grammar of addresses for a second that nothing here checks
     sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
     try:
-        from voila.app import Voila
-
         from rds.panels.app.provisioner import offer
+        from rds.panels.app.server import PanelsServer
     except ImportError as error:
         raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error
     offer(ready)
-    launch: Callable[..., None] = Voila.launch_instance
+    launch: Callable[..., None] = PanelsServer.launch_instance
     return launch
 
 
@@ -66,6 +66,8 @@ def _options(port: int | None, browser: bool, address: str) -> list[str]:
         "VoilaConfiguration.default_pool_size": 1,
         "VoilaConfiguration.show_tracebacks": True,
         "VoilaConfiguration.file_allowlist": "$.",  # a pattern that no file fits
+        "MappingKernelManager.cull_idle_timeout": LEFT,
+        "MappingKernelManager.cull_interval": 10,
     }
     if port is not None:
         settings |= {"Voila.port": port, "Voila.port_retries": 0}

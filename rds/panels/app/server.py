@@ -1,0 +1,22 @@
+"""Voilà, but for one thing: a page that goes away does not end its kernel, as a run may go on in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from voila.app import Voila
+from voila.shutdown_kernel_handler import VoilaShutdownKernelHandler
+
+
+class PanelsServer(Voila):
+    """A kernel without a page ends when nothing goes on in it any more (`serve.LEFT`), not at once.
+
+    What it holds until then, such as the machine, another page sees and can stop. A run's record is saved as if
+    the page were there.
+    """
+
+    name = "voila"  # the user's settings for it
+
+    def init_handlers(self) -> list[Any]:
+        """All but the one that a page tells of its going."""
+        return [handler for handler in super().init_handlers() if VoilaShutdownKernelHandler not in handler]
