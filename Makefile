@@ -24,7 +24,7 @@ test: $(DONE) ## ruff, mypy, then the tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest -n auto --dist loadgroup $(ARGS)
+	$(BIN)/pytest -n auto $(ARGS)
 
 bench: $(DONE) ## measure speed and latency, beside other programs where they are installed (minutes)
 	$(BIN)/python -m benchmarks $(ARGS)

@@ -9,7 +9,9 @@ import signal
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -19,19 +21,39 @@ settings.register_profile("search", deadline=None)
 settings.register_profile("judge", deadline=None, derandomize=True)
 settings.load_profile("judge" if os.environ.get("CI") else "search")
 
+HERE = Path(__file__).parent
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks at the groups
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that wait for real time run one after the other, and those in a browser: beside each other they starve.
-
-    A module whose tests share what is long to make says `pytestmark = pytest.mark.xdist_group(...)` itself.
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Files side by side; those that wait for real time one after the other, and those in a browser: beside each other
+    they starve. (pytest-xdist's own groups need names of tests that pytest 9.2 does not let it change.)
     """
-    for item in items:
-        group = "panels" if "panels" in item.path.parts else "realtime"
-        if group == "panels" or "realtime" in item.keywords:
-            item.add_marker(pytest.mark.xdist_group(group))
+    from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
+
+    class FilesOrGroups(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return _group(nodeid.partition("::")[0])
+
+    return FilesOrGroups(config, log)
+
+
+@cache
+def _group(path: str) -> str:
+    if "/panels/" in path:
+        return "panels"
+    return "realtime" if "pytest.mark.realtime" in (HERE.parent / path).read_text(encoding="utf-8") else path
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_runtime_directory(worker_id: str) -> Iterator[None]:
+    """Tests side by side do not see each other's buses."""
+    if worker_id == "master":
+        yield
+        return
+    with tempfile.TemporaryDirectory(prefix="rds", dir="/tmp") as runtime, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", runtime)
+        yield
 
 
 @pytest.fixture

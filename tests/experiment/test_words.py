@@ -124,7 +124,11 @@ def edit(change: str, base: str = GOOD) -> str:
         ("-name", 12, r"controller needs `name` \(p, pid, modified-pid, tracking\) or `file`"),
         ("gains = [1.0]", 14, "gains = .1.0. must be .g1, g2."),
         ("[model]\nname = 'linear'", 16, "model.name = 'linear' is unknown; known: linear-axis, spindle, machine-axis"),
-        ("[model]\ntau = 0.1", 15, "model needs `name` .linear-axis, spindle, machine-axis. or `file`"),
+        (
+            "[model]\ntau = 0.1",
+            15,
+            "model needs `name` .linear-axis, spindle, .*directional-axis. or `file`",
+        ),
         ("[model]\nname = 'linear-axis'\ntau = -1.0", 17, "tau = -1.0 must be more than 0"),
         ("[model]\nname = 'linear-axis'\nmass = 1.0", 17, "has no option 'mass'; it has tau, K"),
         ("[model]\nfile = 'gone.py'", 16, "model.file = 'gone.py' will not do: there is no such file as .*gone.py"),

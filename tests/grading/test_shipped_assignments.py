@@ -33,7 +33,7 @@ HOSTILE = {
 pytestmark = pytest.mark.skipif(available() is not None, reason=str(available()))
 
 
-@pytest.fixture(scope="module", params=[pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in NAMES])
+@pytest.fixture(scope="module", params=NAMES)
 def graded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, BatchOutcome]:
     """The twelve submissions of one assignment, graded as an instructor does."""
     folder = ASSIGNMENTS / request.param

@@ -29,7 +29,7 @@ class App(NamedTuple):
     process: subprocess.Popen[str]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., App]]:
     """Start `rds app` on a folder; ended with the tests."""
     if CHROMIUM is None:
@@ -68,13 +68,13 @@ def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[...
     shutil.rmtree(runtime, ignore_errors=True)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def app(start_app: Callable[..., App]) -> App:
     """One `rds app` for all tests that can share its folder."""
     return start_app()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
     """Chromium without a window."""
     if CHROMIUM is None:
