@@ -24,7 +24,7 @@ class Counts:
 def count_again(first: Sequence[Sample], again: Run) -> Counts:
     """The questions of a run asked once more in the counted run `again`, which must give the same answers."""
     for asked, answered in first:
-        if again.ask(*asked) != answered:
+        if again.ask(*asked)[2:] != answered:
             t = (again.k - 1) * again.T
             return Counts(len(first), refused=f"at t = {t:.3f} s it answered otherwise while it was counted")
     events = again.total()

@@ -30,11 +30,12 @@ class Run:
         self, cell: Cell, what: str, layout: records.Layout, T: float, through_door: bool = False, seal: int = 0
     ):
         self.cell, self.what, self.layout, self.T = cell, what, layout, T
+        self.is_single = layout.answers == 1
         self.k = 0
         self.has_ended = False
         self._seal, self._ok = seal, records.OK ^ seal
         self._asked: list[tuple[float, ...]] = []
-        self._answered: list[tuple[float, ...]] = []
+        self._answered: list[tuple[Any, ...]] = []
         self._door: Door | None = None
         if through_door:
             memory, question_bell, answer_bell = cell.door
@@ -42,8 +43,11 @@ class Run:
             cell.signs.append(self._has_answer)
         self._exchange = self._door.asker(layout) if self._door else self._pipes()
 
-    def ask(self, *values: float) -> tuple[float, ...]:
-        """The answer to `values`, finite; SubmissionError if there is none, or one to something else."""
+    def ask(self, *values: float) -> tuple[Any, ...]:
+        """Sample number, code, answer to `values`, all finite; SubmissionError if there is none, or to something else.
+
+        Not cut, as this is done at every sample.
+        """
         cell, k = self.cell, self.k
         if cell.is_closed:
             raise ValueError("this run has ended; begin another one")
@@ -57,10 +61,9 @@ class Run:
             self._judge(answer[0], answer[1] ^ self._seal, all(map(isfinite, answer)))
         cell.turn += 1
         self.k = k + 1
-        given = answer[2:]
         self._asked.append(values)
-        self._answered.append(given)
-        return given
+        self._answered.append(answer)
+        return answer
 
     def _pipes(self) -> Callable[[int, tuple[float, ...]], tuple[Any, ...]]:
         cell, pack, answer = self.cell, self.layout.question.pack, self.layout.answer
@@ -87,7 +90,7 @@ class Run:
 
     def recorded(self, most: int | None = None) -> list[Sample]:
         """What was asked and answered so far, of the first `most` samples."""
-        return list(zip(self._asked[:most], self._answered[:most], strict=True))
+        return [(asked, answer[2:]) for asked, answer in zip(self._asked[:most], self._answered[:most], strict=True)]
 
     def total(self) -> int:
         """After the last sample of a counted run: its events; -1 where the counter was found gone."""

@@ -99,12 +99,14 @@ class Subject:
 
         Of several axes each is a sequence in axis order. ValueError if `t` is not the next sample's.
         """
-        run = self._running("control")
+        run = self._run
+        if run is None or run.what != "control":
+            run = self._running("control")
         if t != run.k * run.T:
             raise ValueError(f"t = {t!r} s is not sample {run.k} of {run.T} s; the samples of a run come in order")
-        if run.layout.answers == 1:
-            return run.ask(t, r[0], r[1], r[2], y)[0]  # type: ignore[arg-type]
-        return run.ask(t, *r[0], *r[1], *r[2], *y)  # type: ignore[misc]
+        if run.is_single:
+            return run.ask(t, r[0], r[1], r[2], y)[2]  # type: ignore[arg-type]
+        return run.ask(t, *r[0], *r[1], *r[2], *y)[2:]  # type: ignore[misc]
 
     def begin_model(self, params: Mapping[str, Any] | None = None, T: float = 1e-3) -> float:
         """A fresh run of the model with samples of `T` s; its output before the first sample."""
@@ -116,7 +118,7 @@ class Subject:
 
     def advance(self, u: float) -> float:
         """One sample of the constant voltage `u`, V; the output after it."""
-        return self._running("model").ask(u)[0]
+        return self._running("model").ask(u)[2]
 
     def rows(
         self, segment: Segment, T: float, params: Mapping[str, Any] | None = None, most: int = 1_000_000
@@ -133,7 +135,7 @@ class Subject:
         run = self._running("rows")
         taken = 0
         while True:
-            count, *values = run.ask()
+            _, _, count, *values = run.ask()
             if count != int(count) or not 0 <= count <= records.ROWS:
                 run.give_up("it wrote into the grader's pipe")
             for at in range(0, int(count) * 3 * axes, 3 * axes):
