@@ -45,7 +45,7 @@ def run() -> list[Figure]:
         return [Figure("the page in a browser", note="no Chromium: apt-get install chromium")]
     from playwright.sync_api import sync_playwright
 
-    opened, first, answered, pictures, costs, beside, moving, alone = [], [], [], [], [], [], [], []
+    opened, first, answered, there, pictures, costs, beside, moving, alone = [], [], [], [], [], [], [], [], []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for attempt in range(-1, ROUNDS):  # the first start only brings the files into memory
@@ -61,8 +61,11 @@ def run() -> list[Figure]:
                     if attempt < 0:
                         continue
                     opened.append(taken)
-                    first += [_answer(page, title) for title in ("Equipment control", "Program", "Design")]
-                    answered += [_answer(page, title) for title in ("Program", "Main menu", "Design")]
+                    for title in ("Equipment control", "Program", "Design"):  # none of them has been opened yet
+                        at_once, whole = _answer(page, title)
+                        first.append(at_once)
+                        there.append(whole)
+                    answered += [_answer(page, title)[1] for title in ("Program", "Main menu", "Design")]
                     page.click('.rds-nav button:text-is("Equipment control")')
                     result, cost = _live(page, server, Path(folder))
                     costs.append(cost)
@@ -75,8 +78,9 @@ def run() -> list[Figure]:
         browser.close()
     return [
         Figure("from `rds app` to the first panel", "s", tuple(opened), 6.0),
-        Figure("a press of a button to its answer in sight", "ms", tuple(answered), 100.0),
-        Figure("a press that opens a panel for the first time", "ms", tuple(first), 100.0),
+        Figure("a press that opens a panel for the first time, to its title", "ms", tuple(first), 100.0),
+        Figure("the same, to the panel", "ms", tuple(there)),
+        Figure("a press that goes to a panel that is open, to the panel", "ms", tuple(answered), 100.0),
         Figure("from one picture of the machine in motion to the next", "ms", tuple(pictures), 100.0),
         Figure("kernel, live strip of a run at 10 Hz", "% of a core", tuple(costs), 3.0),
         Figure("lateness of the loop at 99 %, with the page", "µs", tuple(beside)),
@@ -102,22 +106,28 @@ def _app(folder: str) -> Iterator[tuple[str, int, float]]:
         server.wait(20)
 
 
-def _answer(page: Any, title: str) -> float:
-    """ms from a press to the panel's title in sight, both seen from within the page."""
-    return float(
-        page.evaluate(
-            """(title) => new Promise((done) => {
-                const button = [...document.querySelectorAll('.rds-nav button')].find((b) => b.innerText === title);
-                const heading = document.querySelector('.rds-title');
-                const began = performance.now();
-                const look = () => heading.innerText.startsWith(title)
-                    ? done(performance.now() - began) : requestAnimationFrame(look);
-                button.click();
-                look();
-            })""",
-            title,
-        )
+def _answer(page: Any, title: str) -> tuple[float, float]:
+    """ms from a press to the panel's title in sight, and to the panel itself, seen from within the page."""
+    answered, there = page.evaluate(
+        """(title) => new Promise((done) => {
+            const button = [...document.querySelectorAll('.rds-nav button')].find((b) => b.innerText === title);
+            const heading = document.querySelector('.rds-title'), panel = document.querySelector('.rds-panel');
+            const began = performance.now();
+            let answered = 0;
+            const look = () => {
+                if (heading.innerText.startsWith(title)) {
+                    answered ||= performance.now() - began;
+                    if (!panel.classList.contains('rds-opening') && panel.childElementCount)
+                        return done([answered, performance.now() - began]);
+                }
+                requestAnimationFrame(look);
+            };
+            button.click();
+            look();
+        })""",
+        title,
     )
+    return float(answered), float(there)
 
 
 def _live(page: Any, server: int, folder: Path) -> tuple[Result, float]:
