@@ -64,14 +64,18 @@ class Shell:
     def open(self, name: str) -> None:
         """Go to the panel called `name`; InputError if there is none."""
         module = PANELS.module(name)
-        if name not in self.panels:
-            self.panels[name] = self._built(module)
+        if name not in self.panels:  # its title answers at once; making what is below it takes some tenths of a second
+            self._place.add_class("rds-opening")
+            self._place.children = []
         self.here = name
         for other, button in self._buttons.items():
             (button.add_class if other == name else button.remove_class)("rds-here")
         about = f"{escape(self.session.machine)} · files in {escape(str(self.session.folder))}"
         self._title.value = f"<h1>{escape(module.TITLE)}</h1><p>{about}</p>"
+        if name not in self.panels:
+            self.panels[name] = self._built(module)
         self._place.children = [self.panels[name]]
+        self._place.remove_class("rds-opening")
 
     def say(self, text: str, kind: str = "note") -> None:
         """A line over the panel; kind is note, good, warning or error."""

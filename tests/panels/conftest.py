@@ -126,6 +126,7 @@ def open_page(new_page: Callable[[int, int], Any], app: App) -> Callable[..., An
         if panel is not None:
             page.click(f'.rds-nav button:text-is("{panel}")')
             page.wait_for_selector(f'.rds-title h1:text-is("{panel}")')
+            page.wait_for_selector(".rds-panel:not(.rds-opening)")
         return page
 
     return show
