@@ -47,7 +47,7 @@ def _group(path: str) -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """On a test server, what runs whole processes in real time is tried again: it is shared, and stands still at times."""
+    """On a test server, what runs whole processes in real time is tried again: at times it stands still."""
     if not os.environ.get("CI"):
         return
     for item in items:
