@@ -1,11 +1,13 @@
 # make demo, make test: all set-up included, on a machine with Python 3.11 or newer. `make help` lists the rest.
 #
 # Packages are installed into $(VENV) with uv where it is installed, else with venv and pip, from requirements.lock.
-# Variables: PYTHON (interpreter), VENV (folder), UV (empty: do without uv), ARGS (of demo and test).
+# Variables: PYTHON (interpreter), VENV (folder), UV (empty: do without uv), ARGS (of demo and test), JOBS (tests side by
+# side: one more than there are cores, because many wait).
 
 VENV ?= .venv
 UV   ?= $(shell command -v uv 2>/dev/null)
 ARGS ?=
+JOBS ?= $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
 BIN  := $(VENV)/bin
 DONE := $(VENV)/.installed
 
@@ -24,7 +26,7 @@ test: $(DONE) ## ruff, mypy, then the tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest -n auto $(ARGS)
+	$(BIN)/pytest -n $(JOBS) $(ARGS)
 
 bench: $(DONE) ## measure speed and latency, beside other programs where they are installed (minutes)
 	$(BIN)/python -m benchmarks $(ARGS)

@@ -93,7 +93,7 @@ def test_a_place_that_is_not_stable_is_refused_with_the_reason_in_the_dark_too(o
     _type(page, "Real part", "-5")
     _type(page, "Imaginary part", "3000")
     page.wait_for_selector('.rds-notice-error:has-text("make the sampled loop unstable")')
-    assert page.locator('button:text-is("Write the file")').is_disabled()
+    page.wait_for_selector('button:text-is("Write the file"):disabled')
     _type(page, "Imaginary part", "24")
     page.wait_for_selector(".rds-splane-row .scroll")
 
