@@ -2,12 +2,12 @@
 #
 # Packages are installed into $(VENV) with uv where it is installed, else with venv and pip, from requirements.lock.
 # Variables: PYTHON (interpreter), VENV (folder), UV (empty: do without uv), ARGS (of demo and test), JOBS (tests side by
-# side: one more than there are cores, because many wait).
+# side: as many as there are cores).
 
 VENV ?= .venv
 UV   ?= $(shell command -v uv 2>/dev/null)
 ARGS ?=
-JOBS ?= $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1)))
+JOBS ?= auto
 BIN  := $(VENV)/bin
 DONE := $(VENV)/.installed
 

@@ -47,12 +47,12 @@ def _group(path: str) -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """On a test server, what runs whole processes in real time is tried again: at times it stands still."""
-    if not os.environ.get("CI"):
-        return
-    for item in items:
-        waits = "realtime" in item.keywords or "alone" in getattr(item, "fixturenames", ())
-        if waits or _group(item.nodeid.partition("::")[0]) == PANELS:
+    """On a test server a test that fails is tried twice more: it is shared, and processes stand still at times.
+
+    What is wrong fails three times; what was tried again is counted in the last line.
+    """
+    if os.environ.get("CI"):
+        for item in items:
             item.add_marker(pytest.mark.flaky(reruns=2))
 
 
