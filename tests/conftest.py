@@ -46,16 +46,6 @@ def _group(path: str) -> str:
     return REALTIME if "pytest.mark.realtime" in (HERE.parent / path).read_text(encoding="utf-8") else path
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """On a test server a test that fails is tried twice more: it is shared, and processes stand still at times.
-
-    What is wrong fails three times; what was tried again is counted in the last line.
-    """
-    if os.environ.get("CI"):
-        for item in items:
-            item.add_marker(pytest.mark.flaky(reruns=2))
-
-
 @pytest.fixture(scope="session", autouse=True)
 def own_runtime_directory(worker_id: str) -> Iterator[None]:
     """Tests side by side do not see each other's buses."""
