@@ -1,0 +1,27 @@
+"""What goes to other processes, made by several threads at once."""
+
+from __future__ import annotations
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import cloudpickle
+
+from rds.core.load import load_student
+from rds.core.portable import portable
+
+
+def test_threads_that_pack_at_the_same_time_do_not_disturb_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "law.py"
+    path.write_text("def control(t, r, y, state, params):\n    return 3.0, state\n")
+    student = load_student(path)
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            packed = list(threads.map(lambda _: portable(student), range(400)))
+    finally:
+        sys.setswitchinterval(before)
+    assert len(set(packed)) == 1
+    assert not cloudpickle.list_registry_pickle_by_value()
