@@ -11,6 +11,9 @@ JOBS ?= auto
 BIN  := $(VENV)/bin
 DONE := $(VENV)/.installed
 
+# Containers often set this. Each of the many processes of a run or a test would compile all libraries again, at 2 s each.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test bench lock clean
 
