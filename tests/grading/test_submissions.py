@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import socket
+import tempfile
 import zipfile
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
@@ -71,6 +72,35 @@ def test_of_several_assignments_one_must_be_named(tmp_path: Path) -> None:
     tree = {f"ada/{name}/{file}": "" for name in ("ps1", "ps2") for file in ("controller.py", "timestamp.txt")}
     with pytest.raises(InputError, match="several assignments \\(ps1, ps2\\)"):
         collect(put(tmp_path, tree), ACCEPTED, ("Tracking",))
+
+
+@pytest.mark.parametrize("inside", ["ps1/controller.py", "x/timestamp.txt", "ps1/timestamp.txt"])
+def test_what_one_student_s_folder_holds_changes_nobody_else_s_place(tmp_path: Path, inside: str) -> None:
+    tree = {f"{name}/controller.py": name for name in ("ada", "ben", "mal")} | {f"mal/{inside}": "", "mal/y/a.txt": ""}
+    found = of(put(tmp_path, tree), assignments=("Tracking", "ps1"))
+    assert [found[name].status for name in ("ada", "ben")] == [None, None]
+    assert [found[name].read() for name in ("ada", "ben")] == [b"ada", b"ben"]
+
+
+def test_one_student_s_folders_are_not_the_course_s_assignments(tmp_path: Path) -> None:
+    tree = {f"{name}/ps1/{file}": name for name in ("ada", "ben", "mal") for file in ("controller.py", "timestamp.txt")}
+    found = of(put(tmp_path, tree | {"mal/ps9/timestamp.txt": "", "mal/x/a.py": ""}), assignments=("Tracking",))
+    assert [found[name].read() for name in ("ada", "ben", "mal")] == [b"ada", b"ben", b"mal"]
+
+
+def test_students_of_another_assignment_have_not_handed_in_this_one(tmp_path: Path) -> None:
+    tree = {f"{name}/ps2/controller.py": "" for name in ("ben", "cy", "dan")} | {"ada/ps1/controller.py": "a"}
+    found = of(put(tmp_path, tree), assignments=("ps1",))
+    assert [found[name].status for name in ("ada", "ben", "cy", "dan")] == [None, *[Status.MISSING] * 3]
+
+
+def test_a_file_s_date_is_of_no_concern() -> None:
+    """Some file systems keep dates that are further than any calendar: others cut them off."""
+    with tempfile.TemporaryDirectory(dir="/dev/shm" if os.path.isdir("/dev/shm") else None) as folder:
+        place = put(Path(folder), {"ada/controller.py": "a", "ben/controller.py": "b"})
+        os.utime(place / "ada/controller.py", (1e13, 1e13))
+        found = of(place)
+        assert [found[name].read() for name in ("ada", "ben")] == [b"a", b"b"]
 
 
 def test_moodle_s_zip(tmp_path: Path) -> None:

@@ -192,18 +192,32 @@ def _mostly(items: Sequence[Item], fits: Any) -> bool:
 
 
 def _is_nbgrader(items: Sequence[Item], assignments: Sequence[str]) -> bool:
+    """Whether more than half of the students' folders look so: what one of them holds is for its author alone."""
     deep = [item for item in items if len(item.parts) >= 3]
-    return any(item.parts[2] == STAMP or item.parts[1] in assignments for item in deep)
+    marked = {item.parts[0] for item in deep if item.parts[2] == STAMP or item.parts[1] in assignments}
+    names = _of_several(items)
+    fits = marked | {item.parts[0] for item in deep if item.parts[1] in names}
+    return bool(marked) and 2 * len(fits) > len({item.parts[0] for item in items if len(item.parts) > 1})
 
 
 def _assignment(items: Sequence[Item], assignments: Sequence[str]) -> str:
-    names = sorted({item.parts[1] for item in items if len(item.parts) >= 3})
+    all_names = {item.parts[1] for item in items if len(item.parts) >= 3}
     for name in assignments:
-        if name in names:
+        if name in all_names:
             return name
+    names = sorted(_of_several(items) or all_names)
     if len(names) == 1:
         return names[0]
     raise InputError(
         f"the submissions are of several assignments ({', '.join(map(shown, names[:8]))}); give the folder of the "
         "assignment the name of one of them"
     )
+
+
+def _of_several(items: Sequence[Item]) -> set[str]:
+    """The names of folders inside students' folders that more than one student has: the course's assignments."""
+    holders: dict[str, set[str]] = {}
+    for item in items:
+        if len(item.parts) >= 3:
+            holders.setdefault(item.parts[1], set()).add(item.parts[0])
+    return {name for name, students in holders.items() if len(students) > 1}
