@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -255,12 +255,13 @@ def _bus(words: Words, folder: Path) -> dict[str, Any]:
     if "cia402" in table and table.any("dialect") != "cia402":
         raise table.fault("cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it')
     drives = table.any("cia402")
-    if isinstance(drives, Mapping) and drives.get("mode") in ("csp", "csv"):
-        raise InputError(
-            f'bus.cia402.mode = "{drives["mode"]}" takes positions or velocities, and every mode of an experiment '
-            'hands out voltages: use "cst"; rds.bus.cia402.follow sends references to drives in csp and csv',
-            table.place("cia402"),
-        )
+    for name, mode in _drive_modes(drives):
+        if mode in ("csp", "csv"):
+            raise InputError(
+                f'{name} = "{mode}" takes positions or velocities, and every mode of an experiment hands out voltages: '
+                'use "cst"; rds.bus.cia402.follow sends references to drives in csp and csv',
+                table.place("cia402"),
+            )
     if interface == BUILTIN:
         table.whole("bitrate", None, "bit/s", *BITRATES)
         table.whole("data_bitrate", None, "bit/s, of CAN FD", *DATA_BITRATES)
@@ -276,6 +277,17 @@ def _bus(words: Words, folder: Path) -> dict[str, Any]:
 
     table.choice("interface", "", sorted(VALID_INTERFACES))
     return dict(table.table)
+
+
+def _drive_modes(drives: Any) -> Iterator[tuple[str, Any]]:
+    """The modes that a [bus.cia402] table gives, by their keys; what is no such table is refused where it is read."""
+    if not isinstance(drives, Mapping):
+        return
+    yield "bus.cia402.mode", drives.get("mode")
+    axes = drives.get("axis")
+    for name, axis in axes.items() if isinstance(axes, Mapping) else ():
+        if isinstance(axis, Mapping):
+            yield f"bus.cia402.axis.{name}.mode", axis.get("mode")
 
 
 def _timing(words: Words, mode: Mode) -> dict[str, Any]:

@@ -19,7 +19,7 @@ def test_without_a_word_the_machines_own_numbers_hold(machine: Machine) -> None:
     x, spindle = settings.drives
     assert (x.node, x.counts, x.velocity_counts, x.rated_voltage, x.direction) == (2, 1000.0, 1000.0, 10.0, 1)
     assert spindle.reads_velocity and spindle.velocity_counts == pytest.approx(4096 / 60)
-    assert settings.command.mode is Mode.CYCLIC_TORQUE and settings.host == 127
+    assert x.command.mode is Mode.CYCLIC_TORQUE and settings.host == 127
 
 
 def test_counts_from_encoder_gear_and_feed(machine: Machine) -> None:
@@ -63,6 +63,10 @@ def test_the_documented_example_is_accepted(machine: Machine, tmp_path: Path, mo
         ({"axis": {"X": {"counts": 5, "gear": 2}}}, "either counts"),
         ({"axis": {"X": {"direction": 0}}}, "1, -1"),
         ({"axis": {"X": {"homing": 5}}}, "17"),
+        ({"axis": {"X": {"mode": "pp"}}}, "'cst', 'csp', 'csv'"),
+        ({"axis": {"X": {"home": 1.0}}}, "give its method as well"),
+        ({"axis": {"X": {"homing": 17, "home": 1e9}}}, "beyond what a drive can count"),
+        ({"axis": {"X": {"homing": 17, "home": "left"}}}, "must be a number"),
         ({"axis": {"X": {"eds": "nowhere.eds"}}}, "no such file"),
         ({"axis": {"X": {"write": [[0x6072, 0]]}}}, "[index, sub-index, value]"),
     ],

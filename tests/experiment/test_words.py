@@ -404,5 +404,8 @@ def test_drives_that_take_no_voltage_are_refused_in_every_mode(mode: str, comman
     bus = {"dialect": "cia402", "cia402": {"mode": command}}
     with pytest.raises(InputError, match=rf'bus\.cia402\.mode = "{command}" takes positions or velocities.*use "cst"'):
         resolve(Words(table | {"bus": bus}), Path())
+    of_one = bus | {"cia402": {"axis": {"X": {"mode": command}}}}
+    with pytest.raises(InputError, match=rf'bus\.cia402\.axis\.X\.mode = "{command}" takes positions or velocities'):
+        resolve(Words(table | {"bus": of_one}), Path())
     plan, _ = resolve(Words(table | {"bus": bus | {"cia402": {"mode": "cst"}}}), Path())
     assert plan.bus["cia402"]["mode"] == "cst"

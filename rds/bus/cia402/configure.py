@@ -11,7 +11,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from math import ceil
+from math import ceil, inf
 
 import can
 import canopen
@@ -32,6 +32,9 @@ _SECOND_ANSWER = 0.03  # s more for one that has the same node-ID
 _CHANGE = 2.0  # s for a drive to change its state or mode
 _LOST_AFTER = 3  # heartbeats that may be missing
 _PROFILE = 402
+_HALF = 1 << 31
+Watch = Callable[[str, float], object]  # hears the axis that is homed, and the drive's position in axis units
+Limits = tuple[float, float]  # the lowest and highest position, axis units; infinite where there is none
 _DEVICE_TYPE = b"\x00\x10\x00"  # object 0x1000:00 in an SDO frame
 
 
@@ -58,8 +61,15 @@ def library(bus: can.BusABC) -> Iterator[canopen.Network]:
         network.notifier.stop()
 
 
-def prepare(network: canopen.Network, settings: Settings, period: float) -> None:
+def unwatched(axis: str, position: float) -> None:
+    """Nobody looks at the homing."""
+
+
+def prepare(network: canopen.Network, settings: Settings, period: float, watch: Watch = unwatched) -> list[Limits]:
     """Bring all drives to OPERATIONAL (NMT) and SWITCH ON DISABLED, mapped, in their mode, homed where asked for.
+
+    Returns the software limits of each. While a drive is homed it waits for the host's heartbeats, as it does under
+    command: should the host die, it ends the homing. `watch` is called all the while; what it raises ends the homing.
 
     Raises MachineError naming node and object, and what the drive said; InputError for an EDS that can't be read.
     """
@@ -69,7 +79,7 @@ def prepare(network: canopen.Network, settings: Settings, period: float) -> None
         with _naming(drive):
             node.nmt.state = "PRE-OPERATIONAL"
             _communication(node, drive, settings, period)
-            _map(node, drive, settings)
+            _map(node, drive, settings.transmission)
             _reset_fault(node, drive)
             for index, subindex, value in drive.write:
                 _download(node, index, subindex, value)
@@ -80,14 +90,19 @@ def prepare(network: canopen.Network, settings: Settings, period: float) -> None
         try:
             for drive, node in homed:
                 with _naming(drive):
-                    home(node, drive, settings.homing_timeout)
+                    _watch_host(node, drive, settings)
+                    home(node, drive, settings.homing_timeout, watch)
+                    _optional(node, drive, 0x1016, 1, 0)
         finally:
             alive.stop()
+    limits = []
     for drive, node in zip(settings.drives, nodes, strict=True):
         with _naming(drive):
-            _choose(node, drive, settings.command.mode)
-            _still_target(node, settings)
+            _choose(node, drive, drive.command.mode)
+            _still_target(node, drive)
             _watch_host(node, drive, settings)
+            limits.append(_software_limits(node, drive))
+    return limits
 
 
 def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
@@ -126,9 +141,11 @@ def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
             raise MachineError(f"{drive.name} is a device of profile {profile}, not a drive (402)")
 
 
-def home(node: canopen.RemoteNode, drive: DriveSettings, timeout: float) -> None:
+def home(node: canopen.RemoteNode, drive: DriveSettings, timeout: float, watch: Watch = unwatched) -> None:
     """Carry out the drive's homing method. Raises MachineError if it fails or takes longer than `timeout` s."""
     _download(node, 0x6098, 0, drive.homing or 0)
+    if drive.home_offset is not None:
+        _download(node, 0x607C, 0, drive.home_offset)
     _choose(node, drive, Mode.HOMING)
     try:
         for word, state in (
@@ -139,13 +156,13 @@ def home(node: canopen.RemoteNode, drive: DriveSettings, timeout: float) -> None
             _download(node, 0x6040, 0, word)
             _wait_for_state(node, drive, state)
         _download(node, 0x6040, 0, codes.ENABLE_OPERATION | codes.BIT_4)
-        _wait_for_home(node, drive, time.monotonic() + timeout)
+        _wait_for_home(node, drive, time.monotonic() + timeout, watch)
     finally:  # whatever happened, and be it an interrupt from the keyboard: no power
         _download(node, 0x6040, 0, codes.DISABLE_VOLTAGE)
     _wait_for_state(node, drive, State.SWITCH_ON_DISABLED)
 
 
-def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: float) -> None:
+def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: float, watch: Watch) -> None:
     attained = codes.TARGET_REACHED | codes.MODE_12
     while (status := _status(node)) & attained != attained or status & codes.MODE_13:
         if status & codes.MODE_13 or state_of(status) is not State.OPERATION_ENABLED:
@@ -155,6 +172,7 @@ def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: flo
                 f"{drive.name}: homing by method {drive.homing} did not end in time; give it a longer homing_timeout, "
                 f"or check its speeds 0x6099: {_describe(node, status)}"
             )
+        watch(drive.axis.name, _position(node) * drive.direction / drive.counts)
         time.sleep(0.01)
 
 
@@ -185,7 +203,7 @@ def _communication(node: canopen.RemoteNode, drive: DriveSettings, settings: Set
     _optional(node, drive, 0x60C2, 1, value)
 
 
-def _map(node: canopen.RemoteNode, drive: DriveSettings, settings: Settings) -> None:
+def _map(node: canopen.RemoteNode, drive: DriveSettings, transmission: int) -> None:
     """RPDO 1: controlword and target. TPDO 1: statusword and actual position (or velocity). No other PDO."""
     for maps in (node.rpdo, node.tpdo):
         for number, pdo in maps.items():
@@ -194,14 +212,14 @@ def _map(node: canopen.RemoteNode, drive: DriveSettings, settings: Settings) -> 
                 pdo.com_record[1].raw = identifier | 1 << 31
     received, sent = node.rpdo[1], node.tpdo[1]
     actual = 0x606C if drive.reads_velocity else 0x6064
-    for pdo, objects, transmission in (
-        (received, (0x6040, settings.command.target), settings.transmission),
+    for pdo, objects, kind in (
+        (received, (0x6040, drive.command.target), transmission),
         (sent, (0x6041, actual), 1),
     ):
         pdo.clear()
         for index in objects:
             pdo.add_variable(index)
-        pdo.cob_id, pdo.trans_type, pdo.enabled = pdo.predefined_cob_id, transmission, True
+        pdo.cob_id, pdo.trans_type, pdo.enabled = pdo.predefined_cob_id, kind, True
         pdo.rtr_allowed = pdo is received  # the bit has no meaning there
         pdo.save()
 
@@ -226,10 +244,27 @@ def _choose(node: canopen.RemoteNode, drive: DriveSettings, mode: Mode) -> None:
         raise MachineError(f"{drive.name} did not take mode of operation {mode}: {_describe(node, _status(node))}")
 
 
-def _still_target(node: canopen.RemoteNode, settings: Settings) -> None:
+def _still_target(node: canopen.RemoteNode, drive: DriveSettings) -> None:
     """No target from before: stay where you are."""
-    target = settings.command.target
-    _download(node, target, 0, node.sdo[0x6064].raw if target == 0x607A else 0)
+    target = drive.command.target
+    _download(node, target, 0, _position(node) if target == 0x607A else 0)
+
+
+def _software_limits(node: canopen.RemoteNode, drive: DriveSettings) -> Limits:
+    """0x607D in axis units. None: an EDS without it, a spindle, 0 and 0 (which drives take for none), or a whole turn
+    of the counter."""
+    if drive.reads_velocity or 0x607D not in node.object_dictionary:
+        return -inf, inf
+    try:
+        low, high = (int.from_bytes(node.sdo.upload(0x607D, place), "little", signed=True) for place in (1, 2))
+    except SdoAbortedError as error:
+        LOG.warning("%s does not tell its software limits: %s", drive.name, error)
+        return -inf, inf
+    if low >= high:
+        return -inf, inf
+    scale = drive.direction / drive.counts
+    ends = (low * scale if low > -_HALF else -inf * scale, high * scale if high < _HALF - 1 else inf * scale)
+    return min(ends), max(ends)
 
 
 def _watch_host(node: canopen.RemoteNode, drive: DriveSettings, settings: Settings) -> None:
@@ -260,6 +295,10 @@ def _optional(node: canopen.RemoteNode, drive: DriveSettings, index: int, subind
         _download(node, index, subindex, value)
     except MachineError as error:
         LOG.warning("%s; going on without", error)
+
+
+def _position(node: canopen.RemoteNode) -> int:
+    return int.from_bytes(node.sdo.upload(0x6064, 0), "little", signed=True)
 
 
 def _status(node: canopen.RemoteNode) -> int:

@@ -20,9 +20,9 @@ import can
 from rds.bus.cia402 import codes
 from rds.bus.cia402.asking import ask, frame
 from rds.bus.cia402.codes import Nmt, NmtCommand, State, error_text, status_text
-from rds.bus.cia402.configure import library, prepare
+from rds.bus.cia402.configure import Limits, Watch, library, prepare, unwatched
 from rds.bus.cia402.remote import Remote
-from rds.bus.cia402.settings import Command, read_settings
+from rds.bus.cia402.settings import read_settings
 from rds.bus.identity import WAIT as LISTENING
 from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus
 from rds.core.errors import InputError, MachineError
@@ -35,6 +35,7 @@ HOST = "host"  # what the built-in bus calls this node
 LOST_AFTER = 10  # periods in a row without an answer
 _HEARTBEATS = 3  # heartbeats that may be missing
 _SWITCHING = 1.0  # s for all drives to change their state
+_STOPPING = 5.0  # s for a quick stop; a spindle takes the longest
 _STANDSTILL = 20  # cycles in which no encoder moves until the axes count as standing
 _LONGEST_COAST = 3.0  # s until then
 _MOST_WAITING = 64  # frames taken before a cycle, whatever babbles
@@ -58,7 +59,7 @@ class Cia402Drivers:
     Takes an open `bus`, which stays the caller's, or opens one: `interface`, `channel` (default on the built-in bus:
     the machine's name) and further `options` for it. `cia402` is the `[bus.cia402]` table (settings.py).
 
-    What write() takes depends on the table's mode: "cst" (default) voltages, as the contract says, sent as a target
+    What write() takes depends on each drive's mode: "cst" (default) voltages, as the contract says, sent as a target
     torque of 1000 ‰ per rated voltage; "csp" positions in the axis's unit; "csv" velocities in unit/s. Positions, read
     and commanded, are relative to where the axis stood at start(), or with `positions = "drive"` the drive's own.
     Power comes on with the first write() after start(); with `dry_run` never.
@@ -79,7 +80,7 @@ class Cia402Drivers:
         **options: Any,
     ):
         self.settings = read_settings(cia402 or {}, machine, axes)
-        self.drives = [Remote(drive, self.settings) for drive in self.settings.drives]
+        self.drives = [Remote(drive) for drive in self.settings.drives]
         self._period = machine.sample_period if sample_period is None else sample_period
         self._timeout = self._period if timeout is None else timeout
         self._dry_run = dry_run
@@ -106,22 +107,28 @@ class Cia402Drivers:
         self._armed_at = 0.0
         self._commanded = (0.0,) * len(self.drives)  # what the next SYNC makes act
         self._acting = self._commanded
-        self._stopping: int | None = None  # controlword after stop()
+        self._stopping = False  # after stop()
         self._started = self._closed = False
+        self.limits: list[
+            Limits
+        ] = []  # software limits 0x607D as they are since start(), axis units of the drive's own
         self.counters = Counters()
 
     # --- start
 
-    def start(self) -> None:
+    def start(self, watch: Watch = unwatched) -> None:
         """Configure the drives, home them where asked for, bring them to SWITCHED ON, and take the origins.
 
-        The axes stand when this returns, without power. Raises MachineError naming node, state and error code, the
-        devices that share a node-ID, and if another host commands the drives.
+        The axes stand when this returns, without power. `watch(axis, position)` is called while an axis is homed, with
+        the drive's own position in axis units; what it raises ends the homing, takes the power, and comes out of here.
+        Raises MachineError naming node, state and error code, the devices that share a node-ID, and if another host
+        commands the drives.
         """
+        self._next_beat = inf  # drives wait for heartbeats from the first one on
         with self._failing_bus():
             self._refuse_company()
             with library(self._bus) as network:
-                prepare(network, self.settings, self._period)
+                self.limits = prepare(network, self.settings, self._period, watch)
             self._started = True
             for drive in self.drives:
                 drive.heard_at = inf
@@ -246,7 +253,7 @@ class Cia402Drivers:
 
     def _arm(self) -> None:
         """From now on power is wanted, the drives wait for the host's heartbeats, and the host for theirs."""
-        self._armed, self._stopping = True, None
+        self._armed, self._stopping = True, False
         self._armed_at = now = time.monotonic()
         self._next_beat = 0.0
         self._check_beats_at = now + _HEARTBEATS * self.settings.heartbeat
@@ -258,8 +265,8 @@ class Cia402Drivers:
         for drive in self.drives:
             if drive.enabled and self._armed:
                 drive.controlword = codes.ENABLE_OPERATION
-            elif self._stopping is not None:
-                drive.controlword = self._stopping
+            elif self._stopping:
+                drive.quit()
             else:
                 drive.lead(self._armed)
             self._bus.send(drive.fill(), self._timeout * LOST_AFTER)
@@ -358,15 +365,14 @@ class Cia402Drivers:
         If the bus is broken, the drives do it themselves when SYNC and heartbeat are missing; the log says so.
         """
         self._armed = False
-        self._next_beat = inf
-        self._stopping = codes.DISABLE_VOLTAGE if self.settings.command is Command.CST else codes.QUICK_STOP
+        self._stopping = True
         self._commanded = self._acting = (0.0,) * len(self.drives)
         if not self._started:
             return
         try:
             for drive in self.drives:
                 drive.hold()
-                drive.controlword = self._stopping
+                drive.quit()
                 self._bus.send(drive.fill(), 0.1)
             self._bus.send(self._sync, 0.1)
         except (can.CanError, OSError) as error:
@@ -385,11 +391,20 @@ class Cia402Drivers:
             self._bus.shutdown()
 
     def _let_go(self) -> None:
-        """Wait until the drives have stopped; then they need neither SYNC nor our heartbeat any more."""
-        deadline = time.monotonic() + _SWITCHING
+        """Wait until the drives have stopped; then they need neither SYNC nor our heartbeat any more.
+
+        One that stays in QUICK STOP ACTIVE, as option codes 5 to 8 of 0x605A have it, is told to give up its power.
+        """
+        deadline = time.monotonic() + _STOPPING
         moving = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
         while any(drive.state in moving for drive in self.drives) and time.monotonic() < deadline:
             self._paced_exchange()
+        for drive in self.drives:
+            if drive.state in moving:
+                drive.hold()
+                drive.controlword = codes.DISABLE_VOLTAGE
+                self._bus.send(drive.fill(), 0.1)
+        self._bus.send(self._sync, 0.1)
         for drive in self.drives:
             self._bus.send(frame(0x600 + drive.node, b"\x23\x16\x10\x01\0\0\0\0"), 0.1)  # 0x1016:01 = 0
             self._bus.send(frame(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, drive.node])), 0.1)

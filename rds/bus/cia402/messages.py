@@ -20,12 +20,12 @@ def messages_of_drives(
     Raises InputError for times that can't be.
     """
     period, beats = sample_period, settings.heartbeat
-    target = 4 if settings.command is Command.CST else 6  # bytes: controlword, and the target
     drives = sorted(settings.drives, key=lambda drive: drive.node)
     sync = Message("SYNC", 0x080, False, 0, period, host_jitter, sender=HOST)
     table = [sync, Message("heartbeat host", 0x700 + settings.host, False, 1, beats, host_jitter, sender=HOST)]
     for drive in drives:
         name, node = drive.axis.name, drive.node
+        target = 4 if drive.command is Command.CST else 6  # bytes: controlword, and the target
         table += [
             Message(f"TPDO {name}", 0x180 + node, False, _STATUS, period, response_time, sender=name, after=sync.name),
             Message(f"RPDO {name}", 0x200 + node, False, target, period, host_jitter, sender=HOST,

@@ -8,7 +8,7 @@ import can
 
 from rds.bus.cia402 import codes
 from rds.bus.cia402.codes import State, state_of
-from rds.bus.cia402.settings import Command, DriveSettings, Settings
+from rds.bus.cia402.settings import Command, DriveSettings
 from rds.core.errors import InputError
 
 _STATUS = Struct("<Hi")  # statusword, actual position or velocity
@@ -50,9 +50,9 @@ class Remote:
         "was_enabled",
     )
 
-    def __init__(self, settings: DriveSettings, common: Settings):
-        self._settings, self._command = settings, common.command
-        torque = common.command is Command.CST
+    def __init__(self, settings: DriveSettings):
+        self._settings, self._command = settings, settings.command
+        torque = settings.command is Command.CST
         self._pack = Struct("<Hh" if torque else "<Hi").pack_into
         per_unit = settings.velocity_counts if settings.reads_velocity else settings.counts
         self._counts = settings.direction / per_unit  # units per count
@@ -62,7 +62,7 @@ class Remote:
                 Command.CST: 1000.0 / settings.rated_voltage,
                 Command.CSP: settings.counts,
                 Command.CSV: settings.velocity_counts,
-            }[common.command]
+            }[settings.command]
         )
         self._counts_limit = settings.torque_limit if torque else _HALF - 1
         self.message = can.Message(
@@ -130,6 +130,10 @@ class Remote:
         """The RPDO with controlword and target as they are."""
         self._pack(self.message.data, 0, self.controlword, self.target)
         return self.message
+
+    def quit(self) -> None:
+        """Set the controlword that takes the power: at once in mode cst, by a quick stop in csp and csv."""
+        self.controlword = codes.DISABLE_VOLTAGE if self._command is Command.CST else codes.QUICK_STOP
 
     def lead(self, arm: bool) -> None:
         """Set the controlword towards OPERATION ENABLED, or with `arm` false no further than SWITCHED ON."""

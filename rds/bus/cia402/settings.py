@@ -18,6 +18,7 @@ from rds.machines.machine import Axis, Machine
 
 OUR_EDS = "axis.eds"
 _NODES = range(1, 128)
+_HALF = 1 << 31  # counts: a drive's positions are of 32 bits
 
 
 class Command(Enum):
@@ -43,6 +44,7 @@ class DriveSettings:
     """One axis's drive."""
 
     axis: Axis
+    command: Command
     node: int
     eds: str  # path
     counts: float  # position units of the drive per mm (degree, ...); for a spindle per revolution
@@ -51,6 +53,7 @@ class DriveSettings:
     torque_limit: int  # ‰
     direction: int  # 1, or -1 if the drive counts the other way round
     homing: int | None  # method 0x6098, carried out at the start
+    home_offset: int | None  # 0x607C, counts: minus the position that home gets; None: as the drive has it
     write: tuple[tuple[int, int, int], ...]  # (index, sub-index, value) to write before the drive is enabled
 
     @property
@@ -68,7 +71,6 @@ class DriveSettings:
 class Settings:
     """The whole table."""
 
-    command: Command
     drives: tuple[DriveSettings, ...]
     host: int  # node-ID that the host's heartbeats bear
     heartbeat: float  # s between two heartbeats, the drives' and the host's
@@ -79,6 +81,7 @@ class Settings:
 
 _TOP = ("mode", "host", "heartbeat", "rpdo_transmission", "positions", "homing_timeout", "axis")
 _AXIS = (
+    "mode",
     "node",
     "eds",
     "counts",
@@ -90,6 +93,7 @@ _AXIS = (
     "torque_limit",
     "direction",
     "homing",
+    "home",
     "write",
 )
 _MORE_THAN_0 = {
@@ -113,7 +117,9 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
     for name in given:
         machine.axis(name)
     used = [machine.axis(name) for name in (machine.axes if axes is None else axes)]
-    drives = tuple(_drive(axis, given.get(axis.name, {}), machine) for axis in used)
+    mode = table.get("mode", "cst")
+    _command(mode, where)
+    drives = tuple(_drive(axis, {"mode": mode} | given.get(axis.name, {}), machine) for axis in used)
     nodes = [drive.node for drive in drives]
     host = _whole(table, "host", 127, _NODES, where)
     if len(set(nodes)) != len(nodes) or host in nodes:
@@ -123,7 +129,6 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
         raise InputError(f'positions = {positions!r} must be "start" or "drive"', where)
     transmission = _whole(table, "rpdo_transmission", 1, (*range(241), 254, 255), where)
     return Settings(
-        command=_command(table.get("mode", "cst"), where),
         drives=drives,
         host=host,
         heartbeat=_more_than_0(table, "heartbeat", 0.1, "s", where),
@@ -150,8 +155,10 @@ def _drive(axis: Axis, table: Mapping[str, Any], machine: Machine) -> DriveSetti
         homing = _whole(table, "homing", 0, range(-128, 128), where)
         if "eds" not in table and homing not in METHODS:
             raise InputError(f"homing = {homing} must be one of {', '.join(map(str, METHODS))}", where)
+    direction = _whole(table, "direction", 1, (1, -1), where)
     return DriveSettings(
         axis=axis,
+        command=_command(table["mode"], where),
         node=_whole(table, "node", axis.node, _NODES, where),
         eds=_eds(table.get("eds"), machine, where),
         counts=counts,
@@ -162,10 +169,25 @@ def _drive(axis: Axis, table: Mapping[str, Any], machine: Machine) -> DriveSetti
             table, "rated_voltage", machine.converter.range, _MORE_THAN_0["rated_voltage"], where
         ),
         torque_limit=_whole(table, "torque_limit", 1000, range(1, 32768), where),
-        direction=_whole(table, "direction", 1, (1, -1), where),
+        direction=direction,
         homing=homing,
+        home_offset=_home_offset(table, direction * counts, where),
         write=_writes(table.get("write", ()), where),
     )
+
+
+def _home_offset(table: Mapping[str, Any], counts: float, where: str) -> int | None:
+    """0x607C that gives home the position `home`: zero is home plus offset, so home is at minus the offset."""
+    if "home" not in table:
+        return None
+    if "homing" not in table:
+        raise InputError(
+            f"home = {table['home']!r} says where homing ends; give its method as well: homing = 17", where
+        )
+    offset = round(-counts * Option("position that home gets, axis unit").check(table["home"], "home", where))
+    if not -_HALF <= offset < _HALF:
+        raise InputError(f"home = {table['home']!r} is beyond what a drive can count", where)
+    return offset
 
 
 def _counts(axis: Axis, table: Mapping[str, Any], where: str) -> float:
