@@ -18,6 +18,7 @@ from rds.panels.keys import Keys
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
 from rds.panels.presence import Presence
+from rds.panels.rescue import Rescue
 from rds.session.session import Message, Session
 
 _STYLE = Path(__file__).parent / "static" / "style.css"
@@ -53,12 +54,14 @@ class Shell:
         self._place.add_class("rds-panel")
         body = widgets.HBox([nav, self._place])
         body.add_class("rds-body")
+        self._rescue = Rescue()
         self.widget = widgets.VBox(
-            [Presence(self._shown), Keys(), widgets.HTML(_style()), self._head(), self._notice, body]
+            [Presence(self._shown), Keys(), widgets.HTML(_style()), self._head(), self._notice, body, self._rescue]
         )
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
         self.ticker.add(self._show_messages)
+        self.ticker.add(self._tell_channels)
         self.open(panel)
 
     def open(self, name: str) -> None:
@@ -146,6 +149,10 @@ class Shell:
         heard, self._heard[:] = list(self._heard), []
         for message in heard:
             self.say(message.text, message.kind)
+
+    def _tell_channels(self) -> None:
+        """To the page, which names them to its server in an emergency: this kernel may not be able to then."""
+        self._rescue.channels = sorted(self.session.channels)
 
     def _shown(self) -> None:
         """A browser shows the page: take up what other pages of the folder have done since this one was made ready."""

@@ -27,6 +27,7 @@ class App(NamedTuple):
     url: str
     folder: Path
     process: subprocess.Popen[str]
+    runtime: str  # its XDG_RUNTIME_DIR, where the built-in bus is
 
 
 @pytest.fixture(scope="package")
@@ -53,7 +54,7 @@ def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[...
             said.append(line)
             found = re.search(r"http://127\.0\.0\.1\S+token=\S+", line)
             if found:
-                app = App(found.group(0), folder, process)
+                app = App(found.group(0), folder, process, runtime)
                 started.append(app)
                 return app
         raise AssertionError("rds app did not start:\n" + "".join(said))
@@ -117,10 +118,14 @@ def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[
 
 @pytest.fixture
 def open_page(new_page: Callable[[int, int], Any], app: App) -> Callable[..., Any]:
-    """Open a page of the app, or of another one, at a panel by its title."""
+    """Open a page of the app, or of another one, at a panel by its title; with a `clock`, time can be put forward."""
 
-    def show(panel: str | None = None, on: App | None = None, width: int = 1280, height: int = 800) -> Any:
+    def show(
+        panel: str | None = None, on: App | None = None, width: int = 1280, height: int = 800, clock: bool = False
+    ) -> Any:
         page = new_page(width, height)
+        if clock:
+            page.clock.install()
         page.goto((on or app).url)
         page.wait_for_selector(".rds-app .rds-nav button")
         if panel is not None:

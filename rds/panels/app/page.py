@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 FOLDER, MACHINE, PANEL = "RDS_APP_FOLDER", "RDS_APP_MACHINE", "RDS_APP_PANEL"
+WHEREABOUTS = "RDS_APP_WHEREABOUTS"  # the folder where kernels say where they are
 
 
 def show() -> Any:
@@ -13,8 +15,11 @@ def show() -> Any:
     import ipywidgets
 
     from rds.panels import main
+    from rds.panels.app.whereabouts import answer_asks
 
     ipywidgets.register_comm_target()  # it does so itself only where it is imported by a kernel that runs already
+    if WHEREABOUTS in os.environ:
+        answer_asks(Path(os.environ[WHEREABOUTS]))
     folder = os.environ.get(FOLDER, ".")
     os.chdir(folder)
     return main(folder, os.environ.get(MACHINE, "mini-cnc"), os.environ.get(PANEL, "menu"))

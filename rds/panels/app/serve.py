@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.panels import PANELS
-from rds.panels.app.page import FOLDER, MACHINE, PANEL
+from rds.panels.app.page import FOLDER, MACHINE, PANEL, WHEREABOUTS
 from rds.panels.app.ready_kernels import ReadyKernels
 
 _HERE = Path(__file__).parent
@@ -34,12 +35,14 @@ def serve(folder: Path, machine: str, panel: str, port: int | None, browser: boo
         MACHINE: machine,
         PANEL: panel,
     }
-    ready = ReadyKernels()  # imports while this process does
-    try:
-        launch = _server(ready)
-        launch(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, address)])
-    finally:
-        ready.close()
+    with tempfile.TemporaryDirectory(prefix="rds-app-") as whereabouts:
+        os.environ[WHEREABOUTS] = whereabouts
+        ready = ReadyKernels()  # imports while this process does
+        try:
+            launch = _server(ready)
+            launch(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, address)])
+        finally:
+            ready.close()
 
 
 def _server(ready: ReadyKernels) -> Callable[..., None]:
@@ -67,6 +70,7 @@ def _options(port: int | None, browser: bool, address: str) -> list[str]:
         "VoilaConfiguration.show_tracebacks": True,
         "VoilaConfiguration.file_allowlist": "$.",  # a pattern that no file fits
         "MappingKernelManager.cull_idle_timeout": LEFT,
+        "MappingKernelManager.cull_busy": True,  # what a user's code holds is busy for ever, and says nothing
         "MappingKernelManager.cull_interval": 10,
     }
     if port is not None:

@@ -4,7 +4,7 @@
 // first click after a change waits for one word there and back, behind which every change has been sent.
 
 const FIELDS = ".widget-toggle-button, .widget-toggle-buttons button, .widget-upload"; // buttons that are fields
-const AT_ONCE = ".rds-stop, .rds-work button"; // what stops something waits for nothing
+const AT_ONCE = ".rds-stop, .rds-work button, .rds-rescue button"; // what stops something waits for nothing
 
 function render({ model, el }) {
   el.style.display = "none";

@@ -1,0 +1,128 @@
+"""A student's code that holds its page's kernel, or ends it: the emergency stop works, and the page begins again."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rds.panels.app.whereabouts import ask, own_line
+from tests.panels.conftest import App
+from tests.panels.test_interrupted import wait_for
+
+CONTROLLER = '''"""Proportional control, until a sample that no check gets to."""
+
+import os
+
+initial_state = [0]
+
+
+def control(t, r, y, state, params):
+    if state[0] == 9000:
+        open("there", "w").close()
+        {last}
+    return 30.0 * (r.position - y), [state[0] + 1]
+'''
+HELD = 7000  # ms of the page's clock after which it says that it gets no answer
+
+
+@pytest.fixture(scope="module")
+def held_app(start_app: Callable[..., App], tmp_path_factory: pytest.TempPathFactory) -> App:
+    """An app whose equipment control is about to run a student's controller."""
+    folder = tmp_path_factory.mktemp("held")
+    chosen = {"mode": "simulation", "controller": "user", "controller_file": "own.py"}
+    (folder / "session.json").write_text(json.dumps({"equipment control": chosen}))
+    return start_app(folder)
+
+
+@pytest.fixture
+def run_until(held_app: App, open_page: Callable[..., Any], new_page: Any) -> Callable[[str], Any]:
+    """A page whose simulation has come to this statement of its controller, as it looks some seconds later."""
+
+    def run(last: str) -> Any:
+        (held_app.folder / "own.py").write_text(CONTROLLER.format(last=last))
+        (held_app.folder / "there").unlink(missing_ok=True)
+        page = open_page("Equipment control", on=held_app, clock=True)
+        page.click('button:visible:text-is("Run")')
+        wait_for((held_app.folder / "there").is_file)
+        page.clock.run_for(HELD)
+        return page
+
+    return run
+
+
+@pytest.fixture
+def served_machine(held_app: App) -> Iterator[None]:
+    """The machine's modules, in a process of their own."""
+    command = [sys.executable, "-m", "rds", "machine", "serve", "mini-cnc"]
+    env = os.environ | {"XDG_RUNTIME_DIR": held_app.runtime}
+    with subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        yield
+        process.terminate()
+
+
+def refusal(url: str, method: str, page: Any) -> int:
+    """The status of a request that has the page's login and not its secret: another site's."""
+    return int(page.request.fetch(url, method=method).status)
+
+
+@pytest.mark.usefixtures("served_machine")
+def test_a_call_that_never_returns_keeps_neither_the_emergency_stop_nor_the_page(
+    held_app: App, run_until: Callable[[str], Any]
+) -> None:
+    page = run_until("return sum(range(10**12)), state")
+    page.wait_for_selector('.rds-rescue p:has-text("own.py, line 11, in control() has not returned")')
+    page.click("button.rds-stop")
+    page.wait_for_selector('.rds-rescue p:has-text("emergency stop: 4 modules are at zero volts")')
+
+    root, kernel = (
+        held_app.url.partition("?")[0],
+        page.evaluate("JSON.parse(document.getElementById('jupyter-config-data').textContent).kernelId"),
+    )
+    ours = f"{root}rds/kernel/{kernel}"
+    assert refusal(ours, "DELETE", page) == refusal(f"{root}rds/emergency-stop", "POST", page) == 403
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(ours)  # without the token
+
+    page.click('.rds-rescue button:text-is("Begin again")')
+    page.wait_for_selector('.rds-rescue p:has-text("own.py, line 11, in control() did not return, and was ended")')
+    assert page.request.get(f"{root}api/kernels/{kernel}").status == 404
+    page.click('.rds-rescue button:text-is("OK")')
+    page.wait_for_selector(".rds-rescue-box", state="hidden")
+    page.click('.rds-nav button:text-is("Equipment control")')
+    page.wait_for_function("[...document.querySelectorAll('input')].some((each) => each.value === 'own.py')")
+
+
+def test_a_kernel_that_its_code_ends_is_said_and_begun_again(run_until: Callable[[str], Any]) -> None:
+    page = run_until("os._exit(1)")
+    page.wait_for_selector('.rds-rescue p:has-text("has ended")')
+    page.click('.rds-rescue button:text-is("Begin again")')
+    page.wait_for_selector('.rds-rescue p:has-text("begun again")')
+
+
+def test_a_process_says_its_line_while_compiled_code_holds_it(tmp_path: Path) -> None:
+    code = (
+        "import sys; from pathlib import Path; from rds.panels.app.whereabouts import answer_asks\n"
+        "answer_asks(Path(sys.argv[1])); sys.path.insert(0, sys.argv[1]); import own\n"
+    )
+    (tmp_path / "own.py").write_text("def held():\n    return sum(range(10**12))\n\n\nprint(flush=True)\nheld()\n")
+    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert [ask(process, tmp_path) for _ in range(2)] == ["own.py, line 2, in held()"] * 2
+        (tmp_path / str(process.pid)).unlink()
+        assert ask(process, tmp_path) is None  # the signal would end it
+        assert process.poll() is None
+        process.kill()
+    assert ask(process, tmp_path) is None
+    assert own_line('  File "<string>", line 1 in <module>\n  File "/a/b.py", line ??? in f\n') == ""
