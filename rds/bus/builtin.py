@@ -46,6 +46,7 @@ class BuiltinBus(can.BusABC):
     `name`: what the hub calls this node, for faults and `rds bus nodes`.
     `error_frames`: receive what this node's controller reports, in SocketCAN's format (error_reports.py).
     `restart_ms`: come back from bus off by itself, so much later.
+    `fd`: False: this node sends no CAN FD frames, send() raises ValueError; it still receives those of others.
 
     `channel` is a name of up to 32 letters, digits, '.', '_' and '-'. Time stamps are given by the hub: seconds since
     the epoch by a clock that never steps, the same for all nodes; with bit timing, of the end of the frame on the
@@ -59,13 +60,17 @@ class BuiltinBus(can.BusABC):
         channel: Any = "default",
         can_filters: Any = None,
         receive_own_messages: bool = False,
+        fd: bool | None = None,
         **options: Any,
     ):
         settings = read_settings(options)
+        if fd is not None and not isinstance(fd, bool):
+            raise ValueError(f"fd {fd!r} must be true or false")
         can_filters = list(can_filters or ()) or None
         self._channel = str(channel)
+        self._channel_given = channel  # as python-can's own interfaces, messages bear it as it was given: 0, not "0"
         self.channel_info = f"built-in bus channel {self._channel!r}"
-        self._can_protocol = can.CanProtocol.CAN_FD
+        self._can_protocol = can.CanProtocol.CAN_20 if fd is False else can.CanProtocol.CAN_FD
         self._lost: str | None = None
         self._early: deque[bytes] = deque()  # frames read while looking for the reason of an end
         self._stand_in: tuple[socket.socket, socket.socket] | None = None
@@ -134,7 +139,14 @@ class BuiltinBus(can.BusABC):
         stamp, identifier, _, flags, dlc, length = wire.HEADER.unpack_from(record)
         if not flags:
             return can.Message(
-                stamp * 1e-9, identifier, False, False, False, self._channel, dlc, bytearray(record[16 : 16 + length])
+                stamp * 1e-9,
+                identifier,
+                False,
+                False,
+                False,
+                self._channel_given,
+                dlc,
+                bytearray(record[16 : 16 + length]),
             )
         return can.Message(
             timestamp=stamp * 1e-9,
@@ -142,7 +154,7 @@ class BuiltinBus(can.BusABC):
             is_extended_id=bool(flags & wire.EXTENDED),
             is_remote_frame=bool(flags & wire.REMOTE),
             is_error_frame=bool(flags & wire.ERROR),
-            channel=self._channel,
+            channel=self._channel_given,
             dlc=dlc,
             data=bytearray(record[16 : 16 + length]),
             is_fd=bool(flags & wire.FD),
@@ -160,6 +172,8 @@ class BuiltinBus(can.BusABC):
         can.CanOperationError if the bus is gone, ValueError for a frame that can't exist.
         """
         record = _record(msg)
+        if msg.is_fd and self._can_protocol is can.CanProtocol.CAN_20:
+            raise ValueError(f"{self.channel_info}: opened with fd=False, it sends no CAN FD frames; leave fd away")
         if self._lost is not None:
             raise can.CanOperationError(self._lost)
         if self._glance is not None:

@@ -23,7 +23,7 @@ def read_settings(options: Mapping[str, Any]) -> wire.Settings:
     if unknown := sorted(set(given) - set(OPTIONS)):
         raise ValueError(
             f"the built-in bus has no option {', '.join(unknown)}; it takes channel, can_filters, "
-            f"receive_own_messages, {', '.join(OPTIONS)} (python-can's files and variables count too)"
+            f"receive_own_messages, fd, {', '.join(OPTIONS)} (python-can's files and variables count too)"
         )
     bitrate = _whole(given, "bitrate", *BITRATES, 0)
     data_bitrate = _whole(given, "data_bitrate", *DATA_BITRATES, 0)

@@ -11,6 +11,9 @@ from uuid import uuid4
 
 import can
 import pytest
+from can.interfaces.virtual import VirtualBus
+
+from rds.bus.builtin import BuiltinBus
 
 Opener = Callable[..., can.BusABC]
 
@@ -147,3 +150,33 @@ def test_shutdown_may_be_repeated_and_ends_the_bus(opener: Opener) -> None:
         bus.send(frame(1))
     with pytest.raises(can.CanOperationError):
         bus.recv(0.01)
+
+
+def test_messages_bear_the_channel_as_it_was_given(opener: Opener) -> None:
+    interface = "virtual" if isinstance(opener(), VirtualBus) else "rds"
+    with can.Bus(7341, interface=interface) as sender, can.Bus(7341, interface=interface) as receiver:
+        sender.send(frame(1))
+        sender.send(frame(1, extended=True))
+        assert [message.channel for message in (receiver.recv(2.0), receiver.recv(2.0)) if message] == [7341, 7341]
+
+
+def test_fd_as_the_tools_of_python_can_give_it(opener: Opener) -> None:
+    sender, receiver = opener(fd=True), opener(fd=True)
+    sender.send(frame(5, bytes(64), is_fd=True))
+    received = receiver.recv(2.0)
+    assert received is not None and received.is_fd and len(received.data) == 64
+
+
+def test_a_node_without_fd_sends_no_fd_frames() -> None:
+    channel = uuid4().hex
+    with can.Bus(channel, interface="rds", fd=False) as classic, can.Bus(channel, interface="rds") as other:
+        assert (classic.protocol, other.protocol) == (can.CanProtocol.CAN_20, can.CanProtocol.CAN_FD)
+        with pytest.raises(ValueError, match="opened with fd=False"):
+            classic.send(frame(5, is_fd=True))
+        other.send(frame(6, bytes(12), is_fd=True))
+        classic.send(frame(7))
+        heard, last = classic.recv(2.0), other.recv(2.0)
+        assert heard is not None and heard.is_fd
+        assert last is not None and last.arbitration_id == 7
+    with pytest.raises(ValueError, match="fd 'maybe' must be true or false"):
+        BuiltinBus(channel, fd="maybe")  # type: ignore[arg-type]
