@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from html import escape
 from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import RdsError
+from rds.core.errors import InputError
+from rds.panels.kit.button import attempt, button, columns, follow, group, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.notice import Notice
@@ -56,42 +58,36 @@ class DataView:
             [
                 widgets.HTML("What its columns mean is not clear. Correct this map, and save it:"),
                 self._map,
-                self._button("Save map", "Write it beside the data, and describe again", self._keep_map),
+                button("Save map", "Write it beside the data, and describe again", self._keep_map, self.notice),
             ]
         )
         self._map_box.layout.display = "none"
-        side = widgets.VBox([*self._data_step(), *self._fit_step(), *self._validation_step()])
-        side.add_class("rds-side")
-        main = widgets.VBox([self.bar, self.notice, self._map_box, self.text, self.figure])
-        main.add_class("rds-main")
-        self.widget = widgets.HBox([side, main])
-        self.widget.add_class("rds-columns")
+        side = [self._data_step(), self._fit_step(), self._validation_step()]
+        self.widget = columns(side, [self.bar, self.notice, self._map_box, self.text, self.figure])
         self._refresh()
 
-    def _data_step(self) -> list[widgets.Widget]:
-        return [
-            self._group(
-                "1 Data",
-                [self._known, self._upload, self._field("file"), self._field("map")],
-                [self._button("Describe", "Columns, sample period, and what is doubtful", self.describe, primary=True)],
-            )
-        ]
+    def _data_step(self) -> widgets.Widget:
+        tip = "Columns, sample period, and what is doubtful"
+        press = button("Describe", tip, self.describe, self.notice, primary=True)
+        return group("1 Data", self._known, self._upload, self._field("file"), self._field("map"), row(press))
 
-    def _fit_step(self) -> list[widgets.Widget]:
+    def _fit_step(self) -> widgets.Widget:
         own = self._field("structure_file")
         self.desk.choices.watch(lambda name: self._show_own(own))
         self._show_own(own)
         fields = [self._field("structure"), own, self._field("options"), self._field("method"), self._field("model")]
-        buttons = [
-            self._button("Fit", "Estimate the parameters", self.fit, primary=True),
-            self._button("Save model", "Write the model file, which every mode takes", self.save_model),
-            self._button("Use it", "Equipment control with this model", self.use_model),
-        ]
-        return [self._group("2 Fit", fields, buttons)]
+        say = self.notice
+        buttons = row(
+            button("Fit", "Estimate the parameters", self.fit, say, primary=True),
+            button("Save model", "Write the model file, which every mode takes", self.save_model, say),
+            button("Use it", "Equipment control with this model", self.use_model, say),
+        )
+        return group("2 Fit", *fields, buttons)
 
-    def _validation_step(self) -> list[widgets.Widget]:
-        button = self._button("Validate", "How far the model can be trusted on other data", self.validate, primary=True)
-        return [self._group("3 Validate", [self._field("validation_file")], [button])]
+    def _validation_step(self) -> widgets.Widget:
+        tip = "How far the model can be trusted on other data"
+        press = button("Validate", tip, self.validate, self.notice, primary=True)
+        return group("3 Validate", self._field("validation_file"), row(press))
 
     def describe(self) -> None:
         """What the file holds."""
@@ -107,45 +103,26 @@ class DataView:
 
     def save_model(self) -> None:
         """Write the model file."""
-        try:
-            self.notice.say(f"wrote {self.desk.write_model()}", "good")
-            self._refresh()
-        except RdsError as error:
-            self.notice.say(str(error), "error")
+        self.notice.say(f"wrote {self.desk.write_model()}", "good")
+        self._refresh()
 
     def use_model(self) -> None:
         """Go to equipment control with the model file chosen there."""
-        try:
-            path = self.desk.path(self.desk.choices["model"], "the model file")
-            if not path.exists():
-                self.desk.write_model()
-            self.shell.open("equipment-control")
-            choices = self.shell.session.choices("equipment control", ())
-            choices.set("model", "user")
-            choices.set("model_file", self.desk.choices["model"])
-        except RdsError as error:
-            self.notice.say(str(error), "error")
+        path = self.desk.path(self.desk.choices["model"], "the model file")
+        if not path.exists():
+            self.desk.write_model()
+        self.shell.open("equipment-control")
+        choices = self.shell.session.choices("equipment control", ())
+        choices.set("model", "user")
+        choices.set("model_file", self.desk.choices["model"])
 
     def _begin(self, start: Callable[[], Task[Any]], show: Callable[[Any], None]) -> None:
-        if self.bar.busy:
-            return
-        try:
+        def begin() -> Task[Any]:
             task = start()
-        except RdsError as error:
-            self.notice.say(str(error), "error")
-            return
-        self.notice.clear()
-        self._map_box.layout.display = "none"
+            self._map_box.layout.display = "none"
+            return task
 
-        def ended() -> None:
-            if task.stopped:
-                self.notice.say("stopped", "warning")
-            elif task.error is not None:
-                self.notice.say(str(task.error), "error")
-            else:
-                show(task.result)
-
-        self.bar.follow(task, ended)
+        follow(self.bar, self.notice, begin, show)
 
     def _show_description(self, found: Any) -> None:
         from rds.logs.describe_plot import overview
@@ -198,11 +175,7 @@ class DataView:
         self.figure.show(overlay(next(iter(validation.assessments.values()))))
 
     def _keep_map(self) -> None:
-        try:
-            self.desk.keep_map(self._map.value)
-        except RdsError as error:
-            self.notice.say(str(error), "error")
-            return
+        self.desk.keep_map(self._map.value)
         self.describe()
 
     def _picked(self, change: Any) -> None:
@@ -210,19 +183,18 @@ class DataView:
             self.desk.choices.set("file", change["new"])
 
     def _imported(self, change: Any) -> None:
+        for item in change["new"] or ():
+            attempt("import", partial(self._take, str(item["name"]), item["content"]), self.notice)
+        self._refresh()
+
+    def _take(self, name: str, content: Any) -> None:
         from rds.results.atomic import write_whole
 
-        for item in change["new"] or ():
-            path = self.shell.session.folder / _plain(item["name"])
-            if path.exists():
-                self.notice.say(f"{path.name} is there already; rename one of them", "error")
-                continue
-            try:
-                write_whole(path, bytes(item["content"]))
-                self.desk.choices.set("file", path.name)
-            except RdsError as error:
-                self.notice.say(str(error), "error")
-        self._refresh()
+        path = self.shell.session.folder / _plain(name)
+        if path.exists():
+            raise InputError(f"{path.name} is there already; rename one of them")
+        write_whole(path, bytes(content))
+        self.desk.choices.set("file", path.name)
 
     def _refresh(self) -> None:
         self._known.options = [("files of the folder …", ""), *((name, name) for name in self.desk.files())]
@@ -232,18 +204,6 @@ class DataView:
 
     def _field(self, name: str) -> FieldView:
         return FieldView(self.desk.choices, name)
-
-    def _button(self, text: str, tip: str, act: Callable[[], None], primary: bool = False) -> widgets.Button:
-        button = widgets.Button(description=text, tooltip=tip, button_style="primary" if primary else "")
-        button.on_click(lambda _: act())
-        return button
-
-    def _group(self, title: str, fields: list[Any], buttons: list[Any]) -> widgets.VBox:
-        row = widgets.HBox(buttons)
-        row.add_class("rds-row")
-        group = widgets.VBox([widgets.HTML(f"<h3>{title}</h3>"), *fields, row])
-        group.add_class("rds-group")
-        return group
 
 
 def _plain(name: str) -> str:

@@ -8,14 +8,15 @@ from typing import Any
 import ipywidgets as widgets
 import numpy as np
 
-from rds.core.errors import RdsError
+from rds.core.errors import InputError, RdsError
 from rds.panels.design_charts import charts, details, key_numbers
-from rds.panels.kit.button import follow
+from rds.panels.kit.button import button, follow, row, watch
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.splane import Curves, SPlane
 from rds.robustness.tracking_design import Cloud, TrackingDesign
+from rds.session.build import Checked
 from rds.session.design import Design
 from rds.session.task import Task
 
@@ -70,20 +71,20 @@ class DesignView:
         self._refresh()
 
     def _make_buttons(self) -> widgets.VBox:
-        self.write_button = _button("Write the file", "A controller of your own, to read and change", self._write)
-        self.write_button.button_style = "primary"
-        self.replace_button = _button(
-            "Replace it", "Write over the file that is there", lambda: self._write(replace=True)
+        say = self.notice
+        tip = "A controller of your own, to read and change"
+        self.write_button = button("Write the file", tip, self._write, say, primary=True)
+        self.replace_button = button(
+            "Replace it", "Write over the file that is there", lambda: self._write(replace=True), say
         )
         self.replace_button.button_style = "warning"
         self.replace_button.layout.display = "none"
-        self.try_button = _button("Try it", "Go to Equipment control with this file chosen", self._try)
-        self.picture_button = _button(
-            "Save a picture", "Poles and curves as a PNG file beside the controller's file", self._save_picture
+        self.try_button = button("Try it", "Go to Equipment control with this file chosen", self._try, say)
+        self.picture_button = button(
+            "Save a picture", "Poles and curves as a PNG file beside the controller's file", self._save_picture, say
         )
-        row = widgets.HBox([self.write_button, self.replace_button, self.try_button, self.picture_button])
-        row.add_class("rds-row")
-        group = widgets.VBox([FieldView(self.design.choices, "file"), row])
+        press = row(self.write_button, self.replace_button, self.try_button, self.picture_button)
+        group = widgets.VBox([FieldView(self.design.choices, "file"), press])
         group.add_class("rds-group")
         return group
 
@@ -224,29 +225,21 @@ class DesignView:
             self.replace_button.layout.display = "" if there else "none"
             return
         self.replace_button.layout.display = "none"
-        task = self.design.check(path)
 
-        def ended() -> None:
-            if task.error is not None or task.result is None:
-                self.notice.say(f"written, but not checked: {task.error}", "warning")
-            elif task.result.ok:
-                self.notice.say(f"wrote {path.name}; {task.result.sentence}; Try it runs it", "good")
+        def checked(found: Checked) -> None:
+            if found.ok:
+                self.notice.say(f"wrote {path.name}; {found.sentence}; Try it runs it", "good")
             else:
-                self.notice.say(task.result.sentence, "error")
+                self.notice.say(found.sentence, "error")
 
-        self.bar.follow(task, ended)
+        watch(self.bar, self.notice, self.design.check(path), checked, f"wrote {path.name}, which is not checked")
 
     def _try(self) -> None:
-        try:
-            path = self.design.file(self.design.choices["file"])
-            if not path.is_file():
-                self.notice.say(f"there is no {path.name} yet: write the file first", "error")
-                return
-            self.design.try_it(path)
-        except RdsError as error:
-            self.notice.say(str(error), "error")
-        else:
-            self.shell.open("equipment-control")
+        path = self.design.file(self.design.choices["file"])
+        if not path.is_file():
+            raise InputError(f"there is no {path.name} yet: write the file first")
+        self.design.try_it(path)
+        self.shell.open("equipment-control")
 
     def _save_picture(self) -> None:
         made, cloud, size = self._made, self._cloud, self.design.choices["step"]
@@ -260,11 +253,7 @@ class DesignView:
             task.note = "drawing"
             return self.design.keep_picture(design_picture(made, size, cloud).png()).name
 
-        try:
-            self.design.file(self.design.choices["file"])
-        except RdsError as error:
-            self.notice.say(str(error), "error")
-            return
+        self.design.file(self.design.choices["file"])  # a name that will not do is said before the drawing
         follow(self.bar, self.notice, lambda: self.shell.session.work("picture", work), self._pictured)
 
     def _pictured(self, name: str) -> None:
@@ -284,9 +273,3 @@ def _points(values: np.ndarray) -> list[list[float]]:
 def _parts(poles: np.ndarray) -> np.ndarray:
     flat = poles.ravel()
     return np.column_stack([flat.real, flat.imag])
-
-
-def _button(text: str, tip: str, act: Any) -> widgets.Button:
-    button = widgets.Button(description=text, tooltip=tip)
-    button.on_click(lambda _: act())
-    return button

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
 from rds.panels.cells import Cells
+from rds.panels.kit.button import attempt, button, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.notice import Notice
@@ -43,16 +45,10 @@ class DrawingView:
         folded.add_class("rds-folded")
         side = widgets.VBox([_group([self._views["source"]]), self._outline_box, folded])
         side.add_class("rds-side")
-        make = widgets.Button(
-            description="Make the program",
-            button_style="primary",
-            tooltip="Write the part program and open it in the program panel",
-        )
-        make.on_click(lambda _: self.make())
-        row = widgets.HBox([self._views["program"], make])
-        row.add_class("rds-row")
-        row.layout.align_items = "flex-end"
-        main = widgets.VBox([row, self.notice, self.verdict, self._place])
+        tip = "Write the part program and open it in the program panel"
+        top = row(self._views["program"], button("Make the program", tip, self.make, self.notice, primary=True))
+        top.layout.align_items = "flex-end"
+        main = widgets.VBox([top, self.notice, self.verdict, self._place])
         main.add_class("rds-main")
         self.widget = widgets.HBox([side, main])
         self.widget.add_class("rds-columns")
@@ -64,30 +60,22 @@ class DrawingView:
         """What the button does."""
         refused = [view.field.label for view in self._views.values() if view.refused]
         if refused:
-            self.notice.say(f"first mend what is refused: {', '.join(refused)}", "error")
-            return
+            raise InputError(f"first mend what is refused: {', '.join(refused)}")
         self.notice.clear()
-        try:
-            name = self.drawing.write()
-        except InputError as error:
-            self.notice.say(str(error), "error")
-            return
+        name = self.drawing.write()
         self.notice.say(f"written as {name}, and open in the program panel", "good")
         self.shell.open("program")
 
     def _drawn(self, change: Any) -> None:
-        try:
-            self.drawing.choices.set("cells", change["new"])
-        except InputError as error:
-            self.notice.say(str(error), "error")
+        attempt("the drawing", lambda: self.drawing.choices.set("cells", change["new"]), self.notice)
 
     def _uploaded(self, change: Any) -> None:
         for each in change["new"]:
-            try:
-                self.drawing.take_picture(str(each["name"]), bytes(each["content"]))
-                self.notice.say(f"{each['name']} is in your folder", "good")
-            except InputError as error:
-                self.notice.say(str(error), "error")
+            attempt("the picture", partial(self._take, str(each["name"]), each["content"]), self.notice)
+
+    def _take(self, name: str, content: Any) -> None:
+        self.drawing.take_picture(name, bytes(content))
+        self.notice.say(f"{name} is in your folder", "good")
 
     def _chosen(self, name: str) -> None:
         if name == "cells" and self.cells.text != self.drawing.choices["cells"]:

@@ -9,6 +9,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.panels.kit.button import button, follow, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.results import Result
@@ -34,18 +35,12 @@ class EarlierRuns:
         self.list = widgets.SelectMultiple(
             options=[], rows=12, tooltip="Hold Ctrl or Shift to choose several", layout={"width": "100%"}
         )
-        self.open_button = widgets.Button(
-            description="Open", button_style="primary", tooltip="Open the run that is chosen; several are laid over"
-        )
-        self.open_button.on_click(lambda _: self.open())
-        again = widgets.Button(description="Look again", tooltip="Look for runs that other pages have made meanwhile")
-        again.on_click(lambda _: self.refresh())
-        self.bar = WorkBar(shell.ticker)
-        self.notice = Notice()
-        row = widgets.HBox([self.open_button, again, self.bar])
-        row.add_class("rds-row")
+        self.bar, self.notice = WorkBar(shell.ticker), Notice()
+        tip = "Open the run that is chosen; several are laid over"
+        self.open_button = button("Open", tip, self.open, self.notice, primary=True)
+        again = button("Look again", "Look for runs that other pages have made meanwhile", self.refresh, self.notice)
         hint = widgets.HTML("<p>Choose a run to reopen it, or several (Ctrl or Shift) to lay them over each other.</p>")
-        self.widget = widgets.VBox([hint, self.list, row, self.notice])
+        self.widget = widgets.VBox([hint, self.list, row(self.open_button, again, self.bar), self.notice])
 
     def refresh(self) -> None:
         """As they lie in the folder now."""
@@ -57,18 +52,13 @@ class EarlierRuns:
     def open(self) -> None:
         """What the open button does."""
         chosen = [self._runs[i] for i in self.list.value]
-        if self.bar.busy:
-            return
         if not chosen:
-            self.notice.say("choose a run in the list first", "error")
-            return
+            raise InputError("choose a run in the list first")
         if len(chosen) > MOST:
-            self.notice.say(f"{len(chosen)} runs are too many for one picture; choose at most {MOST}", "error")
-            return
+            raise InputError(f"{len(chosen)} runs are too many for one picture; choose at most {MOST}")
         if early := [run for run in chosen if run.state in (State.GOES_ON, State.SAVED_NOW)]:
-            self.notice.say(f"{early[0].name} {early[0].state}; open it when that is over (Look again)", "error")
-            return
-        self.notice.clear()
+            raise InputError(f"{early[0].name} {early[0].state}; open it when that is over (Look again)")
+        names, short = [run.name for run in chosen], _short(chosen)
 
         def work(task: Task[list[Result]]) -> list[Result]:
             results = []
@@ -77,18 +67,10 @@ class EarlierRuns:
                 results.append(run.open())
             return results
 
-        task = self._session.work("open", work)
-        self.bar.follow(task, lambda: self._over(task, [run.name for run in chosen], _short(chosen)))
+        def show(results: list[Result]) -> None:
+            self._opened(results, names, short)
 
-    def _over(self, task: Task[list[Result]], names: list[str], short: list[str]) -> None:
-        if task.error is not None or task.result is None:
-            if not task.stopped:
-                self.notice.say(str(task.error), "error")
-            return
-        try:
-            self._opened(task.result, names, short)
-        except InputError as error:
-            self.notice.say(str(error), "error")
+        follow(self.bar, self.notice, lambda: self._session.work("opening", work), show)
 
 
 def _short(runs: list[KeptRun]) -> list[str]:

@@ -7,15 +7,17 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import RdsError
+from rds.core.errors import InputError
 from rds.panels.earlier_runs import EarlierRuns
 from rds.panels.equipment_settings import EquipmentSettings
+from rds.panels.kit.button import attempt, button, follow, row, say_error
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.live_view import LiveView
 from rds.panels.result_view import ResultView
 from rds.panels.what_runs import WhatRuns
 from rds.results import Result, html
+from rds.session.build import Checked
 from rds.session.equipment import Equipment
 from rds.session.equipment_run import EquipmentRun
 
@@ -37,22 +39,26 @@ class EquipmentView:
         self.results = ResultView(shell)
         self.what = WhatRuns(equipment)
         self.earlier = EarlierRuns(shell, self._reopened)
-        self.run_button = _button("Run", "Run with these settings; files are checked first", self.start, "primary")
-        self._buttons = [
+        say = self.notice
+        built = "Check your files in a process of their own; faults show at their lines"
+        viewed = "What will run, as a block diagram; your files; the experiment's file"
+        loaded = "Make everything ready and look for the machine, without running"
+        self.run_button = button(
+            "Run", "Run with these settings; files are checked first", self.start, say, primary=True
+        )
+        self.bar.locks = [
             self.run_button,
-            _button("Build", "Check your files in a process of their own; faults show at their lines", self.build),
-            _button("View model", "What will run, as a block diagram; your files; the experiment's file", self.view),
-            _button("Load", "Make everything ready and look for the machine, without running", self.load),
+            button("Build", built, self.build, say),
+            button("View model", viewed, self.view, say),
+            button("Load", loaded, self.load, say),
         ]
-        row = widgets.HBox(self._buttons)
-        row.add_class("rds-row")
         self.tabs = widgets.Tab(
             [self.live.widget, self.results.widget, self.results.timing, self.what.widget, self.earlier.widget],
             titles=TABS,
         )
         self.tabs.add_class("rds-tabs")
         self.tabs.observe(self._turned, "selected_index")
-        main = widgets.VBox([row, self.bar, self.notice, self.tabs])
+        main = widgets.VBox([row(*self.bar.locks), self.bar, self.notice, self.tabs])
         main.add_class("rds-main")
         self.widget = widgets.HBox([self.settings.widget, main])
         self.widget.add_class("rds-columns")
@@ -64,87 +70,47 @@ class EquipmentView:
 
     def start(self) -> None:
         """What the run button does."""
-
-        def begin() -> None:
-            self.run = self.equipment.run().start()
-            self._shown = None
-            self.tabs.selected_index = LIVE
-            self.results.clear()
-            self.live.follow(self.run)
-            self._end_look = self.shell.ticker.add(self._look)
-            self._follow(self.run, self._ended)
-
-        self._try(begin)
+        if self.bar.busy:
+            return
+        self._refuse()
+        self.notice.clear()
+        self.run = self.equipment.run().start()
+        self._shown = None
+        self.tabs.selected_index = LIVE
+        self.results.clear()
+        self.live.follow(self.run)
+        self._end_look = self.shell.ticker.add(self._look)
+        self.bar.follow(self.run, lambda: attempt("showing the run", self._ended, self.notice))
 
     def build(self) -> None:
         """What the build button does."""
-
-        def begin() -> None:
-            if not self.equipment.files():
-                self.notice.say("nothing of yours is chosen: what will run is the library's own, and is built", "good")
-                return
-            task = self.equipment.build()
-            self._follow(task, lambda: self._built(task))
-
-        self._try(begin)
+        self._refuse()
+        if self.equipment.files():
+            follow(self.bar, self.notice, self.equipment.build, self._built, _STOPPED)
+        else:
+            self.notice.say("nothing of yours is chosen: what will run is the library's own, and is built", "good")
 
     def load(self) -> None:
         """What the load button does."""
-
-        def begin() -> None:
-            task = self.equipment.load()
-            self._follow(task, lambda: self._said(task))
-
-        self._try(begin)
+        self._refuse()
+        follow(self.bar, self.notice, self.equipment.load, self._loaded, _STOPPED)
 
     def view(self) -> None:
         """What the view button does."""
         self.tabs.selected_index = WHAT
 
-    def _try(self, begin: Callable[[], None]) -> None:
-        if self.bar.busy:
-            return
+    def _refuse(self) -> None:
         if refused := self.settings.refused:
-            self.notice.say(f"first mend what is refused on the left: {', '.join(refused)}", "error")
-            return
-        self.notice.clear()
-        try:
-            begin()
-        except RdsError as error:
-            self.notice.say(str(error), "error")
+            raise InputError(f"first mend what is refused on the left: {', '.join(refused)}")
 
-    def _follow(self, work: Any, ended: Callable[[], None]) -> None:
-        self._enable(False)
-
-        def over() -> None:
-            self._enable(True)
-            ended()
-
-        self.bar.follow(work, over)
-
-    def _enable(self, on: bool) -> None:
-        for button in self._buttons:
-            button.disabled = not on
-
-    def _built(self, task: Any) -> None:
-        if task.stopped:
-            self.notice.say(_STOPPED, "warning")
-            return
-        if task.error is not None:
-            self.notice.say(str(task.error), "error")
-            return
-        self.what.show_checked(task.result)
-        bad = [each for each in task.result if not each.ok]
-        self.notice.say("\n".join(each.sentence for each in bad or task.result), "error" if bad else "good")
+    def _built(self, files: list[Checked]) -> None:
+        self.what.show_checked(files)
+        bad = [each for each in files if not each.ok]
+        self.notice.say("\n".join(each.sentence for each in bad or files), "error" if bad else "good")
         self.tabs.selected_index = WHAT
 
-    def _said(self, task: Any) -> None:
-        if task.stopped:
-            self.notice.say(_STOPPED, "warning")
-        elif task.error is not None:
-            self.notice.say(str(task.error), "error")
-        elif task.result:
-            self.notice.say(task.result, "warning" if "; but" in task.result else "good")
+    def _loaded(self, said: str) -> None:
+        self.notice.say(said, "warning" if "; but" in said else "good")
 
     def _look(self) -> None:
         """Ten times a second while it runs."""
@@ -163,7 +129,7 @@ class EquipmentView:
         if run.stopped_early:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif run.error is not None:
-            self.notice.say(str(run.error), "error")
+            say_error("the run", run.error, self.notice)
             if run.result is None:  # its file may be at fault
                 self.what.show_checked(self.equipment.builds.latest())
         else:
@@ -215,9 +181,3 @@ def _verdict(result: Result) -> tuple[str, str]:
         kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
         return f"timing {result.verdict}: {result.meta.get('verdict_reason')}", kind
     return f"done: {len(result)} samples", "good"
-
-
-def _button(text: str, tip: str, act: Callable[[], None], style: str = "") -> widgets.Button:
-    button = widgets.Button(description=text, tooltip=tip, button_style=style)
-    button.on_click(lambda _: act())
-    return button

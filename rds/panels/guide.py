@@ -7,6 +7,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
+from rds.panels.kit.button import watch
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 
@@ -38,14 +39,11 @@ class Guide:
         elif not self.bar.busy:
             from rds.help.serve import help_server
 
-            self._task = self.shell.session.work("help", lambda task: help_server())
-            self._task.note = "making the pages, once"
-            self.bar.follow(self._task, self._built)
+            task = self.shell.session.work("making the help", lambda task: help_server())
+            task.note = "making the pages, once"
+            watch(self.bar, self.notice, task, self._built)
 
-    def _built(self) -> None:
-        if self._task.error is not None:
-            self.notice.say(str(self._task.error), "error")
-            return
+    def _built(self, _: Any) -> None:
         self._ready = True
         self._turn()
 

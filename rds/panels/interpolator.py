@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import ipywidgets as widgets
 
-from rds.core.errors import RdsError
+from rds.core.errors import InputError
 from rds.interpolators.result import Interpolation
+from rds.panels.kit.button import button, follow, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.notice import Notice
@@ -16,7 +17,11 @@ from rds.panels.kit.work_bar import WorkBar
 from rds.panels.segment_table import SegmentTable
 from rds.panels.what_runs import source_html
 from rds.results.html import notes_list, table
+from rds.session.build import Checked
 from rds.session.interpolator import Interpolating
+from rds.session.task import Task
+
+T = TypeVar("T")
 
 NAME = "interpolator"
 TITLE = "Interpolator"
@@ -55,18 +60,27 @@ class InterpolatorView:
         self._side = widgets.VBox([])
         self._side.add_class("rds-side")
         self.segments = SegmentTable(interpolating.choices, "rows")
-        self.run_button = _button("Interpolate", "Work out the motion along the path", self.start, "primary")
-        self.check_button = _button("Check my file", "In a process of its own; faults show at their lines", self.check)
+        say = self.notice
+        self.run_button = button("Interpolate", "Work out the motion along the path", self.start, say, primary=True)
+        tip = "In a process of its own; faults show at their lines"
+        self.check_button = button("Check my file", tip, self.check, say)
+        self.bar.locks = [self.run_button, self.check_button]
         self.picture = widgets.ToggleButtons(options=[("Motion", "motion")], tooltips=["which picture is shown"])
         self.picture.observe(lambda change: self._draw(), "value")
         self._save_row = self._saving()
-        row = widgets.HBox([self.run_button, self.check_button])
-        row.add_class("rds-row")
         self.results = widgets.VBox([self.picture, self.figure, self._save_row])
         self.results.layout.display = "none"
         main = widgets.VBox(
-            [row, self.bar, self.notice, self.segments, self.source, self.numbers, self.results]
-        )  # fmt: skip
+            [
+                row(self.run_button, self.check_button),
+                self.bar,
+                self.notice,
+                self.segments,
+                self.source,
+                self.numbers,
+                self.results,
+            ]
+        )
         main.add_class("rds-main")
         self.widget = widgets.HBox([self._side, main])
         self.widget.add_class("rds-columns")
@@ -74,11 +88,10 @@ class InterpolatorView:
         self._arrange()
 
     def _saving(self) -> widgets.HBox:
-        row = widgets.HBox(
-            [FieldView(self.work.choices, "file"), _button("Save", "The samples of all axes, as a table", self.save)]
+        return row(
+            FieldView(self.work.choices, "file"),
+            button("Save", "The samples of all axes, as a table", self.save, self.notice),
         )
-        row.add_class("rds-row")
-        return row
 
     def _arrange(self) -> None:
         """Show the fields that matter for what is chosen."""
@@ -105,82 +118,32 @@ class InterpolatorView:
 
     def start(self) -> None:
         """What the first button does."""
-
-        def begin() -> None:
-            task = self.work.run()
-
-            def ended() -> None:
-                if task.stopped:
-                    self.notice.say("stopped; nothing was made", "warning")
-                elif task.error is not None or task.result is None:
-                    self._failed(task.error)
-                else:
-                    self.source.value = ""
-                    self._show(task.result)
-
-            self._follow(task, ended)
-
-        self._try(begin)
+        self._follow(self.work.run, self._show, "stopped; nothing was made")
 
     def check(self) -> None:
         """What the second button does."""
 
-        def begin() -> None:
-            task = self.work.check()
+        def checked(files: list[Checked]) -> None:
+            self.source.value = "".join(map(source_html, files))
+            bad = [each for each in files if not each.ok]
+            self.notice.say("\n".join(each.sentence for each in bad or files), "error" if bad else "good")
 
-            def ended() -> None:
-                if task.stopped:
-                    self.notice.say("stopped; nothing was checked", "warning")
-                    return
-                if task.error is not None or task.result is None:
-                    self._failed(task.error)
-                    return
-                self.source.value = "".join(map(source_html, task.result))
-                bad = [each for each in task.result if not each.ok]
-                said = "\n".join(each.sentence for each in bad or task.result)
-                self.notice.say(said, "error" if bad else "good")
-
-            self._follow(task, ended)
-
-        self._try(begin)
+        self._follow(self.work.check, checked, "stopped; nothing was checked")
 
     def save(self) -> None:
         """What the save button does."""
-        if self.done is None:
-            return
-        try:
-            path = self.work.save(self.done)
-        except RdsError as error:
-            self.notice.say(str(error), "error")
-        else:
-            self.notice.say(f"saved as {path}", "good")
+        if self.done is not None:
+            self.notice.say(f"saved as {self.work.save(self.done)}", "good")
 
-    def _try(self, begin: Callable[[], None]) -> None:
-        if self.bar.busy:
-            return
+    def _follow(self, begin: Callable[[], Task[T]], show: Callable[[T], None], stopped: str) -> None:
         refused = [view.field.label for name, view in self._views.items() if name in self.work.shown and view.refused]
         if self.work.choices["given"] == "several":
             refused += self.segments.refused
         if refused:
-            self.notice.say(f"first mend what is refused: {', '.join(refused)}", "error")
-            return
-        self.notice.clear()
-        try:
-            begin()
-        except RdsError as error:
-            self.notice.say(str(error), "error")
+            raise InputError(f"first mend what is refused: {', '.join(refused)}")
+        follow(self.bar, self.notice, begin, show, stopped, self._show_faults)
 
-    def _follow(self, task: Any, ended: Callable[[], None]) -> None:
-        self.run_button.disabled = self.check_button.disabled = True
-
-        def over() -> None:
-            self.run_button.disabled = self.check_button.disabled = False
-            ended()
-
-        self.bar.follow(task, over)
-
-    def _failed(self, error: BaseException | None) -> None:
-        self.notice.say(str(error), "error")
+    def _show_faults(self) -> None:
         bad = [each for each in self.work.builds.latest() if not each.ok]
         self.source.value = "".join(map(source_html, bad))
 
@@ -189,6 +152,7 @@ class InterpolatorView:
         from rds.interpolators.summary import summary
 
         self.done = done
+        self.source.value = ""
         title, rows = summary(done)
         half = -(-len(rows) // 2)
         both = "".join(table(["quantity", "", "unit"], part) for part in (rows[:half], rows[half:]))
@@ -216,9 +180,3 @@ class InterpolatorView:
 
 
 _FIRST = "<p>Choose a path on the left, then press Interpolate: motion, path and errors follow.</p>"
-
-
-def _button(text: str, tip: str, act: Callable[[], None], style: str = "") -> widgets.Button:
-    button = widgets.Button(description=text, tooltip=tip, button_style=style)
-    button.on_click(lambda _: act())
-    return button

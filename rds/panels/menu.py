@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels import PANELS
+from rds.panels.kit.button import button
 
 NAME = "menu"
 TITLE = "Main menu"
@@ -25,27 +26,24 @@ def build(shell: Any) -> widgets.Widget:
 
 def _first(shell: Any) -> widgets.Widget:
     """What somebody who knows nothing of it does first."""
-    button = widgets.Button(
-        description="Track a sine", button_style="primary", tooltip="Choose a first experiment for you; then press Run"
-    )
 
-    def begin(_: Any) -> None:
+    def begin() -> None:
         from rds.session.equipment import Equipment
 
         Equipment(shell.session, "control").first_sine()
         shell.open("equipment-control")
 
-    button.on_click(begin)
+    tip = "Choose a first experiment for you; then press Run"
+    press = button("Track a sine", tip, begin, shell, primary=True)
     text = widgets.HTML("<p>New here? Let the X axis follow a sine: press this, then Run. The result follows.</p>")
-    first = widgets.HBox([button, text])
+    first = widgets.HBox([press, text])
     first.add_class("rds-first")
     return first
 
 
 def _card(shell: Any, name: str) -> widgets.VBox:
     module = PANELS.module(name)
-    button = widgets.Button(description=module.TITLE, button_style="primary", tooltip=module.SUMMARY)
-    button.on_click(lambda _: shell.open(name))
-    card = widgets.VBox([button, widgets.HTML(f"<p>{escape(module.SUMMARY)}</p>")])
+    press = button(module.TITLE, module.SUMMARY, lambda: shell.open(name), shell, primary=True)
+    card = widgets.VBox([press, widgets.HTML(f"<p>{escape(module.SUMMARY)}</p>")])
     card.add_class("rds-card")
     return card

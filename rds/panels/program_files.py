@@ -7,7 +7,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import InputError
+from rds.panels.kit.button import attempt, button, row
 from rds.panels.kit.notice import Notice
 from rds.session.program import Program
 
@@ -26,18 +26,16 @@ class ProgramFiles:
         self.name.layout.width = "120px"
         self.name.add_class("rds-program-name")
         self.state = widgets.HTML()
-        self.save_button = _button("Save", "Write the file (Ctrl-S in the editor); Run saves, too", self.save)
-        self.discard_button = _button("Discard changes", "Go back to the file as it was saved", self._discard)
-        row = [
+        self.save_button = button("Save", "Write the file (Ctrl-S in the editor); Run saves, too", self.save, notice)
+        self.discard_button = button("Discard changes", "Go back to the file as it was saved", self._discard, notice)
+        self.widget = row(
             self.list,
             self.save_button,
             self.discard_button,
             self.name,
-            _button("Save as", "Save under the name beside this, which is open from then on", self._save_as),
+            button("Save as", "Save under the name beside this, which is open from then on", self._save_as, notice),
             self.state,
-        ]
-        self.widget = widgets.HBox(row)
-        self.widget.add_class("rds-row")
+        )
         self.refresh()
 
     def refresh(self) -> None:
@@ -74,14 +72,5 @@ class ProgramFiles:
 
     def _try(self, act: Callable[[], None]) -> None:
         self._notice.clear()
-        try:
-            act()
-        except InputError as error:
-            self._notice.say(str(error), "error")
+        attempt("the program", act, self._notice)
         self.refresh()
-
-
-def _button(text: str, tip: str, act: Callable[[], None]) -> widgets.Button:
-    button = widgets.Button(description=text, tooltip=tip)
-    button.on_click(lambda _: act())
-    return button

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import InputError
+from rds.panels.kit.button import attempt, button, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -24,13 +25,14 @@ class Operator:
         self._choices, self._notice = choices, notice
         self.work: ProgramWork | None = None
         self.bar = WorkBar(shell.ticker)
-        self.run_button = _button("Run", "Save the program and run it in the mode chosen", run, "primary")
-        self.hold_button = _button("Hold", "Come to rest on the path", lambda: self._do(lambda work: work.hold()))
-        self.resume_button = _button(
-            "Resume", "Go on after a hold, M0, M1 or a tool change", lambda: self._do(lambda work: work.resume())
-        )
-        self.home_button = _button(
-            "Home", "End the program where it is, go up and move home", lambda: self._do(lambda work: work.home())
+        self.run_button = button("Run", "Save the program and run it in the mode chosen", run, notice, primary=True)
+        self.hold_button, self.resume_button, self.home_button = (
+            button(text, tip, partial(self._do, text, act), notice)
+            for text, tip, act in (
+                ("Hold", "Come to rest on the path", ProgramWork.hold),
+                ("Resume", "Go on after a hold, M0, M1 or a tool change", ProgramWork.resume),
+                ("Home", "End the program where it is, go up and move home", ProgramWork.home),
+            )
         )
         field = choices.fields["override"]
         self.override = widgets.IntSlider(
@@ -46,8 +48,7 @@ class Operator:
         buttons = [self.run_button, self.hold_button, self.resume_button, self.home_button]
         self.mode = FieldView(choices, "mode")
         self.mode.add_class("rds-program-mode")
-        self.widget = widgets.HBox([self.mode, *buttons, self.override, self.bar])
-        self.widget.add_class("rds-row")
+        self.widget = row(self.mode, *buttons, self.override, self.bar)
         self.enable()
 
     def enable(self) -> None:
@@ -62,22 +63,12 @@ class Operator:
         self.resume_button.disabled = not (held or waits)
         self.home_button.disabled = not operable
 
-    def _do(self, act: Callable[[ProgramWork], None]) -> None:
-        if self.work is None:
-            return
-        try:
-            act(self.work)
-        except InputError as error:
-            self._notice.say(str(error), "error")
-        self.enable()
+    def _do(self, what: str, act: Callable[[ProgramWork], None]) -> None:
+        if (work := self.work) is not None:
+            attempt(what, lambda: act(work), self._notice)
+            self.enable()
 
     def _overridden(self, change: Any) -> None:
         self._choices.set("override", change["new"])
         if self.work is not None and self.work.operable:
-            self._do(lambda work: work.override(change["new"] / 100.0))
-
-
-def _button(text: str, tip: str, act: Callable[[], None], style: str = "") -> widgets.Button:
-    button = widgets.Button(description=text, tooltip=tip, button_style=style)
-    button.on_click(lambda _: act())
-    return button
+            self._do("Override", lambda work: work.override(change["new"] / 100.0))

@@ -6,8 +6,8 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import InputError, RdsError
 from rds.panels.editor import Editor
+from rds.panels.kit.button import attempt, say_error
 from rds.panels.kit.field import field_group
 from rds.panels.kit.notice import Notice
 from rds.panels.program_files import ProgramFiles
@@ -72,10 +72,7 @@ class ProgramView:
     # the text
 
     def _typed(self, change: Any) -> None:
-        try:
-            self.program.edit(change["new"])
-        except InputError as error:
-            self.notice.say(str(error), "error")
+        attempt("the text", lambda: self.program.edit(change["new"]), self.notice)
         self.files.refresh()
 
     def _opened(self) -> None:
@@ -123,9 +120,6 @@ class ProgramView:
         try:
             work = self.program.run()
             work.start()
-        except RdsError as error:
-            self.notice.say(str(error), "error")
-            return
         finally:
             self.files.refresh()
         self.work = self.operator.work = work
@@ -134,7 +128,7 @@ class ProgramView:
         self.result.clear()
         self.tabs.selected_index = RUN
         self.operator.enable()
-        self.operator.bar.follow(work, self._ended)
+        self.operator.bar.follow(work, lambda: attempt("showing the run", self._ended, self.notice))
 
     def _look(self) -> None:
         work = self.work
@@ -189,7 +183,7 @@ class ProgramView:
         if work.stopped_early:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif work.error is not None:
-            self.notice.say(str(work.error), "error")
+            say_error("the run", work.error, self.notice)
         else:
             self.result.saved(work)
         self.files.refresh()

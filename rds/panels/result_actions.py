@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.core.errors import RdsError
+from rds.panels.kit.button import button, follow, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -19,7 +18,7 @@ from rds.results.serve import server_of
 from rds.session.email import check_address, mail_server, send_files
 from rds.session.fields import Text
 from rds.session.save_as import save_as
-from rds.session.task import Stopped, Task
+from rds.session.task import Task
 
 
 class ResultActions:
@@ -72,47 +71,42 @@ class ResultActions:
                 ),
             ],
         )
-        save = widgets.Button(description="Save", tooltip="Save the result's table under this name, with its units")
-        save.on_click(lambda _: self._save(str(choices["save_as"])))
-        send = widgets.Button(description="Send", tooltip="Send the report and the table (CSV) by e-mail")
-        send.on_click(lambda _: self._send(str(choices["send_to"])))
-        rows = []
-        for name, button in (("save_as", save), ("send_to", send)):
-            row = widgets.HBox([FieldView(choices, name), button])
-            row.add_class("rds-action")
-            rows.append(row)
-        box = widgets.HBox(rows)
-        box.add_class("rds-row")
-        return box
+        saved = "Save the result's table under this name, with its units"
+        sent = "Send the report and the table (CSV) by e-mail"
+        actions = []
+        for name, press in (
+            ("save_as", button("Save", saved, lambda: self._save(str(choices["save_as"])), self.notice)),
+            ("send_to", button("Send", sent, lambda: self._send(str(choices["send_to"])), self.notice)),
+        ):
+            action = widgets.HBox([FieldView(choices, name), press])
+            action.add_class("rds-action")
+            actions.append(action)
+        return row(*actions)
 
     def _save(self, name: str) -> None:
-        if self._result is None or self.bar.busy:
+        if (result := self._result) is None:
             return
-        result, folder = self._result, self._session.folder
-        task = self._session.work("save", lambda task: f"saved as {save_as(result, folder, name)}")
-        self.bar.follow(task, lambda: self._said(task))
+
+        def work(_: Task[str]) -> str:
+            return f"saved as {save_as(result, self._session.folder, name)}"
+
+        follow(self.bar, self.notice, lambda: self._session.work("saving", work), self._succeeded)
 
     def _send(self, to: str) -> None:
-        if self._result is None or self._folder is None or self.bar.busy:
+        if self._folder is None:
             return
         files = [path for name in self._sent if (path := self._folder / name).is_file()]
         subject, folder = f"RDS: {self._folder.name}", self._session.folder
         text = f"Results of {self._folder.name}, sent from RDS.\n"
 
         def work(task: Task[str]) -> str:
+            task.note = "sending"
             return send_files(mail_server(folder), to, subject, text, files, lambda: task.stopping)
 
-        task = self._session.work("send", work)
-        task.note = "sending"
-        self.bar.follow(task, lambda: self._said(task))
+        follow(self.bar, self.notice, lambda: self._session.work("sending", work), self._succeeded)
 
-    def _said(self, task: Any) -> None:
-        if task.error is None:
-            self.notice.say(task.result, "good")
-        else:
-            self.notice.say(str(task.error), "warning" if task.stopping else "error")
-            if not isinstance(task.error, RdsError | Stopped):
-                logging.getLogger(__name__).error("%s failed", task.title, exc_info=task.error)
+    def _succeeded(self, sentence: str) -> None:
+        self.notice.say(sentence, "good")
 
 
 def _refuse(text: str) -> None:

@@ -15,6 +15,7 @@ import ipywidgets as widgets
 from rds.core.errors import RdsError
 from rds.panels import PANELS
 from rds.panels.keys import Keys
+from rds.panels.kit.button import button
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
 from rds.panels.presence import Presence
@@ -71,8 +72,8 @@ class Shell:
             self._place.add_class("rds-opening")
             self._place.children = []
         self.here = name
-        for other, button in self._buttons.items():
-            (button.add_class if other == name else button.remove_class)("rds-here")
+        for other, each in self._buttons.items():
+            (each.add_class if other == name else each.remove_class)("rds-here")
         about = f"{escape(self.session.machine)} · files in {escape(str(self.session.folder))}"
         self._title.value = f"<h1>{escape(module.TITLE)}</h1><p>{about}</p>"
         if name not in self.panels:
@@ -106,9 +107,7 @@ class Shell:
 
     def _button(self, name: str) -> widgets.Button:
         module = PANELS.module(name)
-        button = widgets.Button(description=module.TITLE, tooltip=module.SUMMARY)
-        button.on_click(lambda _: self.open(name))
-        return button
+        return button(module.TITLE, module.SUMMARY, lambda: self.open(name), self)
 
     def _head(self) -> widgets.HBox:
         stop = widgets.Button(
@@ -116,10 +115,8 @@ class Shell:
         )
         stop.add_class("rds-stop")
         stop.on_click(lambda _: self.emergency_stop())
-        release = widgets.Button(description="Release", tooltip="Let the modules be used again after an emergency stop")
-        release.on_click(lambda _: self._release())
-        guide = widgets.Button(description="Help", tooltip="The page of the documentation on this panel")
-        guide.on_click(lambda _: self._help())
+        release = button("Release", "Let the modules be used again after an emergency stop", self._release, self)
+        guide = button("Help", "The page of the documentation on this panel", self._help, self)
         theme = widgets.ToggleButton(description="Dark", tooltip="Dark or light colours", value=False)
         theme.observe(lambda change: self._darken(change["new"]), "value")
         theme.layout.width = "auto"
@@ -128,10 +125,7 @@ class Shell:
         return head
 
     def _release(self) -> None:
-        try:
-            self.say(self.session.release_emergency_stop(), "good")
-        except RdsError as error:
-            self.say(str(error), "error")
+        self.say(self.session.release_emergency_stop(), "good")
 
     def _darken(self, dark: bool) -> None:
         (self.widget.add_class if dark else self.widget.remove_class)("rds-dark")

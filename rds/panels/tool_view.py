@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import ipywidgets as widgets
@@ -11,7 +10,7 @@ from rds.core.errors import InputError
 from rds.nc.errors import ProgramError
 from rds.nc.tools import Tool
 from rds.panels.editor import Editor
-from rds.panels.kit.button import button
+from rds.panels.kit.button import attempt, button, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.results import html
@@ -30,21 +29,22 @@ class ToolView:
         self._kept: dict[str, ToolFile] = {}  # those that were left without being saved
         self.notice = Notice()
         self.table = widgets.HTML()
-        self.editor = Editor(lambda: self._try(self._save), label="tool table", height=170)
+        self.editor = Editor(lambda: attempt("saving", self._save, self.notice), label="tool table", height=170)
         self.editor.observe(lambda change: self._typed(change["new"]), "text")
         tip = "Look for tool tables in the folder, and read this one anew; what is not saved of it is given up"
         again = button("Look again", tip, self._again, self.notice)
         self.state = widgets.HTML()
-        choose = _row(FieldView(program.choices, "tools", buttons=False), again)
+        choose = row(FieldView(program.choices, "tools", buttons=False), again)
+        choose.layout.align_items = "flex-end"
         self._name = widgets.Text(placeholder="tools.tbl", tooltip="A name for a new tool table")
         self._name.layout.width = "140px"
         begin = button("New table", "Begin a table under the name beside this", self._begin, self.notice)
         self.save_button = button(
             "Save table", "Write the table (Ctrl-S); a program is checked anew with it", self._save, self.notice
         )
-        self._shown = (self.editor, _row(self.save_button, self.state))
+        self._shown = (self.editor, row(self.save_button, self.state))
         self._edit = widgets.VBox([])  # nothing of it is on the page before a table is open
-        self.widget = widgets.VBox([choose, _row(self._name, begin), self._edit, self.notice, self.table])
+        self.widget = widgets.VBox([choose, row(self._name, begin), self._edit, self.notice, self.table])
         self.chosen()
 
     def refresh(self) -> None:
@@ -117,21 +117,9 @@ class ToolView:
         self.notice.say(f"saved as {file.name}", "good")
         self._look()
 
-    def _try(self, act: Callable[[], None]) -> None:
-        try:
-            act()
-        except InputError as error:
-            self.notice.say(str(error), "error")
-
 
 def _tools(tools: list[Tool], name: str) -> str:
     rows: list[list[Any]] = [
         [f"T{tool.number}", tool.pocket, f"{tool.diameter:g}", f"{tool.offset[2]:g}", tool.comment] for tool in tools
     ]
     return html.table(["tool", "pocket", "diameter [mm]", "length Z [mm]", "comment"], rows, f"Tools of {name}")
-
-
-def _row(*children: Any) -> widgets.HBox:
-    row = widgets.HBox(list(children), layout={"align_items": "flex-end"})
-    row.add_class("rds-row")
-    return row

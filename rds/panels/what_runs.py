@@ -8,6 +8,7 @@ from html import escape
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.panels.kit.button import button, row
 from rds.panels.kit.diagram import diagram_svg
 from rds.panels.kit.notice import Notice
 from rds.session.as_file import as_python, as_toml, write_toml
@@ -31,12 +32,9 @@ class WhatRuns:
         self._name = widgets.Text(
             placeholder="experiment.toml", tooltip="a name that ends with .toml", continuous_update=False
         )
-        save = widgets.Button(description="Save the file", tooltip="Write it into the folder of your files")
-        save.on_click(lambda _: self._save())
-        row = widgets.HBox([self._name, save])
-        row.add_class("rds-row")
+        save = button("Save the file", "Write it into the folder of your files", self._save, self.notice)
         text = widgets.Accordion(
-            [widgets.VBox([self.toml, row, self.notice]), self.python],
+            [widgets.VBox([self.toml, row(self._name, save), self.notice]), self.python],
             titles=("Show as file (rds run …)", "Show as Python"),
             selected_index=None,
         )
@@ -73,13 +71,9 @@ class WhatRuns:
         self.sources.value = "".join(parts)
 
     def _save(self) -> None:
-        try:
-            path = self._equipment.session.folder / self._name.value.strip()
-            written = write_toml(self._equipment.table(), path)
-        except InputError as error:
-            self.notice.say(str(error), "error")
-        else:
-            self.notice.say(f"saved as {written}; in a terminal: rds run {written.name}", "good")
+        path = self._equipment.session.folder / self._name.value.strip()
+        written = write_toml(self._equipment.table(), path)
+        self.notice.say(f"saved as {written}; in a terminal: rds run {written.name}", "good")
 
 
 def source_html(checked: Checked) -> str:

@@ -57,8 +57,9 @@ class EquipmentRun:
     def start(self) -> EquipmentRun:
         """Begin; InputError if the machine is in use."""
         if self.real_time:
-            self.session.take_machine(self.title, self)
-        self._task = self.session.work(self.title, self._work, self._stop_loop)
+            self._task = self.session.work_on_machine(self, self.title, self._work, self._stop_loop)
+        else:
+            self._task = self.session.work(self.title, self._work, self._stop_loop)
         return self
 
     def _work(self, task: Task[Result]) -> Result:

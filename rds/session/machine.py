@@ -252,7 +252,6 @@ class MachineDesk:
 
     def _work(self, title: str, work: Callable[[Task[T]], T]) -> Task[T]:
         """Begin work that has the bus for itself; InputError if the machine is in use."""
-        self.session.take_machine(title, self)
 
         def act(task: Task[T]) -> T:
             try:
@@ -264,7 +263,7 @@ class MachineDesk:
             finally:
                 self.session.give_machine_back(self)
 
-        self._task = self.session.work(title, act)
+        self._task = self.session.work_on_machine(self, title, act)
         return self._task
 
     @contextlib.contextmanager

@@ -141,6 +141,17 @@ class Session:
             self._claim = Claim(self.folder, what)
             self.machine_user = user
 
+    def work_on_machine(
+        self, user: Any, title: str, work: Callable[[Task[T]], T], on_stop: Callable[[], None] | None = None
+    ) -> Task[T]:
+        """Take the machine for `user` and begin; the work itself gives it back. InputError if it is in use."""
+        self.take_machine(title, user)
+        try:
+            return self.work(title, work, on_stop)
+        except BaseException:  # there is no thread to be had
+            self.give_machine_back(user)
+            raise
+
     def give_machine_back(self, user: Any) -> None:
         """The use is over; whoever is not the user changes nothing."""
         with self._lock:

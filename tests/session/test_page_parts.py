@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import ipywidgets as widgets
 import pytest
 
 from rds.core.errors import InputError
+from rds.panels import PANELS
 from rds.panels.kit.button import button
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
@@ -54,3 +58,27 @@ def test_one_failure_of_a_part_of_the_page_does_not_end_it_and_many_are_said() -
     for _ in range(3 + PATIENCE + 5):
         ticker.tick()
     assert len(calls) == 3 + PATIENCE and "the disk is away; reload the page" in told[0] and len(told) == 1
+
+
+@pytest.mark.parametrize("name", PANELS.names())
+def test_every_button_of_a_panel_says_what_fails_in_it(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shell = Shell(Session(tmp_path), name)
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Session, "work", full)
+    monkeypatch.setattr("rds.results.atomic.write_whole", full)
+    pressed = [each for each in _within(shell.panels[name]) if isinstance(each, widgets.Button)]
+    for each in pressed:
+        each.click()  # raises what its handler raises
+    assert shell.session.machine_user is None
+    assert pressed or name == "help"
+
+
+def _within(widget: Any) -> Iterator[Any]:
+    yield widget
+    for child in getattr(widget, "children", ()):
+        yield from _within(child)

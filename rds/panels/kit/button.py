@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import ipywidgets as widgets
 
 from rds.core.errors import RdsError
-from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.session.task import Task
 
 T = TypeVar("T")
 
 
+class Notice(Protocol):
+    """Where something is said: the `Notice` of a panel, or the page."""
+
+    def say(self, text: str, kind: str = "note") -> None:
+        """Show `text`; kind is note, good, warning or error."""
+        ...
+
+
 def button(text: str, tip: str, act: Callable[[], Any], notice: Notice, primary: bool = False) -> widgets.Button:
     """A button that calls `act()`; what it refuses is said in `notice`."""
     made = widgets.Button(description=text, tooltip=tip, button_style="primary" if primary else "")
-
     made.on_click(lambda _: attempt(text, act, notice))
     return made
 
@@ -28,34 +34,58 @@ def attempt(what: str, act: Callable[[], Any], notice: Notice) -> None:
     """Call `act()`; what it refuses, and whatever else goes wrong in it, is said in `notice`."""
     try:
         act()
-    except RdsError as error:
-        notice.say(str(error), "error")
     except Exception as error:
-        logging.getLogger(__name__).exception("%s failed", what)
-        notice.say(f"{what} failed: {error}", "error")
+        say_error(what, error, notice)
 
 
-def follow(bar: WorkBar, notice: Notice, begin: Callable[[], Task[T]], show: Callable[[T], Any]) -> None:
-    """Begin work, unless some goes on already; `show(result)` at its end, or its error in `notice`."""
+def say_error(what: str, error: BaseException, notice: Notice) -> None:
+    """Say in `notice` why `what` did not succeed. What nobody has foreseen goes to the log as well."""
+    if isinstance(error, RdsError):
+        notice.say(str(error), "error")
+        return
+    logging.getLogger(__name__).error("%s failed", what, exc_info=error)
+    notice.say(f"{what} failed: {error or type(error).__name__}", "error")
+
+
+def follow(
+    bar: WorkBar,
+    notice: Notice,
+    begin: Callable[[], Task[T]],
+    show: Callable[[T], Any],
+    stopped: str = "stopped",
+    failed: Callable[[], Any] | None = None,
+) -> None:
+    """Begin work, unless some goes on already; `show(result)` at its end, or its error in `notice`.
+
+    What `begin()` refuses is raised; `stopped` is said of work that was stopped, and `failed()` shows more of an error.
+    """
     if bar.busy:
         notice.say("wait until it is done, or stop it first", "warning")
         return
     task = begin()
-    notice.clear()
+    notice.say("")
+    watch(bar, notice, task, show, stopped, failed)
+
+
+def watch(
+    bar: WorkBar,
+    notice: Notice,
+    task: Task[T],
+    show: Callable[[T], Any],
+    stopped: str = "stopped",
+    failed: Callable[[], Any] | None = None,
+) -> None:
+    """As `follow`, for work that goes on already."""
 
     def ended() -> None:
-        try:
-            if task.stopped:
-                notice.say("stopped", "warning")
-            elif task.error is not None:
-                raise task.error
-            else:
-                show(task.result)  # type: ignore[arg-type]
-        except RdsError as error:
-            notice.say(str(error), "error")
-        except Exception as error:
-            logging.getLogger(__name__).exception("%s failed", task.title)
-            notice.say(f"{task.title} failed: {error}", "error")
+        if task.stopped:
+            notice.say(stopped, "warning")
+        elif task.error is not None:
+            say_error(task.title, task.error, notice)
+            if failed is not None:
+                failed()
+        else:
+            attempt(task.title, lambda: show(task.result), notice)  # type: ignore[arg-type]
 
     bar.follow(task, ended)
 

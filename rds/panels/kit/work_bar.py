@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import ipywidgets as widgets
@@ -39,9 +39,13 @@ class Work(Protocol):
 
 
 class WorkBar(widgets.HBox):
-    """Hidden until `follow(work, ended)`; when the work is over it calls `ended()` once, and hides again."""
+    """Hidden until `follow(work, ended)`; when the work is over it calls `ended()` once, and hides again.
+
+    `locks` are the buttons that cannot be pressed meanwhile.
+    """
 
     def __init__(self, ticker: Ticker):
+        self.locks: Sequence[widgets.Button] = ()
         self._bar = widgets.FloatProgress(value=0.0, min=0.0, max=1.0)
         self._bar.add_class("rds-progress")
         self._text = widgets.Label("")
@@ -67,6 +71,7 @@ class WorkBar(widgets.HBox):
         self._work, self._ended = work, ended
         self.layout.display = ""
         self.stop_button.disabled = False
+        self._lock(True)
         self._look()
         if self._work is not None:
             self._end = self._ticker.add(self._look)
@@ -91,5 +96,10 @@ class WorkBar(widgets.HBox):
             self.layout.display = "none"
             if self._end is not None:
                 self._end()
+            self._lock(False)
             if ended is not None:
                 ended()
+
+    def _lock(self, on: bool) -> None:
+        for button in self.locks:
+            button.disabled = on
