@@ -128,7 +128,7 @@ def is_free(lock: Path) -> bool:
     return True
 
 
-def wait_for(condition: Callable[[], Any], timeout: float = 5.0) -> None:
+def wait_for(condition: Callable[[], Any], timeout: float = 30.0) -> None:
     """Wait until the condition holds; fail after `timeout` s."""
     deadline = time.monotonic() + timeout
     while not condition():

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -28,6 +27,7 @@ from rds.core.errors import InputError, MachineError
 
 Opener = Callable[..., can.BusABC]
 TEST_BUS = partial(open_any, "rds", "test")
+EXACT = 1e-6  # s, to which times since 1970 are exact
 
 
 def spaced(count: int, gap: float = 0.01) -> list[can.Message]:
@@ -36,6 +36,14 @@ def spaced(count: int, gap: float = 0.01) -> list[can.Message]:
 
 def drain(bus: can.BusABC, quiet: float = 0.2) -> list[can.Message]:
     return list(iter(lambda: bus.recv(quiet), None))
+
+
+def frames_in(path: Path) -> int | None:
+    """How many frames a file holds, None while it is being written."""
+    try:
+        return len(list(LogFile(path)))
+    except InputError:
+        return None
 
 
 class Recorder:
@@ -54,13 +62,46 @@ class Recorder:
 
         self.thread = threading.Thread(target=run)
         self.thread.start()
-        assert ready.wait(5.0)
+        assert ready.wait(30.0)
 
     def end(self) -> Any:
         self.stop.set()
-        self.thread.join(10.0)
-        assert self.error is None
+        return self.ended()
+
+    def ended(self) -> Any:
+        """Its result once it has as many frames as it was to count."""
+        self.thread.join(60.0)
+        assert self.error is None and not self.thread.is_alive()
         return self.result
+
+
+class TimedBus:
+    """Time that passes only by waiting and sending, and a bus that notes when it is given each frame."""
+
+    def __init__(self) -> None:
+        self.now = 0.0  # s
+        self.sending: Callable[[int], float] = lambda number: 0.0  # s that it takes to send the frame of this number
+        self.times: list[float] = []  # s, of each frame
+        self.sent: list[can.Message] = []
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+    def send(self, message: can.Message, timeout: float) -> None:
+        self.times.append(self.now)
+        self.now += self.sending(len(self.sent))
+        self.sent.append(message)
+
+
+@pytest.fixture
+def timed_bus(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A bus whose time is that of replaying."""
+    bus = TimedBus()
+    monkeypatch.setattr("rds.bus.replay.time", bus)
+    return bus
 
 
 @pytest.fixture
@@ -73,13 +114,12 @@ def pair(open_bus: Opener) -> Iterator[tuple[can.BusABC, can.BusABC]]:
 
 @pytest.mark.parametrize("ending", ["asc", "blf", "log"])
 def test_everything_on_the_bus_is_in_the_file(ending: str, tmp_path: Path, open_bus: Opener) -> None:
-    recorder = Recorder(tmp_path / f"a.{ending}")
-    bus = open_bus()
     sent = [message for message in of_every_kind() if not message.is_error_frame]
+    recorder = Recorder(tmp_path / f"a.{ending}", count=len(sent))
+    bus = open_bus()
     for message in sent:
         bus.send(message)
-    time.sleep(0.1)
-    result = recorder.end()
+    result = recorder.ended()
     assert [kept(message) for message in LogFile(tmp_path / f"a.{ending}")] == [kept(message) for message in sent]
     assert result.complete and result.frames == len(sent)
 
@@ -89,8 +129,7 @@ def test_a_burst_as_fast_as_the_bus_carries_it_is_kept(tmp_path: Path, open_bus:
     bus = open_bus()
     for k in range(20_000):
         bus.send(can.Message(arbitration_id=1, is_extended_id=False, data=k.to_bytes(4, "big")))
-    recorder.thread.join(30.0)
-    assert recorder.result.complete
+    assert recorder.ended().complete
     numbers = [int.from_bytes(message.data, "big") for message in LogFile(tmp_path / "a.log")]
     assert numbers == list(range(20_000))
 
@@ -100,21 +139,19 @@ def test_only_what_was_selected_and_as_many_as_asked(tmp_path: Path, open_bus: O
     bus = open_bus()
     for message in spaced(64):
         bus.send(message)
-    recorder.thread.join(10.0)
-    assert recorder.result.frames == 3
+    assert recorder.ended().frames == 3
     assert [message.arbitration_id for message in LogFile(tmp_path / "a.log")] == [0x582, 0x583, 0x582]
 
 
 def test_what_a_format_cannot_hold_is_counted(tmp_path: Path, open_bus: Opener) -> None:
-    recorder = Recorder(tmp_path / "a.trc")
+    recorder = Recorder(tmp_path / "a.trc", count=8)
     bus = open_bus()
-    for message in of_every_kind():
+    for message in [*of_every_kind(), frame(0x7FF)]:  # the last is kept, and comes after all the others
         if not message.is_error_frame:
             bus.send(message)
-    time.sleep(0.1)
-    result = recorder.end()
+    result = recorder.ended()
     assert result.unkept == {"remote frames": 3, "CAN FD frames": 4}
-    assert not result.complete and result.frames == 7
+    assert not result.complete and result.frames == 8
 
 
 def test_a_killed_hub_is_in_the_result_and_recording_goes_on(
@@ -124,7 +161,7 @@ def test_a_killed_hub_is_in_the_result_and_recording_goes_on(
     recorder = Recorder(tmp_path / "a.log")
     first = open_bus()
     first.send(frame(1))
-    time.sleep(0.1)
+    wait_for(lambda: b" 001#" in (tmp_path / "a.log").read_bytes())
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     bus = open_bus()
@@ -166,7 +203,7 @@ def test_a_killed_recorder_leaves_what_it_took(tmp_path: Path, open_bus: Opener)
     bus = open_bus()
     for message in spaced(100):
         bus.send(message)
-    time.sleep(1.2)
+    wait_for(lambda: frames_in(path) == 100)
     process.kill()
     process.wait()
     process.stderr.close()
@@ -177,38 +214,39 @@ def test_a_killed_recorder_leaves_what_it_took(tmp_path: Path, open_bus: Opener)
 
 
 @pytest.mark.parametrize("speed", [1.0, 4.0])
-def test_frames_come_at_their_times(speed: float, pair: tuple[can.BusABC, can.BusABC]) -> None:
+def test_frames_come_at_their_times(speed: float, timed_bus: Any) -> None:
+    log = spaced(30)
+    result = replay(log, timed_bus, speed=speed)
+    assert [kept(message) for message in timed_bus.sent] == [kept(message) for message in log]
+    assert timed_bus.times == pytest.approx([0.01 * k / speed for k in range(30)], abs=EXACT)
+    assert result.sent == 30 and result.loops == 1 and result.latest < EXACT
+
+
+def test_frames_cross_the_bus_and_no_sooner_than_their_times(pair: tuple[can.BusABC, can.BusABC]) -> None:
     sender, witness = pair
     log = spaced(30)
-    result = replay(log, sender, speed=speed)
-    found = drain(witness)
-    assert [kept(message) for message in found] == [kept(message) for message in log]
-    length = found[-1].timestamp - found[0].timestamp
-    assert length == pytest.approx(0.29 / speed, abs=0.05)
-    assert result.sent == 30 and result.loops == 1
+    result = replay(log, sender)
+    assert [kept(message) for message in drain(witness)] == [kept(message) for message in log]
+    assert result.seconds >= 0.29 - EXACT
 
 
-def test_lateness_does_not_add_up() -> None:
-    class Slow:
-        """A bus that takes 8 ms for each frame, of which there is one in 10 ms."""
-
-        def __init__(self) -> None:
-            self.times: list[float] = []
-
-        def send(self, message: can.Message, timeout: float) -> None:
-            self.times.append(time.monotonic())
-            time.sleep(0.008)
-
-    bus = Slow()
-    replay(spaced(50), bus)  # type: ignore[arg-type]
-    assert bus.times[-1] - bus.times[0] == pytest.approx(0.49, abs=0.03)
+def test_lateness_does_not_add_up(timed_bus: Any) -> None:
+    log = spaced(50)
+    timed_bus.sending = lambda number: 0.035 if number == 20 else 0.008  # s, where a frame is due each 10 ms
+    result = replay(log, timed_bus)
+    late = [at - 0.01 * k for k, at in enumerate(timed_bus.times)]
+    assert late[:21] == pytest.approx([0.0] * 21, abs=EXACT)
+    assert late[21:34] == pytest.approx(
+        [0.025 - 0.002 * k for k in range(13)], abs=EXACT
+    )  # 2 ms a frame are made up for
+    assert late[34:] == pytest.approx([0.0] * 16, abs=EXACT)
+    assert result.latest == pytest.approx(0.025, abs=EXACT)
 
 
-def test_as_fast_as_possible(pair: tuple[can.BusABC, can.BusABC]) -> None:
+def test_as_fast_as_possible(pair: tuple[can.BusABC, can.BusABC], timed_bus: Any) -> None:
     sender, witness = pair
-    began = time.monotonic()
     assert replay(spaced(200, gap=1.0), sender, speed=float("inf")).sent == 200
-    assert time.monotonic() - began < 2.0
+    assert timed_bus.now == 0.0  # s waited
     assert len(drain(witness)) == 200
 
 
@@ -221,13 +259,10 @@ def test_a_part_of_a_log_by_time_and_identifier(pair: tuple[can.BusABC, can.BusA
     assert result.skipped == {"not selected": 32 - len(wanted)}
 
 
-def test_loops_follow_each_other_evenly(pair: tuple[can.BusABC, can.BusABC]) -> None:
-    sender, witness = pair
-    assert replay(spaced(5, gap=0.02), sender, loops=3).loops == 3
-    found = drain(witness)
-    assert [message.data[0] for message in found] == [0, 1, 2, 3, 4] * 3
-    gaps = [b.timestamp - a.timestamp for a, b in itertools.pairwise(found)]
-    assert gaps == pytest.approx([0.02] * 14, abs=0.015)
+def test_loops_follow_each_other_evenly(timed_bus: Any) -> None:
+    assert replay(spaced(5, gap=0.02), timed_bus, loops=3).loops == 3
+    assert [message.data[0] for message in timed_bus.sent] == [0, 1, 2, 3, 4] * 3
+    assert timed_bus.times == pytest.approx([0.02 * k for k in range(15)], abs=EXACT)
 
 
 def test_error_frames_are_left_out_and_counted(pair: tuple[can.BusABC, can.BusABC]) -> None:
@@ -238,13 +273,17 @@ def test_error_frames_are_left_out_and_counted(pair: tuple[can.BusABC, can.BusAB
     assert result.sent == len(found) == 2 * (len(of_every_kind()) - 1)
 
 
-def test_a_replay_that_waits_can_be_stopped(open_bus: Opener) -> None:
-    stop = threading.Event()
-    threading.Timer(1.0, stop.set).start()
-    began = time.monotonic()
-    result = replay([frame(0x700), frame(0x701, at=100.0)], open_bus(), stop=stop)
+def test_a_replay_that_waits_can_be_stopped(timed_bus: Any) -> None:
+    class Stop(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            timed_bus.sleep(timeout)
+            if timed_bus.now >= 1.0:
+                self.set()
+            return self.is_set()
+
+    result = replay([frame(0x700), frame(0x701, at=100.0)], timed_bus, stop=Stop())
     assert result.stopped and result.sent == 1
-    assert time.monotonic() - began < 5.0
+    assert timed_bus.now < 1.2
 
 
 @pytest.mark.parametrize(
@@ -294,16 +333,16 @@ def machine(program: Callable[..., Any]) -> None:
     assert server.stdout.readline().startswith("ready")
 
 
-@pytest.mark.parametrize("identifier", [0x010, 0x011, 0x012, 0x021, 0x004, 0x001, 0x000, 0x201, 0x601])
-def test_frames_that_act_on_a_live_machine_are_refused(identifier: int, machine: None, open_bus: Opener) -> None:
+def test_frames_that_act_on_a_live_machine_are_refused(machine: None, open_bus: Opener) -> None:
     bus, witness = open_bus(), open_bus()
-    drain(witness)
-    log = [frame(0x700), frame(identifier, bytes(8), 0.01)]
-    with pytest.raises(InputError, match=r"module 2.*live on this bus.*--with-commands") as caught:
-        replay(log, bus)
-    assert f"{identifier:#05x}" in str(caught.value)
-    assert 0x700 not in {message.arbitration_id for message in drain(witness)}
-    assert replay(log, bus, selection=Selection(["0x700"])).sent == 1
+    for identifier in (0x010, 0x011, 0x012, 0x021, 0x004, 0x001, 0x000, 0x201, 0x601):
+        drain(witness)
+        log = [frame(0x700), frame(identifier, bytes(8), 0.01)]
+        with pytest.raises(InputError, match=r"module 2.*live on this bus.*--with-commands") as caught:
+            replay(log, bus)
+        assert f"{identifier:#05x}" in str(caught.value)
+        assert 0x700 not in {message.arbitration_id for message in drain(witness)}
+        assert replay(log, bus, selection=Selection(["0x700"])).sent == 1
 
 
 def test_with_commands_ends_at_zero_volts(machine: None, open_bus: Opener) -> None:
@@ -324,11 +363,10 @@ def test_mf4_is_recorded_from_the_bus_and_replayed_onto_it(
     pytest.importorskip("asammdf", reason="MF4 needs the package asammdf: pip install asammdf")
     sender, listener = pair
     sent = spaced(50)
-    recorder = Recorder(tmp_path / "log.mf4")
+    recorder = Recorder(tmp_path / "log.mf4", count=50)
     for message in sent:
         sender.send(message)
-    time.sleep(0.3)
-    assert recorder.end().frames == 50
+    assert recorder.ended().frames == 50
     drain(listener)
     replay(LogFile(tmp_path / "log.mf4"), sender, speed=float("inf"))
     heard = drain(listener)
@@ -337,13 +375,12 @@ def test_mf4_is_recorded_from_the_bus_and_replayed_onto_it(
 
 @pytest.mark.parametrize("ending", ["asc", "blf", "trc", "log"])
 def test_a_recording_opens_with_python_can_s_own_reader(ending: str, tmp_path: Path, open_bus: Opener) -> None:
-    recorder = Recorder(tmp_path / f"log.{ending}")
-    bus = open_bus()
     sent = spaced(60)
+    recorder = Recorder(tmp_path / f"log.{ending}", count=60)
+    bus = open_bus()
     for message in sent:
         bus.send(message)
-    time.sleep(0.2)
-    assert recorder.end().frames == 60
+    assert recorder.ended().frames == 60
     with can.LogReader(tmp_path / f"log.{ending}") as reader:
         found = list(reader)
     assert [(m.arbitration_id, bytes(m.data)) for m in found] == [(m.arbitration_id, bytes(m.data)) for m in sent]
