@@ -94,6 +94,29 @@ def test_pages_that_ask_at_the_same_time_have_a_kernel_each(ready: ReadyKernels,
             kernel.kill()
 
 
+def test_a_kernel_that_compiled_code_holds_ends_with_the_server(
+    ready: ReadyKernels, alone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("JUPYTER_PATH", str(APP / "share" / "jupyter"))
+    offer(ready)
+    manager: Any = KernelManager(kernel_name="rds", connection_file=str(alone / "connection.json"))
+    manager.start_kernel(cwd=str(alone), env=os.environ | {"SAID": "", "APP": ""})
+    kernel = manager.provisioner.process
+    client = manager.client()
+    try:
+        client.start_channels()
+        client.wait_for_ready(timeout=60)
+        client.execute("open('there', 'w').close() or sum(range(10**12))")
+        while not (alone / "there").exists():
+            with pytest.raises(subprocess.TimeoutExpired):
+                kernel.wait(0.05)
+        ready.close()
+        assert kernel.wait(30.0) == 0
+    finally:
+        client.stop_channels()
+        kernel.kill()
+
+
 def test_kernels_end_with_the_server(ready: ReadyKernels, alone: Path) -> None:
     command = [sys.executable, *LAUNCHER, "-f", str(alone / "connection.json")]
     kernel = ready.start(command, os.environ, alone)

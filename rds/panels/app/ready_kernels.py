@@ -21,6 +21,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rds.runtime.scheduling import end_with_parent
+
 LAUNCHER = ["-m", "ipykernel_launcher"]  # after the interpreter: how Jupyter starts such a kernel otherwise
 _LONGEST = 64  # bytes of a process's number
 _PATIENCE = 60.0  # s for the imports, on a busy computer
@@ -136,8 +138,11 @@ def main() -> None:
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # a kernel that has ended is gone at once
     parent = os.getpid()
     told = _fork_for_each(channel)
-    if told is not None and os.getppid() == parent:
-        options = [*told["arguments"], f"--IPKernelApp.parent_handle={parent}"]  # it ends with its parent
+    if told is None:
+        return
+    end_with_parent()  # whatever a user's code holds; ipykernel looks now and then, in Python
+    if os.getppid() == parent:
+        options = [*told["arguments"], f"--IPKernelApp.parent_handle={parent}"]
         IPKernelApp.launch_instance(argv=options)
 
 
