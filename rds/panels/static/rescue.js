@@ -74,7 +74,7 @@ function render({ model, el }) {
     } catch (error) {
       text = `This page gets no answer, and ${failed(error)}. Look after \`rds app\`, where it was started.`;
     }
-    if (missed >= HELD) say("held", text);
+    if (missed) say("held", text);
   }
   async function end() {
     again.disabled = true;
@@ -88,7 +88,9 @@ function render({ model, el }) {
     again.disabled = false;
   }
   const pressed = async (event) => {
-    if (!(event.target instanceof Element) || !event.target.closest(".rds-app .rds-stop")) return;
+    if (!(event.target instanceof Element)) return;
+    if (missed && event.target.closest(".rds-app .rds-work button")) look(); // Stop is not heard either
+    if (!event.target.closest(".rds-app .rds-stop")) return;
     const before = answers;
     let stopped;
     try {
