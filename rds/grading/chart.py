@@ -220,7 +220,8 @@ def _thinned(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     if np.isnan(y).any():  # rare, and reduceat knows no gaps
         y = np.nan_to_num(y, nan=float(np.nan_to_num(y).max()))
     low, high = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
-    first_is_low = y[starts] - low <= high - y[starts]
+    with np.errstate(over="ignore"):
+        first_is_low = y[starts] - low <= high - y[starts]
     pairs = np.column_stack([np.where(first_is_low, low, high), np.where(first_is_low, high, low)])
     x = np.asarray(curve.x, float)
     middle = starts + np.diff(np.append(starts, n)) // 2

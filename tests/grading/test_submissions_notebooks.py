@@ -51,7 +51,19 @@ def test_only_what_the_controller_needs_is_kept() -> None:
 
 def test_lines_keep_their_numbers() -> None:
     text = converted(notebook("print(1)\nprint(2)", "x = 1\ndef control():\n    return x").encode()).code.decode()
-    assert text.split("\n")[5] == "def control():"
+    assert text.split("\n")[6] == "def control():"
+
+
+def test_a_cell_s_encoding_is_the_notebook_s() -> None:
+    code = converted(notebook("# -*- coding: latin-1 -*-\nK = 'ü'\ndef control():\n    return K").encode()).code
+    names: dict[str, object] = {}
+    exec(compile(code, "submission.py", "exec"), names)
+    assert names["K"] == "ü"
+
+
+def test_code_that_a_parser_would_need_gigabytes_for_is_refused_before() -> None:
+    with pytest.raises(Refusal, match=r"its code has 60000\d\d bytes, more than 524288"):
+        converted(notebook("x=1\n" * 750_000, "x=1\n" * 750_000).encode())
 
 
 def test_decorators_defaults_conditions_and_loops() -> None:

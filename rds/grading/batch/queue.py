@@ -15,7 +15,6 @@ from rds.grading.intake.names import safe_id
 from rds.grading.intake.notebooks import Converted, converted
 from rds.grading.intake.single import wanted
 from rds.grading.late import days_late
-from rds.grading.sandbox.submission import LARGEST
 from rds.results.atomic import write_whole
 from rds.spread import spread
 
@@ -101,8 +100,6 @@ def _convert(assignment: Assignment, notebooks: list[Queued], jobs: int | None) 
         notebooks, spread(_converted, work, jobs=jobs, retries=0, time_limit=_PATIENCE), strict=True
     ):
         found = outcome.value if outcome.ok else f"the notebook cannot be read: {outcome.reason}"
-        if isinstance(found, Converted) and len(found.code) > LARGEST:
-            found = f"its code has more than {LARGEST} bytes; keep data out of it"
         if isinstance(found, Converted):
             each.code, each.notes = found.code, (*each.notes, *found.notes)
             continue

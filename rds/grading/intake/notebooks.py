@@ -17,6 +17,7 @@ from typing import Any
 from rds.grading.intake.items import Refusal
 
 LARGEST = 16 << 20  # bytes; pictures are in notebooks too
+LARGEST_CODE = 512 << 10  # bytes, of all cells: the parser takes a thousand times as much memory
 INTERFACE = ("control", "derivatives", "advance", "output", "interpolate", "params", "initial_state")
 _MAGIC = re.compile(r"\s*(?:[%!?]|[\w.]+\?{1,2}\s*$)")
 
@@ -36,7 +37,9 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
     notebook, or has no code.
     """
     cells = _code_cells(data)
-    lines: list[str] = []
+    if (size := sum(len(_encoded(source)) for source in cells)) > LARGEST_CODE:
+        raise Refusal(f"its code has {size} bytes, more than {LARGEST_CODE}; keep data out of it")
+    lines = ["# from a notebook"]  # and the first cell's mark below it: where Python would look for an encoding
     notes: list[str] = []
     for number, source in enumerate(cells, 1):
         kept, skipped = _without_magics(source)
@@ -101,13 +104,20 @@ def _parses(source: str) -> bool:
 def _needed(body: Sequence[ast.stmt], wanted: set[str]) -> set[int]:
     """The numbers of the statements that make the wanted names, and of those that make what these use."""
     facts = [_made_and_used(statement) for statement in body]
+    makers: dict[str, list[int]] = {}
+    for number, (made, _) in enumerate(facts):
+        for name in made:
+            makers.setdefault(name, []).append(number)
     keep = {number for number, statement in enumerate(body) if _is_for_all(statement)}
-    while True:
-        new = {number for number, (made, _) in enumerate(facts) if number not in keep and made & wanted}
-        if not new:
-            return keep
-        keep |= new
-        wanted = wanted.union(*(facts[number][1] for number in new))
+    known, todo = set(wanted), list(wanted)
+    while todo:
+        for number in makers.get(todo.pop(), ()):
+            if number not in keep:
+                keep.add(number)
+                new = facts[number][1] - known
+                known |= new
+                todo += new
+    return keep
 
 
 def _is_for_all(statement: ast.stmt) -> bool:
