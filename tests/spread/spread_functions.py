@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -37,6 +38,22 @@ def deadly(x: int) -> int:
     return x
 
 
+def deadly_among_many(x: int) -> int:
+    """Number 7 always kills its process; the others take some time."""
+    if x == 7:
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(0.05)
+    return x
+
+
+def deadly_to_its_parent(x: int) -> int:
+    """Number 7 always kills the process above its own; the others take some time."""
+    if x == 7:
+        os.kill(os.getppid(), signal.SIGKILL)
+    time.sleep(0.05)
+    return x
+
+
 def slow(x: int) -> int:
     """Number 1 takes a minute."""
     if x == 1:
@@ -57,6 +74,12 @@ def process(x: int) -> int:
     return os.getpid()
 
 
+def process_of_a_long_item(x: int) -> None:
+    """It prints the number of its process, and takes ten minutes."""
+    print(os.getpid(), flush=True, file=sys.stderr)
+    time.sleep(600.0)
+
+
 def slow_first(work: tuple[int, str]) -> int:
     """Number 0 waits until another one is long done."""
     number, folder = work
@@ -69,9 +92,14 @@ def slow_first(work: tuple[int, str]) -> int:
     return number
 
 
-def number_of_worker(x: int) -> int | None:
-    """Which worker it is, once it has taken some time."""
+def meeting(work: tuple[str, int]) -> int | None:
+    """Which worker it is, once so many processes are at it at the same time."""
     from rds.spread import worker_number
 
-    time.sleep(0.05)
+    folder, of = work
+    (Path(folder) / str(os.getpid())).touch()
+    deadline = time.monotonic() + 60.0
+    while len(os.listdir(folder)) < of:
+        assert time.monotonic() < deadline, "the others do not come"
+        time.sleep(0.01)
     return worker_number()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import spread_functions
+from distributed import Client
 
 from rds.core.errors import InputError
 from rds.spread import spread
@@ -22,14 +25,14 @@ HERE = str(Path(__file__).parent)
 
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
-    """A dask scheduler with two workers, in processes of its own."""
+    """A dask scheduler with two workers of two threads, which never tries again what lay on a worker that died."""
     program = (
         "import sys\nfrom distributed import LocalCluster\n"
         "if __name__ == '__main__':\n"
-        "    cluster = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)\n"
+        "    cluster = LocalCluster(n_workers=2, threads_per_worker=2, dashboard_address=None)\n"
         "    print(cluster.scheduler_address, flush=True)\n    sys.stdin.read()\n"
     )
-    environment = os.environ | {"PYTHONPATH": HERE, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+    environment = os.environ | {"PYTHONPATH": HERE, "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
     with subprocess.Popen(
         [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
     ) as process:
@@ -74,8 +77,22 @@ def test_an_item_that_always_kills_its_worker_is_given_up(where: dict[str, objec
     assert found[2].failure is Failure.DIED and "2 times" in found[2].reason and found[2].attempts == 2
 
 
-def test_a_time_limit_ends_what_takes_too_long() -> None:
-    found = list(spread(spread_functions.slow, range(3), jobs=2, retries=0, time_limit=1.5))
+def test_an_item_that_kills_its_process_takes_none_with_it(scheduler: str) -> None:
+    function, items = spread_functions.deadly_among_many, range(24)
+    there = list(spread(function, items, scheduler=scheduler))
+    assert [o.index for o in there if not o.ok] == [7]
+    assert there == list(spread(function, items, jobs=2))
+
+
+def test_what_lay_on_a_worker_of_the_cluster_that_died_is_done_again(scheduler: str) -> None:
+    found = list(spread(spread_functions.deadly_to_its_parent, range(24), scheduler=scheduler, retries=0))
+    assert [o.index for o in found if not o.ok] == [7]
+    assert found[7].failure is Failure.DIED and found[7].attempts == 1
+    assert "the cluster's worker that had it ended" in found[7].reason
+
+
+def test_a_time_limit_ends_what_takes_too_long(where: dict[str, object]) -> None:
+    found = list(spread(spread_functions.slow, range(3), retries=0, time_limit=1.5, **where))
     assert [o.ok for o in found] == [True, False, True]
     assert (found[1].failure, found[1].reason) == (Failure.OVERDUE, "it took longer than 1.5 s")
 
@@ -86,16 +103,35 @@ def test_what_a_function_prints_does_not_disturb(capfd: pytest.CaptureFixture[st
     assert out == "" and err.count("noise 2") == 1
 
 
-def test_each_of_the_processes_works() -> None:
-    assert len({o.value for o in spread(spread_functions.process, range(12), jobs=3)}) == 3
+def test_each_of_the_processes_works(tmp_path: Path) -> None:
+    found = list(spread(spread_functions.meeting, [(str(tmp_path), 3)] * 3, jobs=3))
+    assert sorted(o.value for o in found) == [0, 1, 2], "each item waits for the two others, in processes of their own"
+    assert len(list(tmp_path.iterdir())) == 3
 
 
-def test_closing_it_early_leaves_no_process() -> None:
-    found = spread(spread_functions.process, range(100), jobs=2)
+def test_closing_it_early_leaves_no_process(where: dict[str, object]) -> None:
+    found = spread(spread_functions.process, range(100), **where)
     worker = next(iter(found)).value
     found.close()  # type: ignore[attr-defined]
     with pytest.raises(ProcessLookupError):
         os.kill(worker, 0)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the kernel's own doing")
+def test_killing_it_ends_its_processes_in_the_middle_of_an_item() -> None:
+    program = (
+        f"import sys; sys.path.append({HERE!r})\nimport spread_functions\nfrom rds.spread import spread\n"
+        "list(spread(spread_functions.process_of_a_long_item, [1], jobs=1))\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE) as process:
+        assert process.stderr
+        worker = int(process.stderr.readline())
+        process.kill()
+        try:
+            process.communicate(timeout=60)  # to the end of stderr: nobody is left who could write there
+        except subprocess.TimeoutExpired:
+            os.kill(worker, signal.SIGKILL)
+            raise
 
 
 def test_ctrl_c_ends_it_and_its_processes() -> None:
@@ -124,14 +160,27 @@ def test_nothing_to_do() -> None:
         ({"jobs": 0}, "jobs = 0 must be at least 1"),
         ({"retries": -1}, "retries = -1"),
         ({"jobs": 1, "scheduler": "tcp://127.0.0.1:1"}, "give one of them"),
-        ({"scheduler": "tcp://127.0.0.1:1"}, "no dask scheduler answers within 5 s"),
+        ({"scheduler": "tcp://127.0.0.1:1"}, "no dask scheduler answers within 0.3 s"),
         ({"scheduler": "nowhere at all"}, "no dask scheduler answers"),
-        ({"scheduler": "tcp://127.0.0.1:1", "time_limit": 1.0}, "for local processes"),
     ],
 )
-def test_what_will_not_do_is_said_at_once(options: dict[str, object], said: str) -> None:
+def test_what_will_not_do_is_said_at_once(
+    options: dict[str, object], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rds.spread.cluster.CONNECT", 0.3)
     with pytest.raises(InputError, match=re.escape(said)):
         spread(spread_functions.square, [1], **options)
+
+
+def test_a_scheduler_that_was_refused_leaves_nothing_behind() -> None:
+    def left() -> list[object]:
+        found = [each for each in gc.get_objects() if isinstance(each, Client) and each.status != "closed"]
+        return [*found, *(each for each in threading.enumerate() if "loop" in each.name or "cluster" in each.name)]
+
+    before = left()
+    with pytest.raises(InputError, match="no dask scheduler answers"):
+        spread(spread_functions.square, [1], scheduler="nowhere at all")
+    assert left() == before
 
 
 def test_as_they_come_nothing_waits_for_the_slowest(where: dict[str, object], tmp_path: Path) -> None:
@@ -139,7 +188,3 @@ def test_as_they_come_nothing_waits_for_the_slowest(where: dict[str, object], tm
     found = [outcome.index for outcome in spread(spread_functions.slow_first, work, in_order=False, **where)]
     assert sorted(found) == list(range(20))
     assert found[0] != 0
-
-
-def test_local_workers_know_their_number() -> None:
-    assert {o.value for o in spread(spread_functions.number_of_worker, range(20), jobs=2)} == {0, 1}
