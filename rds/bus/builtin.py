@@ -33,6 +33,11 @@ _AT_ONCE = getattr(socket, "MSG_DONTWAIT", 0)  # 0 on Windows, where `select` ha
 _WHOLE = socket.MSG_WAITALL
 _PERIODIC_END = 1.0  # s for a periodic task to send its last frame
 _HALF_SENT = 10.0  # s to finish a frame of which a part is on its way
+_SHUT_DOWN = "this bus has been shut down"
+
+
+class _ShutMeanwhile(can.CanOperationError):
+    """Another thread shut the bus down while this one waited in recv()."""
 
 
 class BuiltinBus(can.BusABC):
@@ -98,12 +103,29 @@ class BuiltinBus(can.BusABC):
 
     # --- receiving
 
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        """The next message, or None if none comes within `timeout` s (None: waits as long as it takes).
+
+        When another thread shuts the bus down meanwhile, nothing more can come: the wait ends early, and a notifier
+        that was stopped before ends in peace. Raises can.CanOperationError if the bus is gone.
+        """
+        try:
+            return super().recv(timeout)
+        except _ShutMeanwhile:
+            if timeout is None:
+                raise
+            return None
+
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         if self._lost is not None:
             return self._after_the_end()
+        if self._is_shutdown:
+            raise can.CanOperationError(f"{self.channel_info}: {_SHUT_DOWN}")
         try:
             record = self._next_record(timeout)
         except OSError as error:
+            if self._is_shutdown:
+                raise _ShutMeanwhile(f"{self.channel_info}: {_SHUT_DOWN}") from error
             raise self._lose(self._describe(error)) from error
         if record is None:
             return None, False
@@ -121,9 +143,9 @@ class BuiltinBus(can.BusABC):
             try:
                 record = receive(_SIZE, _AT_ONCE)
             except BlockingIOError:
-                if timeout <= 0 or not _wait(self._sock, False, timeout):
+                if timeout <= 0 or (waited := self._wait_and_receive(timeout)) is None:
                     return None
-                record = receive(_SIZE, _WHOLE)
+                record = waited
         else:
             if not _wait(self._sock, False, max(0.0, timeout)):
                 return None
@@ -134,6 +156,16 @@ class BuiltinBus(can.BusABC):
                 raise ConnectionResetError("the hub has ended")
             record += more
         return record
+
+    def _wait_and_receive(self, timeout: float) -> bytes | None:
+        """What is there first, within `timeout` s; another thread that reads the same bus may have been quicker."""
+        deadline = time.monotonic() + timeout
+        while timeout > 0 and _wait(self._sock, False, timeout):
+            try:
+                return self._sock.recv(_SIZE, _AT_ONCE)
+            except BlockingIOError:
+                timeout = deadline - time.monotonic()
+        return None
 
     def _message(self, record: bytes) -> can.Message:
         stamp, identifier, _, flags, dlc, length = wire.HEADER.unpack_from(record)
@@ -273,7 +305,7 @@ class BuiltinBus(can.BusABC):
 
     def _describe(self, error: OSError) -> str:
         if self._sock.fileno() < 0 or self._is_shutdown:
-            return "this bus has been shut down"
+            return _SHUT_DOWN
         return f"the hub (process {self.hub_pid}) ended without a word ({error}); open the bus again"
 
     def _lose(self, reason: str) -> can.CanOperationError:

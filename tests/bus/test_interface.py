@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from typing import Any
 from uuid import uuid4
@@ -13,7 +14,7 @@ import can
 import pytest
 from can.interfaces.virtual import VirtualBus
 
-from rds.bus.builtin import BuiltinBus
+from rds.bus import builtin
 
 Opener = Callable[..., can.BusABC]
 
@@ -103,9 +104,12 @@ def test_filters_hold_for_what_waits_already(opener: Opener) -> None:
 def test_recv_waits_as_long_as_asked(opener: Opener) -> None:
     bus = opener()
     for timeout in (0, 0.001, 0.05):
-        start = time.perf_counter()
-        assert bus.recv(timeout) is None
-        assert timeout <= time.perf_counter() - start + 1e-4 < timeout + 0.05
+        took = []
+        for _ in range(10):
+            start = time.perf_counter()
+            assert bus.recv(timeout) is None
+            took.append(time.perf_counter() - start + 1e-4)
+        assert timeout <= min(took) < timeout + 0.05, "a busy computer makes some of them longer, not all"
 
 
 def test_periodic_sending(opener: Opener) -> None:
@@ -179,4 +183,38 @@ def test_a_node_without_fd_sends_no_fd_frames() -> None:
         assert heard is not None and heard.is_fd
         assert last is not None and last.arbitration_id == 7
     with pytest.raises(ValueError, match="fd 'maybe' must be true or false"):
-        BuiltinBus(channel, fd="maybe")  # type: ignore[arg-type]
+        builtin.BuiltinBus(channel, fd="maybe")  # type: ignore[arg-type]
+
+
+class Failures(can.Listener):
+    """Keeps what ends a notifier's thread, and says that it is dealt with."""
+
+    def __init__(self) -> None:
+        self.seen: list[Exception] = []
+
+    def on_message_received(self, msg: can.Message) -> None:
+        pass
+
+    def on_error(self, exc: Exception) -> bool:  # type: ignore[override]
+        self.seen.append(exc)
+        return True
+
+
+def test_a_thread_that_is_woken_for_nothing_waits_to_its_own_time_and_no_longer(monkeypatch: Any) -> None:
+    """Of two threads that read one bus, both are woken by a frame, and one of them gets it."""
+    wait, woken = builtin._wait, iter([True, True])
+    monkeypatch.setattr(builtin, "_wait", lambda *given: next(woken, False) or wait(*given))
+    with ThreadPoolExecutor(1) as pool, can.Bus(uuid4().hex, interface="rds") as bus:
+        assert pool.submit(bus.recv, 0.05).result(timeout=5.0) is None
+    assert next(woken, None) is None
+
+
+def test_a_wait_ends_in_peace_when_another_thread_shuts_the_bus_down(opener: Opener) -> None:
+    """As canopen's `Network.disconnect` does it: the notifier is told to stop, not waited for, and the bus closed."""
+    bus, failures = opener(), Failures()
+    notifier = can.Notifier(bus, [failures], timeout=0.2)
+    time.sleep(0.05)
+    notifier.stop(0)
+    bus.shutdown()
+    notifier.stop(5.0)
+    assert failures.seen == [] and notifier.exception is None
