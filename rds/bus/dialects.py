@@ -60,21 +60,26 @@ def is_served(dialect: str, machine: Machine, interface: str, channel: str) -> b
     )
 
 
-def _answers(dialect: str, machine: Machine, interface: str, channel: str) -> bool:
+def find_dialect(machine: Machine, interface: str, channel: str | None, **options: Any) -> str | None:
+    """What the modules on a channel speak; None where none answers. Nothing moves there."""
+    return next((each for each in _DRIVERS if _answers(each, machine, interface, channel, **options)), None)
+
+
+def _answers(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:
     if dialect == "cia402":
         from rds.bus.cia402.scan import scan
 
-        return any(device.is_drive for device in scan(interface, channel))
+        return any(device.is_drive for device in scan(interface, channel, **options))
     from rds.bus.drivers import find_machine
 
     # the modules of the oacs dialect answer cyclic frames as well
-    nodes = {machine.axis(name).node for name in find_machine(machine, interface, channel)}
+    nodes = {machine.axis(name).node for name in find_machine(machine, interface, channel, **options)}
     if not nodes:
         return False
     from rds.bus.link import open_bus
     from rds.bus.oacs.host import identify
 
-    bus = open_bus(interface, channel, node="scan")
+    bus = open_bus(interface, channel, node="scan", **options)
     try:
         distributed = {info.id for info in identify(bus)}
     finally:

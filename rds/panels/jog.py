@@ -14,7 +14,7 @@ from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.session.jog import Jog
-from rds.session.jog_loop import JogAxis
+from rds.session.jog_axes import JogAxis
 
 NAME = "jog"
 TITLE = "Jog"

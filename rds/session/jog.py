@@ -1,4 +1,4 @@
-"""Jogging: axes moved by hand, while a button is held or by a step. The loop is a process of its own (jog_loop.py)."""
+"""Jogging: axes and spindles moved by hand. The loop is a process of its own (jog_loop.py)."""
 
 from __future__ import annotations
 
@@ -8,31 +8,46 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from rds.bus.link import BUILTIN, bus_name
 from rds.core.errors import InputError, MachineError
 from rds.machines import Machine, load_machine
 from rds.session.fields import Choice, Field, Number
-from rds.session.jog_loop import JogAxis, jog_axes
+from rds.session.jog_axes import JogAxis, JogSpindle, jog_axes, jog_spindles
 from rds.session.session import Session
 from rds.session.task import Task
 
-SPEAKS = ("rds", "oacs")  # dialects that can be jogged
 STEPS = ("0.01", "0.1", "1", "10")
+HOMING = {  # methods of object 0x6098 that every drive of ours has
+    "17": "17: negative limit switch",
+    "18": "18: positive limit switch",
+    "1": "1: index pulse at the negative switch",
+    "2": "2: index pulse at the positive switch",
+    "33": "33: next index pulse, negative way",
+    "34": "34: next index pulse, positive way",
+    "37": "37: here",
+}
+_NO_MODULE = ("dialect", "cia402", "faults", "interface", "channel")  # keys of [bus] that are not can.Bus's options
+_STANDS = 0.01  # of its highest speed: a spindle that is slower stands
 _STARTS_IN = 15.0  # s at most
-_ENDS_IN = 2.0
+_ENDS_IN = 8.0  # s: a quick stop of drives, and what they are told after it
 
 
-def _fields(axes: Mapping[str, JogAxis]) -> tuple[Field, ...]:
+def _fields(axes: Mapping[str, JogAxis], spindles: Mapping[str, JogSpindle]) -> Iterable[Field]:
     fastest = max((axis.speed for axis in axes.values()), default=1.0)
     tip = "Of the reference; an axis whose own limit is lower keeps that"
-    return (
-        Choice("way", "Move", "While a button is held, or by one step for each press", "hold", _WAYS),
-        Choice("step", "Step [mm or °]", "How far one press goes", "1", {step: step for step in STEPS}),
-        Number("speed", "Speed", tip, min(5.0, fastest), unit="mm/s or °/s", above=0.0, high=fastest),
-    )
+    yield Choice("way", "Move", "While a button is held, or by one step for each press", "hold", _WAYS)
+    yield Choice("step", "Step [mm or °]", "How far one press goes", "1", {step: step for step in STEPS})
+    yield Number("speed", "Speed", tip, min(5.0, fastest), unit="mm/s or °/s", above=0.0, high=fastest)
+    if spindles:
+        most = max(max(map(abs, each.speeds)) for each in spindles.values())
+        tip = "Of the spindle; the button chooses the way round"
+        yield Number("spindle_speed", "Spindle speed", tip, 0.1 * most, unit="rev/min", above=0.0, high=most)
+    tip = "Homing mode of CiA 402 drives, object 0x6098; an axis whose [bus.cia402] table gives one keeps that"
+    yield Choice("method", "Homing method", tip, "17", HOMING)
 
 
 _WAYS = {"hold": "while held", "step": "by step"}
@@ -41,16 +56,24 @@ _WAYS = {"hold": "while held", "step": "by step"}
 class Jog:
     """The hand on a session's machine. `begin()` takes the machine, `end()` lets it go; between, axes can be moved.
 
-    `positions` are those of the machine, measured, by axis; `error` says why the loop ended, where it did by itself.
+    `positions` and `speeds` (of spindles, rev/min) are the machine's own, measured; `error` says why the loop ended,
+    where it did by itself. `dialect` is what the modules speak, `left_out` the axes that can't be jogged in it and why,
+    `homing` the axis that is being homed, `homed` those that were since the machine was taken.
     """
 
     def __init__(self, session: Session):
         self.session = session
         self.machine: Machine = load_machine(session.machine)
         self.axes = jog_axes(self.machine)
-        self.choices = session.choices("jog", _fields(self.axes))
+        self.spindles = jog_spindles(self.machine)
+        self.choices = session.choices("jog", _fields(self.axes, self.spindles))
         self.positions: dict[str, float] = {}
+        self.speeds: dict[str, float] = {}
+        self.left_out: dict[str, str] = {}
+        self.dialect = ""
         self.moving = False
+        self.homing = ""
+        self.homed: set[str] = set()
         self.error = ""
         self._loop: subprocess.Popen[str] | None = None
         self._server: subprocess.Popen[bytes] | None = None
@@ -60,40 +83,41 @@ class Jog:
     @property
     def ready(self) -> bool:
         """Whether axes can be moved now."""
-        return bool(self.positions) and self._loop is not None and self._loop.poll() is None
+        return bool(self.positions or self.speeds) and self._loop is not None and self._loop.poll() is None
+
+    @property
+    def finds_home(self) -> bool:
+        """Whether the modules have a homing of their own, as drives do."""
+        return self.ready and self.dialect == "cia402"
 
     def begin(self) -> Task[None]:
         """Take the machine, and hold its axes where they are. InputError where it is in use or cannot be jogged."""
-        if not self.axes:
-            raise InputError("no axis of this machine has a position and a model with tau and K: none can be jogged")
+        if not self.axes and not self.spindles:
+            raise InputError(
+                "nothing of this machine can be jogged: it has no spindle, and no axis with limits or a model with K"
+            )
         self.session.take_machine("jogging", self)
         return self.session.work("taking the machine", self._begin)
 
     def _begin(self, task: Task[None]) -> None:
         try:
-            self.positions, self.error = {}, ""
-            interface = str(self.session.bus.get("interface", BUILTIN))
-            channel = self.session.bus.get("channel") or (self.machine.name if interface == BUILTIN else "")
+            self.positions, self.speeds, self.left_out, self.homed, self.error = {}, {}, {}, set(), ""
+            bus = dict(self.session.bus)
+            interface = bus["interface"] = str(bus.get("interface", BUILTIN))
+            if interface == BUILTIN:
+                bus["channel"] = bus.get("channel") or self.machine.name
             task.note = "looking for the machine"
-            dialect = self._dialect(interface, channel)
+            self.dialect = self._dialect(bus)
             task.advance(1, 3, "starting the loop")
-            command = [
-                sys.executable,
-                "-P",
-                "-m",
-                "rds.session.jog_loop",
-                self.machine.path,
-                dialect,
-                interface,
-                channel,
-            ]
+            words = [self.machine.path, self.dialect, json.dumps(bus)]
+            command = [sys.executable, "-P", "-m", "rds.session.jog_loop", *words]
             self._loop = loop = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
             )
             self._ends.append(weakref.finalize(self, _end_loop, loop))
             threading.Thread(target=_listen, args=(weakref.ref(self), loop), name="rds jog", daemon=True).start()
             deadline = time.monotonic() + _STARTS_IN
-            while not self.positions:
+            while not (self.positions or self.speeds):
                 task.advance(2, 3, "waiting for the axes")
                 if self.error or loop.poll() is not None or time.monotonic() > deadline:
                     time.sleep(0.1)  # its last words
@@ -103,36 +127,35 @@ class Jog:
             self.end()
             raise
 
-    def _dialect(self, interface: str, channel: str) -> str:
+    def _dialect(self, bus: Mapping[str, Any]) -> str:
         """What the modules speak; where none answers on the built-in bus, simulated ones are started for it."""
         from rds.bus.address import channels
-        from rds.bus.dialects import DEFAULT, is_served
+        from rds.bus.dialects import DEFAULT, check_dialect, find_dialect
         from rds.bus.server_process import end_server, start_server
 
-        refused = None
+        interface, channel, wanted = bus["interface"], bus.get("channel"), bus.get("dialect")
+        name = bus_name(interface, channel)
+        if wanted is not None:
+            check_dialect(wanted)
         if interface != BUILTIN or channel in channels():
-            for dialect in SPEAKS:
-                try:
-                    if is_served(dialect, self.machine, interface, channel):
-                        return dialect
-                except InputError as error:
-                    refused = error
-        if refused is not None:
-            raise InputError(
-                f"the modules on {bus_name(interface, channel)} speak no dialect that can be jogged "
-                f"({', '.join(SPEAKS)}); serve the machine in one of these"
-            ) from refused
+            options = {key: value for key, value in bus.items() if key not in _NO_MODULE}
+            found = find_dialect(self.machine, interface, channel, **options)
+            if found is not None and wanted not in (None, found):
+                raise InputError(f'what answers on bus {name} speaks {found}, and [bus] says dialect = "{wanted}"')
+            if found is not None:
+                return found
         if interface == BUILTIN:  # a bus that outlives its modules for a moment included
-            self._server = start_server(DEFAULT, self.machine.path, channel)
+            self._server = start_server(wanted or DEFAULT, self.machine.path, str(channel))
             self._ends.append(weakref.finalize(self, end_server, self._server))
-            return DEFAULT
-        raise MachineError(f"no module of {self.machine.name} answers on {bus_name(interface, channel)}; switch it on")
+            return wanted or DEFAULT
+        raise MachineError(f"no module of {self.machine.name} answers on {name}; switch it on")
 
     def end(self) -> None:
-        """Let the machine go: zero volts. Nothing where it is not taken."""
+        """Let the machine go: no voltage, drives by a quick stop. Nothing where it is not taken."""
         for end in self._ends:
             end()
-        self._ends, self._loop, self._server, self.positions, self.moving = [], None, None, {}, False
+        self._ends, self._loop, self._server = [], None, None
+        self.positions, self.speeds, self.moving, self.homing = {}, {}, False, ""
         self.session.give_machine_back(self)
 
     stop = end  # what the emergency stop calls
@@ -144,9 +167,14 @@ class Jog:
         self._order(hold=self._axis(axis).name, direction=direction)
 
     def rest(self) -> None:
-        """Bring everything to rest, within the axes' accelerations."""
+        """Bring the axes to rest, within their accelerations. Spindles turn on."""
         if self.ready:
-            self._order(stop=True)
+            self._order(rest=True)
+
+    def halt(self) -> None:
+        """Bring everything to rest: axes, spindles, and a homing, which leaves its axis without power."""
+        if self.ready:
+            self._order(halt=True)
 
     def step(self, axis: str, direction: int) -> None:
         """Move by the step chosen. InputError where that leaves the travel."""
@@ -156,7 +184,9 @@ class Jog:
         """Move to a position, at `speed` or that which is chosen. InputError where it is out of the travel."""
         known = self._axis(axis)
         low, high = known.travel
-        if not low <= goal <= high:
+        place = self.positions.get(axis, 0.0)
+        way = 1 if goal > place else -1
+        if not (goal - known.end(place, way)) * way <= 0.0:  # false for NaN too
             raise InputError(
                 f"{axis} would leave its travel, {low:g} to {high:g} {known.unit}, at {goal:.3f}; choose a smaller step"
             )
@@ -166,12 +196,51 @@ class Jog:
 
     def home(self) -> None:
         """All axes to their zero, or the end of the travel next to it, one after the other, Z first."""
-        order = sorted(self.axes.values(), key=lambda axis: axis.name != "Z")
+        order = sorted((self.axes[name] for name in self.positions), key=lambda axis: axis.name != "Z")
         self._order(goals=[[axis.name, min(max(0.0, axis.travel[0]), axis.travel[1])] for axis in order])
+
+    def find_home(self, axes: Iterable[str] | None = None, method: int | None = None) -> None:
+        """Let the drives of `axes` (default: all) find their home by homing mode 6, one after the other, Z first.
+
+        `method` is by default the one that is chosen; a `[bus.cia402]` table of the session goes before both. The other
+        axes have no power meanwhile. InputError where the modules are no drives, or a spindle turns.
+        """
+        if self.ready and not self.finds_home:
+            raise InputError(
+                f"modules that speak {self.dialect} have no homing of their own, which is the drives' (cia402); "
+                "Home moves the axes to their zero"
+            )
+        if any(abs(speed) > _STANDS * self.spindles[name].speeds[1] for name, speed in self.speeds.items()):
+            raise InputError("a spindle turns; stop it first: nothing else has power while a drive is homed")
+        number = Choice("method", "Homing method", "", "", HOMING).check(
+            self.choices["method"] if method is None else str(method)
+        )
+        names = [self._axis(name).name for name in (self.positions if axes is None else axes)]
+        self._order(home=dict.fromkeys(names, int(number)))
+
+    def turn(self, spindle: str, direction: int, speed: float | None = None) -> None:
+        """Turn a spindle at `speed` (rev/min) or that which is chosen; it stops unless this is said again within 1 s.
+
+        InputError for a speed beyond the spindle's own, and while an axis is homed.
+        """
+        if spindle not in self.spindles:
+            names = ", ".join(self.spindles) or "none"
+            raise InputError(f"there is no spindle {spindle!r} to turn; there are: {names}")
+        if spindle in self.left_out:
+            raise InputError(f"{spindle} cannot be jogged: {self.left_out[spindle]}")
+        if self.homing:
+            raise InputError(f"{self.homing} is being homed; wait until it is, or stop it")
+        wanted = direction * (self.choices["spindle_speed"] if speed is None else speed)
+        low, high = self.spindles[spindle].speeds
+        if not low <= wanted <= high:  # false for NaN too
+            raise InputError(f"{spindle} turns at {low:g} to {high:g} rev/min, not at {wanted:g}")
+        self._order(turn=spindle, speed=wanted)
 
     def _axis(self, name: str) -> JogAxis:
         if name not in self.axes:
             raise InputError(f"there is no axis {name!r} to jog; there are {', '.join(self.axes)}")
+        if name in self.left_out:
+            raise InputError(f"{name} cannot be jogged: {self.left_out[name]}")
         return self.axes[name]
 
     def _order(self, *, speed: float | None = None, **order: Any) -> None:
@@ -192,8 +261,17 @@ class Jog:
     def _hear(self, words: Mapping[str, Any]) -> None:
         if "error" in words:
             self.error = str(words["error"])
+        elif "travel" in words:
+            for name, travel in words["travel"].items():
+                self.axes[name] = replace(self.axes[name], travel=tuple(travel))
+            self.left_out = dict(words["left_out"])
+        elif "homed" in words:
+            self.homed |= set(words["homed"])
         else:
-            self.positions, self.moving = dict(words["positions"]), bool(words["moving"])
+            measured = words["measured"]
+            self.positions = {name: measured[name] for name in self.axes if name in measured}
+            self.speeds = {name: measured[name] for name in self.spindles if name in measured}
+            self.moving, self.homing = bool(words["moving"]), str(words["homing"])
 
 
 def _listen(jog: weakref.ref[Jog], loop: subprocess.Popen[str]) -> None:
@@ -207,13 +285,13 @@ def _listen(jog: weakref.ref[Jog], loop: subprocess.Popen[str]) -> None:
         del mine
     loop.wait()
     if (mine := jog()) is not None and mine._loop is loop:  # it ended by itself
-        mine.moving = False
+        mine.moving, mine.homing = False, ""
         mine.error = mine.error or "the loop that jogs has ended"
         mine.session.give_machine_back(mine)
 
 
 def _end_loop(loop: subprocess.Popen[str]) -> None:
-    """Its orders end, so it gives zero volts and ends."""
+    """Its orders end, so it takes the voltage off and ends."""
     assert loop.stdin is not None
     try:
         loop.stdin.close()

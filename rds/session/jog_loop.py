@@ -1,159 +1,125 @@
-"""The loop that jogs, in a process of its own: `python -m rds.session.jog_loop MACHINE DIALECT INTERFACE CHANNEL`.
+"""The loop that jogs, in a process of its own: `python -m rds.session.jog_loop MACHINE DIALECT BUS`, BUS in JSON.
 
-Orders come as lines of JSON on stdin, what the axes do goes out on stdout, REPORTS times a second. A hold ends unless
-it is said again within DEAD_MAN s. When stdin ends, whoever gave orders has died: zero volts at once. Should this
-process die, the modules' own watchdogs cut the voltage after ten periods.
+Orders come as lines of JSON on stdin (jog_orders.py), what the machine does goes out on stdout, REPORTS times a second.
+A hold ends unless it is said again within DEAD_MAN s, a spindle's turning within SPINDLE_DEAD_MAN s. When stdin ends,
+whoever gave orders has died: no voltage, drives by a quick stop. Should this process die, the modules' own watchdogs
+cut the voltage after ten periods, and drives stop when SYNC and heartbeat stay away.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
 import threading
 import time
-from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
-from rds.bus.dialects import open_drivers
+from rds.bus.command import Command
+from rds.bus.link import BUILTIN, default_channel
 from rds.core.errors import RdsError
 from rds.machines import load_machine
-from rds.machines.machine import Axis, Machine
 from rds.motion.jog import advance
+from rds.session.jog_hands import Hand, open_hand
+from rds.session.jog_orders import Orders, Wanted
 
-PERIOD = 0.002  # s
-DEAD_MAN = 0.2  # s
 REPORTS = 20.0  # 1/s
-_REST = 0.08  # s from the highest speed to rest at most
-_COUNTS = 5.0  # of error at rest over which friction is made up for
 
 
-@dataclass(frozen=True)
-class JogAxis:
-    """What jogging needs to know of an axis: units of the axis, s, V."""
-
-    name: str
-    unit: str
-    travel: tuple[float, float]
-    speed: float  # the most
-    acceleration: float
-    braking: float  # deceleration to rest, when it is let go
-    resolution: float
-    tau: float
-    K: float
-    friction: tuple[float, float]  # lost speed, forwards and backwards (negative)
-    voltage: float  # the most
-
-    def volts(self, error: float, velocity: float) -> float:
-        """The voltage for an error of position and a reference velocity.
-
-        u = (v + f)/K + Kp e, with Kp = 1/(2 tau K), which damps τẍ + ẋ = K u by 0.7. At rest, friction f is made up
-        for in proportion to the error, within some counts, so that small steps are not lost in it.
-        """
-        share = (velocity > 0.0) - (velocity < 0.0) if velocity else error / (_COUNTS * self.resolution)
-        share = min(max(share, -1.0), 1.0)
-        friction = share * self.friction[0] if share > 0.0 else -share * self.friction[1]
-        volts = (velocity + friction) / self.K + error / (2.0 * self.tau * self.K)
-        return min(max(volts, -self.voltage), self.voltage)
+class NotWanted(Exception):
+    """A homing that is not wanted any more."""
 
 
-def jog_axes(machine: Machine) -> dict[str, JogAxis]:
-    """The axes of `machine` that can be jogged: those with a position and a model of first order."""
-    return {axis.name: made for axis in machine.axes.values() if (made := _jog_axis(axis, machine)) is not None}
+class Reference:
+    """Where each axis shall be and how fast, and how fast each spindle shall turn."""
 
+    def __init__(self, hand: Hand, measured: Mapping[str, float]):
+        self.places = {name: measured[name] for name in hand.axes}
+        self.speeds = dict.fromkeys((*hand.axes, *hand.spindles), 0.0)
 
-def _jog_axis(axis: Axis, machine: Machine) -> JogAxis | None:
-    tau, K = axis.model.get("tau"), axis.model.get("K")
-    if axis.unit == "rev/min" or not tau or not K:
-        return None
-    volts = machine.converter.range
-    friction = float(axis.model.get("friction_plus", 0.0)), float(axis.model.get("friction_minus", 0.0))
-    speed = axis.limits.velocity if axis.limits else 0.5 * K * volts
-    acceleration = axis.limits.acceleration if axis.limits else speed / (5.0 * tau)
-    return JogAxis(
-        name=axis.name,
-        unit=axis.unit,
-        travel=axis.travel,
-        speed=speed,
-        acceleration=acceleration,
-        braking=max(acceleration, speed / _REST),
-        resolution=axis.resolution,
-        tau=tau,
-        K=K,
-        friction=friction,
-        voltage=volts,
-    )
+    @property
+    def rests(self) -> bool:
+        """Whether nothing shall move."""
+        return not any(self.speeds.values())
 
-
-class Orders:
-    """What is wanted now. `hear` is called by the thread that reads, the rest by the loop."""
-
-    def __init__(self, axes: dict[str, JogAxis]):
-        self.axes = axes
-        self.ended = False
-        self._goals: deque[tuple[str, float, float]] = deque()  # axis, goal, speed: one after the other
-        self._held: tuple[str, float, float] | None = None
-        self._until = 0.0  # s, time.monotonic: when the hold ends
-        self._lock = threading.Lock()
-
-    def hear(self, order: dict[str, Any], now: float) -> None:
-        """One order: {"hold": AXIS, "direction", "speed"}, {"goals": [[AXIS, position], ...], "speed"} or {"stop"}."""
-        with self._lock:
-            self._goals.clear()
-            self._held = None
-            if "hold" in order:
-                axis = self.axes[order["hold"]]
-                self._held = axis.name, axis.travel[order["direction"] > 0], min(order["speed"], axis.speed)
-                self._until = now + DEAD_MAN
-            elif "goals" in order:
-                self._goals.extend(
-                    (name, goal, min(order["speed"], self.axes[name].speed)) for name, goal in order["goals"]
-                )
-
-    def wanted(self, now: float) -> tuple[str, float, float] | None:
-        """Axis, goal and speed at this instant; None: all come to rest."""
-        with self._lock:
-            if self._held is not None and now > self._until:
-                self._held = None
-            return self._held or (self._goals[0] if self._goals else None)
-
-    def reached(self, name: str, goal: float) -> None:
-        """The axis is there: the next goal counts."""
-        with self._lock:
-            if self._goals and self._goals[0][:2] == (name, goal):
-                self._goals.popleft()
-
-
-def jog(machine: Machine, drivers: Any, orders: Orders) -> None:
-    """Hold all axes where they are, and move what is wanted, until `orders.ended`. MachineError where the bus fails."""
-    axes = list(orders.axes.values())
-    drivers.start()
-    origin = drivers.standing
-    places, speeds = list(origin), [0.0] * len(axes)
-    due = time.monotonic()
-    report_at = 0.0
-    while not orders.ended:
-        now = time.monotonic()
-        measured = [at + start for at, start in zip(drivers.exchange(), origin, strict=True)]
-        wanted = orders.wanted(now)
-        for i, axis in enumerate(axes):
-            goal, speed = wanted[1:] if wanted is not None and wanted[0] == axis.name else (None, axis.speed)
+    def advance(self, hand: Hand, orders: Orders, wanted: Wanted | None, turning: Mapping[str, float]) -> None:
+        """Move on by a period: one axis towards its goal, the others to rest, spindles towards their speeds."""
+        for name, axis in hand.axes.items():
+            goal, speed = wanted[1:] if wanted is not None and wanted[0] == name else (None, axis.speed)
             rate = axis.braking if goal is None else axis.acceleration
-            places[i], speeds[i] = advance(places[i], speeds[i], goal, speed, rate, PERIOD)
-            if goal is not None and places[i] == goal:
-                orders.reached(axis.name, goal)
-        drivers.write([axis.volts(p - y, v) for axis, p, y, v in zip(axes, places, measured, speeds, strict=True)])
+            place, velocity = self.places[name], self.speeds[name]
+            self.places[name], self.speeds[name] = advance(place, velocity, goal, speed, rate, hand.period)
+            if goal is not None and self.places[name] == goal:
+                orders.reached(name, goal)
+        for name, spindle in hand.spindles.items():
+            most = spindle.acceleration * hand.period
+            self.speeds[name] += min(max(turning[name] - self.speeds[name], -most), most)
+
+
+def jog(hand: Hand, orders: Orders) -> None:
+    """Hold all axes where they are, and move what is wanted, until `orders.ended`. MachineError where the bus fails."""
+    hand.start()
+    reference = _introduce(hand, orders)
+    due, report_at = time.monotonic(), 0.0
+    while not orders.ended:
+        if orders.homing and reference.rests:
+            _home(hand, orders)
+            reference = _introduce(hand, orders)
+            due = time.monotonic()
+        now = time.monotonic()
+        measured = hand.read()
+        wanted, turning = orders.wanted(now), orders.turning(now)
+        reference.advance(hand, orders, wanted, turning)
+        hand.write(reference.places, reference.speeds)
         if now >= report_at:
             report_at = now + 1.0 / REPORTS
-            moving = wanted is not None or any(speeds)
-            _say({"positions": dict(zip(orders.axes, measured, strict=True)), "moving": moving})
-        due += PERIOD
+            _report(measured, wanted is not None or not reference.rests)
+        due += hand.period
         left = due - time.monotonic()
         if left > 0.0:
             time.sleep(left)
         else:
             due -= left  # what is late is not made up for
+
+
+def _home(hand: Hand, orders: Orders) -> None:
+    """Let drives find home, as long as that is wanted."""
+    methods = orders.homing
+    places = dict(orders.places)
+    report_at = 0.0
+
+    def watch(axis: str, position: float) -> None:
+        nonlocal report_at
+        if orders.ended or orders.homing is not methods:
+            raise NotWanted
+        places[axis] = position
+        if time.monotonic() >= report_at:
+            report_at = time.monotonic() + 1.0 / REPORTS
+            _report(places, True, homing=axis)
+
+    with contextlib.suppress(NotWanted):
+        hand.home(methods, watch)
+        orders.homed()
+        _say({"homed": list(methods)})
+
+
+def _introduce(hand: Hand, orders: Orders) -> Reference:
+    """After a start: where the axes stand and are held, and their travel, which may be another one."""
+    reference = Reference(hand, hand.read())
+    orders.axes, orders.spindles, orders.places = dict(hand.axes), dict(hand.spindles), reference.places
+    _say({"travel": {name: axis.travel for name, axis in hand.axes.items()}, "left_out": hand.left_out})
+    return reference
+
+
+def _report(measured: Mapping[str, float], moving: bool, homing: str = "") -> None:
+    _say({"measured": dict(measured), "moving": moving, "homing": homing})
+
+
+def _say(words: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(words) + "\n")
+    sys.stdout.flush()
 
 
 def _read(orders: Orders) -> None:
@@ -165,24 +131,21 @@ def _read(orders: Orders) -> None:
     orders.ended = True
 
 
-def _say(words: dict[str, Any]) -> None:
-    sys.stdout.write(json.dumps(words) + "\n")
-    sys.stdout.flush()
-
-
 def main(arguments: list[str]) -> int:
     """The program. Exit code 0: its orders have ended; 1: the machine failed, and the last line says why."""
-    name, dialect, interface, channel = arguments
+    name, dialect, words = arguments
+    bus = json.loads(words)
     try:
-        machine = load_machine(name)
-        orders = Orders(jog_axes(machine))
-        threading.Thread(target=_read, args=(orders,), daemon=True).start()
-        bus = {"interface": interface} | ({"channel": channel} if channel else {})
-        drivers = open_drivers(dialect, machine, list(orders.axes), PERIOD, False, bus)
-        try:
-            jog(machine, drivers, orders)
-        finally:
-            drivers.close()
+        with contextlib.ExitStack() as stack:
+            machine = load_machine(name)
+            interface = bus.setdefault("interface", BUILTIN)
+            if interface == BUILTIN:
+                stack.enter_context(Command(str(default_channel(machine, interface, bus.get("channel")))))
+            hand = open_hand(dialect, machine, bus)
+            stack.callback(hand.close)
+            orders = Orders(hand.axes, hand.spindles)
+            threading.Thread(target=_read, args=(orders,), daemon=True).start()
+            jog(hand, orders)
     except RdsError as error:
         _say({"error": str(error)})
         return 1

@@ -20,7 +20,8 @@ from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.session import Session
 from rds.session.jog import Jog
-from rds.session.jog_loop import DEAD_MAN, Orders, jog_axes
+from rds.session.jog_axes import jog_axes, jog_spindles
+from rds.session.jog_orders import DEAD_MAN, Orders
 
 pytestmark = pytest.mark.realtime
 PATIENCE = 30.0  # s, on a busy computer
@@ -110,7 +111,8 @@ def test_whoever_gave_orders_dies_and_the_loop_ends_with_it(alone: Path) -> None
 
 
 def test_a_hold_lasts_as_long_as_it_is_renewed_and_goals_follow_each_other() -> None:
-    orders = Orders(jog_axes(load_machine("mini-cnc")))
+    machine = load_machine("mini-cnc")
+    orders = Orders(jog_axes(machine), jog_spindles(machine))
     orders.hear({"hold": "X", "direction": -1, "speed": 99.0}, 10.0)
     assert orders.wanted(10.0 + DEAD_MAN) == ("X", -75.0, 13.0)  # its own limit
     assert orders.wanted(10.01 + DEAD_MAN) is None

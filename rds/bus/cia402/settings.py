@@ -114,8 +114,12 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
     where = "[bus.cia402]"
     check_known(table, _TOP, where)
     given = table.get("axis", {})
-    for name in given:
+    if not isinstance(given, Mapping):
+        raise InputError(f"axis = {given!r} must be tables, one for each axis: [bus.cia402.axis.X]", where)
+    for name, of_axis in given.items():
         machine.axis(name)
+        if not isinstance(of_axis, Mapping):
+            raise InputError(f"axis.{name} = {of_axis!r} must be a table, [bus.cia402.axis.{name}]", where)
     used = [machine.axis(name) for name in (machine.axes if axes is None else axes)]
     mode = table.get("mode", "cst")
     _command(mode, where)
@@ -140,7 +144,7 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
 
 def _command(name: Any, where: str) -> Command:
     names = {command.name.lower(): command for command in Command}
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise InputError(f"mode = {name!r} must be one of {', '.join(map(repr, names))}", where)
     return names[name]
 
@@ -211,9 +215,9 @@ def _eds(path: Any, machine: Machine, where: str) -> str:
 
 
 def _writes(entries: Any, where: str) -> tuple[tuple[int, int, int], ...]:
-    for entry in entries:
-        if len(entry) != 3 or not all(isinstance(number, int) for number in entry):
-            raise InputError(f"write = {entries!r} must be a list of [index, sub-index, value]", where)
+    lists = isinstance(entries, Sequence) and all(isinstance(entry, Sequence) and len(entry) == 3 for entry in entries)
+    if not lists or not all(isinstance(number, int) for entry in entries for number in entry):
+        raise InputError(f"write = {entries!r} must be a list of [index, sub-index, value]", where)
     return tuple((entry[0], entry[1], entry[2]) for entry in entries)
 
 

@@ -1,0 +1,165 @@
+"""Jogging CiA 402 drives and spindles: real processes on a real bus, and what the drives themselves say afterwards."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rds.bus.cia402.codes import State
+from rds.bus.cia402.scan import scan
+from rds.core.errors import InputError
+from rds.machines import load_machine
+from rds.session import Session
+from rds.session.jog import Jog
+from rds.session.jog_orders import SPINDLE_DEAD_MAN
+
+from .test_jog import PATIENCE, hold_until, wait_for
+
+pytestmark = pytest.mark.realtime
+
+POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+
+
+def taken(folder: Path, machine: str = "mini-cnc", **bus: Any) -> Jog:
+    jog = Jog(Session(folder, machine, bus))
+    task = jog.begin()
+    assert task.wait(PATIENCE)
+    assert task.error is None, task.error
+    return jog
+
+
+@pytest.fixture
+def drives(alone: Path) -> Iterator[Jog]:
+    jog = taken(alone, dialect="cia402")
+    yield jog
+    jog.end()
+
+
+def without_power() -> bool:
+    found = [device.state for device in scan(channel="mini-cnc") if device.is_drive]
+    return len(found) == 4 and not any(state in POWERED for state in found)
+
+
+def turn_until(jog: Jog, reached: Callable[[float], bool], direction: int = 1) -> None:
+    def on() -> bool:
+        jog.turn("spindle", direction, 3000.0)
+        return reached(jog.speeds["spindle"])
+
+    wait_for(on)
+
+
+def test_drives_are_moved_while_held_and_by_step_within_their_limits(drives: Jog) -> None:
+    assert drives.finds_home and set(drives.positions) == {"X", "Y", "Z"} and not drives.left_out
+    hold_until(drives, 1.0)
+    wait_for(lambda: not drives.moving)
+    rested = drives.positions["X"]
+    drives.choices.set("step", "0.1")
+    drives.step("X", -1)
+    wait_for(lambda: drives.positions["X"] == pytest.approx(rested - 0.1, abs=0.005))
+    assert drives.positions["Y"] == pytest.approx(0.0, abs=0.005)
+    with pytest.raises(InputError, match=r"X would leave its travel, -74\.85 to 74\.85 mm"):  # clear of the switches
+        drives.go("X", 75.0)
+    turn_until(drives, lambda speed: speed == pytest.approx(3000.0, abs=60.0))
+    drives.halt()
+    wait_for(lambda: abs(drives.speeds["spindle"]) < 30.0)
+    drives._loop.kill()  # type: ignore[union-attr]
+    wait_for(without_power)
+
+
+def test_software_limits_narrow_the_travel_and_home_is_found(alone: Path) -> None:
+    """Homing by the negative switch makes it the end of the travel, whatever the drive counted before."""
+    here = {"homing": 37, "home": -3.0}
+    limits = [[0x607D, 1, -1_000], [0x607D, 2, 2_500]]
+    axes = {"X": {"write": limits, **here}, "spindle": {"mode": "cst"}}
+    machine = Path(load_machine("mini-cnc").path).read_text()
+    (alone / "small.toml").write_text(machine.replace("[-75.0, 75.0]", "[-3.0, 3.0]"))
+    jog = taken(alone, str(alone / "small.toml"), dialect="cia402", cia402={"axis": axes})
+    try:
+        assert jog.axes["X"].travel == (-1.0, 2.5) and jog.positions["X"] == 0.0  # not homed at the start
+        jog.find_home(["X", "Y"], 17)
+        wait_for(lambda: jog.homing == "Y" and jog.positions["Y"] < -1.0)
+        with pytest.raises(InputError, match="Y is being homed"):
+            jog.turn("spindle", 1)
+        wait_for(lambda: "Y" in jog.homed and not jog.homing)
+        assert jog.positions["X"] == -3.0  # the table's own method and home
+        assert jog.positions["Y"] == pytest.approx(-3.0, abs=0.05)
+        jog.step("Y", 1)
+        wait_for(lambda: jog.positions["Y"] == pytest.approx(-2.0, abs=0.1))
+        with pytest.raises(InputError, match=r"Y would leave its travel, -2\.994 to 2\.994"):
+            jog.go("Y", -4.0)
+        jog.find_home(["Z"], 18)
+        wait_for(lambda: jog.positions["Z"] > 0.5)
+        jog.halt()
+        wait_for(lambda: not jog.homing and jog.ready)
+        assert jog.homed == {"X", "Y"} and jog.positions["Z"] < 45.0
+        jog.step("Z", -1)  # goes on as before
+        wait_for(lambda: not jog.moving)
+    finally:
+        jog.end()
+
+
+DIES = """
+import sys, time
+from rds.session import Session
+from rds.session.jog import Jog
+jog = Jog(Session(sys.argv[1]))
+jog.begin().wait(60)
+while True:
+    jog.hold("X", 1)
+    jog.turn("spindle", 1)
+    print(jog.positions["X"], jog.speeds["spindle"], flush=True)
+    time.sleep(0.05)
+"""
+
+
+def test_whoever_jogs_drives_dies_and_they_stop(alone: Path) -> None:
+    served = [sys.executable, "-m", "rds.bus.cia402.server", "mini-cnc", "--exit-with-stdin"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(served, stdin=pipe, stdout=pipe, text=True) as server:
+        assert server.stdout is not None and server.stdout.readline().startswith("ready")
+        page = subprocess.Popen([sys.executable, "-c", DIES, str(alone)], stdout=pipe, text=True)
+        assert page.stdout is not None
+        for line in page.stdout:
+            position, speed = map(float, line.split())
+            if position > 0.5 and speed > 500.0:
+                break
+        os.kill(page.pid, signal.SIGKILL)
+        page.wait()
+        page.stdout.close()
+        wait_for(without_power)
+        server.terminate()
+
+
+def test_the_emergency_stop_reaches_drives_that_are_jogged(drives: Jog) -> None:
+    hold_until(drives, 0.2)
+    assert "4 modules are at zero volts" in drives.session.emergency_stop()
+    assert not drives.ready
+
+
+def test_a_spindle_keeps_its_speed_and_stops_when_nobody_says_it_any_more(alone: Path) -> None:
+    """Of modules that take voltages: the library's controller keeps the speed that the model alone would miss."""
+    jog = taken(alone)
+    try:
+        assert jog.dialect == "rds" and jog.speeds == {"spindle": 0.0}
+        turn_until(jog, lambda speed: abs(speed + 3000.0) < 30.0, -1)
+        said = time.monotonic()
+        jog.hold("X", 1)  # axes and spindle do not stop each other
+        jog.rest()
+        assert abs(jog.speeds["spindle"]) > 2000.0
+        wait_for(lambda: jog.speeds["spindle"] == 0.0)
+        assert time.monotonic() - said > SPINDLE_DEAD_MAN
+        for words, refused in ((("spindle", 1, 12_000.0), "turns at -10000 to 10000"), (("X", 1), "no spindle 'X'")):
+            with pytest.raises(InputError, match=refused):
+                jog.turn(*words)
+        with pytest.raises(InputError, match="speak rds have no homing"):
+            jog.find_home()
+    finally:
+        jog.end()
