@@ -26,7 +26,7 @@ from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.blame import fault
 from rds.modes.live import Live
-from rds.modes.machine import machine_behind
+from rds.modes.machine import BUILTIN, machine_behind
 from rds.runtime.changes import Change, read_changes, timed
 from rds.runtime.desk import Desk
 from rds.runtime.plan import Plan, dump
@@ -140,6 +140,8 @@ def _recorded(
     """Let a recorder start the target, and wait for the end of the run; whether there is a sample."""
     about: dict[str, Any] = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
     about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8), "ready": READY}
+    if plan.bus.get("interface") == BUILTIN:
+        about["channel"] = plan.bus["channel"]
     capacity = min(plan.most_samples, max(_RING_BYTES // (8 * len(columns)), 1000))
     ring = Ring.create(_ring_path(about["run"]), columns, capacity, **about)
     desk = Desk.create(ring.desk_path, plan.channels())

@@ -156,6 +156,7 @@ def main(arguments: list[str]) -> int:
         )
         # where a user in trouble finds them, and the host if the recorder is killed
         processes = {"recorder": os.getpid(), "target": target.pid, "desk": str(ring.desk_path)}
+        processes["channel"] = ring.about.get("channel")  # of the built-in bus: where an emergency stop goes
         (directory / PROCESSES).write_text(json.dumps(processes))
         hung = watch(target, recorder, ring.about["sample_period"])
     recorder.close()

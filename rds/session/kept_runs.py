@@ -46,6 +46,15 @@ class KeptRun:
 
         return open_result(self.folder)
 
+    @property
+    def channel(self) -> str | None:
+        """Of the built-in bus, where a run that goes on may have a machine of its own; None for any other run."""
+        try:
+            channel = json.loads((self.folder / PROCESSES).read_text())["channel"]
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return channel if isinstance(channel, str) else None
+
     def stop(self) -> None:
         """Ask a run that goes on for a safe end; one that is over stays as it is."""
         with contextlib.suppress(InputError), desk_of(self.folder) as desk:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rds.core.errors import InputError, RdsError
+from rds.core.errors import InputError
 from rds.results.atomic import write_whole
 from rds.session.choices import Choices
 from rds.session.claim import Claim
@@ -194,20 +194,17 @@ class Session:
         return text
 
     def _stop_modules(self) -> list[int]:
+        from concurrent.futures import ThreadPoolExecutor
+
         from rds.bus.estop import stop_everything
 
-        stopped, failed = [], None
-        for channel in self._channels():  # one that fails keeps none of the others from being stopped
-            try:
-                stopped += self._on(channel, stop_everything)
-            except RdsError as error:
-                failed = error
-        if failed is not None:
-            raise failed
-        return stopped
+        channels = self._channels()
+        with ThreadPoolExecutor(len(channels)) as pool:  # none waits for another's answers, or fails with it
+            asked = [pool.submit(self._on, channel, stop_everything) for channel in channels]
+        return [node for each in asked for node in each.result()]
 
     def _channels(self) -> list[str | None]:
-        """Where modules of this session may be: the machine's own channel first."""
+        """Where modules of this session, or of a run in its folder, may be: the machine's own channel first."""
         if self.bus.get("interface", "rds") != "rds":
             return [self.bus.get("channel")]
         from rds.machines import load_machine
@@ -216,7 +213,8 @@ class Session:
             own = self.bus.get("channel") or load_machine(self.machine).name
         except InputError:  # a file that is broken by now is no reason not to stop
             own = self.machine
-        return [own, *sorted(self.channels - {own})]
+        runs = {run.channel for run in self.runs() if run.state is State.GOES_ON and run.channel is not None}
+        return [own, *sorted((self.channels | runs) - {own})]
 
     def _on(self, channel: str | None, act: Callable[[Any], list[int]]) -> list[int]:
         from rds.bus.link import open_bus

@@ -52,6 +52,20 @@ def test_a_run_that_is_being_saved_is_not_cut_short(tmp_path: Path, monkeypatch:
     assert [kept.state for kept in Session(tmp_path).runs()] == [State.CUT_SHORT]  # nothing was saved after all
 
 
+@pytest.mark.realtime
+def test_the_emergency_stop_reaches_a_machine_that_a_run_started_for_itself(tmp_path: Path) -> None:
+    equipment = Equipment(Session(tmp_path), "control")
+    equipment.choices.set("mode", "implementation")
+    equipment.choices.set("duration", 60.0)
+    run = equipment.run().start()
+    while not len(run.new_rows()) and not run.done:
+        time.sleep(0.05)
+    said = Session(tmp_path).emergency_stop()  # of another page, or of the page's server
+    assert said.startswith("emergency stop: 4 modules are at zero volts")
+    assert run.wait(60) and run.result is not None
+    assert run.result.meta["ending"] == "machine lost" and "emergency stop" in run.result.meta["ending_reason"]
+
+
 def test_a_students_fault_is_told_before_anything_runs(tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text("def control(t, r, y, state, params):\n    return r.positoin, state\n")
     equipment = Equipment(Session(tmp_path), "control")
