@@ -3,27 +3,35 @@
 The same input gives the same count, on a busy computer too. What one compiled function does inside counts as one.
 
 The count is begun before the submission is loaded, and kept in closures that nothing a submission can import, patch or
-be handed leads to: what it does to `sys`, `os`, `json` or to this package comes too late. Each answer carries a seal
-that only these closures and the grader know, so that nobody else can answer for them.
+be handed leads to: what it does to `sys`, `os`, `json` or to this package comes too late. It can come by what calls
+them (the trace function of a frame, the argument of a function that it has patched), and so these show nothing of what
+is inside. Real frames, through which lines could be left uncounted, cannot be had. Each answer carries a seal that only
+these closures and the grader know, so that nobody else can answer for them.
 """
 
 from __future__ import annotations
 
+import _imp
+import _signal  # type: ignore[import-not-found] # signal.signal is a wrapper around it
 import os
 import resource
 import sys
+from _functools import _lru_cache_wrapper  # type: ignore[import-not-found] # not functools': that may be Python
 from collections.abc import Callable, Iterator, Sequence
-from types import CodeType, FrameType, ModuleType
+from types import CodeType, FrameType, ModuleType, SimpleNamespace
 from typing import Any, NamedTuple
 
 from rds.grading.sandbox.door import Closed
 from rds.grading.sandbox.inside import kernel
 from rds.grading.sandbox.records import OK, TOTAL, Layout
 
-_NEVER = frozenset({"sys.settrace", "sys.setprofile", "sys._current_frames", "sys._current_exceptions", "os.fork"})
+_TRACES = frozenset({"sys.settrace", "sys.setprofile"})
+_LOOKS = frozenset({"sys._getframe", "sys._current_frames", "sys._current_exceptions"})
+_NOT_TRACED = frozenset({"sys.addaudithook", "sys.monitoring.register_callback", "cpython.PyInterpreterState_New"})
+_NEVER = _TRACES | _LOOKS | _NOT_TRACED | {"os.fork"}
 _NEVER_BEGINS = ("gc.", "ctypes.", "_thread.")
-_NOT_IN_RUNS = frozenset({"sys._getframe"})  # while it is loaded, named tuples look for their module by it
 _FRAMES = frozenset({"tb_frame", "gi_frame", "cr_frame", "ag_frame"})
+_NO_MODULES = ("_test", "_xx")  # of Python's own tests: they reach into the interpreter
 
 
 class Counted(NamedTuple):
@@ -44,19 +52,23 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     """Count from now on. The modules `own` ask and answer, and are not counted themselves."""
     # by these names, which a submission cannot exchange
     settrace, setprofile, gettrace, getprofile = sys.settrace, sys.setprofile, sys.gettrace, sys.getprofile
+    getframe, create, attributes, as_int, text = sys._getframe, _imp.create_builtin, SimpleNamespace, int, str
+    starts, last_part, exactly = str.startswith, str.rpartition, type
     read, write, identity, as_float, refusal = os.read, os.write, id, float, RuntimeError
     unpack, pack, asked, answered = layout.question.unpack, layout.answer.pack, layout.question.size, layout.answer.size
     padding = [0.0] * (layout.answers - 1)
-    codes = {code: None for module in (*own, sys.modules[__name__]) for code in _codes(module)}
-    uncounted = frozenset(map(identity, codes))
-    events, before, runs, is_open = 0, 0, False, False
+    # with the codes themselves: that of a function which is exchanged would make room for another with its number
+    uncounted = {identity(code): code for module in (*own, sys.modules[__name__]) for code in _codes(module)}
+    there = frozenset(sys.builtin_module_names) & sys.modules.keys()
+    events, before, runs, is_open, may_look = 0, 0, False, False, False
+    secret: int | None = seal
 
     def line(frame: FrameType, event: str, arg: Any) -> Any:
         nonlocal events
         if identity(frame.f_code) in uncounted:
             return None
         events += 1
-        return line
+        return tracing
 
     def call(frame: FrameType, event: str, arg: Any) -> None:
         nonlocal events
@@ -65,17 +77,45 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
 
     def guard(event: str, args: tuple[Any, ...]) -> None:
         """Audit hook, which nobody can take away again."""
+        nonlocal may_look
         if is_open:
             return
+        if may_look and event == "sys._getframe":
+            may_look = False
+            return
         is_frame = event == "object.__getattr__" and args[1] in _frames
-        if event in _never or event.startswith(_begins) or (runs and (event in _in_runs or is_frame)):
-            raise refusal(f"{event} is not allowed in a run whose work is counted")
+        is_inner = event == "import" and starts(last_part(args[0], ".")[2], _inner)
+        if is_frame or is_inner or event in _never or event.startswith(_begins):
+            raise refusal(f"{args[1] if is_frame else args[0] if is_inner else event} {_said}")
 
-    _never, _begins, _in_runs, _frames = _NEVER, _NEVER_BEGINS, _NOT_IN_RUNS, _FRAMES
+    _never, _begins, _frames, _inner = _NEVER, _NEVER_BEGINS, _FRAMES, _NO_MODULES
+    _said = "is not allowed in a run whose work is counted"
+
+    def look(depth: int = 0) -> SimpleNamespace:
+        """What named tuples and their like look for in a frame while a file is loaded, and not the frame."""
+        nonlocal may_look
+        if runs:
+            raise refusal(f"sys._getframe {_said}")
+        level = as_int(depth) + 1
+        may_look = True
+        frame = getframe(level)
+        return attributes(f_globals=frame.f_globals, f_code=frame.f_code, f_lineno=frame.f_lineno, f_back=None)
+
+    def create_new(spec: Any) -> Any:
+        """A module of the interpreter's own, but none a second time: it would have all that was exchanged in it."""
+        name = spec.name
+        if exactly(name) is not text or name in there:
+            raise refusal(f"another {name} {_said}")
+        return create(attributes(name=name))  # type: ignore[arg-type] # nothing else of it is read
+
+    def handle(*_: Any) -> None:
+        """In place of `signal.signal`: a handler is given a frame."""
+        raise refusal(f"signal.signal {_said}")
 
     def begin() -> None:
         nonlocal before, runs
-        before, runs = events, True
+        if not runs:  # who begins again would take away what was counted
+            before, runs = events, True
 
     def receive() -> tuple[Any, ...]:
         data = read(questions, asked)
@@ -87,27 +127,38 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
         return unpack(data)
 
     def send(number: int, code: int, *values: float) -> None:
-        if write(answers, pack(number, code ^ seal, *values)) != answered:
+        if secret is None or write(answers, pack(number, code ^ secret, *values)) != answered:
             raise Closed
 
     def total() -> None:
-        is_whole = gettrace() is line and getprofile() is call
+        is_whole = gettrace() is tracing and getprofile() is calling
         send(TOTAL, OK, as_float(events - before) if is_whole else -1.0, *padding)
 
     def stop() -> None:
-        nonlocal is_open
-        is_open = True
+        """Everything is allowed from here on, but no further answer."""
+        nonlocal is_open, secret
+        is_open, secret = True, None
         settrace(None)
         setprofile(None)
 
-    found = Counted(begin, receive, send, total, stop)
+    tracing, calling = _hidden(line), _hidden(call)
+    found = Counted(*[_hidden(each) for each in (begin, receive, send, total, stop)])
     sys.gettrace = sys.getprofile = lambda: None  # it looks like a run that is not counted
+    sys._getframe, _imp.create_builtin, _signal.signal = _hidden(look), _hidden(create_new), _hidden(handle)
     sys.addaudithook(guard)
     is_open = True
-    setprofile(call)
-    settrace(line)
+    setprofile(calling)
+    settrace(tracing)
     is_open = False
     return found
+
+
+def _hidden(function: Callable[..., Any]) -> Any:
+    """What calls `function` and has no attribute that leads to it, as a function's own closure would.
+
+    It is a cache without room, in C; without a name, as nobody calls `functools.update_wrapper`.
+    """
+    return _lru_cache_wrapper(function, 0, False, None)
 
 
 def work_alone() -> None:
