@@ -39,13 +39,16 @@ class EarlierRuns:
         tip = "Open the run that is chosen; several are laid over"
         self.open_button = button("Open", tip, self.open, self.notice, primary=True)
         again = button("Look again", "Look for runs that other pages have made meanwhile", self.refresh, self.notice)
-        hint = widgets.HTML("<p>Choose a run to reopen it, or several (Ctrl or Shift) to lay them over each other.</p>")
+        hint = widgets.HTML(
+            "<p>Choose a run to reopen it, or several (Ctrl or Shift) to lay them over each other. "
+            f"The latest {_SHOWN} are listed; <code>rds compare</code> takes any.</p>"
+        )
         self.widget = widgets.VBox([hint, self.list, row(self.open_button, again, self.bar), self.notice])
 
     def refresh(self) -> None:
         """As they lie in the folder now."""
         chosen = {self._runs[i].name for i in self.list.value}
-        self._runs = self._session.runs()[:_SHOWN]
+        self._runs = self._session.runs(_SHOWN)
         self.list.options = [(_label(run), i) for i, run in enumerate(self._runs)]
         self.list.value = tuple(i for i, run in enumerate(self._runs) if run.name in chosen)
 

@@ -157,8 +157,7 @@ class Shell:
         """What was going on when the page was last left."""
         from rds.session.kept_runs import State
 
-        states = [run.state for run in self.session.runs()]
-        if State.GOES_ON in states:
+        if self.session.runs_that_go_on():
             self.say("a run goes on: its results will be among the earlier runs; Emergency stop ends it", "warning")
-        elif State.CUT_SHORT in states[:1]:
+        elif [run.state for run in self.session.runs(1)] == [State.CUT_SHORT]:
             self.say("the last run was cut short; what it recorded can be opened among the earlier runs", "warning")

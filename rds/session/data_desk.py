@@ -40,6 +40,7 @@ OPTIONS = {
     "delay": "delay",
     "backlash": "backlash",
 }
+LISTED = 200  # runs, the latest; others are named by hand
 SUFFIXES = (".csv", ".txt", ".mat", ".parquet", ".asc", ".blf", ".trc", ".log", ".mf4")
 
 
@@ -57,10 +58,10 @@ class DataDesk:
         self.fitted: tuple[Log, ...] = ()
 
     def files(self) -> list[str]:
-        """Files of the folder that may hold logged data, and its runs, by their way from the folder."""
+        """Files of the folder that may hold logged data, and its latest runs, by their way from the folder."""
         folder = self.session.folder
         found = [path for path in _entries(folder) if path.is_file() and path.suffix.lower() in SUFFIXES]
-        runs = [run.folder for run in self.session.runs()]
+        runs = [run.folder for run in self.session.runs(LISTED)]
         return [str(path.relative_to(folder)) for path in [*found, *runs]]
 
     def path(self, name: str, what: str) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -33,7 +34,7 @@ class KeptRun:
 
     folder: Path
     state: State
-    when: float  # s since 1970, of its latest file
+    when: float  # s since 1970, when its latest file came
 
     @property
     def name(self) -> str:
@@ -61,14 +62,21 @@ class KeptRun:
             desk.set("stop", 1.0)
 
 
-def kept_runs(folder: Path) -> list[KeptRun]:
-    """The runs in the folders of `folder`, the latest first."""
-    found = []
-    for each in _folders(folder):
+def kept_runs(folder: Path, most: int | None = None) -> list[KeptRun]:
+    """The runs in the folders of `folder`, the latest first, at most `most`: no more folders are looked into."""
+    found: list[KeptRun] = []
+    for when, each in sorted(_folders(folder), reverse=True):
+        if len(found) == most:
+            break
         state = state_of(each)
         if state is not None:
-            found.append(KeptRun(each, state, _when(each)))
-    return sorted(found, key=lambda run: run.when, reverse=True)
+            found.append(KeptRun(each, state, when))
+    return found
+
+
+def runs_that_go_on(folder: Path) -> list[KeptRun]:
+    """Those whose loops are running now, wherever they stand among the others."""
+    return [KeptRun(each, State.GOES_ON, when) for when, each in _folders(folder) if _goes_on(each)]
 
 
 def state_of(folder: Path) -> State | None:
@@ -101,15 +109,12 @@ def _goes_on(folder: Path) -> bool:
         return False
 
 
-def _folders(folder: Path) -> list[Path]:
-    try:
-        return [each for each in folder.iterdir() if each.is_dir() and not each.is_symlink()]
-    except OSError:
-        return []
-
-
-def _when(folder: Path) -> float:
-    times = [0.0]
-    with contextlib.suppress(OSError):
-        times += [each.stat().st_mtime for each in folder.iterdir() if each.is_file()]
-    return max(times)
+def _folders(folder: Path) -> list[tuple[float, Path]]:
+    """The folders in `folder`, each after the time at which its latest file came, s since 1970."""
+    found = []
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            with contextlib.suppress(OSError):  # it has just gone
+                if entry.is_dir(follow_symlinks=False):
+                    found.append((entry.stat().st_mtime, Path(entry.path)))
+    return found

@@ -16,7 +16,7 @@ from rds.results.atomic import write_whole
 from rds.session.choices import Choices
 from rds.session.claim import Claim
 from rds.session.fields import Field
-from rds.session.kept_runs import KeptRun, State, kept_runs
+from rds.session.kept_runs import KeptRun, kept_runs, runs_that_go_on
 from rds.session.task import Task
 
 KEPT = "session.json"  # the choices of all panels
@@ -174,9 +174,8 @@ class Session:
             if user is not None:
                 with contextlib.suppress(Exception):
                     user.stop()
-            for run in self.runs():
-                if run.state is State.GOES_ON:
-                    run.stop()
+            for run in self.runs_that_go_on():
+                run.stop()
         if stopped:
             text = f"emergency stop: {len(stopped)} modules are at zero volts and stay so until they are released"
         else:
@@ -213,7 +212,7 @@ class Session:
             own = self.bus.get("channel") or load_machine(self.machine).name
         except InputError:  # a file that is broken by now is no reason not to stop
             own = self.machine
-        runs = {run.channel for run in self.runs() if run.state is State.GOES_ON and run.channel is not None}
+        runs = {channel for run in self.runs_that_go_on() if (channel := run.channel) is not None}
         return [own, *sorted((self.channels | runs) - {own})]
 
     def _on(self, channel: str | None, act: Callable[[Any], list[int]]) -> list[int]:
@@ -224,6 +223,10 @@ class Session:
 
     # runs
 
-    def runs(self) -> list[KeptRun]:
-        """The runs kept in this folder, the latest first."""
-        return kept_runs(self.folder / RUNS)
+    def runs(self, most: int | None = None) -> list[KeptRun]:
+        """The runs kept in this folder, the latest first, at most `most`."""
+        return kept_runs(self.folder / RUNS, most)
+
+    def runs_that_go_on(self) -> list[KeptRun]:
+        """The runs of this folder that any page or terminal has going now."""
+        return runs_that_go_on(self.folder / RUNS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import threading
@@ -110,6 +111,23 @@ def test_runs_of_the_folder_and_what_became_of_them(tmp_path: Path) -> None:
     found = {run.name: run.state for run in session.runs()}
     assert found == {"first": State.WHOLE, "second": State.CUT_SHORT}
     assert len(next(run for run in session.runs() if run.name == "first").open()) == 100
+
+
+def test_of_many_runs_only_the_latest_are_looked_into(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(50):
+        folder = tmp_path / "runs" / f"run-{number}"
+        folder.mkdir(parents=True)
+        (folder / "result.csv").touch()
+        os.utime(folder, (number, number))
+    looked: list[Path] = []
+
+    def state(folder: Path) -> State:
+        looked.append(folder)
+        return State.WHOLE
+
+    monkeypatch.setattr("rds.session.kept_runs.state_of", state)
+    assert [run.name for run in Session(tmp_path).runs(2)] == ["run-49", "run-48"]
+    assert len(looked) == 2
 
 
 @pytest.mark.parametrize("content", [b"{", b"\xff\xfe\x00", b"[" * 100_000, b"\xef\xbb\xbf{}"])
