@@ -47,7 +47,8 @@ function render({ model, el }) {
     if (!response.ok) throw new Error(`the page's server refused (${response.status})`);
     return response.json();
   }
-  const failed = (error) => (error instanceof TypeError ? "the page's server does not answer either" : error.message);
+  const failed = (error) => // fetch's own words for a server that is not there, or hangs, help nobody
+    error instanceof TypeError || error.name === "TimeoutError" ? "the page's server does not answer" : error.message;
 
   let waiting = false, missed = 0, answers = 0;
   const tick = () => {
@@ -72,7 +73,7 @@ function render({ model, el }) {
     try {
       ({ text } = await ask("GET", kernel));
     } catch (error) {
-      text = `This page gets no answer, and ${failed(error)}. Look after \`rds app\`, where it was started.`;
+      text = `This page gets no answer: ${failed(error)}. Look after \`rds app\`, where it was started.`;
     }
     if (missed) say("held", text);
   }
