@@ -116,7 +116,7 @@ def test_the_hub_ends_after_the_last_node_and_starts_again(
     time.sleep(0.5)
     assert process.poll() is None
     bus.shutdown()
-    assert process.wait(3) == 0
+    assert process.wait(30) == 0
     assert list((runtime_directory / "rds").iterdir()) == []
     bus = open_bus()
     assert bus.hub_pid != process.pid  # type: ignore[attr-defined]

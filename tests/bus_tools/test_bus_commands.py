@@ -12,6 +12,7 @@ from pathlib import Path
 
 import can
 import pytest
+from bus.conftest import wait_for
 
 from bus_tools.made_frames import frame
 from rds.bus.faults import Faults
@@ -94,7 +95,7 @@ def test_record_until_ctrl_c_and_replay(
     bus = open_bus()
     for k in range(50):
         bus.send(frame(0x700, bytes([k])))
-    time.sleep(0.3)
+    wait_for(lambda: path.read_bytes().count(b" 700 ") == 50)
     recorder.send_signal(signal.SIGINT)
     result = json.loads(end(recorder)[0])
     assert result["frames"] == 50 and result["complete"] and result["lost"] == 0
