@@ -28,7 +28,7 @@ ALLOWED: dict[str, set[str]] = {
     "programs": {"core", "machines", "motion", "nc", "runtime", "modes", "experiment", "results", "reports"},
     "paths": {"core", "results"},  # see ONLY
     "checks": {"core"},
-    "spread": {"core"},
+    "spread": {"core", "runtime"},  # see ONLY
     "bus": {"core", "machines", "models", "runtime", "results"},  # see ONLY
     "runtime": {"core", "interface", "machines"},
     "modes": {"core", "interface", "runtime", "bus"},
@@ -68,6 +68,7 @@ ONLY = {
     ("logs", "bus"): {"rds.bus", "rds.bus.frames", "rds.bus.decode", "rds.bus.logs"},  # what a log holds
     ("identification", "controllers"): {"rds.controllers.tracking", "rds.controllers.design"},
     ("motion", "results"): {"rds.results.figure"},  # what all plots share
+    ("spread", "runtime"): {"rds.runtime.scheduling"},  # a worker ends with who started it
     ("results", "runtime"): {"rds.runtime.record"},  # a killed run reopens from its record
 }
 LAZY = [("results", "runtime"), ("motion", "results"), ("modes", "bus")]  # inside functions only

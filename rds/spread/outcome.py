@@ -29,3 +29,10 @@ class Outcome:
     def ok(self) -> bool:
         """Whether there is a value."""
         return self.failure is None
+
+
+def reason_of(error: BaseException) -> str:
+    """An exception as a sentence: our own as they are, others with their kind."""
+    from rds.core.errors import RdsError
+
+    return str(error) if isinstance(error, RdsError) else f"{type(error).__name__}: {error}"

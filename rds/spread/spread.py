@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from rds.core.errors import InputError
 from rds.spread.outcome import Outcome
+from rds.spread.process import Work
 
 Item = TypeVar("Item")
 Progress = Callable[[int, int], None]  # items done, items in all
@@ -40,10 +41,10 @@ def spread(
     lambdas and notebook functions will do); the function must not depend on the process it runs in, so that the
     values are the same wherever that is.
 
-    An exception becomes an outcome with its reason. A worker that dies is replaced, and its item tried again `retries`
-    times; so it is, on local processes, after `time_limit` s. (On a cluster the scheduler's own setting
-    `allowed-failures` says how often, and there is no time limit.) `progress(done, of)` is called in this thread.
-    Closing the iterator, and Ctrl-C, end the workers.
+    An exception becomes an outcome with its reason. Each item is at work in a process of its own, one at a time, also
+    on a cluster: one that dies is replaced, and its item tried again `retries` times; so it is after `time_limit` s.
+    What was on a computer of the cluster that is lost is done again. `progress(done, of)` is called in this thread.
+    Closing the iterator, and Ctrl-C, end what is still at work.
 
     InputError if jobs and scheduler are both given, a number will not do, or no scheduler answers there within
     seconds; MachineError if the cluster loses all its workers for good.
@@ -54,17 +55,16 @@ def spread(
         raise InputError(f"jobs = {jobs!r} must be at least 1")
     if retries < 0:
         raise InputError(f"retries = {retries!r} must be at least 0")
-    if time_limit is not None and scheduler is not None:
-        raise InputError("a time limit is for local processes; leave it out with a scheduler")
     todo = list(items)
+    work = Work.of(function, retries, time_limit)
     if scheduler is not None:
         from rds.spread.cluster import on_cluster
 
-        found = on_cluster(function, todo, scheduler)
+        found = on_cluster(work, todo, scheduler)
     else:
         from rds.spread.local import on_processes
 
-        found = on_processes(function, todo, min(jobs or processors(), max(len(todo), 1)), retries, time_limit)
+        found = on_processes(work, todo, min(jobs or processors(), max(len(todo), 1)))
     return (_in_order if in_order else _as_they_come)(found, len(todo), progress)
 
 

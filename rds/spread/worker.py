@@ -1,6 +1,7 @@
 """A worker process: `python -m rds.spread.worker`. Folders and the function first, then items, over stdin.
 
-Whatever the function prints goes to stderr, because stdout is for answers. It ends when stdin does.
+Whatever the function prints goes to stderr, because stdout is for answers. It ends when stdin does, and on Linux at
+once when who started it is killed: an item may take long, and nobody would read what comes of it.
 """
 
 from __future__ import annotations
@@ -11,11 +12,14 @@ import sys
 from typing import Any
 
 from rds.core.portable import portable
+from rds.runtime.scheduling import end_with_parent
+from rds.spread.outcome import reason_of
 from rds.spread.pipe import receive, send
 
 
 def main() -> None:
     """Answer items until there are none."""
+    end_with_parent()
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     questions = sys.stdin.buffer
@@ -34,13 +38,6 @@ def _answer(function: Any, data: bytes) -> bytes:
         return portable((False, function(pickle.loads(data))))
     except Exception as error:
         return pickle.dumps((True, reason_of(error)))
-
-
-def reason_of(error: BaseException) -> str:
-    """An exception as a sentence: our own as they are, others with their kind."""
-    from rds.core.errors import RdsError
-
-    return str(error) if isinstance(error, RdsError) else f"{type(error).__name__}: {error}"
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import gc
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -170,6 +171,20 @@ def test_what_will_not_do_is_said_at_once(
     monkeypatch.setattr("rds.spread.cluster.CONNECT", 0.3)
     with pytest.raises(InputError, match=re.escape(said)):
         spread(spread_functions.square, [1], **options)
+
+
+def test_what_is_no_scheduler_is_refused_whatever_it_answers() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+
+        def answer() -> None:
+            connection, _ = other.accept()
+            with connection:
+                connection.recv(1000)
+                connection.sendall(b"HTTP/1.0 400 Bad Request\r\n\r\n")  # a length of 3 EiB, to dask
+
+        threading.Thread(target=answer, daemon=True).start()
+        with pytest.raises(InputError, match="no dask scheduler answers"):
+            spread(spread_functions.square, [1], scheduler=f"tcp://127.0.0.1:{other.getsockname()[1]}")
 
 
 def test_a_scheduler_that_was_refused_leaves_nothing_behind() -> None:

@@ -176,7 +176,7 @@ class _Batch:
         count = min(jobs or processors(), len(rows)) if shared else None
         work = partial(graded, setup_of(self._assignment, count, shared))
         tasks = [self._task(each, shared) for each in rows]
-        limit = _PATIENCE + 20.0 * self._assignment.limits.wall_seconds if shared else None
+        limit = _PATIENCE + 20.0 * self._assignment.limits.wall_seconds
         failed = []
         for outcome in spread(
             work, tasks, jobs=jobs, scheduler=scheduler, progress=progress, in_order=False, time_limit=limit

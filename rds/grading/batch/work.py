@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -75,7 +74,7 @@ def graded(setup: Setup, task: Task) -> Answer:
     if fault := available():
         return Answer(missing=fault)
     assignment, solution = _assignment(setup)
-    pool = _pool(threading.get_ident(), setup.jobs)
+    pool = _pool(setup.jobs)
     began = time.monotonic()
     if task.path:
         found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
@@ -86,7 +85,7 @@ def graded(setup: Setup, task: Task) -> Answer:
             found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
     grade, seconds = found.grade, time.monotonic() - began
     grade = replace(grade, notes=(*task.notes, *grade.notes), details={**grade.details, **task.about})
-    expected = _expected(setup, threading.get_ident()) if solution else ()
+    expected = _expected(setup) if solution else ()
     page = feedback_page(assignment, grade, found.runs, expected, same_plants=False)
     files = {FEEDBACK: page.encode("utf-8", "replace")}
     if found.runs:
@@ -138,17 +137,17 @@ def _assignment(setup: Setup) -> tuple[Assignment, bytes]:
 
 
 @lru_cache(maxsize=1)
-def _expected(setup: Setup, thread: int) -> tuple[CaseRun, ...]:
+def _expected(setup: Setup) -> tuple[CaseRun, ...]:
     """The runs of the reference solution, once for each worker."""
     assignment, code = _assignment(setup)
     with tempfile.TemporaryDirectory(prefix="rds-solution-") as folder:
         path = Path(folder) / code_name(assignment)
         path.write_bytes(code)
-        return grade_with_runs(assignment, path, _SOLUTION, _pool(thread, setup.jobs)).runs
+        return grade_with_runs(assignment, path, _SOLUTION, _pool(setup.jobs)).runs
 
 
-@lru_cache(maxsize=64)
-def _pool(thread: int, jobs: int | None) -> Pool:
-    """A pool for each thread of a worker, because its sandboxes end with that; ended with the process."""
+@lru_cache(maxsize=1)
+def _pool(jobs: int | None) -> Pool:
+    """The worker's pool, which ends with its process."""
     number = worker_number()
     return Pool() if jobs is None or number is None else Pool(jobs, slot=number)
