@@ -133,6 +133,10 @@ class Compensation:
         self._over = True
         return items
 
+    def beside(self) -> Point:
+        """How far from the programmed point the tool is that the last move took to it, along the plane's axes."""
+        return self._queue.beside(self.programmed)
+
     def leave(self, rapid: bool, start: Point, end: Triple, line: int = 0, any_exit: bool = False) -> None:
         """Check the first motion after G40, straight from the programmed point `start` to `end`, both in the units and
         offsets of now. With `any_exit` it may be short. The interpreter refuses an arc, as LinuxCNC does.

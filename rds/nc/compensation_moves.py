@@ -130,6 +130,11 @@ class HeldMoves:
         self.begin = self.tool
         self._sharp = 0.0
 
+    def beside(self, point: Point) -> Point:
+        """From `point` to the tool where it is now (with a nose, to its controlled point)."""
+        u, v = self._nose[0] * self.radius, self._nose[1] * self.radius
+        return self.made[0] + u - point[0], self.made[1] + v - point[1]
+
     def make(self, move: Move) -> None:
         """A move that is not held back."""
         if self._recording:

@@ -39,6 +39,7 @@ class Context:
         self.out = out
         self.stretches = stretches  # gets what compensation made of what was programmed
         self.leaving: Compensation | None = None  # the compensation that G40 ended, until the move after it
+        self.left_turned = 0.0  # degrees, the rotation of the coordinates at that G40
 
     def from_machine(self, length: float) -> float:
         """A length in the machine's units in the program's."""

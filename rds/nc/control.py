@@ -4,7 +4,8 @@ While `skipping` names a label, every block is passed over but the one with that
 belong to the subroutine that they stand in.
 
 Where LinuxCNC goes on in a strange way, this does not: a loop left by BREAK does not stop a later DO loop, a REPEAT
-left early counts anew, a BREAK that is passed over does nothing, and a subroutine ends only with its own name.
+left early counts anew, a BREAK that is passed over does nothing, and a subroutine ends only with its own name (RETURN
+may bear that of a branch or loop in it).
 """
 
 from __future__ import annotations
@@ -258,7 +259,9 @@ class Control:
     def _return(self, word: Word) -> None:
         if self._frames:
             frame = self._frames[-1]
-            if word.name != frame.name:
+            # RETURN may bear the label of the branch or loop that it stands in: LinuxCNC's own examples are written so
+            within = word.kind == "return" and f"{frame.name}#{word.name}" in self._labels
+            if word.name != frame.name and not within:
                 raise Fault(
                     f"{word.spelled} {word.kind.upper()} inside the subroutine {frame.name!r}; write its name",
                     at=word.at,

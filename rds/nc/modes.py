@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 
+from rds.nc.arcs import AXES_OF
 from rds.nc.blocks import (
     ARC_DISTANCE,
     COMPENSATION,
@@ -67,6 +68,8 @@ def execute(m: Context, block: Block) -> bool:
         _g_words(m, block)
     if block.motion != -1:
         move(m, block)
+    if TOOL_CHANGE in block.m and m.leaving is not None:
+        stand_by_the_contour(m, m.leaving)
     if STOP in block.m:
         return stop(m, block.m[STOP])
     return False
@@ -184,6 +187,18 @@ def change_tool(m: Context) -> None:
     tell_tool(m)
 
 
+def stand_by_the_contour(m: Context, compensation: Compensation) -> None:
+    """After G40 and M6 the program goes on from where the cutter is, beside the contour, as LinuxCNC does, which asks
+    the machine for its position after a change of tools: G0 Z5 alone then goes straight up.
+    """
+    beside = [0.0, 0.0, 0.0]
+    first, second, _ = AXES_OF[PLANES.index(compensation.plane)]
+    beside[first], beside[second] = compensation.beside()
+    rotate(beside, m.left_turned - m.state.rotation)
+    m.state.x, m.state.y, m.state.z = plus([m.state.x, m.state.y, m.state.z], beside)
+    m.leaving = None
+
+
 def tell_tool(m: Context) -> None:
     """Parameters 5400 to 5413: the tool in the spindle."""
     tool = m.tools.spindle
@@ -211,7 +226,7 @@ def compensate(m: Context, code: int, words: dict[str, float]) -> None:
             entered = compensation.entered
             out.put(compensation.off(out.line, (out.digits, out.n)))
             if entered:
-                m.leaving = compensation
+                m.leaving, m.left_turned = compensation, state.rotation
                 state.arc_allowed = 0
         state.comp_side = 0
         return

@@ -50,6 +50,7 @@ STRICTER = {
     "a program number": "O1000\nM2",
     "a character 0": "G0 X1 \x00Y2\nM2",
     "another subroutine's end": "o1 sub\no2 endsub\no1 endsub\no1 call\nM2",
+    "RETURN under another subroutine's name": "o1 sub\no1 endsub\no2 sub\no1 return\no2 endsub\no2 call\nM2",
     "words outside of the dialect": "M48\nM2",
     "a word outside of the dialect": "G97 S100\nM2",
     "an active comment": "(print,#5420)\nM2",
