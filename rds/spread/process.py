@@ -66,6 +66,7 @@ class WorkerProcess:
     def __init__(self, work: Work, environment: Mapping[str, str]):
         self._work, self._environment = work, {**_ONE_THREAD, **environment}
         self._process: subprocess.Popen[bytes] | None = None
+        self._ready: subprocess.Popen[bytes] | None = None  # the process, once it has the function
         self._ending = False
         self._lock = threading.Lock()  # between starting a process and the end
 
@@ -114,6 +115,9 @@ class WorkerProcess:
         """The process's answer to an item. OSError or EOFError if the process ends."""
         process = self._running()
         assert process.stdin is not None and process.stdout is not None
+        if process is not self._ready:
+            receive(process.stdout)  # what it takes to start, on a busy computer, is not the item's time
+            self._ready = process
         timer = None
         if self._work.time_limit is not None:
 

@@ -11,6 +11,7 @@ import pickle
 import sys
 from typing import Any
 
+from rds.core.errors import RdsError
 from rds.core.portable import portable
 from rds.runtime.scheduling import end_with_parent
 from rds.spread.outcome import reason_of
@@ -25,11 +26,25 @@ def main() -> None:
     questions = sys.stdin.buffer
     try:
         sys.path += [folder for folder in pickle.loads(receive(questions)) if folder not in sys.path]
-        function = pickle.loads(receive(questions))
+        function = _function(receive(questions))
+        send(answers, b"ready")
         while True:
             send(answers, _answer(function, receive(questions)))
     except (EOFError, BrokenPipeError):
         return
+
+
+def _function(data: bytes) -> Any:
+    """The function; if it cannot be had here, one that says so of every item."""
+    try:
+        return pickle.loads(data)
+    except Exception as error:
+        reason = reason_of(error)
+
+        def refuse(item: Any) -> None:
+            raise RdsError(f"the function cannot be loaded in a worker process: {reason}")
+
+        return refuse
 
 
 def _answer(function: Any, data: bytes) -> bytes:

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
+import types
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -96,6 +97,19 @@ def test_a_time_limit_ends_what_takes_too_long(where: dict[str, object]) -> None
     found = list(spread(spread_functions.slow, range(3), retries=0, time_limit=1.5, **where))
     assert [o.ok for o in found] == [True, False, True]
     assert (found[1].failure, found[1].reason) == (Failure.OVERDUE, "it took longer than 1.5 s")
+
+
+def test_a_function_that_a_worker_cannot_load_is_told(
+    where: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here_only = types.ModuleType("here_only")
+    exec("def function(x):\n    return x\n", vars(here_only))
+    monkeypatch.setitem(sys.modules, "here_only", here_only)
+    (found,) = spread(here_only.function, [1], **where)
+    assert (found.failure, found.attempts) == (Failure.RAISED, 1)
+    assert found.reason == (
+        "the function cannot be loaded in a worker process: ModuleNotFoundError: No module named 'here_only'"
+    )
 
 
 def test_what_a_function_prints_does_not_disturb(capfd: pytest.CaptureFixture[str]) -> None:
