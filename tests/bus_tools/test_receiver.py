@@ -147,8 +147,9 @@ def test_a_bus_that_cannot_be_opened_again_is_tried_until_it_can() -> None:
         return FakeBus([numbered(7)])
 
     faults: list[Fault] = []
-    with Receiver(opener, faults.append) as receiver:
-        frames = receiver.subscribe()
+    receiver = Receiver(opener, faults.append)
+    frames = receiver.subscribe()
+    with receiver:
         assert number(frames.get(2.0)) == 7
     assert len(faults) == 1
 
@@ -191,8 +192,9 @@ def test_an_error_callback_that_fails_does_no_harm(caplog: pytest.LogCaptureFixt
     def fail(fault: Fault) -> None:
         raise SystemExit
 
-    with Receiver(lambda: buses.pop(0), fail) as receiver:
-        frames = receiver.subscribe()
+    receiver = Receiver(lambda: buses.pop(0), fail)
+    frames = receiver.subscribe()
+    with receiver:
         assert number(frames.get(2.0)) == 1
     assert "callback for bus errors failed itself" in caplog.text
 
