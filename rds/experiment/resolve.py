@@ -55,7 +55,7 @@ def resolve(
     for axis, own in _axes(words, machine) if program is None else _program_axes(words, machine, program):
         made, periods[axis.name] = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
         axes.append(made)
-    bus = _bus(words, folder)
+    bus = bus_table(words, folder)
     words.done()
     _check_coupling(axes, words)
     plan = Plan(
@@ -239,7 +239,7 @@ def _interface(words: Words, mode: Mode) -> tuple[bool, bool]:
     return flags
 
 
-def _bus(words: Words, folder: Path) -> dict[str, Any]:
+def bus_table(words: Words, folder: Path) -> dict[str, Any]:
     """The keyword arguments of can.Bus; python-can itself knows which options an interface has.
 
     On the built-in bus also "faults", the schedule that is injected during the run.

@@ -1,4 +1,4 @@
-"""Jog: axes moved by hand, while a button is held or by a step; where they are, and how far from their limits."""
+"""Jog: axes moved by hand, while a button is held or by a step, spindles turned, drives homed; and their limits."""
 
 from __future__ import annotations
 
@@ -13,14 +13,19 @@ from rds.panels.kit.button import button, columns, follow, group, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
+from rds.panels.turn import TurnButtons
 from rds.session.jog import Jog
-from rds.session.jog_axes import JogAxis
+from rds.session.jog_axes import JogAxis, JogSpindle
 
 NAME = "jog"
 TITLE = "Jog"
-SUMMARY = "Move the axes by hand, and see how far they are from their limits"
+SUMMARY = "Move the axes and the spindle by hand, and see how far they are from their limits"
 HELP = "machine-panel"
 _NEAR = 0.05  # of the travel: from here on the limit is said to be near
+_HINT = (
+    "<p>Arrow keys move the axis whose button has the focus. Letting go, or leaving the page, stops it. "
+    "A spindle turns until it is stopped, and no longer than this page is in sight.</p>"
+)
 
 
 def build(shell: Any) -> widgets.Widget:
@@ -38,28 +43,37 @@ class JogView:
         self._take = button(
             "Take the machine", "Hold the axes where they are; nothing moves yet", self.take, say, primary=True
         )
-        self._free = button("Let it go", "Zero volts, and the machine is free for others", self.free, say)
-        self._rest = button("Stop", "Bring all axes to rest", jog.rest, say)
+        self._free = button("Let it go", "No voltage, and the machine is free for others", self.free, say)
+        self._rest = button("Stop", "Bring all axes and the spindle to rest", self.rest, say)
         self._home = button("Home", "All axes to zero, one after the other, Z first", jog.home, say)
+        self._find = button("Find home", "Let the drives look for it, one after the other", self.find_home, say)
         self._holds = {name: self._hold(name) for name in jog.axes}
-        self._places = {name: widgets.HTML() for name in jog.axes}
+        self._turns = {name: self._turn(name) for name in jog.spindles}
+        self._places = {name: widgets.HTML() for name in (*jog.axes, *jog.spindles)}
         jog.choices.watch(lambda name: self._set_way())
-        step = FieldView(jog.choices, "step")
+        self._not_homed = widgets.HTML()
+        fields = [FieldView(jog.choices, "home_axis"), FieldView(jog.choices, "method")]
+        self._homing = group("Homing of drives", *fields, row(self._find), self._not_homed)
+        motion = ["way", "step", "speed", *(["spindle_speed"] if jog.spindles else [])]
         side = [
             group("The machine", row(self._take, self._free), row(self._rest, self._home)),
-            group("Motion", FieldView(jog.choices, "way"), step, FieldView(jog.choices, "speed")),
+            group("Motion", *(FieldView(jog.choices, name) for name in motion)),
+            self._homing,
         ]
-        axes = [row(widgets.HTML(f"<b>{escape(name)}</b>"), self._holds[name], self._places[name]) for name in jog.axes]
-        for each in axes:
+        rows = [
+            row(widgets.HTML(f"<b>{escape(name)}</b>"), buttons, self._places[name])
+            for name, buttons in (self._holds | self._turns).items()
+        ]
+        for each in rows:
             each.add_class("rds-jog-axis")
-        hint = "<p>Arrow keys move the axis whose button has the focus. Letting go, or leaving the page, stops it.</p>"
-        self.widget = columns(side, [self.bar, self.notice, *axes, widgets.HTML(hint)])
-        self._was_ready, self._shown_error = False, ""
+        self.widget = columns(side, [self.bar, self.notice, *rows, widgets.HTML(_HINT)])
+        self._shown_error = self._shown_homing = ""
         self._set_way()
         self._show()
-        if not jog.axes:
+        if not rows:
             self.notice.say(
-                "no axis of this machine can be jogged: none has a position and a model with tau and K", "error"
+                "nothing of this machine can be jogged: it has no spindle, and no axis with limits or a model with K",
+                "error",
             )
         shell.ticker.add(self._show)
 
@@ -72,6 +86,17 @@ class JogView:
         """Let it go."""
         self.jog.end()
         self.notice.say("the machine is free")
+
+    def rest(self) -> None:
+        """Stop everything."""
+        self.jog.halt()
+        for buttons in self._turns.values():
+            buttons.forget()
+
+    def find_home(self) -> None:
+        """Home the axis that is chosen, or all."""
+        which = self.jog.choices["home_axis"]
+        self.jog.find_home(None if which == "all" else [which])
 
     def _hold(self, name: str) -> HoldButtons:
         def heard(kind: str, direction: int) -> None:
@@ -87,35 +112,87 @@ class JogView:
 
         return HoldButtons(heard, axis=name)
 
+    def _turn(self, name: str) -> TurnButtons:
+        def heard(kind: str, direction: int) -> None:
+            try:
+                if kind == "turn":
+                    self.jog.turn(name, direction)
+                else:
+                    self.jog.still(name)
+            except RdsError as error:
+                buttons.forget()
+                self.notice.say(str(error), "error")
+
+        buttons = TurnButtons(heard, spindle=name)
+        return buttons
+
     def _set_way(self) -> None:
         for each in self._holds.values():
             each.by_step = self.jog.choices["way"] == "step"
 
     def _show(self) -> None:
-        ready = self.jog.ready
+        jog = self.jog
+        ready, busy = jog.ready, bool(jog.homing)
         self._take.disabled, self._free.disabled = ready, not ready
-        self._rest.disabled = self._home.disabled = not ready
+        self._rest.disabled = not ready
+        self._home.disabled = self._find.disabled = not ready or busy
+        self._homing.layout.display = None if jog.finds_home else "none"
+        left = ", ".join(name for name in jog.axes if name not in jog.homed and name not in jog.left_out)
+        self._not_homed.value = f"Not homed since the machine was taken: {escape(left)}" if left else "All are homed."
+        for name, each in (self._holds | self._turns).items():
+            each.disabled = not ready or busy or name in jog.left_out
         for name, place in self._places.items():
-            self._holds[name].disabled = not ready
-            shown = _place(self.jog.axes[name], self.jog.positions.get(name) if ready else None)
+            shown = self._place(name) if ready else self._idle(name)
             if place.value != shown:
                 place.value = shown
-        if self.jog.error and self.jog.error != self._shown_error and not self.bar.busy:
-            self._shown_error = self.jog.error
-            self.notice.say(self.jog.error, "error")
+        if jog.homing != self._shown_homing:
+            self._shown_homing = jog.homing
+            if jog.homing:
+                self.notice.say(f"{jog.homing} looks for its home; Stop ends that")
+            elif ready:
+                self.notice.say(f"homed: {', '.join(sorted(jog.homed)) or 'no axis'}")
+        if jog.error and jog.error != self._shown_error and not self.bar.busy:
+            self._shown_error = jog.error
+            self.notice.say(jog.error, "error")
+
+    def _idle(self, name: str) -> str:
+        """What holds of an axis or spindle while the machine is not taken."""
+        axis = self.jog.axes.get(name)
+        low, high = axis.travel if axis is not None else self.jog.spindles[name].speeds
+        unit, what = (axis.unit, "travel") if axis is not None else ("rev/min", "speeds")
+        return f'<span class="rds-jog-at">– {escape(unit)}</span> {what} {low:g} to {high:g}'
+
+    def _place(self, name: str) -> str:
+        jog = self.jog
+        if name in jog.left_out:
+            return escape(jog.left_out[name])
+        if name in jog.spindles:
+            return _turning(jog.spindles[name], jog.speeds.get(name, 0.0))
+        if name not in jog.positions:
+            return self._idle(name)
+        return _standing(jog.axes[name], jog.positions[name])
 
 
-def _place(axis: JogAxis, position: float | None) -> str:
+def _standing(axis: JogAxis, position: float) -> str:
     """Position, a bar of the travel with it, and the distance to the nearer limit."""
     low, high = axis.travel
-    if position is None:
-        return f'<span class="rds-jog-at">– {escape(axis.unit)}</span> travel {low:g} to {high:g}'
-    share = min(max((position - low) / (high - low), 0.0), 1.0)
     left, end = min((position - low, "low"), (high - position, "high"))
     near = "⚠ " if left < _NEAR * (high - low) else ""
+    bar = _bar(f"{position:.3f} {axis.unit}", position, low, high, "travel")
+    return f"{bar} {near}{left:.3f} {escape(axis.unit)} to the {end} limit"
+
+
+def _turning(spindle: JogSpindle, speed: float) -> str:
+    """The measured speed, and a bar of those that are allowed with it."""
+    return _bar(f"{speed:.0f} {spindle.unit}", speed, *spindle.speeds, "speeds")
+
+
+def _bar(text: str, value: float, low: float, high: float, of: str) -> str:
+    """A value with its place between two ends."""
+    share = min(max((value - low) / (high - low), 0.0), 1.0)
     return (
-        f'<span class="rds-jog-at">{position:.3f} {escape(axis.unit)}</span>'
+        f'<span class="rds-jog-at">{escape(text)}</span>'
         f'<span class="rds-jog-end">{low:g}</span><span class="rds-jog-bar" role="img" '
-        f'aria-label="{100 * share:.0f} % of the travel"><i style="left:{100 * share:.2f}%"></i></span>'
-        f'<span class="rds-jog-end">{high:g}</span> {near}{left:.3f} {escape(axis.unit)} to the {end} limit'
+        f'aria-label="{100 * share:.0f} % of the {of}"><i style="left:{100 * share:.2f}%"></i></span>'
+        f'<span class="rds-jog-end">{high:g}</span>'
     )

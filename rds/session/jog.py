@@ -46,6 +46,8 @@ def _fields(axes: Mapping[str, JogAxis], spindles: Mapping[str, JogSpindle]) -> 
         most = max(max(map(abs, each.speeds)) for each in spindles.values())
         tip = "Of the spindle; the button chooses the way round"
         yield Number("spindle_speed", "Spindle speed", tip, 0.1 * most, unit="rev/min", above=0.0, high=most)
+    names = {"all": "all"} | {name: name for name in axes}
+    yield Choice("home_axis", "Axes to home", "One after the other, Z first; the others have no power", "all", names)
     tip = "Homing mode of CiA 402 drives, object 0x6098; an axis whose [bus.cia402] table gives one keeps that"
     yield Choice("method", "Homing method", tip, "17", HOMING)
 
@@ -103,13 +105,21 @@ class Jog:
         try:
             self.positions, self.speeds, self.left_out, self.homed, self.error = {}, {}, {}, set(), ""
             bus = dict(self.session.bus)
+            if "faults" in bus:
+                raise InputError("[bus] faults are injected in runs; take them out of the table to jog")
+            if "cia402" in bus and bus.get("dialect") != "cia402":
+                raise InputError('[bus.cia402] is for drives: add dialect = "cia402" to [bus], or remove it')
+            if bus.get("dialect") == "cia402":
+                from rds.bus.cia402.settings import read_settings
+
+                read_settings(bus.get("cia402", {}), self.machine)  # refused here, before anything is started
             interface = bus["interface"] = str(bus.get("interface", BUILTIN))
             if interface == BUILTIN:
                 bus["channel"] = bus.get("channel") or self.machine.name
             task.note = "looking for the machine"
             self.dialect = self._dialect(bus)
             task.advance(1, 3, "starting the loop")
-            words = [self.machine.path, self.dialect, json.dumps(bus)]
+            words = [self.machine.path, self.dialect, json.dumps(bus, default=str)]
             command = [sys.executable, "-P", "-m", "rds.session.jog_loop", *words]
             self._loop = loop = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
@@ -132,6 +142,7 @@ class Jog:
         from rds.bus.address import channels
         from rds.bus.dialects import DEFAULT, check_dialect, find_dialect
         from rds.bus.server_process import end_server, start_server
+        from rds.modes.machine import TIMING
 
         interface, channel, wanted = bus["interface"], bus.get("channel"), bus.get("dialect")
         name = bus_name(interface, channel)
@@ -145,7 +156,8 @@ class Jog:
             if found is not None:
                 return found
         if interface == BUILTIN:  # a bus that outlives its modules for a moment included
-            self._server = start_server(wanted or DEFAULT, self.machine.path, str(channel))
+            timing = {key: bus[key] for key in TIMING if key in bus}
+            self._server = start_server(wanted or DEFAULT, self.machine.path, str(channel), timing)
             self._ends.append(weakref.finalize(self, end_server, self._server))
             return wanted or DEFAULT
         raise MachineError(f"no module of {self.machine.name} answers on {name}; switch it on")
@@ -235,6 +247,11 @@ class Jog:
         if not low <= wanted <= high:  # false for NaN too
             raise InputError(f"{spindle} turns at {low:g} to {high:g} rev/min, not at {wanted:g}")
         self._order(turn=spindle, speed=wanted)
+
+    def still(self, spindle: str) -> None:
+        """Bring a spindle to rest."""
+        if self.ready and not self.homing:
+            self._order(turn=spindle, speed=0.0)
 
     def _axis(self, name: str) -> JogAxis:
         if name not in self.axes:

@@ -194,7 +194,7 @@ class DriveHand:
         self._drivers.close()
 
     def _open(self, methods: Mapping[str, int]) -> Any:
-        table = _drive_table(self._bus.get("cia402") or {}, self._machine, self.spindles, methods)
+        table = _drive_table(self._bus.get("cia402", {}), self._machine, self.spindles, methods)
         bus = self._bus | {"cia402": table}
         return open_drivers("cia402", self._machine, self._names, self.period, False, bus)
 

@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from canopen.sdo import SdoCommunicationError
 
+from rds.bus.cia402 import codes, configure
 from rds.bus.cia402.codes import State
 from rds.bus.cia402.host import Cia402Drivers
 from rds.bus.cia402.scan import scan
+from rds.core.errors import MachineError
 from rds.machines import Machine
 
 from .conftest import wait_for
@@ -19,6 +22,7 @@ from .test_host import Served, cycle, drivers, no_voltage, powered
 from .test_processes import Program, serve
 
 pytestmark = pytest.mark.realtime
+POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 PATIENT = [[0x2000, 1, 200], [0x2000, 2, 250]]  # drives that bear what a busy computer does to the period
 
 
@@ -97,6 +101,28 @@ def test_whoever_watches_a_homing_sees_it_move_and_can_end_it(machine: Machine, 
     with drivers(machine, channel, ["X"], cia402={"positions": "drive"}) as host:  # and it can be used again
         host.start()
         powered(host, seen[-1])
+
+
+def test_a_homing_that_fails_says_why_and_takes_the_power_past_a_late_answer(
+    machine: Machine, served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An answer that comes too late is no answer to the next request, which took the power's withdrawal for refused."""
+    download, late = configure._download, ["Unexpected response 0x4B"]
+
+    def silent(axis: str, position: float) -> None:
+        raise SdoCommunicationError("No SDO response received")
+
+    def delayed(node: Any, index: int, subindex: int, value: int) -> None:
+        if late and (index, value) == (0x6040, codes.DISABLE_VOLTAGE) and nodes[0].drive.state in POWERED:
+            raise SdoCommunicationError(late.pop())
+        download(node, index, subindex, value)
+
+    channel, nodes = served("X")
+    monkeypatch.setattr(configure, "_download", delayed)
+    with drivers(machine, channel, ["X"], cia402={"axis": {"X": {"homing": 17}}}) as host:
+        with pytest.raises(MachineError, match="stopped answering during configuration: No SDO response"):
+            host.start(silent)
+        assert not late and nodes[0].drive.state is State.SWITCH_ON_DISABLED and no_voltage(nodes)
 
 
 HOMES = """

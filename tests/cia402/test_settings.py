@@ -63,6 +63,7 @@ def test_the_documented_example_is_accepted(machine: Machine, tmp_path: Path, mo
         ({"axis": {"X": {"counts": 5, "gear": 2}}}, "either counts"),
         ({"axis": {"X": {"direction": 0}}}, "1, -1"),
         ({"axis": {"X": {"homing": 5}}}, "17"),
+        (5, "must be a table"),
         ({"axis": 5}, "must be tables"),
         ({"axis": {"X": 5}}, "must be a table"),
         ({"mode": ["csp"]}, "'cst', 'csp', 'csv'"),
@@ -76,7 +77,7 @@ def test_the_documented_example_is_accepted(machine: Machine, tmp_path: Path, mo
         ({"axis": {"X": {"write": [[0x6072, 0]]}}}, "[index, sub-index, value]"),
     ],
 )
-def test_what_cannot_be_is_refused_in_words(machine: Machine, table: dict[str, Any], says: str) -> None:
+def test_what_cannot_be_is_refused_in_words(machine: Machine, table: Any, says: str) -> None:
     with pytest.raises(InputError, match=r"\[bus\.cia402|mini-cnc") as refused:
         read_settings(table, machine, ["X", "Y"])
     assert says in str(refused.value)

@@ -143,8 +143,12 @@ def test_an_axis_is_moved_from_the_command_line_as_from_the_panel(alone: Path) -
     said = json.loads(done.stdout)
     assert said == {"axis": "X", "position": pytest.approx(1.0, abs=0.01), "unit": "mm"}
     for words, why in (
-        (["X"], "neither is given"),
-        (["X", "--by", "1", "--to", "1"], "both are given"),
+        (["X"], "nothing is given"),
+        (["X", "--by", "1", "--to", "1"], "--by and --to are given"),
+        (["X", "--for", "1"], "--for is given: move X by a distance with --by"),
+        (["spindle", "--by", "1"], "--by is given: spindle is a spindle, which turns at a speed for a time"),
+        (["spindle", "--for", "1"], "say how fast it shall turn"),
+        (["X", "--find-home", "17", "--speed", "1"], "a drive homes at speeds of its own"),
         (["X", "--to", "999"], "would leave its travel"),
     ):
         refused = runner.invoke(app, ["jog", *words, "--json"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -12,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from rds.bus.cia402.codes import State
 from rds.bus.cia402.scan import scan
+from rds.cli import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.session import Session
@@ -163,3 +166,40 @@ def test_a_spindle_keeps_its_speed_and_stops_when_nobody_says_it_any_more(alone:
             jog.find_home()
     finally:
         jog.end()
+
+
+def test_a_drive_is_homed_and_the_spindle_turned_from_the_command_line(alone: Path) -> None:
+    bus = '[bus]\ndialect = "cia402"\n[bus.cia402.axis.X]\nhoming = 37\nhome = 4.0\n'
+    (alone / "drives.toml").write_text(bus)
+    served = [sys.executable, "-m", "rds.bus.cia402.server", "mini-cnc", "--exit-with-stdin"]
+    with subprocess.Popen(served, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None and server.stdout.readline().startswith("ready")
+        for words, expected in (
+            (["X", "--find-home", "37"], {"axis": "X", "position": 4.0, "unit": "mm"}),
+            (
+                ["spindle", "--speed=-2000", "--for", "1.5"],
+                {"axis": "spindle", "speed": pytest.approx(-2000.0, abs=30.0), "unit": "rev/min"},
+            ),
+        ):
+            done = CliRunner().invoke(app, ["jog", *words, "--experiment", "drives.toml", "--json"])
+            assert done.exit_code == 0, done.stderr
+            assert json.loads(done.stdout) == expected
+        assert without_power()
+        server.terminate()
+
+
+@pytest.mark.parametrize(
+    "table, says",
+    [
+        ('dialect = "cia402"\n[bus.cia402.axis.X]\nhoming = 5', "homing = 5 must be one of"),
+        ('dialect = "cia402"\n[bus.cia402]\naxis = 3', "must be tables"),
+        ("[bus.cia402]", 'add `dialect = "cia402"`'),
+        ('dialect = "cia402"\ncia402 = 3', "must be a table"),
+        ('faults = "faults.toml"', "faults.toml"),
+    ],
+)
+def test_a_bus_that_will_not_do_is_refused_in_words(alone: Path, table: str, says: str) -> None:
+    (alone / "bus.toml").write_text(f"[bus]\n{table}\n")
+    refused = CliRunner().invoke(app, ["jog", "X", "--by", "1", "--experiment", "bus.toml"])
+    assert refused.exit_code == 2 and says in refused.stderr, refused.stderr
+    assert "Traceback" not in refused.stderr

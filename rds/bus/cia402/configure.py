@@ -157,9 +157,23 @@ def home(node: canopen.RemoteNode, drive: DriveSettings, timeout: float, watch: 
             _wait_for_state(node, drive, state)
         _download(node, 0x6040, 0, codes.ENABLE_OPERATION | codes.BIT_4)
         _wait_for_home(node, drive, time.monotonic() + timeout, watch)
-    finally:  # whatever happened, and be it an interrupt from the keyboard: no power
-        _download(node, 0x6040, 0, codes.DISABLE_VOLTAGE)
+    except BaseException:  # be it an interrupt from the keyboard: no power, and what was wrong is said
+        with contextlib.suppress(MachineError, SdoCommunicationError, can.CanError, OSError):
+            _take_power(node)
+        raise
+    _take_power(node)
     _wait_for_state(node, drive, State.SWITCH_ON_DISABLED)
+
+
+def _take_power(node: canopen.RemoteNode) -> None:
+    """Disable the voltage. Said again where something else was answered: a late answer is not the one to this."""
+    for last in (False, False, True):
+        try:
+            _download(node, 0x6040, 0, codes.DISABLE_VOLTAGE)
+            return
+        except SdoCommunicationError:
+            if last:
+                raise
 
 
 def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: float, watch: Watch) -> None:

@@ -112,6 +112,8 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
     Raises InputError for an unknown key or axis, or a value that can't be.
     """
     where = "[bus.cia402]"
+    if not isinstance(table, Mapping):
+        raise InputError(f"cia402 = {table!r} must be a table, [bus.cia402]", where)
     check_known(table, _TOP, where)
     given = table.get("axis", {})
     if not isinstance(given, Mapping):

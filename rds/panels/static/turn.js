@@ -1,0 +1,67 @@
+// The buttons of a spindle: one way, the other way, stop. While it turns, a word every 200 ms, so that whoever listens
+// notices when they end; and a word when it shall stop, because of a press, or because nobody looks at the page any more.
+const BEAT = 200; // ms
+
+function render({ model, el }) {
+  const box = document.createElement("div");
+  box.className = "rds-hold rds-turn";
+  let turning = null; // the direction, and the timer that beats
+
+  const forget = () => {
+    if (turning === null) return false;
+    clearInterval(turning.timer);
+    turning.button.classList.remove("rds-hold-on");
+    turning.button.setAttribute("aria-pressed", "false");
+    turning = null;
+    return true;
+  };
+  const stop = () => forget() && model.send({ kind: "stop" });
+  const turn = (button, direction) => {
+    if (turning !== null && turning.direction === direction) return;
+    forget();
+    const say = () => model.send({ kind: "turn", direction });
+    turning = { button, direction, timer: setInterval(say, BEAT) };
+    button.classList.add("rds-hold-on");
+    button.setAttribute("aria-pressed", "true");
+    say();
+  };
+  const add = (text, name, title, act) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = text;
+    button.setAttribute("aria-label", `${model.get("spindle")} ${name}`);
+    button.title = title;
+    button.addEventListener("click", () => act(button));
+    box.append(button);
+    return button;
+  };
+  const while_here = "It turns until Stop, and no longer than this page is in sight";
+  const buttons = [
+    add("↺ −", "reverse", while_here, (button) => turn(button, -1)),
+    add("■", "stop", "Bring the spindle to rest", () => {
+      forget();
+      model.send({ kind: "stop" });
+    }),
+    add("+ ↻", "forward", while_here, (button) => turn(button, 1)),
+  ];
+  const hidden = () => document.hidden && stop();
+  window.addEventListener("pagehide", stop);
+  document.addEventListener("visibilitychange", hidden);
+  const enable = () => {
+    for (const button of buttons) button.disabled = model.get("disabled");
+    if (model.get("disabled")) forget();
+  };
+  const told = (word) => word.kind === "forget" && forget();
+  model.on("change:disabled", enable);
+  model.on("msg:custom", told);
+  enable();
+  el.append(box);
+  return () => {
+    stop();
+    model.off("change:disabled", enable);
+    model.off("msg:custom", told);
+    window.removeEventListener("pagehide", stop);
+    document.removeEventListener("visibilitychange", hidden);
+  };
+}
+export default { render };
