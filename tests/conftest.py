@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import os
 import shutil
@@ -23,6 +24,7 @@ settings.load_profile("judge" if os.environ.get("CI") else "search")
 
 HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
+MARK = "pytest.mark.realtime"
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
 
@@ -34,16 +36,29 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     class FilesOrGroups(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return _group(nodeid.partition("::")[0])
+            return group_of(nodeid)
 
     return FilesOrGroups(config, log)
 
 
-@cache
-def _group(path: str) -> str:
+def group_of(nodeid: str) -> str:
+    """What a test runs one by one with: those in a browser, those that wait for real time, or those of its file."""
+    path, name = nodeid.partition("[")[0].split("::")[:2]
     if "/panels/" in path:
         return PANELS
-    return REALTIME if "pytest.mark.realtime" in (HERE.parent / path).read_text(encoding="utf-8") else path
+    return REALTIME if name in _waiting_for_real_time(path) else path
+
+
+@cache
+def _waiting_for_real_time(path: str) -> frozenset[str]:
+    """The functions and classes of a file that are marked `realtime`: all of them where the file itself is."""
+    text = (HERE.parent / path).read_text(encoding="utf-8")
+    if MARK not in text:
+        return frozenset()
+    body = ast.parse(text).body
+    named = [node for node in body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    is_all = any(MARK in ast.unparse(node) for node in body if node not in named)
+    return frozenset(node.name for node in named if is_all or MARK in ast.unparse(node))
 
 
 @pytest.fixture(scope="session", autouse=True)
