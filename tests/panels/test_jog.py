@@ -1,10 +1,16 @@
-"""The jog panel in a browser: an axis moves while a button is held, and stops when the page goes away."""
+"""The jog panel in a browser: an axis moves while a button is held, a spindle turns while the page is in sight."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
+
+from rds.machines import load_machine
+from tests.panels.conftest import App
+
+SPEED = "parseFloat(document.querySelectorAll('.rds-jog-at')[3].innerText)"  # of the spindle, rev/min
 
 
 def position(page: Any) -> float:
@@ -15,7 +21,7 @@ def position(page: Any) -> float:
 
 
 def _speed_beyond_the_machine_is_refused(page: Any) -> None:
-    field = page.locator('.rds-field:has(.rds-label:has-text("Speed")) input')
+    field = page.locator('.rds-field:has(.rds-label:has-text("Speed [mm")) input')
     before = field.input_value()
     field.fill("99")
     field.press("Enter")
@@ -53,4 +59,41 @@ def test_an_axis_moves_while_held_and_by_step(open_page: Callable[..., Any]) -> 
     page.wait_for_function(f"parseFloat(document.querySelector('.rds-jog-at').innerText) > {rested + 9.95}")
     page.click("button.rds-stop")
     page.wait_for_selector('.rds-notice:has-text("modules are at zero volts")')
+    page.wait_for_selector('button[aria-label="X plus"]:disabled')
+
+
+def test_drives_are_held_turned_and_homed(
+    start_app: Callable[..., App], open_page: Callable[..., Any], tmp_path: Path
+) -> None:
+    machine = Path(load_machine("mini-cnc").path).read_text().replace("[-75.0, 75.0]", "[-3.0, 3.0]")
+    (tmp_path / "small.toml").write_text(machine.replace('name = "mini-cnc"', 'name = "small-cnc"'))
+    page = open_page("Machine", on=start_app(tmp_path, "--machine", str(tmp_path / "small.toml")))
+    page.select_option('.widget-dropdown:has-text("cia402") select', "cia402: drives")
+    page.click('button:text-is("Start modules")')
+    page.wait_for_selector("td:has-text('cia402')")
+    page.click('.rds-nav button:text-is("Jog")')
+    page.click('button:text-is("Take the machine")')
+    page.wait_for_selector('.rds-notice-good:has-text("the axes can be moved")')
+    assert page.locator("text=2.994 mm to the").count() == 2  # clear of the limit switches at 3 mm
+    plus = page.locator('button[aria-label="X plus"]')
+    plus.focus()
+    page.keyboard.down("ArrowRight")
+    page.wait_for_function("parseFloat(document.querySelector('.rds-jog-at').innerText) > 0.5")
+    page.keyboard.up("ArrowRight")
+    page.click('button[aria-label="spindle reverse"]')
+    page.wait_for_function(f"Math.abs({SPEED} + 1000) < 50")
+    page.evaluate("Object.defineProperty(document, 'hidden', { value: true, configurable: true })")
+    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")  # another tab is looked at
+    page.wait_for_function(f"Math.abs({SPEED}) < 50")
+    page.evaluate("delete document.hidden")
+    page.click('.rds-field:has-text("Axes to home") button:text-is("X")')
+    page.select_option('.rds-field:has-text("Homing method") select', "17: negative limit switch")
+    page.click('button:text-is("Find home")')
+    page.wait_for_selector('.rds-notice:has-text("X looks for its home")')
+    assert plus.is_disabled()
+    page.wait_for_selector('.rds-notice:has-text("homed: X")')
+    page.wait_for_selector("text=Not homed since the machine was taken: Y, Z")
+    assert -3.0 <= position(page) < -2.9
+    page.click("button.rds-stop")
+    page.wait_for_selector('.rds-notice:has-text("4 modules are at zero volts")')
     page.wait_for_selector('button[aria-label="X plus"]:disabled')
