@@ -115,14 +115,16 @@ def test_a_process_says_its_line_while_compiled_code_holds_it(tmp_path: Path) ->
         "import sys; from pathlib import Path; from rds.panels.app.whereabouts import answer_asks\n"
         "answer_asks(Path(sys.argv[1])); sys.path.insert(0, sys.argv[1]); import own\n"
     )
-    (tmp_path / "own.py").write_text("def held():\n    return sum(range(10**12))\n\n\nprint(flush=True)\nheld()\n")
+    (tmp_path / "own.py").write_text("def held():\n    return print(flush=True) or sum(range(10**12))\n\n\nheld()\n")
     with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        assert [ask(process, tmp_path) for _ in range(2)] == ["own.py, line 2, in held()"] * 2
-        (tmp_path / str(process.pid)).unlink()
-        assert ask(process, tmp_path) is None  # the signal would end it
-        assert process.poll() is None
-        process.kill()
+        try:
+            assert process.stdout is not None
+            process.stdout.readline()
+            assert [ask(process, tmp_path) for _ in range(2)] == ["own.py, line 2, in held()"] * 2
+            (tmp_path / str(process.pid)).unlink()
+            assert ask(process, tmp_path) is None  # the signal would end it
+            assert process.poll() is None
+        finally:
+            process.kill()
     assert ask(process, tmp_path) is None
     assert own_line('  File "<string>", line 1 in <module>\n  File "/a/b.py", line ??? in f\n') == ""

@@ -16,7 +16,8 @@ from typing import Any
 from rds.core.blame import is_installed
 
 _FRAME = re.compile(r'^  File "(.+)", line (\d+) in (.+)$')
-_PATIENCE = 0.5  # s for the answer
+_PATIENCE = 3.0  # s for an answer, on a busy computer
+_QUIET = 0.5  # s without another line, after which an answer is taken for whole
 _POLL = 0.02  # s
 _MOST = 1 << 20  # bytes of an answer that are read
 
@@ -35,7 +36,8 @@ def answer_asks(folder: Path) -> None:
 def ask(process: Any, folder: Path) -> str | None:
     """The line of a user's own code that `process` (a Popen) is at, as in "file.py, line 3, in control()".
 
-    Empty where it is in none, or cannot say; None if it is over, or has not shown a page. Takes half a second at most.
+    Empty where it is in none, or cannot say; None if it is over, or has not shown a page. Takes some hundredths of a
+    second, and _PATIENCE at most.
     """
     said = folder / str(process.pid)
     if process.poll() is not None:
@@ -44,14 +46,22 @@ def ask(process: Any, folder: Path) -> str | None:
         return None if hasattr(faulthandler, "register") else ""
     os.truncate(said, 0)
     process.send_signal(signal.SIGUSR1)
-    size, until = 0, time.monotonic() + _PATIENCE
-    while time.monotonic() < until:
+    begun = heard = time.monotonic()
+    text = ""
+    while (now := time.monotonic()) - begun < _PATIENCE and not (text and now - heard > _QUIET):
         time.sleep(_POLL)
-        before, size = size, said.stat().st_size
-        if 0 < size == before:
-            break
+        before, text = text, _read(said)
+        if line := own_line(text):  # what comes after it is of other threads
+            return line
+        if text != before:
+            heard = now
+    return ""
+
+
+def _read(said: Path) -> str:
+    """The whole lines that are there: they come in pieces."""
     with said.open("rb") as stream:
-        return own_line(stream.read(_MOST).decode("utf-8", "replace"))
+        return stream.read(_MOST).rpartition(b"\n")[0].decode("utf-8", "replace")
 
 
 def own_line(threads: str) -> str:
