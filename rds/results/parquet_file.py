@@ -41,13 +41,14 @@ def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any] | None]:
 
     with open(path, "rb") as stream:
         try:
-            file = parquet.ParquetFile(stream)
+            # none of Arrow's threads: one that lets go of the stream's buffers while Python ends aborts the process
+            file = parquet.ParquetFile(stream, pre_buffer=False)
             text = (file.metadata.metadata or {}).get(_DESCRIPTION)
             schema = file.schema_arrow
             numbers = [f.name for f in schema if pa.types.is_floating(f.type) or pa.types.is_integer(f.type)]
             if len(set(schema.names)) != len(schema.names):
                 raise InputError("two columns have the same name; rename one")
-            table = file.read(columns=numbers)
+            table = file.read(columns=numbers, use_threads=False)
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(f"it is not a Parquet file, or is truncated ({error}); take another copy") from error
     return {name: table.column(name).to_numpy() for name in numbers}, None if text is None else parse(text)

@@ -366,3 +366,20 @@ def test_reopening_is_quick(tmp_path: Path) -> None:
     started = time.perf_counter()
     open_result(path)
     assert time.perf_counter() - started < 2.0
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc, which Linux has")
+def test_reading_parquet_starts_no_thread_that_could_outlive_it(tmp_path: Path, result: Result) -> None:
+    """One that still held a buffer of Python's while Python ended aborted the process, now and then, after its work."""
+    path = result.save(tmp_path / "run.parquet")
+    program = (
+        "import os, sys, pandas, pyarrow.parquet, rds\n"
+        "def threads(): return set(os.listdir('/proc/self/task'))\n"
+        "rds.open_result(sys.argv[2])\n"
+        "before = threads()\n"
+        "rds.open_result(sys.argv[1])\n"
+        "print(len(threads() - before))\n"
+    )
+    other = result.save(tmp_path / "run.mat")  # what else it takes to open a result is loaded by this one
+    said = subprocess.run([sys.executable, "-c", program, path, other], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["0"]
