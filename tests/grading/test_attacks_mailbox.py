@@ -204,6 +204,16 @@ def output(x, params):
     assert caught.value.status in (Status.BROKE_CONTRACT, Status.FAILED_TO_LOAD)
 
 
+def test_a_model_s_first_output_that_is_infinite_is_no_voltage(pool: Pool, written: Written) -> None:
+    text = "initial_state = 0.0\ndef advance(x, u, T, params): return x\n"
+    text += "def output(t, x, u, params): return float('inf')\n"
+    with (
+        pool.open(written(text, ""), SHORT, "model") as subject,
+        pytest.raises(SubmissionError, match="its output before the first sample is inf; it must be one finite number"),
+    ):
+        subject.begin_model({}, 1e-3)
+
+
 @pytest.mark.parametrize("value", ["9" * 320, r'"\\ud800"', "NaN", "[" * 50 + "]" * 50])
 def test_what_a_function_returns(value: str, pool: Pool, written: Written) -> None:
     text = INSIDE + ENDS + f"def attack():\n    frame('{{\"value\": {value}}}')\n    time.sleep(9)\n"

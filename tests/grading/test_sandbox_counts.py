@@ -257,7 +257,14 @@ def test_no_way_leads_to_the_counter(way: str, pool: Pool, written: Written) -> 
 
 def test_what_python_itself_asks_frames_for_is_there_while_a_file_is_loaded(pool: Pool, written: Written) -> None:
     text = """
-import collections, enum, typing, warnings
+import collections, enum, signal, sys, typing, warnings
+frame, names = sys._getframe(), []
+while frame is not None:
+    names.append(frame.f_globals["__name__"])
+    frame = frame.f_back
+assert names[0] == __name__ and len(names) > 3
+heard = []
+signal.signal(signal.SIGUSR1, lambda number, frame: heard.append(number))
 Pair = collections.namedtuple("Pair", "a b")
 Mode = enum.Enum("Mode", "ON OFF")
 Other = typing.NamedTuple("Other", [("a", int)])
@@ -268,10 +275,17 @@ import array, zlib
 initial_state = ()
 def control(t, r, y, state, params):
     warnings.warn("another")
+    signal.raise_signal(signal.SIGUSR1)
     return float(Pair(1.0, Mode.ON).a), state
 """
     found = counts(pool, written(text, ""), samples=3)
     assert found.events and not found.refused
+
+
+def test_a_file_that_cannot_be_loaded_while_it_is_counted_is_told_why(pool: Pool, written: Written) -> None:
+    found = counts(pool, written("import threading\nthreading.Thread(target=int).start()\n"), samples=1)
+    assert found.events is None
+    assert "line 2, in <module>: RuntimeError: can't start new thread" in found.refused
 
 
 @pytest.mark.parametrize("name", FORGED)

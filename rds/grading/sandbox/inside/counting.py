@@ -53,6 +53,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     # by these names, which a submission cannot exchange
     settrace, setprofile, gettrace, getprofile = sys.settrace, sys.setprofile, sys.gettrace, sys.getprofile
     getframe, create, attributes, as_int, text = sys._getframe, _imp.create_builtin, SimpleNamespace, int, str
+    set_handler, is_function = _signal.signal, callable
     starts, last_part, exactly = str.startswith, str.rpartition, type
     read, write, identity, as_float, refusal = os.read, os.write, id, float, RuntimeError
     unpack, pack, asked, answered = layout.question.unpack, layout.answer.pack, layout.question.size, layout.answer.size
@@ -91,15 +92,29 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     _never, _begins, _frames, _inner = _NEVER, _NEVER_BEGINS, _FRAMES, _NO_MODULES
     _said = "is not allowed in a run whose work is counted"
 
-    def look(depth: int = 0) -> SimpleNamespace:
-        """What named tuples and their like look for in a frame while a file is loaded, and not the frame."""
+    def look(depth: int = 0) -> SimpleNamespace | None:
+        """What named tuples and their like look for in frames while a file is loaded, and not the frames."""
         nonlocal may_look
         if runs:
             raise refusal(f"sys._getframe {_said}")
         level = as_int(depth) + 1
         may_look = True
-        frame = getframe(level)
-        return attributes(f_globals=frame.f_globals, f_code=frame.f_code, f_lineno=frame.f_lineno, f_back=None)
+        frame: FrameType | None = getframe(level)
+        frames = []
+        while frame is not None:
+            frames.append(frame)
+            frame = frame.f_back
+        found = None
+        while frames:
+            frame = frames.pop()
+            found = attributes(
+                f_globals=frame.f_globals,
+                f_code=frame.f_code,
+                f_lineno=frame.f_lineno,
+                f_lasti=frame.f_lasti,
+                f_back=found,
+            )
+        return found
 
     def create_new(spec: Any) -> Any:
         """A module of the interpreter's own, but none a second time: it would have all that was exchanged in it."""
@@ -108,9 +123,11 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
             raise refusal(f"another {name} {_said}")
         return create(attributes(name=name))  # type: ignore[arg-type] # nothing else of it is read
 
-    def handle(*_: Any) -> None:
-        """In place of `signal.signal`: a handler is given a frame."""
-        raise refusal(f"signal.signal {_said}")
+    def handle(number: int, handler: Any) -> Any:
+        """In place of `signal.signal`: no handler is given a frame."""
+        if is_function(handler):
+            return set_handler(number, _hidden(lambda number, frame: handler(number, None)))
+        return set_handler(number, handler)
 
     def begin() -> None:
         nonlocal before, runs

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import isfinite
 from typing import Any
 
 from rds.checks.rows import iterate, row_of
@@ -92,7 +93,9 @@ def model(channel: Channel, student: StudentFile, order: dict[str, Any], counted
     try:
         motion = start(student_model(student, order["params"]), order["T"])
         write, read = motion.write, motion.read
-        first = as_voltage(read())
+        first = float(read())
+        if not isfinite(first):
+            raise InputError(f"its output before the first sample is {first!r}; it must be one finite number")
     except (InputError, *STUDENT_ERRORS) as error:
         return _refuse(channel, error, student, counted)
     channel.tell({"begun": True, "output": first})
