@@ -53,7 +53,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The assignment in `task`, submissions in `in`."""
     folder = tmp_path_factory.mktemp("cluster")
     assignment_in(folder / "task", ASSIGNMENT, law())
-    put(folder / "in", {f"s{n}.py": law(10.0 + n) for n in range(8)} | {"exit.py": "import os\nos._exit(0)\n"})
+    put(folder / "in", {f"s{n}.py": law(10.0 + n) for n in range(8)})
+    put(folder / "in", {"exit.py": "import os\nos._exit(0)\n", "broken.py": "def control(:\n"})
     return folder
 
 
@@ -66,7 +67,7 @@ def test_the_same_scores_though_a_worker_is_killed(place: Path) -> None:
                 os.kill(workers[0], signal.SIGKILL)
 
         there = run_batch(place / "task", place / "in", place / "there", scheduler=address, progress=kill_one)
-    assert there.grades == here.grades and len(there.grades) == 9
+    assert there.grades == here.grades and len(there.grades) == 10
 
 
 def test_a_worker_without_the_sandbox_is_told(place: Path) -> None:

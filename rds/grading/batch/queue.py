@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.grading.assignment import Assignment
+from rds.grading.batch.work import CODE
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import HandedIn, Intake
 from rds.grading.intake.items import Refusal
@@ -18,7 +19,6 @@ from rds.grading.late import days_late
 from rds.results.atomic import write_whole
 from rds.spread import spread
 
-CODE = "submission.py"
 _PATIENCE = 30.0  # s for a notebook
 
 

@@ -12,9 +12,9 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.grading.assignment import Assignment, read_assignment
 from rds.grading.batch.outcome import BatchOutcome
-from rds.grading.batch.queue import CODE, Queued, keep, queued, ungraded
+from rds.grading.batch.queue import Queued, keep, queued, ungraded
 from rds.grading.batch.record import FILE, check_same, read_record, record_of
-from rds.grading.batch.work import FEEDBACK, Answer, Task, graded, setup_of
+from rds.grading.batch.work import CODE, FEEDBACK, Answer, Task, graded, setup_of
 from rds.grading.class_files import write_class_files
 from rds.grading.feedback import feedback_page
 from rds.grading.grade import Grade, Status

@@ -23,6 +23,7 @@ from rds.spread import worker_number
 if TYPE_CHECKING:
     from rds.grading.cases.case import CaseRun
 
+CODE = "submission.py"  # what a submission is called in messages to its author, wherever it is graded
 COLUMNS, FEEDBACK = "columns.parquet", "feedback.html"
 _SOLUTION = "reference solution"  # the student whose plants it runs on
 
@@ -80,7 +81,7 @@ def graded(setup: Setup, task: Task) -> Answer:
         found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
     else:
         with tempfile.TemporaryDirectory(prefix="rds-grade-") as folder:
-            path = Path(folder) / code_name(assignment)
+            path = Path(folder) / CODE
             path.write_bytes(task.code)
             found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
     grade, seconds = found.grade, time.monotonic() - began
@@ -115,11 +116,6 @@ def columns_of(runs: tuple[CaseRun, ...]) -> bytes:
     return data
 
 
-def code_name(assignment: Assignment) -> str:
-    """What a submission is called in messages to its author."""
-    return next((name for name in assignment.files if name.endswith(".py")), "submission.py")
-
-
 @lru_cache(maxsize=1)
 def _assignment(setup: Setup) -> tuple[Assignment, bytes]:
     """Read once for each worker, with the reference solution if there is one."""
@@ -141,7 +137,7 @@ def _expected(setup: Setup) -> tuple[CaseRun, ...]:
     """The runs of the reference solution, once for each worker."""
     assignment, code = _assignment(setup)
     with tempfile.TemporaryDirectory(prefix="rds-solution-") as folder:
-        path = Path(folder) / code_name(assignment)
+        path = Path(folder) / CODE
         path.write_bytes(code)
         return grade_with_runs(assignment, path, _SOLUTION, _pool(setup.jobs)).runs
 
