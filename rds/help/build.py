@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import importlib.util
 import os
@@ -10,13 +11,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from rds.core.errors import InputError
 
 _HERE = Path(__file__).parent
 FIRST = "index"
+_PULSE = 0.1  # s
 # the order in which a reader needs them; documents that are not named here come last
 ORDER = (
     *("readme", "panels", "equipment", "design", "program-panel", "machine-panel", "experiments", "paper", "data"),
@@ -39,10 +41,11 @@ def sources() -> dict[str, Path]:
     raise InputError("the documents are not installed; install rds from a wheel or a checkout that has docs/")
 
 
-def help_pages(out: Path | None = None) -> Path:
+def help_pages(out: Path | None = None, pulse: Callable[[], None] = lambda: None) -> Path:
     """The folder with the built pages (`index.html`), by default in the user's cache, built if they are not there.
 
-    InputError where sphinx is missing, the documents have faults, or the folder cannot be written to.
+    `pulse()` is called ten times a second meanwhile: what it raises ends the building. InputError where sphinx is
+    missing, the documents have faults, or the folder cannot be written to.
     """
     documents = sources()
     place = out or _cache() / _fingerprint(documents)
@@ -53,7 +56,7 @@ def help_pages(out: Path | None = None) -> Path:
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".rds-help-", dir=place.parent) as work:
-            built = _built(documents, Path(work))
+            built = _built(documents, Path(work), pulse)
             if out is not None and place.exists():
                 shutil.rmtree(place)
             if not place.exists():  # else another process was quicker
@@ -69,7 +72,7 @@ def page_file(name: str) -> str:
     return f"{name if name in known else FIRST}.html"
 
 
-def _built(documents: dict[str, Path], work: Path) -> Path:
+def _built(documents: dict[str, Path], work: Path, pulse: Callable[[], None]) -> Path:
     if importlib.util.find_spec("sphinx") is None or importlib.util.find_spec("myst_parser") is None:
         raise InputError("help needs sphinx and myst-parser, which are not installed: pip install 'rds[lab]'")
     source, target = work / "source", work / "html"
@@ -79,11 +82,34 @@ def _built(documents: dict[str, Path], work: Path) -> Path:
     (source / f"{FIRST}.md").write_text(_contents(documents), encoding="utf-8")
     # in a process of its own: sphinx changes docutils for the whole process
     command = [sys.executable, "-m", "sphinx", "-q", "-b", "html", "-c", str(_HERE), "-d", str(work / "doctrees")]
-    done = subprocess.run([*command, str(source), str(target)], capture_output=True, text=True, check=False)
-    faults = "\n".join(line for line in done.stderr.splitlines() if "WARNING" in line or "ERROR" in line)
-    if done.returncode or faults:
-        raise InputError(f"the documents have faults: {(faults or done.stderr).strip()[:2000]}", str(source))
+    code, said = _run([*command, str(source), str(target)], pulse)
+    faults = "\n".join(line for line in said.splitlines() if "WARNING" in line or "ERROR" in line)
+    if code or faults:
+        raise InputError(f"the documents have faults: {(faults or said).strip()[:2000]}", str(source))
     return target
+
+
+def _run(command: list[str], pulse: Callable[[], None]) -> tuple[int, str]:
+    """Exit code and stderr of a command, which ends with this call and with this process."""
+    process = subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+
+    def end() -> None:
+        process.kill()
+        process.wait()
+
+    atexit.register(end)  # before the folder that it writes into is taken away, if a page's kernel ends meanwhile
+    try:
+        while True:
+            try:
+                said = process.communicate(timeout=_PULSE)[1]
+                return process.returncode, said
+            except subprocess.TimeoutExpired:
+                pulse()
+    finally:
+        atexit.unregister(end)
+        end()
 
 
 def _contents(documents: dict[str, Path]) -> str:

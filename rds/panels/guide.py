@@ -39,7 +39,7 @@ class Guide:
         elif not self.bar.busy:
             from rds.help.serve import help_server
 
-            task = self.shell.session.work("making the help", lambda task: help_server())
+            task = self.shell.session.work("making the help", lambda task: help_server(task.pulse))
             task.note = "making the pages, once"
             watch(self.bar, self.notice, task, self._built)
 

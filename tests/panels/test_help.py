@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -58,6 +60,37 @@ def test_a_folder_with_other_things_is_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="other things"):
         help_pages(tmp_path)
     assert (tmp_path / "thesis.txt").read_text() == "mine"
+
+
+def test_building_ends_when_it_is_asked_to_and_leaves_nothing(tmp_path: Path) -> None:
+    class Enough(Exception):
+        pass
+
+    def pulse() -> None:
+        raise Enough
+
+    with pytest.raises(Enough):
+        help_pages(tmp_path / "pages", pulse)
+    assert list(tmp_path.iterdir()) == []
+
+
+ENDS_MEANWHILE = """
+import sys, threading
+from pathlib import Path
+from rds.help.build import help_pages
+from rds.session.task import Task
+
+begun = threading.Event()
+Task("help", lambda task: help_pages(Path(sys.argv[1]) / "pages", begun.set)).start()
+begun.wait()
+"""
+
+
+def test_a_process_that_ends_while_it_builds_says_nothing_and_leaves_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", ENDS_MEANWHILE, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (done.stderr, done.returncode) == ("", 0)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_only_who_knows_the_path_reads_the_pages(server: FolderServer) -> None:
