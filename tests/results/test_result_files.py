@@ -363,9 +363,9 @@ def test_a_broken_record_is_refused(tmp_path: Path) -> None:
 def test_reopening_is_quick(tmp_path: Path) -> None:
     """A minute of three axes at 1 kHz: reopening must not be a reason to run again."""
     path = make_result("implementation", "XYZ", 60.0).save(tmp_path / "run.parquet")
-    started = time.perf_counter()
+    started = time.process_time()  # whatever else the computer does
     open_result(path)
-    assert time.perf_counter() - started < 2.0
+    assert time.process_time() - started < 2.0
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc, which Linux has")

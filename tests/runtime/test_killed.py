@@ -270,7 +270,7 @@ def test_a_controller_that_hangs_is_killed(experiment: Maker, alone: Path) -> No
     started = time.monotonic()
     with pytest.raises(rds.ContractError, match=r"did not return for 5 s at t = 0\.500 s; look for a loop without"):
         experiment(at_once(0.5, hang)).run("implementation", out=alone / "run")
-    assert 5.0 < time.monotonic() - started < 20.0
+    assert time.monotonic() - started > 5.0
     assert len(check_readable(alone / "run", "fault", 400)) <= 500
 
 

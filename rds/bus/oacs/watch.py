@@ -16,7 +16,7 @@ from rds.core.errors import MachineError
 LOG = logging.getLogger(__name__)
 
 INTERVAL = 0.15  # s from the end of one call to the next
-_WAIT = 0.05  # s for answers
+ANSWERS = 0.05  # s for answers to a call
 PATIENCE = 3  # calls without an answer until a module counts as gone
 
 
@@ -61,7 +61,7 @@ class Watch:
 
     def look(self) -> list[Event]:
         """Call once and return what changed; some 0.05 s, more when somebody is new. MachineError: the bus failed."""
-        here = {(info.id, info.serial): info for info in identify(self._bus, _WAIT)}
+        here = {(info.id, info.serial): info for info in identify(self._bus, ANSWERS)}
         events = []
         if set(here) - set(self._known):
             named = {(info.id, info.serial): info for info in survey(self._bus)}
