@@ -20,7 +20,6 @@ from rds.panels.app.page import FOLDER, MACHINE, WHEREABOUTS
 from rds.panels.app.whereabouts import ask
 
 _MOST_CHANNELS = 64
-_STAY = "files, fields and earlier runs are as they were"
 _KERNEL = r"/rds/kernel/([0-9a-f-]{36})"  # as Jupyter names them
 
 
@@ -95,12 +94,15 @@ def emergency_stop(channels: Iterable[str]) -> tuple[str, str]:
 
 
 def _held(where: str | None) -> str:
+    stay = "files, fields and earlier runs stay as they are"
     if where is None:
-        return f"What this page worked with has ended. Begin again: {_STAY}."
+        return f"What this page worked with has ended. Begin again: {stay}."
     at = f"{where} has not returned" if where else "what it is at takes long"
-    return f"This page gets no answer: {at}. Wait for it, or begin again: {_STAY}."
+    return f"This page gets no answer: {at}. Wait for it, or begin again: {stay}."
 
 
 def _ended(where: str | None) -> str:
-    at = f"{where} did not return, and was ended" if where else "what it was at has ended"
-    return f"This page was begun again: {at}. Nothing else is lost: {_STAY}."
+    at = (
+        f"{where} did not return, and was ended with all else in this page" if where else "all that was in it has ended"
+    )
+    return f"This page was begun again: {at}. Files, fields and earlier runs are as they were."
