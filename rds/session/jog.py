@@ -214,8 +214,9 @@ class Jog:
     def find_home(self, axes: Iterable[str] | None = None, method: int | None = None) -> None:
         """Let the drives of `axes` (default: all) find their home by homing mode 6, one after the other, Z first.
 
-        `method` is by default the one that is chosen; a `[bus.cia402]` table of the session goes before both. The other
-        axes have no power meanwhile. InputError where the modules are no drives, or a spindle turns.
+        `method` is by default the one that a `[bus.cia402]` table of the session gives, else the one that is chosen.
+        The other axes have no power meanwhile. InputError where the modules are no drives, a spindle turns, or the
+        table gives another method.
         """
         if self.ready and not self.finds_home:
             raise InputError(
@@ -224,11 +225,18 @@ class Jog:
             )
         if any(abs(speed) > _STANDS * self.spindles[name].speeds[1] for name, speed in self.speeds.items()):
             raise InputError("a spindle turns; stop it first: nothing else has power while a drive is homed")
-        number = Choice("method", "Homing method", "", "", HOMING).check(
-            self.choices["method"] if method is None else str(method)
-        )
         names = [self._axis(name).name for name in (self.positions if axes is None else axes)]
-        self._order(home=dict.fromkeys(names, int(number)))
+        self._order(home={name: self._method(name, method) for name in names})
+
+    def _method(self, name: str, method: int | None) -> int:
+        """The homing method for an axis."""
+        own = self.session.bus.get("cia402", {}).get("axis", {}).get(name, {}).get("homing")
+        if own is not None:
+            if method not in (None, own):
+                raise InputError(f"[bus.cia402.axis.{name}] says homing = {own}, not {method}; change it there")
+            return int(own)
+        wanted = self.choices["method"] if method is None else str(method)
+        return int(Choice("method", "Homing method", "", "", HOMING).check(wanted))
 
     def turn(self, spindle: str, direction: int, speed: float | None = None) -> None:
         """Turn a spindle at `speed` (rev/min) or that which is chosen; it stops unless this is said again within 1 s.

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+from rds.bus import frames
 from rds.bus.dialects import open_drivers
 from rds.controllers import library_controller
 from rds.controllers.axis_data import SPINDLE_UNIT
@@ -94,8 +95,10 @@ class VoltageHand:
 
     def __init__(self, machine: Machine, dialect: str, bus: Mapping[str, Any]):
         self.left_out: dict[str, str] = {}
-        for axis in machine.axes.values():
-            if not (axis.model.get("tau") and axis.model.get("K")):
+        for place, axis in enumerate(machine.axes.values()):
+            if place >= frames.SLOTS:
+                self.left_out[axis.name] = f"a command carries the voltages of the machine's first {frames.SLOTS} only"
+            elif not (axis.model.get("tau") and axis.model.get("K")):
                 self.left_out[axis.name] = "its modules take voltages, and it has no model with tau and K"
         self.axes = {name: axis for name, axis in jog_axes(machine).items() if name not in self.left_out}
         self.spindles = {name: each for name, each in jog_spindles(machine).items() if name not in self.left_out}

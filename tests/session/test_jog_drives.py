@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.session import Session
 from rds.session.jog import Jog
+from rds.session.jog_hands import VoltageHand
 from rds.session.jog_orders import SPINDLE_DEAD_MAN
 
 from .test_jog import PATIENCE, hold_until, wait_for
@@ -87,7 +89,9 @@ def test_software_limits_narrow_the_travel_and_home_is_found(alone: Path) -> Non
     jog = taken(alone, str(alone / "small.toml"), dialect="cia402", cia402={"axis": axes})
     try:
         assert jog.axes["X"].travel == (-1.0, 2.5) and jog.positions["X"] == 0.0  # not homed at the start
-        jog.find_home(["X", "Y"], 17)
+        with pytest.raises(InputError, match=r"\[bus\.cia402\.axis\.X\] says homing = 37, not 17"):
+            jog.find_home(["X"], 17)
+        jog.find_home(["X", "Y"])  # by 17, which is chosen unless the table gives one
         wait_for(lambda: jog.homing == "Y" and jog.positions["Y"] < -1.0)
         with pytest.raises(InputError, match="Y is being homed"):
             jog.turn("spindle", 1)
@@ -186,6 +190,21 @@ def test_a_drive_is_homed_and_the_spindle_turned_from_the_command_line(alone: Pa
             assert json.loads(done.stdout) == expected
         assert without_power()
         server.terminate()
+
+
+def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason(alone: Path) -> None:
+    """An axis without a model, and a spindle in the fifth place of four; drives need neither."""
+    text = Path(load_machine("mini-cnc").path).read_text()
+    rotary = '[axis.C]\nnode = 9\nunit = "deg"\ntravel = [-90.0, 90.0]\nresolution = 0.01\n'
+    fifth = re.sub(r"\[axis\.Y\.model\][^\[]*", "", text).replace("[axis.spindle]", rotary + "[axis.spindle]")
+    (alone / "five.toml").write_text(fifth)
+    hand = VoltageHand(load_machine(str(alone / "five.toml")), "rds", {"interface": "virtual", "channel": "five"})
+    try:
+        assert list(hand.axes) == ["X", "Z"] and not hand.spindles
+        assert "no model with tau and K" in hand.left_out["Y"] and "no model with tau and K" in hand.left_out["C"]
+        assert "the machine's first 4 only" in hand.left_out["spindle"]
+    finally:
+        hand.close()
 
 
 @pytest.mark.parametrize(
