@@ -249,6 +249,13 @@ def test_a_file_of_a_gigabyte_is_not_read(tmp_path: Path) -> None:
         of(tmp_path)["ada"].read()
 
 
+def test_whose_files_are_too_many_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rds.grading.intake.folders.MOST_FILES", 9)
+    put(tmp_path, {"ada/controller.py": "", **{f"mal/{n}.txt": "" for n in range(9)}})
+    with pytest.raises(InputError, match="more than 9 files, 9 of them in mal; move that one away"):
+        collect(tmp_path, ACCEPTED)
+
+
 def test_names_that_would_fool_somebody(tmp_path: Path) -> None:
     names = ["a\nb", "a\\nb", "\u202eabc", "..", "Ada", "ada", "\x1b[31m", "con", "x" * 120]
     folder = put(tmp_path, {f"{name}.py" if name != ".." else "...py": "" for name in names})

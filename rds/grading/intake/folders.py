@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import stat
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.grading.intake.items import CODE, DEEPEST, MOST_FILES, Item, Refusal, faulty, is_clutter
+from rds.grading.intake.names import shown
 
 _KINDS = {
     stat.S_IFLNK: "a link",
@@ -26,7 +28,12 @@ def files_below(folder: Path) -> tuple[list[Item], list[str]]:
     for item in _walk(folder, ()):
         found.append(item)
         if len(found) > MOST_FILES:
-            raise InputError(f"holds more than {MOST_FILES} files; name the folder of the submissions", str(folder))
+            largest, count = Counter(item.parts[0] for item in found).most_common(1)[0]
+            raise InputError(
+                f"holds more than {MOST_FILES} files, {count} of them in {shown(largest)}; move that one away, or name "
+                "the folder of the submissions",
+                str(folder),
+            )
     with os.scandir(folder) as entries:
         folders = sorted(entry.name for entry in entries if entry.is_dir(follow_symlinks=False))
     return found, [name for name in folders if not is_clutter((name,)) and not _looks_like_code(name)]
