@@ -30,6 +30,7 @@ from rds.modes.machine import BUILTIN, machine_behind
 from rds.runtime.changes import Change, read_changes, timed
 from rds.runtime.desk import Desk
 from rds.runtime.plan import Plan, dump
+from rds.runtime.processes import is_alive
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
 from rds.runtime.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
 from rds.runtime.ring import Ring
@@ -228,7 +229,7 @@ def _take_over(directory: Path, ring: Ring, period: float) -> None:
     except (OSError, ValueError, KeyError):
         target = 0  # it died before it started one
     deadline = time.monotonic() + max(HANG_AFTER, 20 * period)
-    while target and _is_target(target, ring):
+    while target and is_alive(target, str(ring.path)):
         recorder.drain()
         if time.monotonic() > deadline:
             os.kill(target, signal.SIGKILL)
@@ -237,22 +238,6 @@ def _take_over(directory: Path, ring: Ring, period: float) -> None:
     recorder.close()
     reason = "the recorder process was ended from outside; the samples up to then are kept"
     finish(directory, ring, {"ending": Ending.KILLED, "reason": reason, "rows": ring.head})
-
-
-def _is_target(process: int, ring: Ring) -> bool:
-    """Whether this process is alive and the target of this run: numbers of processes are used again."""
-    try:
-        return str(ring.path).encode() in Path(f"/proc/{process}/cmdline").read_bytes()
-    except FileNotFoundError:
-        return not Path("/proc").is_dir() and _is_alive(process)
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except OSError:
-        return False
-    return True
 
 
 def _ring_path(run: str) -> Path:

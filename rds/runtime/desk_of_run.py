@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 from rds.runtime.desk import Desk
+from rds.runtime.processes import is_alive
 from rds.runtime.record import PROCESSES
 
 
@@ -16,7 +17,11 @@ from rds.runtime.record import PROCESSES
 def desk_of(directory: str | Path) -> Iterator[Desk]:
     """The live values of the run in `directory`, for whoever is not its host. InputError if no run goes on there."""
     try:
-        path = json.loads((Path(directory) / PROCESSES).read_text())["desk"]
+        told = json.loads((Path(directory) / PROCESSES).read_text())
+        path = Path(told["desk"])
+        # all of them may have been killed: the file and the memory are there then, and nobody takes from it
+        if not any(is_alive(int(told[name]), path.stem) for name in ("target", "recorder")):
+            raise ValueError("no process of the run is alive")
         desk = Desk.open(path)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError("no run goes on there; give the folder of one that does", str(directory)) from error

@@ -138,8 +138,14 @@ class Session:
         with self._lock:
             if self.machine_user is not None:
                 raise InputError("the machine is in use on this page; stop that first")
-            self._claim = Claim(self.folder, what)
-            self.machine_user = user
+            claim = Claim(self.folder, what)
+            if going := self.runs_that_go_on():  # its page was killed, or it was begun in a terminal
+                claim.release()
+                raise InputError(
+                    f"the machine is in use by a run that goes on without a page, {going[0].name}; wait for its end, "
+                    "or press Emergency stop, which ends it"
+                )
+            self._claim, self.machine_user = claim, user
 
     def work_on_machine(
         self, user: Any, title: str, work: Callable[[Task[T]], T], on_stop: Callable[[], None] | None = None

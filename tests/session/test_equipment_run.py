@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -11,6 +16,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.results import open_result
+from rds.runtime.record import PROCESSES
 from rds.session import Session
 from rds.session.equipment import Equipment
 from rds.session.kept_runs import State
@@ -159,3 +165,46 @@ def test_a_folder_that_is_taken_away_during_a_run_is_said_so(alone: Path) -> Non
     run.stop()
     assert run.wait(30) and isinstance(run.error, InputError) and run.folder.name in str(run.error)
     assert session.machine_user is None
+
+
+ORPHAN = """
+import os, sys, time
+from rds.session import Session
+from rds.session.equipment import Equipment
+
+equipment = Equipment(Session(sys.argv[1]), "control")
+equipment.choices.set("mode", "implementation")
+equipment.choices.set("duration", 60.0)
+run = equipment.run().start()
+while not len(run.new_rows()):
+    time.sleep(0.02)
+os._exit(0)  # as a kernel that is killed
+"""
+
+
+@pytest.mark.realtime
+def test_a_run_whose_page_was_killed_keeps_the_machine_until_it_ends(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-c", ORPHAN, str(tmp_path)], check=True, timeout=60)
+    session = Session(tmp_path)
+    (orphan,) = session.runs_that_go_on()
+    with pytest.raises(InputError, match=f"a run that goes on without a page, {orphan.name}"):
+        session.take_machine("another run", object())
+    orphan.stop()
+    deadline = time.monotonic() + 60
+    while session.runs_that_go_on() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    session.take_machine("another run", object())  # what refused held nothing
+
+
+@pytest.mark.realtime
+def test_a_run_of_which_all_processes_were_killed_goes_on_no_more(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-c", ORPHAN, str(tmp_path)], check=True, timeout=60)
+    session = Session(tmp_path)
+    (orphan,) = session.runs_that_go_on()
+    for name in ("recorder", "target"):
+        os.kill(json.loads((orphan.folder / PROCESSES).read_text())[name], signal.SIGKILL)
+    deadline = time.monotonic() + 20
+    while session.runs_that_go_on() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert [run.state for run in session.runs()] == [State.CUT_SHORT]
+    session.take_machine("another run", object())
