@@ -72,7 +72,8 @@ def _text(exc: BaseException) -> str:
         text = " ".join(str(exc).split())
     except Exception:  # an exception class of the student's own may fail to print itself
         text = "(its message cannot be printed)"
-    return text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
+    text = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
+    return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone
 
 
 def _sentence(where: str, kind: str, text: str, line: str) -> str:

@@ -99,7 +99,7 @@ def metric_notes(result: Result) -> list[str]:
     notes: dict[str, list[str]] = {}
     for axis in result.axes:
         period = _period(result, axis)
-        if period is None or not len(result):
+        if period is None or not len(result) or not _compares(result, axis):
             continue
         first = _first_settled(result, period)
         if first is None:
@@ -111,6 +111,11 @@ def metric_notes(result: Result) -> list[str]:
                 note += f"; only {rest:g} s of the second are there"
         notes.setdefault(note, []).append(axis)
     return [f"{', '.join(axes)}: {note}." for note, axes in notes.items()]
+
+
+def _compares(result: Result, axis: str) -> bool:
+    """Whether there is a metric of `axis`: a system test measures, and has nothing to compare that with."""
+    return f"{axis}_measured" in result and (f"{axis}_reference" in result or f"{axis}_modelled" in result)
 
 
 def _first_settled(result: Result, period: float) -> int | None:

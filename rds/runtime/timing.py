@@ -135,7 +135,7 @@ def judge(
         f"{float(own_wait(timing, period).max(initial=0.0)) / 1e6:.2f} ms late with a period of {period / 1e6:g} ms, "
         f"took {float(timing.taken.sum()) / 1e6:.2f} ms from the running code, "
         f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{answers}; "
-        "the run says nothing about the controller: repeat it on a quieter machine"
+        "the run says nothing about the code that it tried: repeat it on a quieter machine"
     )
     return Judgement(Verdict.VOID, reason, count, alone, discarded)
 

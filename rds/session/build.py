@@ -101,7 +101,9 @@ def _checked(role: str, path: Path, text: str, T: float, pulse: Callable[[], Non
             return Checked(role, path, text)
         return _python(role, path, text, T, pulse)
     except InputError as error:
-        return Checked(role, path, text, (_mark(str(error).removeprefix(f"{path}:").strip(), path, text, error.where),))
+        # the message without its place, which the mark is
+        said = str(error).removeprefix(f"{error.where}: ").removeprefix(f"{path}:").strip()
+        return Checked(role, path, text, (_mark(said, path, text, error.where),))
 
 
 def _python(role: str, path: Path, text: str, T: float, pulse: Callable[[], None]) -> Checked:

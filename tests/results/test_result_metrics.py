@@ -62,6 +62,16 @@ def test_the_first_period_is_left_out() -> None:
     assert metric_notes(result) == ["X: the metrics leave out the first period of the reference (0.3 s)."]
 
 
+def test_a_run_with_nothing_to_compare_says_nothing_of_metrics() -> None:
+    """A system test has a periodic voltage and a measured response: no metric, so none that leaves a period out."""
+    time = 0.1 * np.arange(6)
+    result = Result(
+        {"time": time, "X_measured": time, "X_voltage": time},
+        meta={"axes": ["X"], "sample_period": 0.1, "period": {"X": 0.3}},
+    )
+    assert result.metrics["X"] == {} and metric_notes(result) == []
+
+
 @pytest.mark.parametrize("periods", [1, 2, 3, 7])
 @pytest.mark.parametrize("T", [0.001, 0.0003, 1 / 3000])
 def test_exactly_one_period_goes_whatever_the_rounding(periods: int, T: float) -> None:

@@ -54,6 +54,18 @@ def test_a_fault_is_marked_at_its_line(
     assert any(mark.line in (line, line + 1) and words in mark.text for mark in checked.marks), checked.marks
 
 
+def test_a_message_names_its_line_once(tmp_path: Path) -> None:
+    path = write(tmp_path, "mine.py", "def control(t, r, y, state, params)\n    return 0.0, state\n")
+    (mark,) = Builds().check("controller", path, 0.001).marks
+    assert mark.line == 1 and mark.text.startswith("syntax error: expected ':'")
+
+
+def test_a_key_that_params_lacks_is_told_in_words(tmp_path: Path) -> None:
+    text = "params = {'Kp': 1.0}\n\n\ndef control(t, r, y, state, params):\n    return params['Kd'] * y, state\n"
+    checked = Builds().check("controller", write(tmp_path, "mine.py", text), 0.001)
+    assert "mine.py, line 5" in checked.sentence and "KeyError: 'Kd' (the dict has no such key)" in checked.sentence
+
+
 def test_what_is_no_such_part_is_said(tmp_path: Path) -> None:
     builds = Builds()
     assert "there is no such file" in builds.check("controller", tmp_path / "none.py", 0.001).sentence
