@@ -14,7 +14,11 @@ from typing import Any
 
 import pytest
 
+from rds.core.errors import MachineError
 from rds.panels.app.whereabouts import ask, own_line
+from rds.panels.rescue import Rescue
+from rds.panels.shell import Shell
+from rds.session import Session
 from tests.panels.conftest import App
 from tests.panels.test_interrupted import wait_for
 
@@ -128,3 +132,29 @@ def test_a_process_says_its_line_while_compiled_code_holds_it(tmp_path: Path) ->
             process.kill()
     assert ask(process, tmp_path) is None
     assert own_line('  File "<string>", line 1 in <module>\n  File "/a/b.py", line ??? in f\n') == ""
+
+
+def test_the_page_tells_its_server_of_the_channels_it_started_and_hears_what_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("jupyter_server", reason="jupyter_server is not installed: pip install 'rds[lab]'")
+    from rds.panels.app.page import FOLDER, MACHINE
+    from rds.panels.app.rescue import emergency_stop
+
+    shell = Shell(Session(tmp_path))
+    shell.session.channels |= {"second", "first"}
+    shell.ticker.tick()
+    named = next(each.channels for each in shell.widget.children if isinstance(each, Rescue))
+    assert named == ["first", "second"]
+
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    monkeypatch.setenv(MACHINE, "mini-cnc")
+    for error, said in ((MachineError("bus failed; cut the power"), "bus failed"), (KeyError("x"), "cut the power")):
+
+        def fails(session: Session, error: Exception = error) -> str:
+            assert session.channels == set(named)
+            raise error
+
+        monkeypatch.setattr(Session, "emergency_stop", fails)
+        text, kind = emergency_stop(named)
+        assert said in text and kind == "error"
