@@ -110,6 +110,7 @@ def test_real_time(folder: Path) -> None:
 @pytest.mark.realtime
 def test_a_missed_verdict_is_exit_code_1(folder: Path) -> None:
     (folder / "law.py").write_text(SLOW)
+    (folder / "e.toml").write_text(SIMULATION.replace("duration = 2.0", "duration = 0.5"))
     done = command("run", "e.toml", "-m", "emulation", "-o", "out", "--json")
     said = only_json(done.stdout)
     assert (done.returncode, said["verdict"]) == (1, "missed")
