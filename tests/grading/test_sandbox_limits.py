@@ -9,7 +9,7 @@ import pytest
 
 from rds.core.types import Reference
 from rds.grading.grade import Status
-from rds.grading.sandbox import Limits, Pool, SandboxError, SubmissionError
+from rds.grading.sandbox import Limits, Pool, SandboxError, SubmissionError, processes
 from rds.grading.sandbox.budget import Budget
 
 Written = Callable[..., Path]
@@ -146,3 +146,14 @@ def test_the_kernel_would_end_a_submission_first(pool: Pool, written: Written) -
     with pool.open(written("")) as subject:
         assert subject._cell is not None
         assert Path(f"/proc/{subject._cell._process}/oom_score_adj").read_text() == "1000\n"
+
+
+def test_memory_that_was_swapped_out_is_still_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process can ask the kernel to swap it out, and would hold it out of sight."""
+    files = {
+        "/proc/7/task/7/children": b"8 ",
+        "/proc/8/status": b"Name:\tpython\nVmPeak:\t 900 kB\nVmRSS:\t     100 kB\nVmSwap:\t     700 kB\nThreads:\t1\n",
+    }
+    monkeypatch.setattr(processes, "_read", lambda path: files.get(path, b""))
+    monkeypatch.setattr(processes, "_threads", lambda process: [str(process)])
+    assert processes.usage(7).memory_bytes == 800 << 10

@@ -16,12 +16,13 @@ from typing import Any, NoReturn
 
 from rds.grading.grade import Status
 from rds.grading.sandbox import frames
+from rds.grading.sandbox.asleep import Asleep
 from rds.grading.sandbox.budget import FLOOD, Budget
 from rds.grading.sandbox.door import make_bell, make_memory
 from rds.grading.sandbox.errors import SandboxError, SubmissionError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.output import Output, printable
-from rds.grading.sandbox.processes import ended_for_memory, usage
+from rds.grading.sandbox.processes import ended_for_memory, turns_of, usage
 from rds.grading.sandbox.supervise import Supervisor
 
 _START = 60.0  # s that the kernel may take for three forks on a busy computer
@@ -42,6 +43,7 @@ class Cell:
         self._budget, self._supervisor = budget, supervisor
         self._verdict: tuple[Status, str] | None = None
         self._cpu, self._computed, self._turn_seen, self._turn_time = 0.0, 0.0, 0, 0.0
+        self._asleep, self._grader = Asleep(), threading.get_native_id()
         self._baseline = interpreter.resident_bytes
         self.is_closed = False
         self.signs: list[Callable[[], bool]] = []  # whether an answer is there that came by another way than the pipe
@@ -102,12 +104,18 @@ class Cell:
         computed, self._computed = used.first_seconds - self._computed, used.first_seconds
         # one that waits for a processor has no fault, if none of its own children keeps it busy
         is_working = used.first_runs and used.processes == 1
-        if turn != self._turn_seen:
+        is_same, asleep, grading = turn == self._turn_seen, self._asleep, turns_of(os.getpid(), self._grader)
+        asleep.look(seconds, used.first_thread, grading, used.first_sleeps, is_same)
+        if not is_same:
             self._turn_seen, self._turn_time = turn, 0.0
-            if turn % 2 and not is_working and not self.has_answered():
+            if turn % 2 and is_working:
+                self._budget.step(asleep.between)
+            elif turn % 2 and not self.has_answered():
                 self._budget.step(seconds)  # asleep at many samples, if only for a moment at each
         elif turn % 2:
             self._turn_time += self._budget.step(computed if is_working else seconds)
+            if asleep.slept:  # and awake at the looks
+                self._turn_time += self._budget.step(asleep.own - self._turn_time)
         self._cpu = max(self._cpu, used.cpu_seconds)
         fault = self._budget.fault(self._cpu, used.memory_bytes, self._turn_time, self.turn_limit)
         if fault is not None:

@@ -7,17 +7,26 @@ import re
 from typing import NamedTuple
 
 _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
-_PAGE = os.sysconf("SC_PAGE_SIZE")
+_HELD = re.compile(rb"^Vm(?:RSS|Swap):\s*(\d+) kB$", re.MULTILINE)
+
+
+class Turns(NamedTuple):
+    """What a thread has done so far, s; what is missing in the time that has gone by it was asleep."""
+
+    computed: float
+    waited: float  # for a processor
 
 
 class Usage(NamedTuple):
     """Of all processes of a cell together."""
 
     cpu_seconds: float
-    memory_bytes: int  # resident; what processes share counts for each
+    memory_bytes: int  # resident or swapped out; what processes share counts for each
     processes: int
     first_seconds: float  # computing time of the first of them, the one that answers
     first_runs: bool  # whether that one computes, or would if it had a processor
+    first_thread: Turns | None  # of that one's first thread; None if this kernel does not tell
+    first_sleeps: int  # how often that thread has gone to sleep by its own will
 
 
 def usage(top: int, baseline: int = 0) -> Usage:
@@ -30,19 +39,32 @@ def usage(top: int, baseline: int = 0) -> Usage:
     """
     cpu, memory, count = _cpu(_fields(top), False, True), 0, 0
     waiting = _children(top)
-    first = _fields(waiting[0]) if waiting else []
+    answering = waiting[0] if waiting else 0
+    first = _fields(answering) if answering else []
     while waiting:
         process = waiting.pop()
         count += 1
         cpu += _cpu(_fields(process), True, True)
         memory += max(_resident(process) - baseline, 0)
         waiting += _children(process)
-    return Usage(cpu, memory, count, _cpu(first, True, False), first[:1] == [b"R"])
+    turns, sleeps = (turns_of(answering), _sleeps(answering)) if answering else (None, 0)
+    return Usage(cpu, memory, count, _cpu(first, True, False), first[:1] == [b"R"], turns, sleeps)
+
+
+def turns_of(process: int, thread: int | None = None) -> Turns | None:
+    """Of one of a process's threads (default: the first); None if this kernel does not tell, or it has gone."""
+    fields = _read(f"/proc/{process}/task/{thread or process}/schedstat").split()
+    return Turns(int(fields[0]) * 1e-9, int(fields[1]) * 1e-9) if len(fields) > 1 else None
 
 
 def ended_for_memory() -> int:
     """How many processes the kernel has ended since it was started because there was no memory left."""
     found = re.search(rb"^oom_kill (\d+)$", _read("/proc/vmstat"), re.MULTILINE)
+    return int(found[1]) if found else 0
+
+
+def _sleeps(process: int) -> int:
+    found = re.search(rb"^voluntary_ctxt_switches:\s*(\d+)$", _read(f"/proc/{process}/status"), re.MULTILINE)
     return int(found[1]) if found else 0
 
 
@@ -66,16 +88,13 @@ def _cpu(fields: list[bytes], own: bool, children: bool) -> float:
 
 
 def _resident(process: int) -> int:
-    """In bytes. A process whose first thread has ended seems to have none; its other threads tell."""
-    found = _pages(f"/proc/{process}/statm")
-    if not found:
-        found = max((_pages(f"/proc/{process}/task/{thread}/statm") for thread in _threads(process)), default=0)
-    return found * _PAGE
+    """In bytes, swapped out or not. A process whose first thread has ended seems to have none; its others tell."""
+    found = _held(f"/proc/{process}/status")
+    return found or max((_held(f"/proc/{process}/task/{thread}/status") for thread in _threads(process)), default=0)
 
 
-def _pages(path: str) -> int:
-    fields = _read(path).split()
-    return int(fields[1]) if len(fields) > 1 else 0
+def _held(path: str) -> int:
+    return sum(int(kib) << 10 for kib in _HELD.findall(_read(path)))
 
 
 def _threads(process: int) -> list[str]:
