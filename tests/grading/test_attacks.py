@@ -12,10 +12,11 @@ import pytest
 from rds.grading.grade import Status
 from rds.grading.sandbox import Pool
 from tests.grading.attacked import HONEST, SAMPLES, Machine, Outcome, run
-from tests.grading.attacks import SHORT, Attack, leaving, looking, lying, taking
+from tests.grading.attacks import SHORT, Attack, changing, leaving, looking, lying, taking
 
 Written = Callable[..., Path]
-ATTACKS: dict[str, Attack] = {**leaving.ATTACKS, **lying.ATTACKS, **looking.ATTACKS, **taking.ATTACKS}
+KINDS = (changing, leaving, looking, lying, taking)
+ATTACKS: dict[str, Attack] = {name: attack for kind in KINDS for name, attack in kind.ATTACKS.items()}
 
 
 @pytest.fixture(scope="module")
