@@ -31,6 +31,10 @@ _FIRST = (
     "<li><b>Validate</b>: try the model on other data than it was fitted to.</li></ol>"
     "<p>No log yet? Run a <i>System test</i> in Equipment model: its run is one.</p></div>"
 )
+_IMPORT = (
+    "Copy a file into the folder: up to 250 MB here, up to 10 MB in JupyterLab, whose own upload takes larger ones; "
+    "or put it there yourself"
+)
 _SIGNS = {"fault": "✖", "warning": "⚠", "note": "ℹ"}
 
 
@@ -51,7 +55,7 @@ class DataView:
             options=[("files of the folder …", "")], tooltip="What the folder holds", layout={"width": "auto"}
         )
         self._known.observe(self._picked, "value")
-        self._upload = widgets.FileUpload(description="Import a file", tooltip="Copy a file into the folder")
+        self._upload = widgets.FileUpload(description="Import a file", tooltip=_IMPORT)
         self._upload.observe(self._imported, "value")
         self._map = widgets.Textarea(rows=10, layout=widgets.Layout(width="100%"))
         self._map_box = widgets.VBox(

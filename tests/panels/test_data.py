@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,3 +42,15 @@ def test_a_file_that_is_not_there_is_refused(open_page: Callable[..., Any]) -> N
     fill(page, "File with logged data", "no.csv")
     page.click('button:text-is("Describe")')
     page.wait_for_selector('.rds-notice:has-text("no.csv")')
+
+
+def test_a_log_of_some_size_is_imported(app: App, open_page: Callable[..., Any], tmp_path: Path) -> None:
+    log = tmp_path / "large.csv"
+    log.write_bytes(b"time [s],command [V],position [mm]\n" + b"0.001,1.25,3.5\n" * 800_000)
+    assert log.stat().st_size > 11e6  # more than a page may send to a server of tornado as it comes
+    page = open_page("Data")
+    with page.expect_file_chooser() as chooser:
+        page.click('button:has-text("Import a file")')
+    chooser.value.set_files(log)
+    page.wait_for_function("""() => [...document.querySelectorAll("input")].some(each => each.value == "large.csv")""")
+    assert (app.folder / log.name).read_bytes() == log.read_bytes()

@@ -1,6 +1,7 @@
-"""Voilà, but for two things: a page that goes away does not end its kernel, as a run may go on in it.
+"""Voilà, but for three things: a page that goes away does not end its kernel, as a run may go on in it.
 
-And a page can ask the server itself for an emergency stop, and for the end of a kernel that does not answer (`rescue`).
+A page can hand in a file of some size, such as a log, where tornado ends the connection beyond 10 MB. And it can ask
+the server itself for an emergency stop, and for the end of a kernel that does not answer (`rescue`).
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from voila.shutdown_kernel_handler import VoilaShutdownKernelHandler
 
 from rds.panels.app.rescue import handlers
 
+_LARGEST = 256 << 20  # bytes of a page's message, such as a file that is imported
+
 
 class PanelsServer(Voila):
     """A kernel without a page ends when nothing goes on in it any more (`serve.LEFT`), not at once.
@@ -21,6 +24,10 @@ class PanelsServer(Voila):
     """
 
     name = "voila"  # the user's settings for it
+
+    def init_settings(self) -> dict[str, Any]:
+        """As ever, but for the size of a page's message."""
+        return {**super().init_settings(), "websocket_max_message_size": _LARGEST}
 
     def init_handlers(self) -> list[Any]:
         """All but the one that a page tells of its going, and before them our own."""
