@@ -36,6 +36,22 @@ class View:
         """Whether nothing went wrong while it watched."""
         return not (self.lost or self.faults)
 
+    @property
+    def headline(self) -> str:
+        """State, load and rate in a line, and what is doubtful about them."""
+        seen = self.snapshot
+        text = (
+            f"{self.bus}: {self.state}, load {seen.load:.1f} % of {self.bitrate / 1000:g} kbit/s, "
+            f"{seen.rate:.0f} frames/s, {seen.frames} frames, {seen.errors} error frames"
+        )
+        if seen.impossible:
+            text += f", {seen.impossible} that CAN doesn't have"
+        if self.lost:
+            text += f", {self.lost} not counted: they came too fast"
+        if seen.load > 100.0:
+            text += "; no real bus of this bit rate could carry this"
+        return text
+
 
 def monitor(
     open_bus: Callable[[], can.BusABC],

@@ -26,7 +26,7 @@ def picture(view: View, decode: Decoder, height: int | None = None) -> Group:
         table.add_column(heading, justify="left" if left else "right", no_wrap=heading not in ("data", "decoded"))
     for row in rows[:room]:
         table.add_row(*(escape(cell) for cell in _cells(row, decode)))
-    parts: list[RenderableType] = [Text(_headline(view), style="bold" if view.healthy else "bold red"), table]
+    parts: list[RenderableType] = [Text(view.headline, style="bold" if view.healthy else "bold red"), table]
     if len(rows) > room:
         parts.append(Text(f"and {len(rows) - room} more identifiers; a higher terminal shows them", style="dim"))
     error = describe_error(view.snapshot)
@@ -34,21 +34,6 @@ def picture(view: View, decode: Decoder, height: int | None = None) -> Group:
         parts.append(Text(f"last error frame: {error}", style="red"))
     parts += [Text(fault, style="red") for fault in view.faults[-_FAULTS:]]
     return Group(*parts)
-
-
-def _headline(view: View) -> str:
-    snapshot = view.snapshot
-    text = (
-        f"{view.bus}: {view.state}, load {snapshot.load:.1f} % of {view.bitrate / 1000:g} kbit/s, "
-        f"{snapshot.rate:.0f} frames/s, {snapshot.frames} frames, {snapshot.errors} error frames"
-    )
-    if snapshot.impossible:
-        text += f", {snapshot.impossible} that CAN doesn't have"
-    if view.lost:
-        text += f", {view.lost} not counted: they came too fast"
-    if snapshot.load > 100.0:
-        text += "; no real bus of this bit rate could carry this"
-    return text
 
 
 def _cells(row: Row, decode: Decoder) -> list[str]:

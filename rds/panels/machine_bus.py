@@ -133,18 +133,19 @@ class BusView:
         view = self.monitor.view
         assert view is not None
         try:
-            lines = self.monitor.lines(self.choices["filter"])
+            lines, more = self.monitor.lines(self.choices["filter"])
         except InputError as error:
             self.notice.say(str(error), "error")
             return
         rows = [[x.identifier, x.name, x.count, x.rate, x.load, x.data, x.signals] for x in lines]
         heads = ["identifier", "message", "frames", "frames/s", "load [%]", "data", "means"]
+        left = f"and {more} more identifiers: say above which are to be shown" if more else ""
         sign = "" if view.healthy else "⚠ "
         said = f"<p>{sign}{escape(self.monitor.headline)}</p>"
         self.live.value = (
             said
             + _bar(view.snapshot.load)
-            + (html.table(heads, rows) if rows else "<p>no frame that is to be shown goes over the bus</p>")
+            + (html.table(heads, rows, note=left) if rows else "<p>no frame that is to be shown goes over the bus</p>")
         )
 
     def _enable(self) -> None:

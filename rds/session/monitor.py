@@ -75,25 +75,21 @@ class BusMonitor:
         view = self.view
         if view is None:
             return "nothing was heard yet"
-        now = view.snapshot
-        text = (
-            f"{view.bus} {view.state}: {now.load:.1f} % of {view.bitrate / 1000:g} kbit/s, {now.rate:.0f} frames/s, "
-            f"{now.errors} error frames"
-        )
-        if view.lost:
-            text += f"; {view.lost} frames came too fast to be counted"
-        if view.faults:
-            text += f"; {view.faults[-1]}: it is opened again by itself; check cable, power and bit rate"
-        return text
+        if not view.faults:
+            return view.headline
+        return f"{view.headline}; {view.faults[-1]}: it is opened again by itself; check cable, power and bit rate"
 
-    def lines(self, wanted: str = "") -> list[Line]:
-        """The identifiers heard, those with the highest priority first: of a filter as `parse_filter` has it."""
+    def lines(self, wanted: str = "") -> tuple[list[Line], int]:
+        """The identifiers heard, those with the highest priority first: of a filter as `parse_filter` has it.
+
+        At most MOST, and how many more there are.
+        """
         if self.view is None or self._decode is None:
-            return []
+            return [], 0
         keep = parse_filter(wanted)
         rows = [row for row in self.view.snapshot.rows if row.rate != 0.0 or row.count]
-        lines = (self._line(row) for row in rows)
-        return [line for line in lines if keep(int(line.identifier, 16), line.name)][:MOST]
+        kept = [line for line in map(self._line, rows) if keep(int(line.identifier, 16), line.name)]
+        return kept[:MOST], len(kept[MOST:])
 
     def _line(self, row: Row) -> Line:
         assert self._decode is not None

@@ -152,7 +152,7 @@ def test_a_monitor_listens_until_it_is_ended(desk: MachineDesk) -> None:
     monitor = BusMonitor()
     task = desk.session.work("bus monitor", monitor.watch(*desk.bus), monitor.end)
     done(desk.scan())
-    while not monitor.lines("reply"):
+    while not monitor.lines("reply")[0]:
         assert not task.wait(0.1)
     assert "kbit/s" in monitor.headline
     task.stop()
