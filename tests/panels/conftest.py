@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +27,7 @@ class App(NamedTuple):
 
     url: str
     folder: Path
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[bytes]
     runtime: str  # its XDG_RUNTIME_DIR, where the built-in bus is
 
 
@@ -41,31 +42,27 @@ def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[...
 
     def start(folder: Path | None = None, *options: str) -> App:
         folder = folder or tmp_path_factory.mktemp("student")
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rds", "app", str(folder), "--no-browser", *options],
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-            env=os.environ | {"XDG_RUNTIME_DIR": runtime},
-        )
-        assert process.stderr is not None
-        said = []
-        for line in process.stderr:
-            said.append(line)
-            found = re.search(r"http://127\.0\.0\.1\S+token=\S+", line)
-            if found:
+        log = tmp_path_factory.mktemp("app") / "stderr.txt"
+        with log.open("w") as stderr:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "rds", "app", str(folder), "--no-browser", *options],
+                stderr=stderr,
+                start_new_session=True,
+                env=os.environ | {"XDG_RUNTIME_DIR": runtime},
+            )
+        while process.poll() is None:
+            if found := re.search(r"http://127\.0\.0\.1\S+token=\S+(?=\s)", log.read_text()):
                 app = App(found.group(0), folder, process, runtime)
                 started.append(app)
                 return app
-        raise AssertionError("rds app did not start:\n" + "".join(said))
+            time.sleep(0.05)
+        raise AssertionError("rds app did not start:\n" + log.read_text())
 
     yield start
     for app in started:
         if app.process.poll() is None:
             os.killpg(app.process.pid, signal.SIGTERM)
             app.process.wait(20)
-        if app.process.stderr is not None:
-            app.process.stderr.close()
     shutil.rmtree(runtime, ignore_errors=True)
 
 

@@ -69,8 +69,8 @@ def _options(port: int | None, browser: bool, address: str) -> list[str]:
         "VoilaConfiguration.default_pool_size": 1,
         "VoilaConfiguration.show_tracebacks": True,
         "VoilaConfiguration.file_allowlist": "$.",  # a pattern that no file fits
+        "VoilaConfiguration.multi_kernel_manager_class": "rds.panels.app.kernels.PageKernels",
         "MappingKernelManager.cull_idle_timeout": LEFT,
-        "MappingKernelManager.cull_busy": True,  # what a user's code holds is busy for ever, and says nothing
         "MappingKernelManager.cull_interval": 10,
     }
     if port is not None:
