@@ -14,8 +14,10 @@ from rds.cli import app
 from rds.grading.assignment import read_assignment
 from rds.grading.cases.case import CaseRun
 from rds.grading.cases.control import ControlCase
-from rds.grading.check_assignment import IDLE, check_assignment
+from rds.grading.check_assignment import IDLE, WORK_SEEDS, check_assignment
 from rds.grading.sandbox import Pool
+from rds.grading.sandbox.counts import Counts
+from rds.grading.sandbox.subject import Subject
 from rds.grading.self_check import self_check
 from rds.grading.trusted import TrustedFiles
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
@@ -139,6 +141,24 @@ def test_what_is_the_same_for_everybody_is_run_once(tmp_path: Path, monkeypatch:
     assert varied.least < varied.largest
     # for the first student, once more, and for what does nothing; the drawn one for the four others too
     assert (ran.count("sine"), ran.count("drawn")) == (3, 7)
+
+
+def test_work_is_counted_for_the_first_students_only(
+    tmp_path: Path, pool: Pool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = SINE.replace("1.0\n\n", "0.1\n\n") + '[case.vary]\ntau = "±10 %"\n'
+    work = RMS.replace("rms-error", "work").replace("0.05", "50").replace("0.5", "500").replace("mm", "events")
+    counts, count = [], Subject.count
+
+    def counted(subject: Subject) -> Counts:
+        counts.append(count(subject))
+        return counts[-1]
+
+    monkeypatch.setattr(Subject, "count", counted)
+    assignment = read_assignment(assignment_in(tmp_path, HEAD + case + work))
+    (row,) = check_assignment(assignment, pool, WORK_SEEDS + 3).criteria
+    assert row.margin is not None and row.margin > 100.0
+    assert len(counts) == WORK_SEEDS + 2  # for the first student once more, and for what does nothing
 
 
 def test_an_assignment_without_a_solution_cannot_be_checked(tmp_path: Path, pool: Pool) -> None:

@@ -41,7 +41,7 @@ def scheduler() -> Iterator[str]:
         assert process.stdin and process.stdout
         yield process.stdout.readline().strip()
         process.stdin.close()
-        process.wait(20)
+        process.wait(60)
 
 
 @pytest.fixture(params=["processes", "cluster"])
