@@ -7,6 +7,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from canopen.sdo import SdoCommunicationError
 
@@ -123,6 +124,18 @@ def test_a_homing_that_fails_says_why_and_takes_the_power_past_a_late_answer(
         with pytest.raises(MachineError, match="stopped answering during configuration: No SDO response"):
             host.start(silent)
         assert not late and nodes[0].drive.state is State.SWITCH_ON_DISABLED and no_voltage(nodes)
+
+
+def test_an_emergency_stop_while_a_drive_is_homed_is_told_as_such(machine: Machine, served: Served) -> None:
+    channel, nodes = served("X")
+    with (
+        can.Bus(interface="virtual", channel=channel) as bus,
+        drivers(machine, channel, ["X"], cia402={"axis": {"X": {"homing": 17}}}) as host,
+    ):
+        stop = can.Message(arbitration_id=0, is_extended_id=False, data=[codes.NmtCommand.STOP, 0])
+        with pytest.raises(MachineError, match=r"emergency stop: X \(node 2\) was stopped from outside"):
+            host.start(lambda axis, position: bus.send(stop))
+        wait_for(lambda: no_voltage(nodes))
 
 
 HOMES = """

@@ -89,7 +89,7 @@ def prepare(network: canopen.Network, settings: Settings, period: float, watch: 
         alive = network.send_periodic(0x700 + settings.host, bytes([codes.Nmt.OPERATIONAL]), settings.heartbeat)
         try:
             for drive, node in homed:
-                with _naming(drive):
+                with _naming(drive), _stops_told(network, drive):
                     _watch_host(node, drive, settings)
                     home(node, drive, settings.homing_timeout, watch)
                     _optional(node, drive, 0x1016, 1, 0)
@@ -163,6 +163,28 @@ def home(node: canopen.RemoteNode, drive: DriveSettings, timeout: float, watch: 
         raise
     _take_power(node)
     _wait_for_state(node, drive, State.SWITCH_ON_DISABLED)
+
+
+@contextmanager
+def _stops_told(network: canopen.Network, drive: DriveSettings) -> Iterator[None]:
+    """A failure after an NMT stop, which is what an emergency stop sends, is told as such."""
+    stopped: list[int] = []
+
+    def note(_: int, data: bytearray, __: float) -> None:
+        if len(data) == 2 and data[0] == NmtCommand.STOP and data[1] in (0, drive.node):
+            stopped.append(data[1])
+
+    network.subscribe(0x000, note)
+    try:
+        yield
+    except (MachineError, SdoAbortedError, SdoCommunicationError) as error:
+        if not stopped:
+            raise
+        raise MachineError(
+            f"emergency stop: {drive.name} was stopped from outside this run (NMT stop) while it was homed"
+        ) from error
+    finally:
+        network.unsubscribe(0x000, note)
 
 
 def _take_power(node: canopen.RemoteNode) -> None:
