@@ -166,7 +166,12 @@ def _loop(law: LinearLaw, axes: np.ndarray, w: np.ndarray, T: float) -> np.ndarr
 
 
 def margins_of(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Gain margin (dB), phase margin (°) and modulus margin of loops given on a grid, by interpolation."""
+    """Gain margin (dB), phase margin (°) and modulus margin of loops given on a grid, by interpolation.
+
+    The gain margin is the least factor, up or down, at which a stable loop comes to its limit, as in python-control's
+    `stability_margins`: an integrating law on an axis is often unstable with less gain, too.
+    A loop that is below 1 at the first frequency, and integrates, has the phase margin of its phase there.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         size, phase = np.log(np.abs(loop)), np.unwrap(np.angle(loop), axis=1)
         turned = phase + np.pi  # zero, or a multiple of 2π, where the loop crosses the negative real axis
@@ -175,13 +180,25 @@ def margins_of(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
         level = np.maximum(lap[:, 1:], lap[:, :-1]) * 2.0 * np.pi
         share = (level - turned[:, :-1]) / (turned[:, 1:] - turned[:, :-1])
         there = size[:, :-1] + share * (size[:, 1:] - size[:, :-1])
-        gain = np.where(crossing & (there < 0.0), -there, np.inf).min(axis=1) * 20.0 / np.log(10.0)
+        gain = np.where(crossing, np.abs(there), np.inf).min(axis=1) * 20.0 / np.log(10.0)
         unity = (size[:, 1:] > 0.0) != (size[:, :-1] > 0.0)
         share = -size[:, :-1] / (size[:, 1:] - size[:, :-1])
         angle = turned[:, :-1] + share * (turned[:, 1:] - turned[:, :-1])
         angle = np.abs((angle + np.pi) % (2.0 * np.pi) - np.pi)
         margin = np.degrees(np.where(unity, angle, np.inf).min(axis=1))
-    return np.stack([gain, margin, np.abs(1.0 + loop).min(axis=1)], axis=1)
+        falling = (size[:, 1] - size[:, 0]) / np.log(w[1] / w[0]) < -0.5  # an integrating loop: 1 at a lower frequency
+        first = np.degrees(np.abs((turned[:, 0] + np.pi) % (2.0 * np.pi) - np.pi))
+        margin = np.where((size[:, 0] < 0.0) & falling, np.minimum(margin, first), margin)
+    return np.stack([gain, margin, _nearest(1.0 + loop)], axis=1)
+
+
+def _nearest(curves: np.ndarray) -> np.ndarray:
+    """The least distance from 0 of complex curves given by points: (curves, points) to (curves,). On the chords."""
+    begin, chord = curves[:, :-1], np.diff(curves, axis=1)
+    length = np.maximum(np.abs(chord) ** 2, np.finfo(float).tiny)
+    share = np.clip(-(begin * chord.conj()).real / length, 0.0, 1.0)
+    nearest: np.ndarray = np.abs(begin + share * chord).min(axis=1)
+    return nearest
 
 
 def _pole_radius(law: LinearLaw, axes: np.ndarray, T: float) -> np.ndarray:

@@ -13,5 +13,5 @@ NEEDS = (LINEAR,)
 
 
 def measure(run: CaseRun, options: Options) -> float:
-    """In dB; a loop that no gain makes unstable has 1000."""
+    """In dB: the least change of the gain, up or down, that makes the loop unstable; 1000 where none does."""
     return min(float(linear_of(run).margins[0]), 1000.0)

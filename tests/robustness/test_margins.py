@@ -1,0 +1,56 @@
+"""Margins of sampled loops against python-control and against finer frequencies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rds.models import library_model
+from rds.robustness.margins import LinearLaw, loop_margins, margins_of, open_loop
+
+T = 0.001  # s
+NONE = np.zeros(0)
+
+
+def axis(tau: float, K: float) -> Any:
+    """tau in s, K in (mm/s)/V."""
+    return library_model("linear-axis", tau=tau, K=K)
+
+
+def proportional(gain: float) -> LinearLaw:
+    """V/mm."""
+    return LinearLaw(np.zeros((0, 0)), NONE, NONE, -gain)
+
+
+def test_the_gain_margin_counts_less_gain_too() -> None:
+    """A PID is often unstable with less gain as well: python-control's gain margin is then below 1, here 0.54."""
+    import control
+
+    tau, P, Ki, D = 0.07239, 58.04, 1678.7, 1.8035  # s, V/mm, V/(mm s), V s/mm; K = 1 (mm/s)/V
+    law = LinearLaw(np.diag([1.0, 0.0]), np.array([T, 1.0]), np.array([-Ki, D / T]), -(P + D / T + Ki * T))
+    found = loop_margins(law, [axis(tau, 1.0)], T)[0]
+    plant = control.tf([1.0], [tau, 1.0, 0.0]).sample(T)
+    pid = control.tf([P + D / T + Ki * T, -(P + 2 * D / T), D / T], [1.0, -1.0, 0.0], T)
+    with pytest.warns(UserWarning, match="stability_margins"):
+        wanted = control.stability_margins(plant * pid)
+    assert wanted[0] < 1.0
+    assert found[0] == pytest.approx(-20 * np.log10(wanted[0]), abs=0.05)
+    assert found[1] == pytest.approx(wanted[1], abs=0.05)
+    edge = 10 ** (-found[0] / 20)
+    radius = loop_margins(law, [axis(tau, edge * 0.99), axis(tau, edge * 1.01)], T)[:, 3]
+    assert radius[0] > 1.0 > radius[1]
+
+
+def test_a_loop_that_is_slower_than_the_lowest_frequency_has_the_phase_margin_of_an_integrator() -> None:
+    assert loop_margins(proportional(1e-3), [axis(0.01, 1.0)], T)[0, 1] == pytest.approx(90.0, abs=0.1)
+
+
+def test_the_least_distance_may_lie_between_two_frequencies() -> None:
+    model = axis(0.01, 1.0)
+    edge = 10 ** (loop_margins(proportional(1.0), [model], T)[0, 0] / 20)
+    law = proportional(0.99 * edge)
+    fine = np.pi / T * np.logspace(-3, 0, 200_001)
+    wanted = margins_of(fine, open_loop(law, model, T, fine)[None])[0, 2]
+    assert loop_margins(law, [model], T)[0, 2] == pytest.approx(wanted, rel=0.05)
