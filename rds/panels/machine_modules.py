@@ -49,7 +49,7 @@ class ModulesView:
 
     def start(self) -> None:
         """Start the simulated modules, then scan."""
-        follow(self.bar, self.notice, self.desk.start, lambda _: self._scan_next())
+        follow(self.bar, self.notice, self.desk.start, lambda _: self._scan_next(), failed=self._enable)
 
     def _scan_next(self) -> None:
         self._enable()
@@ -63,7 +63,8 @@ class ModulesView:
 
     def scan(self) -> None:
         """Who is there."""
-        follow(self.bar, self.notice, self.desk.scan, self._scanned)
+        # the simulated modules may be found to have ended
+        follow(self.bar, self.notice, self.desk.scan, self._scanned, failed=self._enable)
 
     def _scanned(self, rows: list[dict[str, Any]]) -> None:
         self._show(rows)

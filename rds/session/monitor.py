@@ -77,7 +77,7 @@ class BusMonitor:
             return "nothing was heard yet"
         if not view.faults:
             return view.headline
-        return f"{view.headline}; {view.faults[-1]}: it is opened again by itself; check cable, power and bit rate"
+        return f"{view.headline}; {view.faults[-1]}; check cable, power and bit rate"
 
     def lines(self, wanted: str = "") -> tuple[list[Line], int]:
         """The identifiers heard, those with the highest priority first: of a filter as `parse_filter` has it.

@@ -14,8 +14,10 @@ from rds.panels import PANELS
 from rds.panels.kit.button import button
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
+from rds.panels.machine_modules import ModulesView
 from rds.panels.shell import Shell
 from rds.session import Session
+from rds.session.machine import MachineDesk
 
 
 @pytest.mark.parametrize(
@@ -76,6 +78,28 @@ def test_every_button_of_a_panel_says_what_fails_in_it(
         each.click()  # raises what its handler raises
     assert shell.session.machine_user is None
     assert pressed or name == "help"
+
+
+def test_simulated_modules_that_have_ended_can_be_started_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def scan(self: MachineDesk) -> Any:
+        def none(task: Any) -> None:
+            raise InputError("no module answers; start the simulated modules")
+
+        return self.session.work("scan", none)
+
+    shell = Shell(Session(tmp_path))
+    monkeypatch.setattr(MachineDesk, "scan", scan)
+    monkeypatch.setattr(MachineDesk, "serves", True)
+    view = ModulesView(shell, MachineDesk(shell.session), lambda: None)
+    start = next(each for each in _within(view.widget) if getattr(each, "description", "") == "Start modules")
+    assert start.disabled
+    monkeypatch.setattr(MachineDesk, "serves", False)  # their process was killed
+    view.scan()
+    while view.bar.busy:
+        shell.ticker.tick()
+    assert "start the simulated modules" in view.notice.value and not start.disabled
 
 
 def _within(widget: Any) -> Iterator[Any]:
