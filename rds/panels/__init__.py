@@ -6,6 +6,7 @@ the documentation) and build(shell), which gives the panel's widget.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +31,16 @@ PANELS = Registry(
 )
 
 
-def main(folder: str | Path = ".", machine: str = "mini-cnc", panel: str = "menu") -> Any:
+def main(
+    folder: str | Path = ".", machine: str = "mini-cnc", panel: str = "menu", bus: Mapping[str, Any] | None = None
+) -> Any:
     """The page with all panels, on the files of `folder`; the last expression of a notebook cell shows it.
 
+    `bus` holds what the `[bus]` table of an experiment does; by default the machine is on the built-in bus.
     InputError for a panel that does not exist, ImportError naming the extra `lab` where ipywidgets is missing.
     """
     from rds.panels.shell import Shell
     from rds.session import Session
 
     PANELS.module(panel)
-    return Shell(Session(folder, machine), panel).widget
+    return Shell(Session(folder, machine, bus), panel).widget

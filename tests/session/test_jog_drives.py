@@ -11,11 +11,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+from rds import panels
 from rds.bus.cia402.codes import State
 from rds.bus.cia402.scan import scan
 from rds.cli import app
@@ -205,6 +207,17 @@ def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason
         assert "the machine's first 4 only" in hand.left_out["spindle"]
     finally:
         hand.close()
+
+
+def test_panels_are_shown_for_a_bus_of_ones_own(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ipywidgets", reason="panels need rds[lab]")
+    monkeypatch.setattr("rds.panels.shell.Shell", lambda session, panel: SimpleNamespace(widget=session))
+    bus = {"interface": "virtual", "channel": "mine", "dialect": "cia402"}
+    jog = Jog(panels.main(alone, bus=bus))
+    task = jog.begin()
+    assert task.wait(PATIENCE)
+    assert str(task.error) == "no module of mini-cnc answers on virtual:mine; switch it on"
+    assert jog.session.machine_user is None
 
 
 @pytest.mark.parametrize(
