@@ -70,7 +70,10 @@ class ControllersView:
     def refresh(self) -> None:
         """Other modules are known."""
         options = [(words, number) for number, words in self.desk.describing().items()]
-        self._which.options = options
+        if options != list(self._which.options):  # else what was typed for a module stays
+            numbers, chosen = [number for _, number in options], self._which.value
+            self._which.options = options  # which leaves none of them chosen
+            self._which.value = chosen if chosen in numbers else next(iter(numbers), None)
         self._which.disabled = not options
         if not options:
             self.notice.say("no module with a controller is known: scan a bus whose modules speak oacs", "warning")

@@ -184,8 +184,10 @@ class Interpolating:
 
     def _program_path(self) -> Path:
         name = str(self.choices["program"]).strip()
+        if not name:
+            raise InputError(f"name the part program (in {self.session.folder}); the Program panel writes one")
         path = self.session.folder / name
-        if not name or not path.is_file():
+        if not path.is_file():
             raise InputError(
                 f"there is no part program {name!r} in {self.session.folder}; save it there, or name another"
             )

@@ -47,6 +47,8 @@ def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_pag
     page.wait_for_selector("td:visible:has-text('met')")
     press(page, "Listen")
     tab(page, "3 Controllers")
+    modules = page.locator('.widget-dropdown:has-text("Module") select')
+    assert modules.evaluate("(box) => box.selectedOptions[0]?.label").startswith("2:")  # one of them, before any choice
     page.select_option('.widget-dropdown:has-text("Module") select', "4: LinrXa")
     press(page, "Step")
     page.wait_for_selector(".rds-figure canvas, .rds-figure img")

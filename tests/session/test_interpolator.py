@@ -134,6 +134,12 @@ def test_what_is_refused(tmp_path: Path, name: str, value: object, why: str) -> 
         make(tmp_path).choices.set(name, value)
 
 
+def test_a_part_program_without_a_name_is_asked_for(tmp_path: Path) -> None:
+    panel = make(tmp_path, given="program")
+    with pytest.raises(InputError, match=r"name the part program \(in .*\); the Program panel writes one"):
+        run(panel)
+
+
 def test_arc_that_does_not_close_says_so(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="move end or centre so that both are on one circle"):
         run(make(tmp_path, end="0, 11"))
