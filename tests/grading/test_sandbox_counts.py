@@ -347,6 +347,25 @@ def test_a_counted_run_may_not_take_much_longer_than_the_first(pool: Pool, writt
         assert 30.0 <= subject._generous().cpu_seconds < 100.0
 
 
+def test_all_counted_runs_together_have_one_limit(pool: Pool, written: Written) -> None:
+    """Who takes its time only while it is counted does so once, and not once more in each run of each case."""
+    text = """
+import resource, time
+initial_state = ()
+def control(t, r, y, state, params):
+    if resource.getrlimit(resource.RLIMIT_NPROC)[0] == 1: time.sleep(0.45)
+    return 1.0, state
+"""
+    with pool.open(written(text, ""), Limits(wall_seconds=0.1)) as subject:
+        found = []
+        for _ in range(3):
+            subject.begin_control()
+            subject.control(0.0, Reference(0.0, 0.0, 0.0), 0.0)
+            found.append(subject.counts)
+    assert found[0].events and found[2].events is None
+    assert found[2].refused == "while it was counted: it took more than 1 s in all"
+
+
 def test_models_and_interpolators_are_counted_too(pool: Pool, written: Written) -> None:
     text = "def derivatives(t, x, u, params): return [x[1], u[0] - x[1]]\n"
     with pool.open(written(text, ""), kind="model") as subject:

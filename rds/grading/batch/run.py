@@ -30,6 +30,7 @@ from rds.spread.spread import Progress
 
 STUDENTS, SIMILARITY = "students", "similarity.json"
 _PATIENCE = 600.0  # s for one submission beyond all that it may take: then it is the grader that hangs
+_LONGEST = 2.0 * (1.0 + 10.0)  # times the limits: where all is visible and where it is hidden, run and counted
 
 
 def run_batch(
@@ -176,7 +177,8 @@ class _Batch:
         count = min(jobs or processors(), len(rows)) if shared else None
         work = partial(graded, setup_of(self._assignment, count, shared))
         tasks = [self._task(each, shared) for each in rows]
-        limit = _PATIENCE + 20.0 * self._assignment.limits.wall_seconds
+        limits = self._assignment.limits
+        limit = _PATIENCE + _LONGEST * (limits.cpu_seconds + limits.wall_seconds)
         failed = []
         for outcome in spread(
             work, tasks, jobs=jobs, scheduler=scheduler, progress=progress, in_order=False, time_limit=limit

@@ -60,6 +60,7 @@ class Subject:
         self._submission, self._kind = submission, kind
         self._interpreter, self._supervisor, self._place = interpreter, supervisor, place
         self._budget = Budget(limits)
+        self._counting = Budget(limits)  # what all counted runs together have used up
         self._printed: list[str] = []
         self._said_loading = b"", 0  # what it printed when it was first loaded, and how many bytes that were
         self._cell: Cell | None = None
@@ -180,11 +181,12 @@ class Subject:
         if run is None:
             return Counts(0, refused="no run was begun")
         self._leave()
-        generous = self._generous()
+        generous, budget = self._generous(), self._counting
+        budget.limits = generous
         seal = secrets.randbits(63)
         first = run.recorded(most_samples)
         try:
-            cell = self._load(Budget(generous), {**order, "seal": seal})
+            cell = self._load(budget, {**order, "seal": seal})
             self._answer(cell, {**order, "through_door": False}, generous.call_seconds, Status.BROKE_CONTRACT)
             again = Run(cell, run.what, run.layout, run.T, seal=seal)
             return count_again(first, again)
@@ -235,7 +237,7 @@ class Subject:
         return answer
 
     def _generous(self) -> Limits:
-        """For a run that is counted: that takes some 30 times as long as what it took before, and no more."""
+        """For all runs that are counted: these take some 30 times as long as what it took before, and no more."""
         took = 5.0 + 200.0 * self._budget.cpu_before
         limits = {name: getattr(self.limits, name) for name in ("cpu_seconds", "wall_seconds")}
         longer = {name: min(10.0 * most, max(most, took)) for name, most in limits.items()}
