@@ -1,8 +1,11 @@
-"""A kernel that no browser shows ends; but one that was just given to a page, or whose browser just left, does not."""
+"""When kernels end: a time after their last page has gone, and with the server, even one that is just starting."""
 
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
+from collections.abc import Callable
 from datetime import timedelta
 
 import pytest
@@ -12,6 +15,7 @@ pytest.importorskip("jupyter_server", reason="Voilà is not installed: pip insta
 from jupyter_server._tz import utcnow
 
 from rds.panels.app.kernels import PageKernels
+from tests.panels.conftest import App
 
 
 def test_a_kernel_ends_a_time_after_its_last_browser_left_and_not_after_its_last_word() -> None:
@@ -36,3 +40,9 @@ def test_a_kernel_ends_a_time_after_its_last_browser_left_and_not_after_its_last
         return alive
 
     assert asyncio.run(life()) == [True, True, True, False]
+
+
+def test_a_server_ends_at_once_though_its_first_kernel_is_just_starting(start_app: Callable[..., App]) -> None:
+    app = start_app()
+    os.killpg(app.process.pid, signal.SIGTERM)
+    assert app.process.wait(60) == 0
