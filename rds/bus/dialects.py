@@ -60,9 +60,15 @@ def is_served(dialect: str, machine: Machine, interface: str, channel: str) -> b
     )
 
 
-def find_dialect(machine: Machine, interface: str, channel: str | None, **options: Any) -> str | None:
-    """What the modules on a channel speak; None where none answers. Nothing moves there."""
-    return next((each for each in _DRIVERS if _answers(each, machine, interface, channel, **options)), None)
+def find_dialect(
+    machine: Machine, interface: str, channel: str | None, first: str = DEFAULT, **options: Any
+) -> str | None:
+    """What the modules on a channel speak; None where none answers. Nothing moves there.
+
+    The dialect `first` is asked for before the others; `options` go to the interface.
+    """
+    order = sorted(_DRIVERS, key=lambda dialect: dialect != first)
+    return next((each for each in order if _answers(each, machine, interface, channel, **options)), None)
 
 
 def _answers(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:

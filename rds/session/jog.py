@@ -150,7 +150,7 @@ class Jog:
             check_dialect(wanted)
         if interface != BUILTIN or channel in channels():
             options = {key: value for key, value in bus.items() if key not in _NO_MODULE}
-            found = find_dialect(self.machine, interface, channel, **options)
+            found = find_dialect(self.machine, interface, channel, wanted or DEFAULT, **options)
             if found is not None and wanted not in (None, found):
                 raise InputError(f'what answers on bus {name} speaks {found}, and [bus] says dialect = "{wanted}"')
             if found is not None:

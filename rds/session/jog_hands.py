@@ -8,6 +8,8 @@ from typing import Any, Protocol
 
 from rds.bus import frames
 from rds.bus.dialects import open_drivers
+from rds.bus.drivers import find_machine
+from rds.bus.link import default_channel
 from rds.controllers import library_controller
 from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.core.errors import MachineError
@@ -16,6 +18,7 @@ from rds.machines.machine import Axis, Machine
 from rds.session.jog_axes import JogAxis, JogSpindle, jog_axes, jog_spindles
 
 _COUNTS = 5.0  # of error at rest over which friction is made up for
+_ANSWERS_IN = 0.5  # s in which a spindle's module has to say that it is there
 _FROM_SWITCHES = 1e-3  # of the travel, which is left between an axis and its limit switch: to touch one is a fault
 Watch = Callable[[str, float], object]  # hears the axis that is homed, and where it is
 
@@ -101,12 +104,14 @@ class VoltageHand:
             elif not (axis.model.get("tau") and axis.model.get("K")):
                 self.left_out[axis.name] = "its modules take voltages, and it has no model with tau and K"
         self.axes = {name: axis for name, axis in jog_axes(machine).items() if name not in self.left_out}
+        options = {key: value for key, value in bus.items() if key not in ("dialect", "cia402", "faults")}
         self.spindles = {name: each for name, each in jog_spindles(machine).items() if name not in self.left_out}
+        if self.spindles:
+            _leave_out(self, set(find_machine(machine, timeout=_ANSWERS_IN, **options)))
         volts = machine.converter.range
         self._laws = {name: _axis_law(machine.axis(name), volts) for name in self.axes}
         self._turners = {name: SpindleLaw(machine.axis(name), self.period, volts) for name in self.spindles}
         self._names = [*self.axes, *self.spindles]
-        options = {key: value for key, value in bus.items() if key not in ("dialect", "cia402", "faults")}
         self._drivers = open_drivers(dialect, machine, self._names, self.period, False, options)
         self._origin = [0.0] * len(self._names)
         self._measured: dict[str, float] = {}
@@ -138,6 +143,13 @@ class VoltageHand:
         self._drivers.close()
 
 
+def _leave_out(hand: Hand, answering: set[str]) -> None:
+    """A machine may be used without its spindle's module; without an axis's, it is not whole, which start() says."""
+    for name in [name for name in hand.spindles if name not in answering]:
+        del hand.spindles[name]
+        hand.left_out[name] = "no module answers for it; switch it on, and take the machine again"
+
+
 def _axis_law(axis: Axis, voltage: float) -> AxisLaw:
     friction = float(axis.model.get("friction_plus", 0.0)), float(axis.model.get("friction_minus", 0.0))
     return AxisLaw(axis.model["tau"], axis.model["K"], friction, voltage, axis.resolution)
@@ -163,6 +175,8 @@ class DriveHand:
         for axis in machine.axes.values():
             if axis.name not in self.axes and axis.name not in self.spindles:
                 self.left_out[axis.name] = "the machine's file has neither its limits nor a model with tau and K"
+        if self.spindles:
+            _leave_out(self, self._answering())
         self._names = [*self.axes, *self.spindles]
         self._drivers = self._open({})
 
@@ -195,6 +209,16 @@ class DriveHand:
     def close(self) -> None:
         """As Hand.close: a quick stop, then no power."""
         self._drivers.close()
+
+    def _answering(self) -> set[str]:
+        from rds.bus.cia402.scan import scan
+        from rds.bus.cia402.settings import read_settings
+
+        settings = read_settings(self._bus.get("cia402", {}), self._machine, list(self.spindles))
+        where = {"channel": default_channel(self._machine, self._bus["interface"], self._bus.get("channel"))}
+        options = {key: value for key, value in (self._bus | where).items() if key != "cia402"}
+        nodes = {device.node for device in scan(timeout=_ANSWERS_IN, **options) if device.is_drive}
+        return {drive.axis.name for drive in settings.drives if drive.node in nodes}
 
     def _open(self, methods: Mapping[str, int]) -> Any:
         table = _drive_table(self._bus.get("cia402", {}), self._machine, self.spindles, methods)

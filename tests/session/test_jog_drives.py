@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 from rds import panels
 from rds.bus.cia402.codes import State
 from rds.bus.cia402.scan import scan
+from rds.bus.dialects import server_module
 from rds.cli import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
@@ -207,6 +208,21 @@ def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason
         assert "the machine's first 4 only" in hand.left_out["spindle"]
     finally:
         hand.close()
+
+
+@pytest.mark.parametrize("dialect", ["rds", "cia402"])
+def test_a_machine_is_jogged_without_its_spindle(alone: Path, dialect: str) -> None:
+    served = [sys.executable, "-m", server_module(dialect), "mini-cnc", "--axes", "X,Y,Z", "--exit-with-stdin"]
+    with subprocess.Popen(served, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None and server.stdout.readline().startswith("ready")
+        jog = taken(alone)
+        try:
+            assert jog.dialect == dialect and set(jog.positions) == {"X", "Y", "Z"} and not jog.speeds
+            with pytest.raises(InputError, match="spindle cannot be jogged: no module answers for it"):
+                jog.turn("spindle", 1)
+        finally:
+            jog.end()
+        server.terminate()
 
 
 def test_panels_are_shown_for_a_bus_of_ones_own(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
