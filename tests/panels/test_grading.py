@@ -1,0 +1,43 @@
+"""The grading panel in a browser: a class is graded, seen and exported; what is missing is said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rds.grading.sandbox import available
+from tests.grading.batches import ASSIGNMENT, law
+from tests.panels.conftest import App
+
+IDLE = "def control(t, r, y, state, params):\n    return 0.0, state\n"
+
+
+def fill(page: Any, label: str, value: str) -> None:
+    page.fill(f'.rds-field:has(.rds-label span:text-is("{label}")) input', value)
+    page.keyboard.press("Tab")
+
+
+@pytest.mark.skipif(available() is not None, reason=str(available()))
+def test_a_class_is_graded_and_exported(app: App, open_page: Callable[..., Any]) -> None:
+    assignment = app.folder / "small"
+    assignment.mkdir()
+    (assignment / "assignment.toml").write_text(ASSIGNMENT)
+    (assignment / "solution.py").write_text(law())
+    for student, text in (("ada", law()), ("<i>ben<i>", IDLE)):
+        folder = app.folder / "handed in" / student
+        folder.mkdir(parents=True)
+        (folder / "controller.py").write_text(text)
+    page = open_page("Grading")
+    page.click('button:text-is("Grade")')
+    page.wait_for_selector('.rds-notice:has-text("name the assignment\'s folder")')
+    fill(page, "Assignment", "small")
+    fill(page, "Submissions", "handed in")
+    fill(page, "Grades", "grades")
+    page.click('button:text-is("Grade")')
+    page.wait_for_selector('.rds-notice:has-text("2 submissions are graded")')
+    assert page.locator("tbody tr td:first-child").all_inner_texts() == ["<i>ben<i>", "ada"]  # the worst first
+    page.click('button:text-is("Export")')
+    page.wait_for_selector('.rds-notice:has-text("2 students: ")')
+    assert (app.folder / "grades" / "grades.csv").is_file()
