@@ -31,6 +31,7 @@ HOMING = {  # methods of object 0x6098 that every drive of ours has
     "37": "37: here",
 }
 _NO_MODULE = ("dialect", "cia402", "faults", "interface", "channel")  # keys of [bus] that are not can.Bus's options
+_OURS = {"machine", "axes", "bus", "sample_period", "dry_run", "timeout", "node", "first"}  # words of the drivers
 _STANDS = 0.01  # of its highest speed: a spindle that is slower stands
 _STARTS_IN = 15.0  # s at most
 _ENDS_IN = 8.0  # s: a quick stop of drives, and what they are told after it
@@ -105,6 +106,8 @@ class Jog:
         try:
             self.positions, self.speeds, self.left_out, self.homed, self.error = {}, {}, {}, set(), ""
             bus = dict(self.session.bus)
+            if ours := sorted(_OURS & bus.keys()):
+                raise InputError(f"[bus] {ours[0]} is no option of a bus, but what jogging sets itself; remove it")
             if "faults" in bus:
                 raise InputError("[bus] faults are injected in runs; take them out of the table to jog")
             if "cia402" in bus and bus.get("dialect") != "cia402":

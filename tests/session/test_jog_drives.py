@@ -244,6 +244,7 @@ def test_panels_are_shown_for_a_bus_of_ones_own(alone: Path, monkeypatch: pytest
         ("[bus.cia402]", 'add `dialect = "cia402"`'),
         ('dialect = "cia402"\ncia402 = 3', "must be a table"),
         ('faults = "faults.toml"', "faults.toml"),
+        ('interface = "virtual"\ndry_run = true', "dry_run is no option of a bus"),
     ],
 )
 def test_a_bus_that_will_not_do_is_refused_in_words(alone: Path, table: str, says: str) -> None:
