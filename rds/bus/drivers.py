@@ -30,7 +30,7 @@ _STANDSTILL = 20  # ticks in which no encoder moves until the axes count as stan
 _LONGEST_COAST = 3.0  # s until then
 _SET_UP_AGAIN = 20  # ticks at the start until a module that was not set up is so again
 HOST = "host"  # what the built-in bus calls this node
-_RELEASE = "release its button, then `rds estop --reset`"
+_RELEASE = "release its button, then `rds estop --reset`, or Release at the top of the page"
 _ALARMS = int(Status.EMERGENCY | Status.NOT_SET_UP | Status.REFUSED)  # a plain number: flags cost 1 µs
 _HOSTS = (frames.COMMAND, frames.DRY_COMMAND, frames.SETUP)  # what only a host sends
 

@@ -44,6 +44,7 @@ def describe(
         written = []
         if write_map:
             written.append(_write_map(file))
+            typer.echo(f"rds: wrote {written[0]}, a draft: check every line of it", err=True)
         with progress_bars() as bar:
             found = described(file, map_, bar(f"read {file.name}"))
         if plot is not None:
@@ -54,8 +55,6 @@ def describe(
         _show(found)
         for path in written:
             typer.echo(f"wrote {path}")
-    if write_map:
-        typer.echo(f"rds: {written[0]} is a draft: check every line of it", err=True)
     raise typer.Exit(0 if found.usable else 1)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.toml_text import toml_text
-from rds.logs.map import DIMENSIONS, SUFFIX, AxisMap, ColumnMap, LogMap, TimeMap
+from rds.logs.map import DIMENSIONS, SUFFIX, UNKNOWN, AxisMap, ColumnMap, LogMap, TimeMap
 from rds.logs.table import Column, Table, remedy
 from rds.logs.units import dimension
 from rds.results.units import default_unit
@@ -94,14 +94,14 @@ def draft(table: Table) -> str:
         }
         for needed in ("command", "position"):
             if needed not in chosen:
-                chosen[needed] = {"column": "?", "unit": _LIKELY[needed]}
+                chosen[needed] = {"column": UNKNOWN, "unit": _LIKELY[needed]}
         if any(c is not None and dimension(c.unit or "") == "counts" for c in parts.values()):
             chosen["resolution"] = 0.001
             notes.append("resolution: mm (or degrees) per encoder count, or name a machine.")
         if {"command", "position"} & {q for q, c in parts.items() if c is not None}:
             axes[name] = chosen
     if not axes:
-        axes["X"] = {q: {"column": "?", "unit": _LIKELY[q]} for q in ("command", "position")}
+        axes["X"] = {q: {"column": UNKNOWN, "unit": _LIKELY[q]} for q in ("command", "position")}
     missing = [c.name for c in table.columns.values() if c.unit is None and c.text is None]
     if missing:
         notes.append(f"The file gives no unit for {', '.join(missing[:8])}{' ...' if len(missing) > 8 else ''}.")

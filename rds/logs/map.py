@@ -15,6 +15,7 @@ from rds.logs.units import check_unit
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 
+UNKNOWN = "?"  # what a draft has for the column of a quantity that nothing in the file tells
 SUFFIX = ".map.toml"
 JITTER_LIMIT = 0.1  # of the sample period: how far a step of the time may be from it
 ROTARY = ("angle", "angular speed")
@@ -268,6 +269,8 @@ def _column(axis: Words, quantity: str) -> ColumnMap:
     column = words.text("column")
     if column is None:
         raise InputError(f'{quantity} needs column = "..." ', axis.place(quantity))
+    if column == UNKNOWN:
+        raise words.fault("column", "is the draft's mark for what the file does not tell: name one of its columns")
     sign = words.any("sign", 1)
     if sign not in (1, -1) or isinstance(sign, bool):
         raise words.fault("sign", "must be 1 or -1")

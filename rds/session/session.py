@@ -194,7 +194,7 @@ class Session:
         from rds.bus.estop import reset_everything
 
         free = [node for channel in self._channels() for node in self._on(channel, reset_everything)]
-        text = f"{len(free)} modules are free again" if free else "no module is on the bus"
+        text = f"{len(free)} modules are free again" if free else "no module is on the bus: none is to be released"
         self.say(text)
         return text
 

@@ -182,10 +182,21 @@ def test_describe_without_a_map_drafts_one_and_says_that_it_is_a_draft(tmp_path:
     code, out, _ = rds("data", "describe", path)
     assert code == 1 and "nothing gives its unit" in out and "[axis.axis.position]" in out
     code, out, err = rds("data", "describe", path, "--write-map")
-    assert code == 0 and "is a draft: check every line" in err
+    assert code == 0 and "a draft: check every line" in err
     assert rds("data", "describe", path)[0] == 0
     code, _, err = rds("data", "describe", path, "--write-map")
     assert code == 2 and "exists already" in err
+
+
+def test_a_draft_with_columns_that_nothing_tells_asks_for_them(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t_s;p1;p2\n" + "".join(f"{k / 1000};{k % 7};{k}\n" for k in range(50)))
+    code, _, err = rds("data", "describe", path, "--write-map")
+    assert code == 2 and "log.csv.map.toml, a draft" in err
+    assert "column = '?' is the draft's mark for what the file does not tell: name one of its columns" in err
+    draft = tmp_path / "log.csv.map.toml"
+    draft.write_text(draft.read_text().replace("?", "p1", 1).replace("?", "p2", 1))
+    assert rds("data", "describe", path)[0] == 0
 
 
 @pytest.mark.parametrize(
