@@ -9,6 +9,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
+from rds.core.errors import InputError
 from rds.panels.kit.button import button, follow, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
@@ -96,6 +97,8 @@ class ResultActions:
         if self._folder is None:
             return
         files = [path for name in self._sent if (path := self._folder / name).is_file()]
+        if not files:
+            raise InputError(f"nothing is there to send: {', '.join(self._sent)} are gone from {self._folder}")
         subject, folder = f"RDS: {self._folder.name}", self._session.folder
         text = f"Results of {self._folder.name}, sent from RDS.\n"
 

@@ -15,6 +15,7 @@ from rds.panels.kit.button import button
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
 from rds.panels.machine_modules import ModulesView
+from rds.panels.result_actions import ResultActions
 from rds.panels.shell import Shell
 from rds.session import Session
 from rds.session.machine import MachineDesk
@@ -78,6 +79,14 @@ def test_every_button_of_a_panel_says_what_fails_in_it(
         each.click()  # raises what its handler raises
     assert shell.session.machine_user is None
     assert pressed or name == "help"
+
+
+def test_a_run_whose_files_are_gone_is_not_sent_without_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rds.panels.result_actions.send_files", lambda *_: "sent")
+    actions = ResultActions(Shell(Session(tmp_path)))
+    actions.offer(object(), tmp_path / "runs" / "gone", ["report.html", "result.csv"])  # type: ignore[arg-type]
+    next(each for each in _within(actions.widget) if getattr(each, "description", "") == "Send").click()
+    assert "report.html, result.csv are gone from" in actions.notice.value
 
 
 def test_simulated_modules_that_have_ended_can_be_started_again(

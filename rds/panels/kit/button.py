@@ -81,7 +81,10 @@ def watch(
         if task.stopped:
             notice.say(stopped, "warning")
         elif task.error is not None:
-            say_error(task.title, task.error, notice)
+            if task.stopping and isinstance(task.error, RdsError):  # what came of being stopped is no fault
+                notice.say(str(task.error), "warning")
+            else:
+                say_error(task.title, task.error, notice)
             if failed is not None:
                 failed()
         else:
