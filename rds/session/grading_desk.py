@@ -128,6 +128,7 @@ class _Batch:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=log,  # a pipe that nobody reads would hold it up, and end it with this page
+                env=_plain(),
                 start_new_session=True,
                 pass_fds=(lock,) if os.name == "posix" else (),
             )
@@ -205,6 +206,11 @@ def progress(out: Path) -> tuple[int, int]:
     return 0, 0
 
 
+def _plain() -> dict[str, str]:
+    """The environment without what a notebook's kernel sets to get colours: they would be characters in the text."""
+    return {name: value for name, value in os.environ.items() if name not in ("FORCE_COLOR", "CLICOLOR_FORCE")}
+
+
 def _said(words: list[str], pulse: Callable[[], None]) -> str:
     """What a command of `rds grade` says; InputError where it refuses. What `pulse()` raises ends it."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
@@ -213,6 +219,7 @@ def _said(words: list[str], pulse: Callable[[], None]) -> str:
             stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=err,
+            env=_plain(),
             start_new_session=True,
         )
         try:

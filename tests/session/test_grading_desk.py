@@ -13,7 +13,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.grading.grade import Grade, Status
 from rds.session import Session
-from rds.session.grading_desk import GradingDesk, progress, rows
+from rds.session.grading_desk import GradingDesk, _said, progress, rows
 
 
 def test_progress_is_what_the_journal_has(tmp_path: Path) -> None:
@@ -45,6 +45,13 @@ def test_an_assignment_that_is_not_there_is_the_task_s_error(tmp_path: Path) -> 
         desk.choices.set(name, name)
     task = desk.grade()
     assert task.wait(120) and isinstance(task.error, InputError) and "assignment" in str(task.error)
+
+
+def test_what_a_command_says_is_plain_text_in_a_notebook_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as IPython's kernel does
+    monkeypatch.setenv("CLICOLOR_FORCE", "1")
+    said = _said(["check", "--help"], lambda: None)
+    assert "Usage" in said and "\x1b" not in said
 
 
 def test_the_worst_come_first() -> None:
