@@ -121,9 +121,11 @@ class EquipmentView:
             self._show(run.result)
 
     def _ended(self) -> None:
-        self._look()
-        self._end_look()
-        self.live.ended()
+        try:
+            self._look()
+        finally:
+            self._end_look()
+            self.live.ended()
         run = self.run
         assert run is not None
         if run.stopped_early:

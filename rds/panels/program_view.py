@@ -176,10 +176,12 @@ class ProgramView:
     def _ended(self) -> None:
         work = self.work
         assert work is not None
-        self._look()
-        self.work = self.operator.work = None
-        self.operator.enable()
-        self.editor.locked, self.editor.running = False, 0
+        try:
+            self._look()
+        finally:  # whatever its result does to the page, the next one can be run
+            self.work = self.operator.work = None
+            self.operator.enable()
+            self.editor.locked, self.editor.running = False, 0
         if work.stopped_early:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif work.error is not None:

@@ -10,15 +10,18 @@ import ipywidgets as widgets
 import pytest
 
 from rds.core.errors import InputError
+from rds.nc.check import Setup
 from rds.panels import PANELS
 from rds.panels.kit.button import button
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
 from rds.panels.machine_modules import ModulesView
+from rds.panels.program_view import ProgramView
 from rds.panels.result_actions import ResultActions
 from rds.panels.shell import Shell
 from rds.session import Session
 from rds.session.machine import MachineDesk
+from rds.session.program_run import ProgramWork
 
 
 @pytest.mark.parametrize(
@@ -79,6 +82,26 @@ def test_every_button_of_a_panel_says_what_fails_in_it(
         each.click()  # raises what its handler raises
     assert shell.session.machine_user is None
     assert pressed or name == "help"
+
+
+def test_after_a_result_that_cannot_be_shown_the_next_program_can_be_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = ProgramView(Shell(Session(tmp_path)))
+
+    def fails() -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(view, "_look", fails)
+    view.work = view.operator.work = ProgramWork(
+        view.shell.session, tmp_path / "part.ngc", "simulation", Setup(), "tracking", []
+    )
+    view.operator.enable()
+    view.editor.locked = True
+    assert view.operator.run_button.disabled
+    with pytest.raises(OSError, match="No space"):
+        view._ended()
+    assert view.work is None and not view.editor.locked and not view.operator.run_button.disabled
 
 
 def test_a_run_whose_files_are_gone_is_not_sent_without_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
