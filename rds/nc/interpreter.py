@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from rds.nc.blocks import AXIS_SET, CHECKED, NON_MODAL, STOP, Block, check, settle_motion
+from rds.nc.blocks import AXES, AXIS_SET, CHECKED, NON_MODAL, STOP, Block, check, settle_motion
 from rds.nc.canon import Call, MotionBlock
 from rds.nc.context import Context
 from rds.nc.control import Control
@@ -303,14 +303,23 @@ class Interpreter:
 
     # -- faults -------------------------------------------------------------------------------------------------------
 
+    def _place(self, key: str) -> int:
+        """Where a word of the block stands in its text; -1 when it has none."""
+        place = self._places.get(key, -1)
+        if place >= 0:
+            return place
+        return self._text.find("(") if key == "(" else place_of(key, self._text)
+
     def _error(self, fault: Fault, raw: bytes) -> ProgramError:
         """The fault with file, line, column and word."""
-        source, text, at = self.control.source, self._text, fault.at
+        source, text, at, message = self.control.source, self._text, fault.at, fault.message
         word = ""
         if fault.key:
-            at = self._places.get(fault.key, -1)
-            if at < 0:
-                at = text.find("(") if fault.key == "(" else place_of(fault.key, text)
+            at = self._place(fault.key)
+            motion = self.context.state.motion
+            if at < 0 and fault.key == f"g{motion}":  # of a motion that an earlier line has set
+                message = f"G{motion // 10} is still in force: {message}"
+                at = min((place for axis in AXES if (place := self._place(axis)) >= 0), default=-1)
         column = 0
         if at == -2:
             column = len(raw[: raw.rfind(b"(")].decode("utf-8", "replace")) + 1 + source.column
@@ -318,4 +327,4 @@ class Interpreter:
         elif at >= 0 and text:
             column = column_of(raw, at) + source.column
             word = word_at(text, at).encode("latin-1").decode("utf-8", "replace")
-        return ProgramError(recoded(fault.message), file=source.name, line=source.line, column=column, word=word)
+        return ProgramError(recoded(message), file=source.name, line=source.line, column=column, word=word)
