@@ -136,7 +136,9 @@ class _Session:
         except (CancelledError, asyncio.CancelledError):
             if not future.cancelled():
                 raise  # this coroutine is, not the item
-            raise MachineError(f"scheduler {self._scheduler!r} is gone, and with it what was at work") from None
+            raise MachineError(
+                f"scheduler {self._scheduler!r} is gone, and with it what was at work there; start it again, and go on"
+            ) from None
         except Exception as error:  # it did not come as far as its process
             return index, Reply(failure=Failure.RAISED, reason=reason_of(error))
         return index, reply
