@@ -13,6 +13,7 @@ from rds.panels.kit.button import button, columns, follow, group, row
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
+from rds.panels.still_here import StillHere
 from rds.panels.turn import TurnButtons
 from rds.session.jog import Jog
 from rds.session.jog_axes import JogAxis, JogSpindle
@@ -39,6 +40,7 @@ class JogView:
     def __init__(self, shell: Any, jog: Jog):
         self.jog = jog
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
+        self._here = StillHere()
         say = self.notice
         self._take = button(
             "Take the machine", "Hold the axes where they are; nothing moves yet", self.take, say, primary=True
@@ -66,7 +68,7 @@ class JogView:
         ]
         for each in rows:
             each.add_class("rds-jog-axis")
-        self.widget = columns(side, [self.bar, self.notice, *rows, widgets.HTML(_HINT)])
+        self.widget = columns(side, [self.bar, self.notice, *rows, widgets.HTML(_HINT), self._here])
         self._shown_error = self._shown_homing = ""
         self._set_way()
         self._show()
@@ -132,6 +134,9 @@ class JogView:
 
     def _show(self) -> None:
         jog = self.jog
+        if jog.ready and self._here.gone:  # or its axes would be held, and nobody else could have the machine
+            jog.end()
+            self.notice.say("no browser has shown this panel for a while: the machine was let go", "warning")
         ready, busy = jog.ready, bool(jog.homing)
         self._take.disabled, self._free.disabled = ready, not ready
         self._rest.disabled = not ready

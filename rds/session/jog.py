@@ -167,9 +167,11 @@ class Jog:
 
     def end(self) -> None:
         """Let the machine go: no voltage, drives by a quick stop. Nothing where it is not taken."""
-        for end in self._ends:
+        ends, self._ends = self._ends, []
+        self._loop = None  # first: that it ends now is no error
+        for end in ends:
             end()
-        self._ends, self._loop, self._server = [], None, None
+        self._server = None
         self.positions, self.speeds, self.moving, self.homing = {}, {}, False, ""
         self.session.give_machine_back(self)
 

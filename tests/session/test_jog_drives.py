@@ -210,6 +210,24 @@ def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason
         hand.close()
 
 
+def test_a_panel_that_nobody_shows_any_more_lets_the_machine_go(alone: Path) -> None:
+    """Its axes were held, and the machine in use, for as long as its kernel lived."""
+    pytest.importorskip("anywidget", reason="panels need rds[lab]")
+    from rds.panels.jog import JogView
+    from rds.panels.shell import Shell
+    from rds.panels.still_here import GONE_AFTER
+
+    jog = taken(alone)
+    view = JogView(Shell(jog.session), jog)
+    view._here._said(None, {"kind": "here"}, None)
+    view._show()
+    assert jog.ready
+    view._here.heard_at -= GONE_AFTER + 1.0
+    view._show()
+    assert not jog.ready and jog.session.machine_user is None
+    assert "the machine was let go" in view.notice.value
+
+
 @pytest.mark.parametrize("dialect", ["rds", "cia402"])
 def test_a_machine_is_jogged_without_its_spindle(alone: Path, dialect: str) -> None:
     served = [sys.executable, "-m", server_module(dialect), "mini-cnc", "--axes", "X,Y,Z", "--exit-with-stdin"]
