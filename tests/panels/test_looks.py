@@ -39,3 +39,14 @@ def test_a_projector_of_1024_and_the_keyboard_alone(open_page: Callable[..., Any
     assert gain.input_value() == "" and gain.get_attribute("placeholder") == "20"
     style = "getComputedStyle(document.querySelector('.rds-field input[placeholder]'), '::placeholder').fontStyle"
     assert page.evaluate(style) == "italic"  # the file's value, not one that was typed
+
+
+def test_long_lines_of_a_command_scroll_within_the_panel(open_page: Callable[..., Any]) -> None:
+    page = open_page("Data", width=1024)
+    right = page.evaluate("""() => {
+        const places = [...document.querySelectorAll(".rds-main .widget-html-content")];
+        const place = places.find((each) => each.offsetParent);
+        place.innerHTML = `<pre>${"x".repeat(400)}</pre>`;
+        return place.firstChild.getBoundingClientRect().right;
+    }""")
+    assert right <= 1024
