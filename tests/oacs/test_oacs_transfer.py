@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from contextlib import suppress
 from dataclasses import replace
 from math import cos, nan, sin
@@ -110,6 +111,21 @@ def test_impossible_modules_are_refused(changes: dict[str, object], told: str) -
 def test_a_newer_version_is_told_so() -> None:
     with pytest.raises(MachineError, match="version 2, this program reads version 1; update"):
         decode_description(b"\x02" + encode_description(X)[1:])
+
+
+def test_a_host_that_stood_still_for_a_while_takes_the_frames_that_waited_for_it() -> None:
+    payload = encode_description(X)
+    module, host = Sender(2), Receiver(2)
+    for frame in module.start(payload):
+        host.feed(frame)
+    for flow in host.pump():
+        module.feed(flow)
+    frames = module.pump()
+    time.sleep(0.4)  # a busy computer's; ISO 15765-2 grants 1 s
+    for frame in frames:
+        host.feed(frame)
+    host.pump()
+    assert host.result() == payload and host.problem is None
 
 
 def test_over_iso_tp() -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import isotp
 
 LONGEST = 512  # bytes of a download that a host takes
-_TIMEOUT = 250  # ms until a partner that says nothing is given up
+_TIMEOUT = 1000  # ms until a partner that says nothing is given up: N_Bs and N_Cr of ISO 15765-2
 
 
 class _End:
