@@ -28,15 +28,16 @@ SLOW = replace(MACHINE, sample_period=0.01)
 
 
 @pytest.fixture(params=["rds", "virtual"])
-def served(request: pytest.FixtureRequest) -> Iterator[dict[str, Any]]:
+def served(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
+    monkeypatch.setattr("rds.bus.drivers.LOST_AFTER", 5.0)  # s: its modules share this process, which may be held up
     where = {"interface": request.param, "channel": uuid4().hex}
     stop, ready = threading.Event(), threading.Event()
     thread = threading.Thread(target=lambda: serve(SLOW, **where, ready=ready.set, stop=stop))
     thread.start()
-    assert ready.wait(5.0)
+    assert ready.wait(30.0)
     yield where
     stop.set()
-    thread.join(5.0)
+    thread.join(30.0)
     assert not thread.is_alive()
 
 
