@@ -69,7 +69,7 @@ def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> Stu
         cause: BaseException = error
         if count:
             count.stop()
-            cause = _first(error)
+            cause = runs.first_cause(error)
         said = str(cause) if isinstance(cause, InputError) else student_error(cause, file)
         channel.tell({"error": said.replace(f"{walls.HOME}/", "")[:2000]})
         return None
@@ -80,15 +80,6 @@ def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> Stu
     problem = "; ".join(f"{name}: {text}" for name, text in [("params", fault), ("initial_state", state_fault)] if text)
     channel.tell({"defines": names[:1000], "params": params or {}, "initial_state": state, "problem": problem})
     return loaded
-
-
-def _first(error: BaseException) -> BaseException:
-    """What went wrong first: to explain an error is not allowed either while the work is counted, and fails too."""
-    for _ in range(8):  # an author can tie a ring of errors
-        if isinstance(error, InputError) or error.__context__ is None:
-            break
-        error = error.__context__
-    return error
 
 
 def _interface(kind: str, file: Path) -> StudentFile:
