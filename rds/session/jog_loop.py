@@ -22,10 +22,12 @@ from rds.bus.link import BUILTIN, default_channel
 from rds.core.errors import RdsError
 from rds.machines import load_machine
 from rds.motion.jog import advance
+from rds.runtime.scheduling import raise_priority
 from rds.session.jog_hands import Hand, open_hand
 from rds.session.jog_orders import Orders, Wanted
 
 REPORTS = 20.0  # 1/s
+_PRIORITY = 50  # of SCHED_FIFO, below that of hub and simulated modules
 
 
 class NotWanted(Exception):
@@ -135,6 +137,7 @@ def main(arguments: list[str]) -> int:
     """The program. Exit code 0: its orders have ended; 1: the machine failed, and the last line says why."""
     name, dialect, words = arguments
     bus = json.loads(words)
+    raise_priority(_PRIORITY)  # where that is permitted: a busy computer stalls others for longer than drives bear
     try:
         with contextlib.ExitStack() as stack:
             machine = load_machine(name)
