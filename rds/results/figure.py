@@ -92,6 +92,7 @@ def legend(axes: Axes, columns: int = 4) -> None:
         handlelength=1.6,
         handletextpad=0.5,
         columnspacing=0.9,
+        labelspacing=0.2,  # as close as the lines of the blank title, which keeps the height free
         borderaxespad=0.2,
     )
     # a legend wider than its axes would make the layout shrink them; a blank title keeps just the height free

@@ -57,7 +57,7 @@ def _histograms(axes: Axes, result: Result) -> None:
     axes.set_ylim(bottom=0.7)
     dress(axes, "number of samples", "time per sample [µs]")
     axes.xaxis.set_major_formatter("{x:g}")
-    legend(axes, columns=3)
+    legend(axes, columns=2)  # three are wider than a panel's figure
 
 
 def _label(stage: str, values: np.ndarray) -> str:

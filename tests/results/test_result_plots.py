@@ -74,6 +74,17 @@ def test_the_voltage_shows_the_limits(result: Result) -> None:
     assert "limit" not in labels(plots.voltage(without))
 
 
+def test_the_legend_of_the_timing_lies_within_a_panel_s_figure() -> None:
+    from rds.panels.kit.figure import DPI, WIDTH
+
+    picture = plots_timing.timing(make_result("implementation", seconds=8.0))
+    picture.set_size_inches(WIDTH, picture.get_size_inches()[1])
+    picture.set_dpi(DPI)
+    picture.draw_without_rendering()
+    legend = picture.axes[0].get_legend()
+    assert legend is not None and legend.get_window_extent().x1 <= WIDTH * DPI
+
+
 def test_the_timing_marks_period_and_late_samples(result: Result) -> None:
     said = labels(plots_timing.timing(result))
     assert "period 1000 µs" in said

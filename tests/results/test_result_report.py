@@ -120,3 +120,11 @@ def test_a_page_of_any_kind_escapes_its_title_and_keeps_its_body() -> None:
     assert not seen.open and "<p>as it is</p>" in text
     assert "script" not in {tag for tag, _ in seen.tags} and HOSTILE in seen.text
     assert "default-src 'none'" in text
+
+
+def test_a_number_of_five_digits_is_written_out() -> None:
+    from rds.results.html import number
+
+    assert [number(value) for value in (9.6e-7, 0.0123456, 10070.4, -12345.6, 3.2e9)] == [
+        "9.6e-07", "0.01235", "10070", "-12346", "3.2e+09"
+    ]  # fmt: skip
