@@ -80,4 +80,4 @@ def no_such_letter(letter: str) -> str:
 
 
 def active_comment(name: str) -> str:
-    return f"({name.upper()}...) is outside this dialect; write a plain comment or (MSG, ...)"
+    return f"({name.upper()}...) is outside this dialect; write a plain comment, (MSG, ...) or (DEBUG, ...)"

@@ -12,6 +12,7 @@ from rds.nc.state import State
 
 COUNT = 5602  # numbers 1 to 5601, as in LinuxCNC
 ARGUMENTS = 30  # #1 to #30 are a subroutine's own
+DEBUG_SHOWN = 5599  # (DEBUG, ...) is a message while this is above 0
 READ_ONLY = frozenset([*range(5400, 5414), *range(5420, 5429)])
 TOOL = 5400  # number; 5401 to 5409 offsets X Y Z A B C U V W; 5410 diameter
 POSITION = 5420  # X Y Z A B C
@@ -33,6 +34,7 @@ class Parameters:
 
     def __init__(self, state: State, initial: Mapping[int, float] | None = None):
         self.numbers = [0.0] * COUNT
+        self.numbers[DEBUG_SHOWN] = 1.0
         for number, value in (initial or {}).items():
             self.numbers[number] = float(value)
         self.globals: dict[str, float] = {}

@@ -31,7 +31,15 @@ _WRONG = _words(
 )
 _ODD = _words("X--5 /X1 X##1 X#[#1+1] X-[3] X+[3] X-#1 G0.99999 G54.0001 M3.00001")
 _COMMENTS = [
-    *("(a comment)", "( spaced  Text )", "(MSG, hello)", "(msg,Hi There)", "; rest (of) line", "X1 (a) Y2 (b)"),
+    *(
+        "(a comment)",
+        "( spaced  Text )",
+        "(MSG, hello)",
+        "(debug, #1 #<a> %d#5220)",
+        "(msg,Hi There)",
+        "; rest (of) line",
+        "X1 (a) Y2 (b)",
+    ),
     *("G0 ; c", "()", "(é)"),
 ]
 
