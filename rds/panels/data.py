@@ -10,9 +10,10 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.kit.button import attempt, button, columns, follow, group, row
+from rds.panels.kit.button import attempt, button, follow
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.session.data_desk import DataDesk

@@ -10,8 +10,9 @@ import numpy as np
 
 from rds.core.errors import InputError, RdsError
 from rds.panels.design_charts import charts, details, key_numbers
-from rds.panels.kit.button import button, follow, row, watch
+from rds.panels.kit.button import button, follow, watch
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.splane import Curves, SPlane

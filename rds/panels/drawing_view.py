@@ -9,9 +9,10 @@ import ipywidgets as widgets
 
 from rds.core.errors import InputError
 from rds.panels.cells import Cells
-from rds.panels.kit.button import attempt, button, row
+from rds.panels.kit.button import attempt, button
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.session.drawing import CELLS, PICTURES, Drawing
 

@@ -9,7 +9,8 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.kit.button import button, follow, row
+from rds.panels.kit.button import button, follow
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.results import Result

@@ -10,7 +10,8 @@ import ipywidgets as widgets
 from rds.core.errors import InputError
 from rds.panels.earlier_runs import EarlierRuns
 from rds.panels.equipment_settings import EquipmentSettings
-from rds.panels.kit.button import attempt, button, follow, row, say_error
+from rds.panels.kit.button import attempt, button, follow, say_error
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.live_view import LiveView

@@ -7,8 +7,9 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.kit.button import attempt, button, columns, follow, group, row, watch
+from rds.panels.kit.button import attempt, button, follow, watch
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.session.grading_desk import GradingDesk, rows

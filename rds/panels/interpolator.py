@@ -9,9 +9,10 @@ import ipywidgets as widgets
 
 from rds.core.errors import InputError
 from rds.interpolators.result import Interpolation
-from rds.panels.kit.button import button, follow, row
+from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.segment_table import SegmentTable

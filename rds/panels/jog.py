@@ -9,8 +9,9 @@ import ipywidgets as widgets
 
 from rds.core.errors import RdsError
 from rds.panels.hold import HoldButtons
-from rds.panels.kit.button import button, columns, follow, group, row
+from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.still_here import StillHere

@@ -8,8 +8,9 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.kit.button import button, columns, follow, group, row
+from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.results import html

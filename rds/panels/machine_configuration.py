@@ -7,8 +7,9 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.kit.button import button, columns, group, row
+from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.results import html
 from rds.session.configuration import directions, faults, first_order, moved, write_machine

@@ -7,7 +7,8 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.kit.button import attempt, button, row
+from rds.panels.kit.button import attempt, button
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.session.program import Program
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.kit.button import attempt, button, row
+from rds.panels.kit.button import attempt, button
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.session.choices import Choices

@@ -10,8 +10,9 @@ from rds.core.errors import InputError
 from rds.nc.errors import ProgramError
 from rds.nc.tools import Tool
 from rds.panels.editor import Editor
-from rds.panels.kit.button import attempt, button, row
+from rds.panels.kit.button import attempt, button
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.results import html
 from rds.session.program import Program

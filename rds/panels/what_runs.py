@@ -8,8 +8,9 @@ from html import escape
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.kit.button import button, row
+from rds.panels.kit.button import button
 from rds.panels.kit.diagram import diagram_svg
+from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.session.as_file import as_python, as_toml, write_toml
 from rds.session.build import Checked, Mark

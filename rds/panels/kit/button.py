@@ -91,27 +91,3 @@ def watch(
             attempt(task.title, lambda: show(task.result), notice)  # type: ignore[arg-type]
 
     bar.follow(task, ended)
-
-
-def row(*children: Any) -> widgets.HBox:
-    """Controls side by side, which go on in the next line where there is no room."""
-    box = widgets.HBox(list(children))
-    box.add_class("rds-row")
-    return box
-
-
-def group(title: str, *children: Any) -> widgets.VBox:
-    """Controls under a heading."""
-    box = widgets.VBox([widgets.HTML(f"<h3>{title}</h3>"), *children])
-    box.add_class("rds-group")
-    return box
-
-
-def columns(side: list[Any], main: list[Any]) -> widgets.HBox:
-    """Settings at the left, what comes of them at the right."""
-    left, right = widgets.VBox(side), widgets.VBox(main)
-    left.add_class("rds-side")
-    right.add_class("rds-main")
-    box = widgets.HBox([left, right])
-    box.add_class("rds-columns")
-    return box
