@@ -70,7 +70,7 @@ def is_installed(filename: str) -> bool:
 def _text(exc: BaseException) -> str:
     try:
         text = " ".join(str(exc).split())
-    except Exception:  # an exception class of the student's own may fail to print itself
+    except STUDENT_ERRORS:  # an exception class of the student's own may fail to print itself
         text = "(its message cannot be printed)"
     text = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
     return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone

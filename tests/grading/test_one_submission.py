@@ -59,6 +59,21 @@ def test_what_cannot_be_loaded_costs_no_attempt(tmp_path: Path) -> None:
     assert data["gradable"] is False and "failed to load" in data["format_errors"][0]
 
 
+@needs_sandbox
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_pipe_is_what_the_student_handed_in_and_no_failure_of_the_grader(beside: bool, tmp_path: Path) -> None:
+    root = container_in(tmp_path, "gradescope")
+    handed_in = root / CONTAINERS["gradescope"].submission / "my_controller.py"
+    if beside:
+        os.mkfifo(handed_in.with_name("notes.txt"))
+    else:
+        handed_in.unlink()
+        os.mkfifo(handed_in)
+    data = json.loads(grade_in("gradescope", root).read_text())
+    assert data["score"] == pytest.approx(9.0 if beside else 0.0)
+    assert beside or "it is a pipe (FIFO)" in data["output"]
+
+
 @pytest.mark.parametrize("platform", SCRIPTS)
 def test_without_a_sandbox_nothing_is_run_and_nobody_gets_a_zero(
     platform: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -86,7 +86,7 @@ ATTACKS = {
         "import codecs\nfor name in ('strict', 'replace', 'surrogatepass'): codecs.register_error(name, lambda error: ('1', error.end))\ncodecs.register(lambda name: None)"
     ),
     "a profiler that raises": Attack(
-        "import sys\ndef profile(*a): raise KeyboardInterrupt\nsys.setprofile(profile)", KILLED, "exit code 1"
+        "import sys\ndef profile(*a): raise KeyboardInterrupt\nsys.setprofile(profile)", LOAD, "KeyboardInterrupt"
     ),
     "an audit hook that raises": Attack(
         "import sys\ndef hook(*a): raise SystemExit\nsys.addaudithook(hook)", KILLED, "exit code 1"

@@ -32,7 +32,12 @@ ATTACKS = {
     "os._exit with success": Attack("import os; os._exit(0)", KILLED, "exit code 0"),
     "os._exit in a sample": Attack(in_control("os._exit(0)"), KILLED, "exit code 0"),
     "an exception of no known kind": Attack(
-        in_control("raise type('Unknown', (BaseException,), {})()"), KILLED, "exit code 1"
+        in_control("raise type('Unknown', (BaseException,), {})()"), CONTRACT, "Unknown"
+    ),
+    "an exception of no known kind while loading": Attack("raise GeneratorExit('done')", LOAD, "GeneratorExit: done"),
+    "as if somebody pressed Ctrl-C": Attack(in_control("raise KeyboardInterrupt"), CONTRACT, "KeyboardInterrupt"),
+    "an exception whose text leaves": Attack(
+        in_control("class Odd(Exception):\n    def __str__(self): raise SystemExit\nraise Odd"), CONTRACT, "Odd"
     ),
     "an exception whose text fails": Attack(
         in_control("class Odd(Exception):\n    def __str__(self): raise ValueError\nraise Odd"), CONTRACT, "Odd"

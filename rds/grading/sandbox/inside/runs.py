@@ -1,6 +1,7 @@
 """The submission's side of the loop: one question in, one answer out, until the grader closes the pipe.
 
-The laws, models in motion and rows are those of every other run of RDS, so that graded answers are the same.
+The laws, models in motion and rows are those of every other run of RDS, so that graded answers are the same. Whatever a
+submission raises is its own doing and is told, be it KeyboardInterrupt: nobody else is in this process.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from math import isfinite
 from typing import Any
 
 from rds.checks.rows import iterate, row_of
-from rds.core.blame import STUDENT_ERRORS, student_error
+from rds.core.blame import student_error
 from rds.core.errors import InputError
 from rds.core.load import StudentFile
 from rds.core.types import ArcSegment, LineSegment, Reference, Segment
@@ -42,7 +43,7 @@ def control(channel: Channel, student: StudentFile, order: dict[str, Any], count
         else:
             each = range(axes)
             law = coupled(each, names, controller, references, order["T"], [as_voltage] * axes, params)
-    except (InputError, *STUDENT_ERRORS) as error:
+    except BaseException as error:
         return _refuse(channel, error, student, counted)
     channel.tell({"begun": True})
     receive, send = _begun(channel, layout, order, counted)
@@ -54,7 +55,7 @@ def control(channel: Channel, student: StudentFile, order: dict[str, Any], count
         voltages: list[float] = []
         try:
             law(k, take(values), [], voltages)
-        except (InputError, *STUDENT_ERRORS) as error:
+        except BaseException as error:
             send(k, records.FAULT, *[0.0] * axes)
             return _explain(channel, error, student, k * order["T"], counted)
         send(k, records.OK, *voltages)
@@ -96,7 +97,7 @@ def model(channel: Channel, student: StudentFile, order: dict[str, Any], counted
         first = float(read())
         if not isfinite(first):
             raise InputError(f"its output before the first sample is {first!r}; it must be one finite number")
-    except (InputError, *STUDENT_ERRORS) as error:
+    except BaseException as error:
         return _refuse(channel, error, student, counted)
     channel.tell({"begun": True, "output": first})
     while True:
@@ -106,7 +107,7 @@ def model(channel: Channel, student: StudentFile, order: dict[str, Any], counted
         try:
             write(voltage)
             output = float(read())
-        except (InputError, *STUDENT_ERRORS) as error:
+        except BaseException as error:
             send(k, records.FAULT, 0.0)
             return _explain(channel, error, student, k * order["T"], counted)
         send(k, records.OK, output)
@@ -122,7 +123,7 @@ def rows(channel: Channel, student: StudentFile, order: dict[str, Any], counted:
         given = iterate(student.functions["interpolate"](segment, order["T"], student.parameters(order["params"])))
         if isinstance(given, str):
             raise InputError(f"interpolate() returned {given}")
-    except (InputError, *STUDENT_ERRORS) as error:
+    except BaseException as error:
         return _refuse(channel, error, student, counted)
     channel.tell({"begun": True})
     taken = 0
@@ -141,7 +142,7 @@ def rows(channel: Channel, student: StudentFile, order: dict[str, Any], counted:
                 values = row_of(row, axes)
                 if isinstance(values, tuple):
                     raise InputError(f"row {taken} is {shown(row)}; {values[1]}")
-            except (InputError, *STUDENT_ERRORS) as error:
+            except BaseException as error:
                 send(k, records.FAULT, *[0.0] * layout.answers)
                 return _explain(channel, error, student, taken * order["T"], counted)
             block += values.ravel().tolist()

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.blame import STUDENT_ERRORS, student_error
+from rds.core.blame import student_error
 from rds.core.errors import ContractError, InputError
 from rds.core.load import StudentFile, load_student
 from rds.core.signature import INTERFACES, form
@@ -65,8 +65,8 @@ def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> Stu
     """Run the file and tell what it defines; None if it cannot be used."""
     try:
         loaded = _functions(file) if kind == "functions" else _interface(kind, file)
-    except (InputError, *STUDENT_ERRORS) as error:
-        cause: BaseException = error
+    except BaseException as error:  # whatever a submission raises is its own doing: nobody else is in this process
+        cause = error
         if count:
             count.stop()
             cause = runs.first_cause(error)
@@ -117,5 +117,5 @@ def _call(channel: Channel, loaded: Any, order: dict[str, Any], file: Path) -> N
         channel.tell({"value": plain(functions[name](*order["args"]))})
     except NotPlain as fault:
         channel.tell({"error": f"{name}() returned what is not made of numbers, texts and lists: {fault}"})
-    except STUDENT_ERRORS as error:
+    except BaseException as error:
         channel.tell({"error": f"{name}() failed: {student_error(error, file)}".replace(f"{walls.HOME}/", "")[:2000]})
