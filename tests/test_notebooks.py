@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import nbformat
@@ -13,6 +14,7 @@ from nbclient import NotebookClient
 from rds.grading.sandbox import available
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+SHORTER = {"duration=5.0": "duration=3.0", "duration=3.0": "duration=1.0"}  # s: in real time, five runs of the first
 
 
 @pytest.mark.realtime
@@ -23,6 +25,8 @@ def test_it_runs(path: Path, alone: Path, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setenv("JUPYTER_PREFER_ENV_PATH", "1")  # the kernel of this environment, not one of the user's
     monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(alone / "jupyter"))
     notebook = nbformat.read(path, as_version=4)
+    if path.stem == "01_first_axis":
+        _shorten(notebook)
     place = {"metadata": {"path": str(alone)}}
     NotebookClient(notebook, timeout=120, kernel_name="python3", resources=place).execute()
     if path.stem == "01_first_axis":
@@ -36,6 +40,16 @@ def test_it_is_stored_without_outputs(path: Path) -> None:
     for cell in nbformat.read(path, as_version=4).cells:
         if cell.cell_type == "code":
             assert cell.outputs == [] and cell.execution_count is None
+
+
+def _shorten(notebook: nbformat.NotebookNode) -> None:
+    """Give its experiments less time: what the notebook says of them is so after a period as after more."""
+    changes = 0
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.source, found = re.subn("|".join(SHORTER), lambda match: SHORTER[match[0]], cell.source)
+            changes += found
+    assert changes == 5
 
 
 def _check_first_axis(notebook: nbformat.NotebookNode) -> None:

@@ -25,7 +25,7 @@ ELSEWHERE = (
     "jupyter lab",
     "rds app",
 )  # not run by this test
-SHORT = 1.0  # s, of real-time runs
+SHORT = 0.5  # s, of real-time runs
 
 
 @pytest.mark.realtime

@@ -112,10 +112,19 @@ def test_an_emergency_stop_that_nobody_acknowledges_fails(rds: Rds, bus: can.Bus
     assert json.loads(stopped.stdout) == {"stopped": []}
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("words", [["move", "--by", "100"], ["jog", "1", "--seconds", "20"], ["step", "--by", "100"]])
+@pytest.mark.parametrize(
+    ("words", "number"),
+    [
+        (["move", "--by", "100"], signal.SIGINT),
+        (["jog", "1", "--seconds", "20"], signal.SIGINT),
+        (["jog", "1", "--seconds", "20"], signal.SIGTERM),
+        (["jog", "1", "--seconds", "20"], signal.SIGHUP),
+        (["step", "--by", "100"], signal.SIGTERM),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else signal.Signals(value).name,
+)
 def test_what_ends_the_command_ends_the_motion(
-    serve: Serve, bus: can.BusABC, channel: str, number: int, words: list[str], tmp_path: Path
+    serve: Serve, bus: can.BusABC, channel: str, words: list[str], number: int, tmp_path: Path
 ) -> None:
     """At once: by a stop on the bus, not by the module's own watchdog, 2 s after the host's last word."""
     serve("X")

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rds.results import open_result
@@ -18,7 +19,6 @@ from rds.session.kept_runs import State, state_of
 from tests.panels.conftest import App
 
 LONG = 60.0  # s of a run that is stopped
-RELOADED = 20.0  # s of one that is waited for, and still goes on when a busy computer has reloaded its page
 ORPHANED = 12.0  # s of one that is waited for, whose kernel is killed at its beginning
 PATIENCE = 120.0  # s
 
@@ -58,12 +58,16 @@ def wait_for(look: Callable[[], Any]) -> Any:
 
 
 def test_a_reload_during_a_run_loses_nothing(begin: Callable[..., Any]) -> None:
-    _, page, folder = begin(RELOADED)
+    _, page, folder = begin(LONG)
     page.reload()  # its kernel goes on until the run is kept
     page.wait_for_selector('.rds-notice:has-text("a run goes on")')
+    before = len(open_result(folder))
+    wait_for(lambda: len(open_result(folder)) > before + 500)  # the loop goes on, too
+    page.click("button.rds-stop")
     wait_for(lambda: state_of(folder) is State.WHOLE)
     result = open_result(folder)
-    assert result.meta["ending"] == "done" and len(result) == RELOADED * 1000
+    assert result.meta["ending"] == "machine lost" and len(result) > before + 500
+    assert (result["time"] == np.arange(len(result)) * 0.001).all()  # no sample is missing
     page.click('.rds-nav button:text-is("Equipment control")')
     page.click('.lm-TabBar-tab:visible:has-text("Earlier runs")')
     earlier = page.locator("select[multiple]:visible option").first

@@ -242,7 +242,7 @@ def test_compiled_simulations_do_not_ignore_changes(experiment: Maker) -> None:
 
 
 def test_a_simulation_is_stopped_and_keeps_what_it_has(experiment: Maker) -> None:
-    run = experiment(PID, duration=15000.0).start()
+    run = experiment(PID, duration=2000.0).start()
     assert run.ready(10)
     run.desk.set("X.Pgain", 5.0)
     while run.progress[0] < 1000:
@@ -258,7 +258,7 @@ def test_a_simulation_is_stopped_and_keeps_what_it_has(experiment: Maker) -> Non
     assert len(result) == run.progress[0] >= len(rows)
     assert (result["X_measured"][: len(rows)] == rows["X_measured"]).all()
     assert [change.name for change in run.changes] == ["X.Pgain", "stop"]
-    again = experiment(PID, duration=15000.0).run(changes=result.meta["changes"])
+    again = experiment(PID, duration=2000.0).run(changes=result.meta["changes"])
     assert all((again[name] == result[name]).all() for name in result.columns)
     with pytest.raises(rds.InputError, match="no live value can be read or set: the run is over"):
         run.desk.set("X.Pgain", 1.0)
