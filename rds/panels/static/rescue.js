@@ -52,13 +52,12 @@ function render({ model, el }) {
 
   let waiting = false, missed = 0, answers = 0;
   const tick = () => {
-    if (!waiting) {
-      waiting = true;
-      model.send({ kind: "beat" });
-      return;
-    }
-    missed += 1;
-    if (missed % HELD === 0) look();
+    if (waiting) missed += 1;
+    const look_now = missed > 0 && missed % HELD === 0;
+    if (look_now) look();
+    if (missed > HELD && !look_now) return; // a kernel that comes back after hours has few of them to answer
+    waiting = true;
+    model.send({ kind: "beat" }); // again and again: one that was under way when the connection broke is lost
   };
   const answered = (message) => {
     if (message.kind !== "beat") return;
