@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from html import escape
 from typing import Any
 
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.kit.button import attempt, button, follow
+from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.file_import import FileImport
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -32,10 +32,7 @@ _FIRST = (
     "<li><b>Validate</b>: try the model on other data than it was fitted to.</li></ol>"
     "<p>No log yet? Run a <i>System test</i> in Equipment model: its run is one.</p></div>"
 )
-_IMPORT = (
-    "Copy a file into the folder: up to 250 MB here, up to 10 MB in JupyterLab, whose own upload takes larger ones; "
-    "or put it there yourself"
-)
+_IMPORT = "Copy a file of up to 250 MB into the folder; or put it there yourself"
 _SIGNS = {"fault": "✖", "warning": "⚠", "note": "ℹ"}
 
 
@@ -56,8 +53,7 @@ class DataView:
             options=[("files of the folder …", "")], tooltip="What the folder holds", layout={"width": "auto"}
         )
         self._known.observe(self._picked, "value")
-        self._upload = widgets.FileUpload(description="Import a file", tooltip=_IMPORT)
-        self._upload.observe(self._imported, "value")
+        self._upload = FileImport("Import a file", _IMPORT, self._imported, self.notice)
         self._map = widgets.Textarea(rows=10, layout=widgets.Layout(width="100%"))
         self._map_box = widgets.VBox(
             [
@@ -187,19 +183,16 @@ class DataView:
         if change["new"]:
             self.desk.choices.set("file", change["new"])
 
-    def _imported(self, change: Any) -> None:
-        for item in change["new"] or ():
-            attempt("import", partial(self._take, str(item["name"]), item["content"]), self.notice)
-        self._refresh()
-
-    def _take(self, name: str, content: Any) -> None:
+    def _imported(self, name: str, content: bytes) -> None:
         from rds.results.atomic import write_whole
 
         path = self.shell.session.folder / _plain(name)
         if path.exists():
             raise InputError(f"{path.name} is there already; rename one of them")
-        write_whole(path, bytes(content))
+        write_whole(path, content)
         self.desk.choices.set("file", path.name)
+        self.notice.say(f"{path.name} is in your folder", "good")
+        self._refresh()
 
     def _refresh(self) -> None:
         self._known.options = [("files of the folder …", ""), *((name, name) for name in self.desk.files())]

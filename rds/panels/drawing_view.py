@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import ipywidgets as widgets
@@ -12,6 +11,7 @@ from rds.panels.cells import Cells
 from rds.panels.kit.button import attempt, button
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.file_import import FileImport
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.session.drawing import CELLS, PICTURES, Drawing
@@ -35,10 +35,8 @@ class DrawingView:
         self.verdict.add_class("rds-verdict")
         self.verdict.say("tracing …")
         self.notice = Notice()
-        self.upload = widgets.FileUpload(
-            accept=",".join(PICTURES), description="Take a picture", tooltip="Copy a picture into your folder"
-        )
-        self.upload.observe(self._uploaded, "value")
+        tip = "Copy a picture into your folder"
+        self.upload = FileImport("Take a picture", tip, self._take, self.notice, accept=",".join(PICTURES))
         self._views = {name: FieldView(choices, name) for name in ["source", "program", *_OUTLINE, *_CUT]}
         self._place = widgets.VBox([])
         self._outline_box, cut = _group([]), _group([self._views[name] for name in _CUT])
@@ -70,12 +68,8 @@ class DrawingView:
     def _drawn(self, change: Any) -> None:
         attempt("the drawing", lambda: self.drawing.choices.set("cells", change["new"]), self.notice)
 
-    def _uploaded(self, change: Any) -> None:
-        for each in change["new"]:
-            attempt("the picture", partial(self._take, str(each["name"]), each["content"]), self.notice)
-
-    def _take(self, name: str, content: Any) -> None:
-        self.drawing.take_picture(name, bytes(content))
+    def _take(self, name: str, content: bytes) -> None:
+        self.drawing.take_picture(name, content)
         self.notice.say(f"{name} is in your folder", "good")
 
     def _chosen(self, name: str) -> None:

@@ -48,9 +48,18 @@ def test_a_log_of_some_size_is_imported(app: App, open_page: Callable[..., Any],
     log = tmp_path / "large.csv"
     log.write_bytes(b"time [s],command [V],position [mm]\n" + b"0.001,1.25,3.5\n" * 800_000)
     assert log.stat().st_size > 11e6  # more than a page may send to a server of tornado as it comes
-    page = open_page("Data")
+    sent: list[int] = []  # bytes of each message of the page
+    page = open_page()
+    page.on("websocket", lambda socket: socket.on("framesent", lambda message: sent.append(len(message))))
+    page.reload()
+    page.click('.rds-nav button:text-is("Data")')
     with page.expect_file_chooser() as chooser:
         page.click('button:has-text("Import a file")')
     chooser.value.set_files(log)
     page.wait_for_function("""() => [...document.querySelectorAll("input")].some(each => each.value == "large.csv")""")
     assert (app.folder / log.name).read_bytes() == log.read_bytes()
+    assert log.stat().st_size / 10 < max(sent) < 5e6  # JupyterLab's server ends the connection at 10 MB
+    with page.expect_file_chooser() as chooser:
+        page.click('button:text-is("Import a file")')
+    chooser.value.set_files(log)
+    page.wait_for_selector('.rds-notice:has-text("large.csv is there already")')
