@@ -43,19 +43,22 @@ def open_drivers(
     return drivers(machine, axes, sample_period=sample_period, dry_run=dry_run, **bus)
 
 
-def is_served(dialect: str, machine: Machine, interface: str, channel: str) -> bool:
-    """Whether modules of this dialect answer on a channel; nothing moves there.
+def is_served(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:
+    """Whether modules of this dialect answer on a channel; nothing moves there. `options` go to the interface.
 
     InputError naming the dialects of those that answer, if none of them speaks this one.
     """
-    if _answers(dialect, machine, interface, channel):
+    if _answers(dialect, machine, interface, channel, **options):
         return True
-    others = [other for other in _DRIVERS if other != dialect and _answers(other, machine, interface, channel)]
+    rest = [other for other in _DRIVERS if other != dialect]
+    others = [other for other in rest if _answers(other, machine, interface, channel, **options)]
     if not others:
         return False
+    from rds.bus.link import bus_name
+
     speak = " and ".join(others)
     raise InputError(
-        f"what answers on bus {interface}:{channel} speaks {speak}, not {dialect}: set [bus] dialect = "
+        f"what answers on bus {bus_name(interface, channel)} speaks {speak}, not {dialect}: set [bus] dialect = "
         f'"{others[0]}", or choose another channel'
     )
 

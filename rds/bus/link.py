@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import can
@@ -11,11 +11,17 @@ from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 
 BUILTIN = "rds"  # the built-in bus's name among python-can's interfaces
+_OURS = ("dialect", "cia402", "faults", "interface", "channel")  # keys of a [bus] table that are not can.Bus's options
 
 
 def bus_name(interface: str, channel: str | None) -> str:
     """How messages call a bus."""
-    return f"{interface}:{channel}" if channel else interface
+    return interface if channel in (None, "") else f"{interface}:{channel}"
+
+
+def bus_options(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a `[bus]` table goes to can.Bus beside interface and channel, such as the bit rate."""
+    return {key: value for key, value in table.items() if key not in _OURS}
 
 
 def default_channel(machine: Machine, interface: str, channel: str | None) -> str | None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import can
@@ -16,41 +18,44 @@ _WAIT = 0.2  # s for the answers to the cyclic call
 Row = dict[str, Any]  # id, type, dialect, version, state; what else a dialect tells
 
 
-def scan_all(interface: str = BUILTIN, channel: str | None = None) -> list[Row]:
+def scan_all(interface: str = BUILTIN, channel: str | None = None, **options: Any) -> list[Row]:
     """Each module and drive that answers on a bus; nothing moves. It takes about a second.
+
+    `options` go to the interface as they are (bitrate, ...).
 
     MachineError naming both modules of a number that is used twice, for a bus on which nobody answers but frames of
     modules are seen, and where the bus fails.
     """
-    distributed = _distributed(interface, channel)
+    opened = partial(open_bus, interface, channel, **options)
+    distributed = _distributed(opened)
     rows = [
-        *_cyclic(interface, channel, {row["id"]: row for row in distributed}),
+        *_cyclic(opened, {row["id"]: row for row in distributed}),
         *distributed,
-        *_drives(interface, channel),
+        *_drives(interface, channel, options),
     ]
     if not rows:
         from rds.bus.traffic import refuse_taken
 
-        with open_bus(interface, channel) as bus:
+        with opened() as bus:
             refuse_taken(bus)
     return rows
 
 
-def _distributed(interface: str, channel: str | None) -> list[Row]:
+def _distributed(opened: Callable[[], can.BusABC]) -> list[Row]:
     from rds.bus.oacs.host import scan
 
-    with open_bus(interface, channel) as bus:
+    with opened() as bus:
         return [info.as_dict() for info in scan(bus)]
 
 
-def _cyclic(interface: str, channel: str | None, distributed: dict[int, Row]) -> list[Row]:
+def _cyclic(opened: Callable[[], can.BusABC], distributed: dict[int, Row]) -> list[Row]:
     """Modules that answer the cyclic call and speak no other dialect: those of `rds machine serve`.
 
     The distributed modules take cyclic commands as well. MachineError naming both modules of a clash.
     """
     from rds.bus.identity import clash, listen, refuse_clashes
 
-    with open_bus(interface, channel) as bus:
+    with opened() as bus:
         identities = listen(bus).modules
         refuse_clashes(identities)
         for identity in identities:
@@ -77,7 +82,7 @@ def _state(status: int) -> str:
     return state.replace("|", ", ").replace("_", " ").replace("none", "idle")
 
 
-def _drives(interface: str, channel: str | None) -> list[Row]:
+def _drives(interface: str, channel: str | None, options: dict[str, Any]) -> list[Row]:
     from rds.bus.cia402.scan import scan
 
     return [
@@ -88,5 +93,5 @@ def _drives(interface: str, channel: str | None) -> list[Row]:
             "version": device.version,
             "state": device.state.name.lower().replace("_", " ") if device.state is not None else None,
         }
-        for device in scan(interface, channel)
+        for device in scan(interface, channel, **options)
     ]

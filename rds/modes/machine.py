@@ -29,10 +29,11 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
     from rds.bus.address import channels
     from rds.bus.command import commanded
     from rds.bus.dialects import DEFAULT, is_served
+    from rds.bus.link import default_channel
     from rds.bus.server_process import end_server, start_server
 
     given, dialect = bus.get("channel"), bus.get("dialect", DEFAULT)
-    channel = str(given or plan.machine.name)
+    channel = str(default_channel(plan.machine, BUILTIN, given))
     if (
         channel in channels()
         and (given or not commanded(channel))

@@ -73,7 +73,7 @@ class BusView:
         if self._task is not None:
             return
         interface, channel = self.desk.bus
-        work = self.monitor.watch(interface, channel)
+        work = self.monitor.watch(interface, channel, **self.session.bus_options)
         self._task = self.session.work("bus monitor", work, self.monitor.end)
         self.notice.clear()
         self._enable()

@@ -30,7 +30,6 @@ HOMING = {  # methods of object 0x6098 that every drive of ours has
     "34": "34: next index pulse, positive way",
     "37": "37: here",
 }
-_NO_MODULE = ("dialect", "cia402", "faults", "interface", "channel")  # keys of [bus] that are not can.Bus's options
 _OURS = {"machine", "axes", "bus", "sample_period", "dry_run", "timeout", "node", "first"}  # words of the drivers
 _STANDS = 0.01  # of its highest speed: a spindle that is slower stands
 _STARTS_IN = 15.0  # s at most
@@ -81,6 +80,7 @@ class Jog:
         self._loop: subprocess.Popen[str] | None = None
         self._server: subprocess.Popen[bytes] | None = None
         self._ends: list[weakref.finalize[Any, Any]] = []
+        self._taking: Task[None] | None = None  # what takes the machine now
         self._lock = threading.Lock()
 
     @property
@@ -100,7 +100,8 @@ class Jog:
                 "nothing of this machine can be jogged: it has no spindle, and no axis with limits or a model with K"
             )
         self.session.take_machine("jogging", self)
-        return self.session.work("taking the machine", self._begin)
+        self._taking = self.session.work("taking the machine", self._begin)
+        return self._taking
 
     def _begin(self, task: Task[None]) -> None:
         try:
@@ -136,9 +137,12 @@ class Jog:
                     time.sleep(0.1)  # its last words
                     raise MachineError(self.error or "the loop that jogs did not start")
                 time.sleep(0.02)
+            task.advance(3, 3)
         except BaseException:
-            self.end()
+            self._let_go()
             raise
+        finally:
+            self._taking = None
 
     def _dialect(self, bus: Mapping[str, Any]) -> str:
         """What the modules speak; where none answers on the built-in bus, simulated ones are started for it."""
@@ -152,7 +156,7 @@ class Jog:
         if wanted is not None:
             check_dialect(wanted)
         if interface != BUILTIN or channel in channels():
-            options = {key: value for key, value in bus.items() if key not in _NO_MODULE}
+            options = self.session.bus_options
             found = find_dialect(self.machine, interface, channel, wanted or DEFAULT, **options)
             if found is not None and wanted not in (None, found):
                 raise InputError(f'what answers on bus {name} speaks {found}, and [bus] says dialect = "{wanted}"')
@@ -166,7 +170,16 @@ class Jog:
         raise MachineError(f"no module of {self.machine.name} answers on {name}; switch it on")
 
     def end(self) -> None:
-        """Let the machine go: no voltage, drives by a quick stop. Nothing where it is not taken."""
+        """Let the machine go: no voltage, drives by a quick stop. Nothing where it is not taken.
+
+        While it is being taken that is given up first: else it would have the machine after all, when all is over here.
+        """
+        if (taking := self._taking) is not None:
+            taking.stop()
+            taking.wait(_STARTS_IN)
+        self._let_go()
+
+    def _let_go(self) -> None:
         ends, self._ends = self._ends, []
         self._loop = None  # first: that it ends now is no error
         for end in ends:

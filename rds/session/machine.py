@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rds.bus.dialects import DEFAULT
-from rds.bus.link import BUILTIN, bus_name
+from rds.bus.link import BUILTIN, bus_name, default_channel
 from rds.core.errors import InputError, MachineError, RdsError
 from rds.machines import Machine, load_machine, machine_names
 from rds.results import Result
@@ -66,9 +66,8 @@ class MachineDesk:
     @property
     def bus(self) -> tuple[str, str | None]:
         """Interface and channel: of the session's bus, else the built-in one with the name of the machine chosen."""
-        bus = self.session.bus
-        interface = str(bus.get("interface", BUILTIN))
-        return interface, bus.get("channel") or (self.machine.name if interface == BUILTIN else None)
+        interface = self.session.interface
+        return interface, default_channel(self.machine, interface, self.session.bus.get("channel"))
 
     @property
     def serves(self) -> bool:
@@ -125,7 +124,7 @@ class MachineDesk:
             from rds.bus.scan import scan_all
 
             self.rows, self.data = [], {}
-            rows = scan_all(interface, channel)
+            rows = scan_all(interface, channel, **self.session.bus_options)
             if not rows:
                 raise MachineError(
                     f"no module answers on {bus_name(interface, channel)}; "
@@ -271,5 +270,5 @@ class MachineDesk:
         from rds.bus.link import open_bus
         from rds.bus.oacs.remote import Module
 
-        with open_bus(*self.bus, node="panel") as bus:
+        with open_bus(*self.bus, node="panel", **self.session.bus_options) as bus:
             yield Module(bus, number)

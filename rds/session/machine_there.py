@@ -15,16 +15,22 @@ def machine_sentence(plan: Plan) -> str:
         return "no machine is needed"
     from rds.bus.address import channels
     from rds.bus.dialects import DEFAULT, is_served
+    from rds.bus.link import bus_name, bus_options, default_channel
 
     bus = {"interface": BUILTIN, **plan.bus}
-    interface, channel = str(bus["interface"]), str(bus.get("channel") or plan.machine.name)
+    interface = str(bus["interface"])
+    channel = default_channel(plan.machine, interface, bus.get("channel"))
     builtin = interface == BUILTIN
+    if builtin:
+        channel = str(channel)  # 0 is a channel's name there
+    options = {} if builtin else bus_options(bus)
+    where = bus_name(interface, channel)
     if builtin and channel not in channels():
         return "no machine is on the built-in bus yet: a simulated one is started for the run"
     try:
-        there = is_served(bus.get("dialect", DEFAULT), plan.machine, interface, channel)
+        there = is_served(bus.get("dialect", DEFAULT), plan.machine, interface, channel, **options)
     except (RdsError, OSError) as error:
         return f"but the machine does not answer: {error}"
     if there:
-        return f"the machine answers on {interface} {channel}"
-    return f"but no module of {plan.machine.name} answers on {interface} {channel}; switch it on before you run"
+        return f"the machine answers on {where}"
+    return f"but no module of {plan.machine.name} answers on {where}; switch it on before you run"

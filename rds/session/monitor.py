@@ -38,8 +38,11 @@ class BusMonitor:
         self._stop = threading.Event()
         self._decode: Callable[..., Any] | None = None
 
-    def watch(self, interface: str, channel: str | None) -> Callable[[Task[View]], View]:
-        """Work for a Task: watch until `end`. Its errors are those of opening the bus; outages are in the view."""
+    def watch(self, interface: str, channel: str | None, **options: Any) -> Callable[[Task[View]], View]:
+        """Work for a Task: watch until `end`. Its errors are those of opening the bus; outages are in the view.
+
+        `options` go to the interface as they are (bitrate, ...).
+        """
         self._stop.clear()
         self.view, self.paused = None, False
 
@@ -47,10 +50,10 @@ class BusMonitor:
             from rds.bus.decode import decoder
 
             self._decode = decoder()
-            options: dict[str, Any] = {"error_frames": True} if interface == BUILTIN else {}
+            own: dict[str, Any] = {"error_frames": True} if interface == BUILTIN else {}
 
             def opener() -> Any:
-                return open_bus(interface, channel, node="monitor", **options)
+                return open_bus(interface, channel, node="monitor", **options | own)
 
             with opener() as bus:
                 bitrate = getattr(bus, "bitrate", 0) or BITRATE

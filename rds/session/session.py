@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rds.bus.link import BUILTIN, bus_options
 from rds.core.errors import InputError
 from rds.results.atomic import write_whole
 from rds.session.choices import Choices
@@ -45,6 +46,8 @@ class Session:
         self.folder = Path(folder).resolve()
         self.machine = machine
         self.bus = dict(bus or {})
+        if self.interface == BUILTIN and self.bus.get("channel") is not None:
+            self.bus["channel"] = str(self.bus["channel"])  # 0 is a channel's name there
         self.messages: list[Message] = []
         self.tasks: list[Task[Any]] = []
         self.machine_user: Any = None  # what holds the machine now: something with stop()
@@ -54,6 +57,18 @@ class Session:
         self._lock = threading.Lock()
         self._claim: Claim | None = None
         self._kept = self._read_kept()
+
+    # the bus
+
+    @property
+    def interface(self) -> str:
+        """python-can's name for the kind of bus."""
+        return str(self.bus.get("interface", BUILTIN))
+
+    @property
+    def bus_options(self) -> dict[str, Any]:
+        """What goes to can.Bus beside interface and channel: without the bit rate, modules hear nothing."""
+        return bus_options(self.bus)
 
     # choices
 
@@ -210,7 +225,7 @@ class Session:
 
     def _channels(self) -> list[str | None]:
         """Where modules of this session, or of a run in its folder, may be: the machine's own channel first."""
-        if self.bus.get("interface", "rds") != "rds":
+        if self.interface != BUILTIN:
             return [self.bus.get("channel")]
         from rds.machines import load_machine
 
@@ -224,7 +239,9 @@ class Session:
     def _on(self, channel: str | None, act: Callable[[Any], list[int]]) -> list[int]:
         from rds.bus.link import open_bus
 
-        with open_bus(self.bus.get("interface", "rds"), channel) as bus:
+        # the built-in bus takes whoever comes as it is, also where a run has given it another timing
+        options = {} if self.interface == BUILTIN else self.bus_options
+        with open_bus(self.interface, channel, **options) as bus:
             return act(bus)
 
     # runs

@@ -83,6 +83,14 @@ def test_one_hand_at_a_time_and_the_emergency_stop_ends_it(jog: Jog) -> None:
         jog.hold("X", 1)
 
 
+def test_who_is_stopped_while_taking_the_machine_does_not_have_it_after_all(alone: Path) -> None:
+    jog = Jog(Session(alone))
+    task = jog.begin()
+    jog.session.emergency_stop()
+    assert task.done and task.stopped and not jog.ready
+    assert jog.session.machine_user is None and jog._loop is None and jog._server is None
+
+
 DIES = """
 import sys, time
 from rds.session import Session

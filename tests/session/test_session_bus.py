@@ -1,0 +1,77 @@
+"""The bus of a session's own: everything that opens it opens it as its table says, the emergency stop above all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+
+import rds.bus.link
+from rds.bus.link import bus_name
+from rds.core.errors import MachineError
+from rds.session import Session
+from rds.session.jog import Jog
+from rds.session.machine import MachineDesk
+from rds.session.monitor import BusMonitor
+
+REAL = {"interface": "virtual", "channel": 0, "bitrate": 250_000, "dialect": "cia402", "cia402": {"mode": "csp"}}
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
+    """With what each bus was opened that this test opens; real ones are replaced by nothing at all."""
+    calls: list[dict[str, Any]] = []
+    real = can.Bus
+
+    def bus(**options: Any) -> Any:
+        calls.append(options)
+        return real(**{key: value for key, value in options.items() if key != "bitrate"})
+
+    monkeypatch.setattr(rds.bus.link.can, "Bus", bus)
+    yield calls
+
+
+def as_told(calls: list[dict[str, Any]]) -> bool:
+    told = [{key: call.get(key) for key in ("interface", "channel", "bitrate")} for call in calls]
+    return bool(told) and all(each == {"interface": "virtual", "channel": 0, "bitrate": 250_000} for each in told)
+
+
+@pytest.mark.parametrize("act", ["emergency_stop", "release_emergency_stop"])
+def test_the_emergency_stop_opens_the_bus_with_its_bit_rate(
+    act: str, tmp_path: Path, opened: list[dict[str, Any]]
+) -> None:
+    getattr(Session(tmp_path, bus=REAL), act)()
+    assert as_told(opened)
+
+
+def test_so_do_the_scan_and_the_monitor(tmp_path: Path, opened: list[dict[str, Any]]) -> None:
+    session = Session(tmp_path, bus=REAL)
+    desk = MachineDesk(session)
+    task = desk.scan()
+    assert task.wait(20.0) and "virtual:0" in str(task.error)
+    assert as_told(opened)
+    opened.clear()
+    monitor = BusMonitor()
+    watching = session.work("bus monitor", monitor.watch(*desk.bus, **session.bus_options), monitor.end)
+    while not opened:
+        assert not watching.wait(0.02)
+    watching.stop()
+    assert watching.wait(20.0)
+    assert as_told(opened)
+
+
+def test_jogging_looks_on_the_same_channel(tmp_path: Path, opened: list[dict[str, Any]]) -> None:
+    task = Jog(Session(tmp_path, bus=REAL)).begin()
+    assert task.wait(20.0) and isinstance(task.error, MachineError)
+    assert as_told(opened)
+
+
+def test_channel_0_of_the_built_in_bus_is_not_the_machine_s(tmp_path: Path, opened: list[dict[str, Any]]) -> None:
+    session = Session(tmp_path, bus={"channel": 0})
+    assert MachineDesk(session).bus == ("rds", "0")
+    session.emergency_stop()
+    assert [call["channel"] for call in opened] == ["0"]
+    assert bus_name("virtual", 0) == "virtual:0"
