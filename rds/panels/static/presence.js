@@ -25,7 +25,8 @@ function render({ model, el }) {
     if (button === through || touched === settled || button.matches(AT_ONCE)) return;
     event.stopImmediatePropagation();
     event.preventDefault();
-    if ([...waiting.values()].some((each) => each.button === button)) return; // pressed twice
+    // pressed again: once, and not never where the first word was lost with its connection
+    for (const [other, each] of waiting) if (each.button === button) waiting.delete(other);
     number += 1;
     waiting.set(number, { button, touched });
     model.send({ kind: "settle", number });
