@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from rds.commands.common import refusals
+from rds.commands.common import Experiment, bus_of, refusals
 
 
 def app(
     folder: Annotated[Path, typer.Argument(help="The folder with your files; runs are kept in its runs/.")] = Path("."),
     machine: Annotated[str, typer.Option(help="A machine's name, or its TOML file.")] = "mini-cnc",
     panel: Annotated[str, typer.Option(help="The panel to begin with.")] = "menu",
+    experiment: Experiment = None,
     port: Annotated[int | None, typer.Option(min=1, max=65535, help="Port; by default the first free one.")] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
@@ -24,6 +25,6 @@ def app(
         try:
             from rds.panels.app.serve import serve
 
-            serve(folder, machine, panel, port, browser)
+            serve(folder, machine, panel, port, browser, bus=bus_of(experiment))
         except ModuleNotFoundError as error:
             raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.commands.common import Json, ends_as_ctrl_c, print_json, refusals
+from rds.commands.common import Experiment, Json, bus_of, ends_as_ctrl_c, print_json, refusals
 
 if TYPE_CHECKING:
     from rds.session.jog import Jog
@@ -35,7 +35,7 @@ def jog(
     machine: Annotated[str, typer.Option(help="A machine's name, or the path of its TOML file.")] = "mini-cnc",
     interface: Annotated[str | None, typer.Option(help="python-can interface; by default rds, the built-in.")] = None,
     channel: Annotated[str | None, typer.Option("--channel", "-c", help="By default the machine's name.")] = None,
-    experiment: Annotated[Path | None, typer.Option(help="An experiment's TOML file, for its \\[bus].")] = None,
+    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Move one axis, turn a spindle or home a drive, hold the others where they are; Ctrl-C or a kill stops it."""
@@ -45,7 +45,7 @@ def jog(
         from rds.session.session import Session
 
         given = {"interface": interface, "channel": channel}
-        bus = _bus_of(experiment) | {key: value for key, value in given.items() if value is not None}
+        bus = bus_of(experiment) | {key: value for key, value in given.items() if value is not None}
         with tempfile.TemporaryDirectory(prefix="rds-jog-") as folder, ends_as_ctrl_c():
             hand = Jog(Session(Path(folder), machine, bus))
             ways = {"--by": by, "--to": to, "--find-home": find_home, "--for": seconds}
@@ -90,16 +90,6 @@ def _which(axis: str, named: list[str], allowed: list[str]) -> str:
         f"{given}: move {axis} by a distance with --by, or to a position with --to, as in --by 5; "
         "a drive is homed with --find-home 17"
     )
-
-
-def _bus_of(experiment: Path | None) -> dict[str, Any]:
-    """The [bus] table of an experiment."""
-    if experiment is None:
-        return {}
-    from rds.core.words import Words
-    from rds.experiment.resolve import bus_table
-
-    return bus_table(Words.read(experiment), experiment.parent)
 
 
 def _moved(hand: Jog, axis: str, goal: float, speed: float | None) -> tuple[dict[str, Any], str]:

@@ -10,7 +10,8 @@ from typing import Any
 import anywidget
 import traitlets
 
-GONE_AFTER = 90.0  # s without a word; a page in the background says one each minute
+IN_SIGHT = 20.0  # s without a word of a page that was in sight, which says one every five
+IN_BACKGROUND = 90.0  # s without a word of a page in the background, which browsers let say one each minute
 
 
 @cache
@@ -19,20 +20,23 @@ def _module() -> str:
 
 
 class StillHere(anywidget.AnyWidget):
-    """Invisible; `heard_at` is when a browser last said that it shows the page, s of time.monotonic()."""
+    """Invisible; `until` is how long a browser shows the page by what it said last, s of time.monotonic()."""
 
     _esm = traitlets.Unicode().tag(sync=True)
 
     def __init__(self) -> None:
         super().__init__(_esm=_module())
-        self.heard_at = time.monotonic()
+        self.until = time.monotonic() + IN_SIGHT
         self.on_msg(self._said)
 
     @property
     def gone(self) -> bool:
         """Whether no browser shows the page any more."""
-        return time.monotonic() - self.heard_at > GONE_AFTER
+        return time.monotonic() > self.until
 
     def _said(self, _: Any, content: Any, __: Any) -> None:
-        if content == {"kind": "here"}:
-            self.heard_at = time.monotonic()
+        """Another browser may show the same page: the one that stays longest counts."""
+        if content == {"kind": "in sight"}:
+            self.until = max(self.until, time.monotonic() + IN_SIGHT)
+        elif content == {"kind": "in background"}:
+            self.until = max(self.until, time.monotonic() + IN_BACKGROUND)

@@ -138,7 +138,7 @@ def test_the_page_tells_its_server_of_the_channels_it_started_and_hears_what_fai
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("jupyter_server", reason="jupyter_server is not installed: pip install 'rds[lab]'")
-    from rds.panels.app.page import FOLDER, MACHINE
+    from rds.panels.app.page import BUS, FOLDER, MACHINE
     from rds.panels.app.rescue import emergency_stop
 
     shell = Shell(Session(tmp_path))
@@ -149,10 +149,11 @@ def test_the_page_tells_its_server_of_the_channels_it_started_and_hears_what_fai
 
     monkeypatch.setenv(FOLDER, str(tmp_path))
     monkeypatch.setenv(MACHINE, "mini-cnc")
+    monkeypatch.setenv(BUS, '{"channel": "bench"}')
     for error, said in ((MachineError("bus failed; cut the power"), "bus failed"), (KeyError("x"), "cut the power")):
 
         def fails(session: Session, error: Exception = error) -> str:
-            assert session.channels == set(named)
+            assert session.channels == set(named) and session.bus == {"channel": "bench"}
             raise error
 
         monkeypatch.setattr(Session, "emergency_stop", fails)

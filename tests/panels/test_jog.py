@@ -77,7 +77,9 @@ def test_drives_are_held_turned_and_homed(
 ) -> None:
     machine = Path(load_machine("mini-cnc").path).read_text().replace("[-75.0, 75.0]", "[-3.0, 3.0]")
     (tmp_path / "small.toml").write_text(machine.replace('name = "mini-cnc"', 'name = "small-cnc"'))
-    page = open_page("Machine", on=start_app(tmp_path, "--machine", str(tmp_path / "small.toml")))
+    (tmp_path / "bus.toml").write_text('[bus]\nchannel = "bench"\ndialect = "cia402"\n')
+    named = ("--machine", str(tmp_path / "small.toml"), "--experiment", str(tmp_path / "bus.toml"))
+    page = open_page("Machine", on=start_app(tmp_path, *named))
     page.select_option('.widget-dropdown:has-text("cia402") select', "cia402: drives")
     page.click('button:text-is("Start modules")')
     page.wait_for_selector("td:has-text('cia402')")

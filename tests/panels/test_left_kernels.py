@@ -6,6 +6,7 @@ import asyncio
 import os
 import signal
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 
 import pytest
@@ -39,7 +40,8 @@ def test_a_kernel_ends_a_time_after_its_last_browser_left_and_not_after_its_last
             await kernels.shutdown_all(now=True)
         return alive
 
-    assert asyncio.run(life()) == [True, True, True, False]
+    with ThreadPoolExecutor(1) as thread:  # in this one the browser of other tests has a loop
+        assert thread.submit(asyncio.run, life()).result() == [True, True, True, False]
 
 
 def test_a_server_ends_at_once_though_its_first_kernel_is_just_starting(start_app: Callable[..., App]) -> None:

@@ -224,14 +224,17 @@ def test_a_panel_that_nobody_shows_any_more_lets_the_machine_go(alone: Path) -> 
     pytest.importorskip("anywidget", reason="panels need rds[lab]")
     from rds.panels.jog import JogView
     from rds.panels.shell import Shell
-    from rds.panels.still_here import GONE_AFTER
+    from rds.panels.still_here import IN_BACKGROUND, IN_SIGHT
 
     jog = taken(alone)
     view = JogView(Shell(jog.session), jog)
-    view._here._said(None, {"kind": "here"}, None)
-    view._show()
-    assert jog.ready
-    view._here.heard_at -= GONE_AFTER + 1.0
+    for said, stays in (("in background", IN_BACKGROUND), ("in sight", IN_SIGHT)):
+        view._here.until = 0.0
+        view._here._said(None, {"kind": said}, None)
+        view._here.until -= stays - 5.0
+        view._show()
+        assert jog.ready
+    view._here.until -= 5.0
     view._show()
     assert not jog.ready and jog.session.machine_user is None
     assert "the machine was let go" in view.notice.value

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 from typing import Any
 
 FOLDER, MACHINE, PANEL = "RDS_APP_FOLDER", "RDS_APP_MACHINE", "RDS_APP_PANEL"
+BUS = "RDS_APP_BUS"  # as JSON, what rds.panels.main takes as bus
 WHEREABOUTS = "RDS_APP_WHEREABOUTS"  # the folder where kernels say where they are
 
 
@@ -22,4 +24,5 @@ def show() -> Any:
         answer_asks(Path(os.environ[WHEREABOUTS]))
     folder = os.environ.get(FOLDER, ".")
     os.chdir(folder)
-    return main(folder, os.environ.get(MACHINE, "mini-cnc"), os.environ.get(PANEL, "menu"))
+    bus = json.loads(os.environ.get(BUS, "{}"))
+    return main(folder, os.environ.get(MACHINE, "mini-cnc"), os.environ.get(PANEL, "menu"), bus)

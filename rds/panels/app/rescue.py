@@ -16,7 +16,7 @@ from jupyter_server.base.handlers import APIHandler
 from tornado import web
 
 from rds.core.errors import RdsError
-from rds.panels.app.page import FOLDER, MACHINE, WHEREABOUTS
+from rds.panels.app.page import BUS, FOLDER, MACHINE, WHEREABOUTS
 from rds.panels.app.whereabouts import ask
 
 _MOST_CHANNELS = 64
@@ -82,7 +82,7 @@ def emergency_stop(channels: Iterable[str]) -> tuple[str, str]:
     """What the page's kernel would do: the sentence, and whether it is a warning or an error."""
     from rds.session import Session
 
-    session = Session(os.environ[FOLDER], os.environ[MACHINE])
+    session = Session(os.environ[FOLDER], os.environ[MACHINE], json.loads(os.environ.get(BUS, "{}")))
     session.channels.update(channels)
     try:
         return session.emergency_stop(), "warning"

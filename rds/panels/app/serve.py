@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.panels import PANELS
-from rds.panels.app.page import FOLDER, MACHINE, PANEL, WHEREABOUTS
+from rds.panels.app.page import BUS, FOLDER, MACHINE, PANEL, WHEREABOUTS
 from rds.panels.app.ready_kernels import ReadyKernels
 
 _HERE = Path(__file__).parent
 LEFT = 60  # s after which a kernel ends that no browser shows and that has nothing to say: nothing goes on in it
 
 
-def serve(folder: Path, machine: str, panel: str, port: int | None, browser: bool, address: str = "127.0.0.1") -> None:
+def serve(
+    folder: Path,
+    machine: str,
+    panel: str,
+    port: int | None,
+    browser: bool,
+    address: str = "127.0.0.1",
+    bus: Mapping[str, Any] | None = None,
+) -> None:
     """Serve until Ctrl-C. InputError for a folder, machine or panel that is not there, or where Voilà is missing.
+
+    `bus` is as for `rds.panels.main`, but for faults, which are for a run by itself.
 
     Only who has the address with its token gets in: a kernel runs whatever its page asks for.
     """
@@ -28,12 +39,15 @@ def serve(folder: Path, machine: str, panel: str, port: int | None, browser: boo
         raise InputError("is no folder; give the one with your files, or make it first", str(folder))
     load_machine(machine)
     PANELS.module(panel)
+    if bus and "faults" in bus:
+        raise InputError("[bus] faults are injected by `rds run`; take them out of the table for the page")
     paths = [str(_HERE / "share" / "jupyter"), os.environ.get("JUPYTER_PATH", "")]
     os.environ |= {
         "JUPYTER_PATH": os.pathsep.join(filter(None, paths)),
         FOLDER: str(folder.resolve()),
         MACHINE: machine,
         PANEL: panel,
+        BUS: json.dumps(dict(bus or {})),
     }
     with tempfile.TemporaryDirectory(prefix="rds-app-") as whereabouts:
         os.environ[WHEREABOUTS] = whereabouts

@@ -2,9 +2,13 @@
 const BEAT = 5000; // ms; browsers let a page in the background beat once a minute at least
 
 function render({ model }) {
-  const say = () => model.send({ kind: "here" });
+  const say = () => model.send({ kind: document.hidden ? "in background" : "in sight" });
   const timer = setInterval(say, BEAT);
+  document.addEventListener("visibilitychange", say); // before its beats come seldom
   say();
-  return () => clearInterval(timer);
+  return () => {
+    clearInterval(timer);
+    document.removeEventListener("visibilitychange", say);
+  };
 }
 export default { render };
