@@ -95,6 +95,7 @@ def test_in_words(folder: Path) -> None:
 
 @pytest.mark.realtime
 def test_real_time(folder: Path) -> None:
+    (folder / "e.toml").write_text(SIMULATION.replace("duration = 2.0", "duration = 1.0"))
     done = command("run", "e.toml", "--mode", "implementation", "--out", "out", "--json")
     said = only_json(done.stdout)
     assert said["verdict"] in ("met", "missed", "void")
@@ -103,7 +104,7 @@ def test_real_time(folder: Path) -> None:
     assert said["axes"]["X"]["fit_percent"] > 50
     for stage in ("lateness", "io", "compute", "model"):
         assert set(said["timing"][stage]) == {"p50", "p99", "p999", "max"}
-    assert said["timing"]["samples"] <= 2000
+    assert said["timing"]["samples"] <= 1000
     assert said["environment"]["sentence"]
 
 
@@ -218,9 +219,9 @@ def test_a_coupled_controller_is_checked_with_as_many_axes_as_are_said(folder: P
 
 
 def test_compare(folder: Path) -> None:
-    call("run", "e.toml", "--out", "a")
+    rds.Experiment.from_toml("e.toml").run(out="a")
     (folder / "law.py").write_text(LAW.replace("20.0", "30.0"))
-    call("run", "e.toml", "--out", "b")
+    rds.Experiment.from_toml("e.toml").run(out="b")
     same, different = command("compare", "a", "a", "--json"), command("compare", "a", "b/result.csv", "--json")
     assert same.returncode == different.returncode == 0
     assert only_json(same.stdout) != only_json(different.stdout)
@@ -246,6 +247,7 @@ def test_a_served_machine_ends_by_ctrl_c(folder: Path) -> None:
     assert served.stderr is not None
     try:
         assert "Ctrl-C ends" in served.stderr.readline()
+        (folder / "e.toml").write_text(SIMULATION.replace("duration = 2.0", "duration = 0.2"))
         done = command("run", "e.toml", "-m", "implementation", "-o", "out", "--json")
         assert only_json(done.stdout)["mode"] == "implementation"
         served.send_signal(signal.SIGINT)
@@ -278,8 +280,7 @@ def test_progress_is_for_terminals(folder: Path) -> None:
     shown = os.read(main, 65536).decode(errors="replace")
     os.close(main)
     assert "simulation" in shown or "run" in shown
-    only_json(on_terminal.stdout)
-    assert command("run", "e.toml", "--out", "another", "--json").stderr == ""
+    only_json(on_terminal.stdout)  # in a pipe, nothing is shown: test_a_simulation
 
 
 def test_ctrl_c_during_the_imports_is_no_traceback() -> None:

@@ -38,7 +38,6 @@ class Equipment:
             return
         box.fill(value)
         box.press("Enter")
-        self.page.wait_for_timeout(SETTLE)
 
     def refusal(self, label: str) -> str:
         text = self.field(label).locator(".rds-refusal [role=alert]")
@@ -184,7 +183,7 @@ def test_model_validation_has_a_fit_and_a_verdict(at: Callable[..., Equipment], 
     (app.folder / "axis.py").write_text(MODEL)
     model = at("Equipment model")
     model.choose("Mode", "Model validation")
-    model.type("Final time", "2")
+    model.type("Final time", "1")
     model.press("User-defined")
     model.type("File of the model", "axis.py")
     model.press("Run")
