@@ -131,10 +131,14 @@ class WorkerProcess:
         if timer is not None:
             timer.start()
         try:
-            return receive(process.stdout)
+            answer = receive(process.stdout)
         finally:
             if timer is not None:
                 timer.cancel()
+                timer.join()  # it may be ending the process right now, of which the next item would die
+        if overdue.is_set():
+            raise EOFError("answered too late")
+        return answer
 
     def _why(self, overdue: threading.Event) -> tuple[Failure, str]:
         """Why there was no answer; the process is gone then."""
