@@ -46,6 +46,18 @@ name = "p"
 channel = "{channel}"
 """
 
+HOST = """
+import subprocess
+from rds.cli import main
+
+class Popen(subprocess.Popen):
+    def __init__(self, command, **options):  # a machine that nobody needs any more ends after 3 s instead of 10
+        super().__init__([*command, *(["--afterlife", "3"] if "--exit-with-stdin" in command else [])], **options)
+
+subprocess.Popen = Popen
+main()
+"""
+
 
 @contextmanager
 def served(channel: str) -> Iterator[subprocess.Popen[str]]:
@@ -84,7 +96,7 @@ def started(folder: Path, mode: str, duration: float, channel: str, **options: A
     """`rds run` of an experiment in a process of its own, when its record has begun to grow."""
     experiment = folder / "experiment.toml"
     experiment.write_text(FILE.format(mode=mode, duration=duration, channel=channel))
-    command = [sys.executable, "-m", "rds.cli", "run", str(experiment), "--out", str(folder / "run"), "--json"]
+    command = [sys.executable, "-c", HOST, "run", str(experiment), "--out", str(folder / "run"), "--json"]
     host = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
     wait_until(lambda: (folder / "run" / "record.rds").is_file() or host.poll() is not None)
     assert host.poll() is None, host.communicate()
@@ -149,13 +161,13 @@ def mapped(number: int) -> list[str]:
 
 
 def test_a_killed_host_leaves_the_run_going_to_its_end(alone: Path) -> None:
-    host = started(alone, "implementation", 3.0, "own")
+    host = started(alone, "implementation", 2.0, "own")
     host.kill()
     host.communicate()
     wait_until(lambda: (alone / "run" / "ending.json").is_file())
     result = check_readable(alone / "run", "done")
-    assert len(result) >= 2000  # the rest were discarded, on a busy computer
-    assert result["time"][-1] > 2.5
+    assert len(result) >= 1000  # the rest were discarded, on a busy computer
+    assert result["time"][-1] > 1.5
     wait_until(lambda: not find_machine(rds.load_machine("mini-cnc"), channel="own"), 20.0)  # nobody needs it now
     assert sorted(path.name for path in (alone / "run").iterdir()) == ["ending.json", "record.rds"]
 
