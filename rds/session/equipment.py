@@ -49,7 +49,9 @@ class Equipment:
         self.machine: Machine = load_machine(self.session.machine)
         self._order: list[str] = []  # of the fields of parameters
         self._of: dict[str, Path] = {}  # the student's file that has the parameters of a prefix
-        self.choices: Choices = self.session.choices(f"equipment {self.kind}", first_fields(self.kind, self.machine))
+        panel = f"equipment {self.kind}"
+        fields = first_fields(self.kind, self.machine, self.session.kept(panel, "system"))
+        self.choices: Choices = self.session.choices(panel, fields)
         self._fit_system()
         self.choices.watch(self._chosen)
 

@@ -41,10 +41,14 @@ _COMMENT = 40  # characters of a file's comment that stand beside a field
 _FIRST = {"V": (2.0, 1.0), "mm": (5.0, 0.2), "°": (20.0, 0.2), SPINDLE: (200.0, 0.5)}
 
 
-def first_fields(kind: str, machine: Machine) -> Iterable[Field]:
-    """All fields of the panel `kind`, "model" or "control", but the controller's parameters."""
+def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[Field]:
+    """All fields of the panel `kind`, "model" or "control", but the controller's parameters.
+
+    As they are for the system `kept`, so that the values that were kept with it will do; else for the first one.
+    """
     systems = {name: "Spindle" if axis.unit == SPINDLE else f"{name} axis" for name, axis in machine.axes.items()}
     first = next(iter(systems))
+    axis = machine.axes[kept if isinstance(kept, str) and kept in systems else first]
     what = "voltage signal" if kind == "model" else "reference"
     yield Choice("system", "System", "which axis of the machine, or its spindle", first, systems)
     yield Choice("mode", "Mode", _MODE_TIPS[kind], "simulation", MODES[kind])
@@ -58,7 +62,7 @@ def first_fields(kind: str, machine: Machine) -> Iterable[Field]:
         "e.g. 3*sin(2*pi*0.5*t)",
         refuse=_refuse_signal,
     )
-    yield from sizes(kind, machine, machine.axes[first])
+    yield from sizes(kind, machine, axis)
     yield Choice("model", "Model", "what stands for the machine in simulation, and beside it", "default", MODELS)
     yield Text(
         "model_file",
@@ -68,7 +72,7 @@ def first_fields(kind: str, machine: Machine) -> Iterable[Field]:
         "e.g. my_model.py",
     )
     if kind == "control":
-        yield controllers(machine.axes[first])
+        yield controllers(axis)
         yield Text(
             "controller_file", "File of the controller", "a Python file with control()", "", "e.g. my_controller.py"
         )

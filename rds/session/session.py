@@ -82,6 +82,10 @@ class Session:
             self._choices[panel] = made
         return self._choices[panel]
 
+    def kept(self, panel: str, name: str) -> Any:
+        """The value of a panel's choice as it was kept in this folder, unchecked; None where it was not."""
+        return self._kept.get(panel, {}).get(name)
+
     def keep(self) -> None:
         """Write all choices to the folder; a folder that cannot be written to is said once, and nothing else breaks."""
         self._kept |= {panel: choices.values() for panel, choices in self._choices.items()}

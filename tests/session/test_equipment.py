@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,22 @@ def test_a_spindle_is_not_offered_what_it_cannot_have(tmp_path: Path) -> None:
     assert equipment.choices.fields["amplitude"].unit == "rev/min"
     choose(equipment, system="X", controller="tracking")
     assert equipment.parameters == ["controller.pole", "controller.pole_imaginary", "controller.observer_pole"]
+
+
+@pytest.mark.parametrize("amplitude", [50.0, 300.0])  # rev/min: within an axis's range in mm, and beyond it
+def test_what_was_kept_for_a_spindle_is_there_when_the_page_is_opened_again(tmp_path: Path, amplitude: float) -> None:
+    choose(Equipment(Session(tmp_path), "control"), system="spindle", amplitude=amplitude, offset=400.0)
+    session = Session(tmp_path)
+    again = Equipment(session, "control")
+    assert again.table()["axis"] == "spindle"
+    assert again.table()["reference"] == {"kind": "sinusoid", "amplitude": amplitude, "frequency": 0.2, "offset": 400.0}
+    assert not session.messages
+
+
+@pytest.mark.parametrize("system", ["W", 3, ["X"], None])
+def test_a_kept_system_that_is_not_there_is_the_first(tmp_path: Path, system: Any) -> None:
+    (tmp_path / "session.json").write_text(json.dumps({"equipment control": {"system": system}}))
+    assert Equipment(Session(tmp_path), "control").table()["axis"] == "X"
 
 
 def test_a_system_test_has_no_model_to_choose(tmp_path: Path) -> None:
