@@ -33,6 +33,7 @@ HOMING = {  # methods of object 0x6098 that every drive of ours has
 _OURS = {"machine", "axes", "bus", "sample_period", "dry_run", "timeout", "node", "first"}  # words of the drivers
 _STANDS = 0.01  # of its highest speed: a spindle that is slower stands
 _STARTS_IN = 15.0  # s at most
+_ENDED = "the loop that jogs has ended; take the machine again"
 _ENDS_IN = 8.0  # s: a quick stop of drives, and what they are told after it
 
 
@@ -297,9 +298,7 @@ class Jog:
                 )
                 loop.stdin.flush()
         except OSError as error:
-            raise MachineError(
-                f"the loop that jogs has ended: {self.error or error}; take the machine again"
-            ) from error
+            raise MachineError(self.error or _ENDED) from error
 
     def _hear(self, words: Mapping[str, Any]) -> None:
         if "error" in words:
@@ -324,12 +323,17 @@ def _listen(jog: weakref.ref[Jog], loop: subprocess.Popen[str]) -> None:
         mine = jog()
         if mine is None or mine._loop is not loop:
             break
-        mine._hear(json.loads(line))
+        try:
+            words = json.loads(line)
+        except ValueError:
+            words = None
+        if isinstance(words, dict):  # there are interfaces of python-can that print
+            mine._hear(words)
         del mine
     loop.wait()
     if (mine := jog()) is not None and mine._loop is loop:  # it ended by itself
         mine.moving, mine.homing = False, ""
-        mine.error = mine.error or "the loop that jogs has ended"
+        mine.error = mine.error or _ENDED
         mine.session.give_machine_back(mine)
 
 

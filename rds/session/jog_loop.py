@@ -126,11 +126,13 @@ def _say(words: dict[str, Any]) -> None:
 
 def _read(orders: Orders) -> None:
     rest = b""
-    while data := os.read(0, 4096):
-        *lines, rest = (rest + data).split(b"\n")
-        for line in lines:
-            orders.hear(json.loads(line), time.monotonic())
-    orders.ended = True
+    try:
+        while data := os.read(0, 4096):
+            *lines, rest = (rest + data).split(b"\n")
+            for line in lines:
+                orders.hear(json.loads(line), time.monotonic())
+    finally:  # whatever it could not read: nobody would hear from now on that the machine is to be let go
+        orders.ended = True
 
 
 def main(arguments: list[str]) -> int:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from rds.cli import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.session import Session
-from rds.session.jog import Jog
+from rds.session.jog import Jog, _listen
 from rds.session.jog_axes import jog_axes, jog_spindles
 from rds.session.jog_orders import DEAD_MAN, Orders
 
@@ -86,9 +87,27 @@ def test_one_hand_at_a_time_and_the_emergency_stop_ends_it(jog: Jog) -> None:
 def test_who_is_stopped_while_taking_the_machine_does_not_have_it_after_all(alone: Path) -> None:
     jog = Jog(Session(alone))
     task = jog.begin()
-    jog.session.emergency_stop()
+    jog.stop()  # as the emergency stop does
     assert task.done and task.stopped and not jog.ready
     assert jog.session.machine_user is None and jog._loop is None and jog._server is None
+
+
+def test_a_loop_that_cannot_read_an_order_lets_the_machine_go(jog: Jog) -> None:
+    assert jog._loop is not None and jog._loop.stdin is not None
+    jog._loop.stdin.write('{"hold": "Q", "direction": 1, "speed": 1}\n')
+    jog._loop.stdin.flush()
+    wait_for(lambda: jog.session.machine_user is None)
+    assert not jog.ready and "take the machine again" in jog.error
+
+
+def test_what_an_interface_prints_is_no_word_of_the_loop(alone: Path) -> None:
+    jog = Jog(Session(alone))
+    jog.session.take_machine("jogging", jog)
+    words = ("adapter 3 opened", "7", '{"error": "X is lost"}')
+    said = [sys.executable, "-c", f"print(*{words!r}, sep=chr(10))"]
+    with subprocess.Popen(said, stdout=subprocess.PIPE, text=True) as jog._loop:
+        _listen(weakref.ref(jog), jog._loop)
+    assert jog.error == "X is lost" and jog.session.machine_user is None
 
 
 DIES = """
