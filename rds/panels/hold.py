@@ -36,3 +36,5 @@ class HoldButtons(anywidget.AnyWidget):
         kind, direction = content.get("kind"), content.get("direction", 0)
         if kind == "release" or (kind in ("hold", "step") and direction in (-1, 1)):
             self._on_word(str(kind), int(direction))
+        if kind == "hold":
+            self.send({"kind": "heard"})

@@ -39,3 +39,5 @@ class TurnButtons(anywidget.AnyWidget):
         kind, direction = content.get("kind"), content.get("direction", 0)
         if kind == "stop" or (kind == "turn" and direction in (-1, 1)):
             self._on_word(str(kind), int(direction))
+        if kind == "turn":
+            self.send({"kind": "heard"})

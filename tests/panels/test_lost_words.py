@@ -11,11 +11,13 @@ from tests.panels.conftest import App
 
 LOSES = """
 window.lost = null; // the kind of words that are lost
+window.tried = 0; // how many of them
 const Real = window.WebSocket;
 window.WebSocket = class extends Real {
   send(data) {
     const text = typeof data === "string" ? data : new TextDecoder().decode(data);
-    if (window.lost === null || !text.includes(`"kind":"${window.lost}"`)) super.send(data);
+    if (window.lost !== null && text.includes(`"kind":"${window.lost}"`)) window.tried += 1;
+    else super.send(data);
   }
 };
 """
@@ -50,3 +52,19 @@ def test_a_button_whose_word_was_lost_can_be_pressed_again(page: Any) -> None:
     assert page.locator('.rds-title h1:text-is("Jog")').count() == 0
     page.click('.rds-nav button:text-is("Jog")')
     page.wait_for_selector('.rds-title h1:text-is("Jog")')
+
+
+@pytest.mark.parametrize(
+    "kind, label, most", [("hold", "X plus", 10), ("turn", "spindle forward", 5)], ids=["held", "turning"]
+)
+def test_a_hand_that_is_not_heard_lets_go(page: Any, kind: str, label: str, most: int) -> None:
+    page.click('.rds-nav button:text-is("Jog")')
+    press = page.locator(f'button[aria-label="{label}"]')
+    press.wait_for()
+    press.evaluate("(button) => { button.disabled = false; }")  # as if the machine were taken
+    page.evaluate(f"window.lost = '{kind}'")
+    press.focus()
+    page.keyboard.down("Enter")
+    page.clock.run_for(5000)
+    assert page.evaluate("window.tried") == most
+    assert page.locator(".rds-hold-on").count() == 0

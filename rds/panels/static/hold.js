@@ -1,11 +1,14 @@
 // Two buttons of an axis, minus and plus. Held: a word every 50 ms, so that whoever listens notices when they end; and
 // a word when they are let go, by whatever happens to the pointer, the focus or the page. By step: one word a press.
 const BEAT = 50; // ms
+const UNHEARD = 10; // words without an answer, after which it counts as let go: a kernel that was held up, or a
+// connection that broke, would hand on all of them later, when nobody holds the button any more
 
 function render({ model, el }) {
   const box = document.createElement("div");
   box.className = "rds-hold";
   let held = null; // the direction, and the timer that beats
+  let unheard = 0; // words since the last answer
 
   const release = () => {
     if (held === null) return;
@@ -21,8 +24,11 @@ function render({ model, el }) {
       return;
     }
     if (held !== null) return;
-    const say = () => (button.disabled ? release() : model.send({ kind: "hold", direction }));
-    held = { button, timer: setInterval(say, BEAT) };
+    const say = () => {
+      unheard += 1;
+      model.send({ kind: "hold", direction });
+    };
+    held = { button, timer: setInterval(() => (button.disabled || unheard >= UNHEARD ? release() : say()), BEAT) };
     button.classList.add("rds-hold-on");
     say();
   };
@@ -58,11 +64,15 @@ function render({ model, el }) {
     for (const button of buttons) button.disabled = model.get("disabled");
     if (model.get("disabled")) release();
   };
+  const told = (word) => { if (word.kind === "heard") unheard = 0; };
   model.on("change:disabled", enable);
+  model.on("msg:custom", told);
   enable();
   el.append(box);
   return () => {
     release();
+    model.off("change:disabled", enable);
+    model.off("msg:custom", told);
     window.removeEventListener("blur", release);
     window.removeEventListener("pagehide", release);
     document.removeEventListener("visibilitychange", hidden);

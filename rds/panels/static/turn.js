@@ -1,11 +1,13 @@
 // The buttons of a spindle: one way, the other way, stop. While it turns, a word every 200 ms, so that whoever listens
 // notices when they end; and a word when it shall stop, because of a press, or because nobody looks at the page any more.
 const BEAT = 200; // ms
+const UNHEARD = 5; // words without an answer, after which it shall stop: they would all be handed on later
 
 function render({ model, el }) {
   const box = document.createElement("div");
   box.className = "rds-hold rds-turn";
   let turning = null; // the direction, and the timer that beats
+  let unheard = 0; // words since the last answer
 
   const forget = () => {
     if (turning === null) return false;
@@ -19,8 +21,11 @@ function render({ model, el }) {
   const turn = (button, direction) => {
     if (turning !== null && turning.direction === direction) return;
     forget();
-    const say = () => model.send({ kind: "turn", direction });
-    turning = { button, direction, timer: setInterval(say, BEAT) };
+    const say = () => {
+      unheard += 1;
+      model.send({ kind: "turn", direction });
+    };
+    turning = { button, direction, timer: setInterval(() => (unheard >= UNHEARD ? stop() : say()), BEAT) };
     button.classList.add("rds-hold-on");
     button.setAttribute("aria-pressed", "true");
     say();
@@ -51,7 +56,10 @@ function render({ model, el }) {
     for (const button of buttons) button.disabled = model.get("disabled");
     if (model.get("disabled")) forget();
   };
-  const told = (word) => word.kind === "forget" && forget();
+  const told = (word) => {
+    if (word.kind === "heard") unheard = 0;
+    if (word.kind === "forget") forget();
+  };
   model.on("change:disabled", enable);
   model.on("msg:custom", told);
   enable();
