@@ -45,9 +45,9 @@ def serve(
     os.environ |= {
         "JUPYTER_PATH": os.pathsep.join(filter(None, paths)),
         FOLDER: str(folder.resolve()),
-        MACHINE: machine,
+        MACHINE: str(Path(machine).resolve()) if machine.endswith(".toml") else machine,  # a page is in its folder
         PANEL: panel,
-        BUS: json.dumps(dict(bus or {})),
+        BUS: json.dumps(dict(bus or {}), default=str),  # a date is no JSON
     }
     with tempfile.TemporaryDirectory(prefix="rds-app-") as whereabouts:
         os.environ[WHEREABOUTS] = whereabouts
