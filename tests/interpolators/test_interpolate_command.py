@@ -114,8 +114,8 @@ def test_a_part_program_by_a_profile(tmp_path: Path, profile: str) -> None:
         pytest.importorskip("ruckig")
     file = tmp_path / "part.ngc"
     file.write_text(PROGRAM)
-    words = f"{file} --profile {profile} --period 0.01 --out {tmp_path / 'out'} --plot"
-    said = numbers(words)
+    words = f"{file} --profile {profile} --period 0.01"
+    said = numbers(f"{words} --out {tmp_path / 'out'} --plot")
     assert said["certificate"]["ok"] and said["dwell_s"] == 1.0
     assert [Path(path).name for path in said["files"]] == ["interpolation.csv", "motion.png", "certificate.png"]
     table = open_result(tmp_path / "out" / "interpolation.csv")

@@ -14,7 +14,13 @@ import pytest
 
 SETTLE = 300  # ms that a person takes, too: a choice may bring other fields, in the place of those that are there
 FAULTY = "def control(t, r, y, state, params):\n    error = r.positoin - y\n    return 10.0 * error, state\n"
-MODEL = "def derivatives(t, x, u, params):\n    return [x[1], (1.764 * u[0] - x[1]) / 0.009943]\n"
+MODEL = """initial_state = [0.0, 0.0]
+
+def advance(x, u, T, params):
+    kept = 2.718281828 ** (-T / 0.009943)
+    toward = 1.764 * u[0]
+    return [x[0] + toward * T + 0.009943 * (1.0 - kept) * (x[1] - toward), toward + kept * (x[1] - toward)]
+"""
 
 
 class Equipment:
