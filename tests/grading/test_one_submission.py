@@ -54,6 +54,15 @@ def test_the_script_leaves_results(platform: str, score: float, tmp_path: Path) 
 
 
 @needs_sandbox
+def test_a_folder_called_like_the_assignment_does_not_hide_the_file_beside_it(tmp_path: Path) -> None:
+    root = container_in(tmp_path, "gradescope")
+    beside = root / CONTAINERS["gradescope"].submission / Path(CONTAINERS["gradescope"].assignment).name
+    beside.mkdir()
+    (beside / "notes.txt").write_text("what I tried")
+    assert json.loads(grade_in("gradescope", root).read_text())["score"] == pytest.approx(9.0)
+
+
+@needs_sandbox
 def test_what_cannot_be_loaded_costs_no_attempt(tmp_path: Path) -> None:
     data = json.loads(grade_in("prairielearn", container_in(tmp_path, "prairielearn", "def (")).read_text())
     assert data["gradable"] is False and "failed to load" in data["format_errors"][0]

@@ -192,12 +192,17 @@ def _mostly(items: Sequence[Item], fits: Any) -> bool:
 
 
 def _is_nbgrader(items: Sequence[Item], assignments: Sequence[str]) -> bool:
-    """Whether more than half of the students' folders look so: what one of them holds is for its author alone."""
+    """Whether more than half of the students' folders look so: what one of them holds is for its author alone.
+
+    One with code beside its folders does not, but for nbgrader's stamp in them: there each assignment has its folder.
+    """
     deep = [item for item in items if len(item.parts) >= 3]
-    marked = {item.parts[0] for item in deep if item.parts[2] == STAMP or item.parts[1] in assignments}
+    stamped = {item.parts[0] for item in deep if item.parts[2] == STAMP}
+    marked = stamped | {item.parts[0] for item in deep if item.parts[1] in assignments}
     names = _of_several(items)
     fits = marked | {item.parts[0] for item in deep if item.parts[1] in names}
-    return bool(marked) and 2 * len(fits) > len({item.parts[0] for item in items if len(item.parts) > 1})
+    fits -= {item.parts[0] for item in items if len(item.parts) == 2 and item.is_code} - stamped
+    return bool(marked & fits) and 2 * len(fits) > len({item.parts[0] for item in items if len(item.parts) > 1})
 
 
 def _assignment(items: Sequence[Item], assignments: Sequence[str]) -> str:
