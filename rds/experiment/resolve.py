@@ -219,7 +219,7 @@ def _check_travel(reference: ReferenceSamples, axis: Axis, words: Words) -> None
     if lowest < low or highest > high:
         raise InputError(
             f"the reference goes from {lowest:g} to {highest:g} {axis.unit}, "
-            f"but axis {axis.name} travels from {low:g} to {high:g} {axis.unit}; reduce the amplitude",
+            f"but axis {axis.name} travels from {low:g} to {high:g} {axis.unit}; bring the reference into that range",
             words.place("reference"),
         )
 

@@ -115,7 +115,11 @@ def edit(change: str, base: str = GOOD) -> str:
         ("-kind", 7, 'kind is missing; as in `kind = "sinusoid"`'),
         ("amplitude = 'large'", 9, "amplitude = 'large' must be a number"),
         ("amplitude = nan", 9, "amplitude = nan must be a finite number"),
-        ("amplitude = 80.0", 7, "goes from 0 to 76.05.*but axis X travels from -75 to 75 mm; reduce the amplitude"),
+        (
+            "amplitude = 80.0",
+            7,
+            "goes from 0 to 76.05.*but axis X travels from -75 to 75 mm; bring the reference into that range",
+        ),
         ("-amplitude", 7, "needs amplitude"),
         ("frequency = 600.0", 10, "frequency = 600 Hz is above half the sampling frequency .500 Hz"),
         ("frequency = -1.0", 10, "frequency = -1.0 must be more than 0"),
