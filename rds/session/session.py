@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rds.bus.link import BUILTIN, bus_options
-from rds.core.errors import InputError
+from rds.core.errors import InputError, MachineError
 from rds.results.atomic import write_whole
 from rds.session.choices import Choices
 from rds.session.claim import Claim
@@ -57,6 +57,8 @@ class Session:
         self._lock = threading.Lock()
         self._claim: Claim | None = None
         self._kept = self._read_kept()
+        self._own: str | None = None
+        self._own_channel()
 
     # the bus
 
@@ -223,22 +225,34 @@ class Session:
         from rds.bus.estop import stop_everything
 
         channels = self._channels()
-        with ThreadPoolExecutor(len(channels)) as pool:  # none waits for another's answers, or fails with it
+        with ThreadPoolExecutor(max(len(channels), 1)) as pool:  # none waits for another's answers, or fails with it
             asked = [pool.submit(self._on, channel, stop_everything) for channel in channels]
-        return [node for each in asked for node in each.result()]
+        stopped = [node for each in asked for node in each.result()]
+        if self.interface == BUILTIN and self._own is None:  # nobody may believe that it was stopped
+            raise MachineError(
+                f"emergency stop: {self.machine} cannot be read, so the channel of its modules is not known; "
+                "run `rds estop --channel NAME` in a terminal, or cut the power"
+            )
+        return stopped
 
     def _channels(self) -> list[str | None]:
         """Where modules of this session, or of a run in its folder, may be: the machine's own channel first."""
         if self.interface != BUILTIN:
             return [self.bus.get("channel")]
+        own = [] if (channel := self._own_channel()) is None else [channel]
+        runs = {channel for run in self.runs_that_go_on() if (channel := run.channel) is not None}
+        return [*own, *sorted((self.channels | runs).difference(own))]
+
+    def _own_channel(self) -> str | None:
+        """The machine's on the built-in bus, as its file said last: one that is broken by now is no reason not to stop.
+
+        None if it never could be read.
+        """
         from rds.machines import load_machine
 
-        try:
-            own = self.bus.get("channel") or load_machine(self.machine).name
-        except InputError:  # a file that is broken by now is no reason not to stop
-            own = self.machine
-        runs = {channel for run in self.runs_that_go_on() if (channel := run.channel) is not None}
-        return [own, *sorted((self.channels | runs) - {own})]
+        with contextlib.suppress(Exception):  # whatever is wrong in it, what was known before is stopped
+            self._own = self.bus.get("channel") or load_machine(self.machine).name
+        return self._own
 
     def _on(self, channel: str | None, act: Callable[[Any], list[int]]) -> list[int]:
         from rds.bus.link import open_bus
