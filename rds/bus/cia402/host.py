@@ -109,9 +109,7 @@ class Cia402Drivers:
         self._acting = self._commanded
         self._stopping = False  # after stop()
         self._started = self._closed = False
-        self.limits: list[
-            Limits
-        ] = []  # software limits 0x607D as they are since start(), axis units of the drive's own
+        self.limits: list[Limits] = []  # software limits 0x607D since start(), axis units, from the drives' own zero
         self.counters = Counters()
 
     # --- start
