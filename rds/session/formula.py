@@ -102,7 +102,8 @@ def _read(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except SyntaxError as error:
-        raise InputError(f"not a formula of t: {error.msg} at character {error.offset}") from error
+        place = f"at character {error.offset}" if error.offset else "at its end"
+        raise InputError(f"not a formula of t: {error.msg} {place}; write it as in 3*sin(2*pi*t) + 1") from error
     except (ValueError, RecursionError, MemoryError) as error:
         raise InputError(f"not a formula of t: {error}") from error
 

@@ -215,7 +215,10 @@ class Session:
         from rds.bus.estop import reset_everything
 
         free = [node for channel in self._channels() for node in self._on(channel, reset_everything)]
-        text = f"{len(free)} modules are free again" if free else "no module is on the bus: none is to be released"
+        if free:
+            text = f"{len(free)} modules are free again"
+        else:
+            text = "no module is on the bus that is to be released; a machine that a run or Jog starts ends with it"
         self.say(text)
         return text
 

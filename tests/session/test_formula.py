@@ -33,6 +33,8 @@ def test_a_formula_is_worth_what_it_says(a: float, f: float, c: float) -> None:
         ("(lambda: 1)()", "cannot stand in a formula"),
         ("[t for t in (1,)]", "cannot stand in a formula"),
         ("3*sin(2*pi*", "not a formula of t"),
+        ("3*t +", "at its end; write it as in 3"),
+        ("3*t + 2t", "at character 7; write it as in 3"),
         ("x + 1", "knows no 'x'"),
         ("sin(t, 2)", r"sin\(\) takes 1 value, not 2"),
         ("1/t", "is inf at t = 0 s"),

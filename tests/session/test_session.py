@@ -161,3 +161,11 @@ def test_a_folder_that_is_full_or_gone_refuses_in_words_and_holds_nothing(
     with pytest.raises(InputError, match="cannot be written"):
         session.take_machine("a run", user)
     assert session.machine_user is None
+
+
+def test_a_release_where_the_machine_has_ended_says_why_there_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # a built-in bus on which nobody is
+    said = Session(tmp_path).release_emergency_stop()
+    assert said.startswith("no module is on the bus") and "a machine that a run or Jog starts ends with it" in said
