@@ -102,14 +102,19 @@ def _machine(data: dict[str, Any], path: str) -> Machine:
         place = f"{path}, [axis.{name}]"
         _known(table, _AXIS, path, f"axis.{name}.")
         travel = table.get("travel", [])
-        if len(travel) != 2 or not travel[0] < travel[1]:
+        if not _rises(travel):
             raise InputError(f"travel = {travel!r} must be [lowest, highest]", place)
         resolution = _number(table, "resolution", place)
-        if resolution <= 0:
+        if not (isfinite(resolution) and resolution > 0):
             raise InputError(f"resolution = {resolution!r} must be more than 0 (unit per encoder count)", place)
+        node = _number(table, "node", place)
+        if not (isfinite(node) and node == int(node)):
+            raise InputError(f"node = {node!r} must be a whole number", place)
+        for key in ("model", "machine"):
+            _must_be_table(table.get(key, {}), f"axis.{name}.{key}", path)
         axes[name] = Axis(
             name=name,
-            node=int(_number(table, "node", place)),
+            node=int(node),
             unit=str(table.get("unit", "mm")),
             travel=(float(travel[0]), float(travel[1])),
             resolution=resolution,
@@ -152,7 +157,19 @@ def _table(data: dict[str, Any], key: str, path: str) -> dict[str, Any]:
     return table
 
 
-def _known(table: dict[str, Any], known: set[str], path: str, prefix: str) -> None:
+def _rises(travel: Any) -> bool:
+    """Whether it is two finite numbers, the lower one first."""
+    numbers = isinstance(travel, list) and all(isinstance(each, int | float) and isfinite(each) for each in travel)
+    return numbers and len(travel) == 2 and travel[0] < travel[1]
+
+
+def _must_be_table(table: Any, name: str, path: str) -> None:
+    if not isinstance(table, dict):
+        raise InputError(f"{name} = {table!r} must be a table; write [{name}]", path)
+
+
+def _known(table: Any, known: set[str], path: str, prefix: str) -> None:
+    _must_be_table(table, prefix.rstrip("."), path)
     for key in table:
         if key not in known:
             raise InputError(f"unknown key '{prefix}{key}'; known keys: {', '.join(sorted(known))}", path)
