@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rds.commands.common import Experiment, bus_of, refusals
+from rds.commands.common import Experiment, bus_table_of, refusals
 
 
 def app(
@@ -25,6 +25,6 @@ def app(
         try:
             from rds.panels.app.serve import serve
 
-            serve(folder, machine, panel, port, browser, bus=bus_of(experiment))
+            serve(folder, machine, panel, port, browser, bus=bus_table_of(experiment))
         except ModuleNotFoundError as error:
             raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error

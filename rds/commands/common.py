@@ -26,7 +26,7 @@ Channel = Annotated[
 Experiment = Annotated[Path | None, typer.Option(help="An experiment's TOML file, for its \\[bus].")]
 
 
-def bus_of(experiment: Path | None) -> dict[str, Any]:
+def bus_table_of(experiment: Path | None) -> dict[str, Any]:
     """The [bus] table of an experiment; empty for the built-in bus. InputError for one that will not do."""
     if experiment is None:
         return {}

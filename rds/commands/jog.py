@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.commands.common import Experiment, Json, bus_of, ends_as_ctrl_c, print_json, refusals
+from rds.commands.common import Experiment, Json, bus_table_of, ends_as_ctrl_c, print_json, refusals
 
 if TYPE_CHECKING:
     from rds.session.jog import Jog
@@ -45,7 +45,7 @@ def jog(
         from rds.session.session import Session
 
         given = {"interface": interface, "channel": channel}
-        bus = bus_of(experiment) | {key: value for key, value in given.items() if value is not None}
+        bus = bus_table_of(experiment) | {key: value for key, value in given.items() if value is not None}
         with tempfile.TemporaryDirectory(prefix="rds-jog-") as folder, ends_as_ctrl_c():
             hand = Jog(Session(Path(folder), machine, bus))
             ways = {"--by": by, "--to": to, "--find-home": find_home, "--for": seconds}
