@@ -28,7 +28,7 @@ def test_the_documents_of_a_wheel_are_there_once(tmp_path: Path, monkeypatch: py
 
 
 def test_a_page_without_its_extra_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    def without(*_: object) -> None:
+    def without(*_: object, **__: object) -> None:
         raise ModuleNotFoundError("No module named 'ipywidgets'", name="ipywidgets")
 
     monkeypatch.setattr(serve, "serve", without)
