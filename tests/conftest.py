@@ -22,6 +22,8 @@ settings.register_profile("search", deadline=None)
 settings.register_profile("judge", deadline=None, derandomize=True)
 settings.load_profile("judge" if os.environ.get("CI") else "search")
 
+pytest_plugins = ["held_up"]
+
 HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
 MARK = "pytest.mark.realtime"

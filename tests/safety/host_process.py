@@ -1,9 +1,10 @@
-"""A host in a process of its own: python host_process.py DIALECT CHANNEL PERIOD VOLTS [--free]
+"""A host in a process of its own: python host_process.py DIALECT CHANNEL PERIOD VOLTS [--free] [--patient]
 
 It commands axis X with constant VOLTS and writes what happens on stdout: "moving" once it commands, "refused" when a
 module has refused a command, "lost REASON" at its end. Without --free it takes the command of the channel, as every
-run does. With a line on stdin, "VOLTS SECONDS IDENTIFIER", it commands VOLTS for one period, in a frame with this
-identifier that the bus holds back for so long.
+run does. With --patient a CiA 402 drive waits for its heartbeats for 15 s, longer than a computer is held up. With a
+line on stdin, "VOLTS SECONDS IDENTIFIER", it commands VOLTS for one period, in a frame with this identifier that the
+bus holds back for so long.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import contextlib
 import select
 import sys
 import time
+from typing import Any
 
 from rds.bus.command import Command
 from rds.bus.dialects import open_drivers
@@ -29,7 +31,9 @@ def main(dialect: str, channel: str, period: str, volts: str, *flags: str) -> in
         try:
             if "--free" not in flags:
                 stack.enter_context(Command(channel))
-            bus = {"interface": "rds", "channel": channel}
+            bus: dict[str, Any] = {"interface": "rds", "channel": channel}
+            if "--patient" in flags:
+                bus["cia402"] = {"heartbeat": 5.0}
             drivers = open_drivers(dialect, load_machine(MACHINES[dialect]), ["X"], T, False, bus)
             stack.callback(drivers.close)
             drivers.start()

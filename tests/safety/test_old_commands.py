@@ -25,7 +25,7 @@ VOLTS = frames.encode_voltages([8.0])
 def test_a_command_that_waits_on_its_way_moves_nothing(bench: Bench) -> None:
     """One command of 6 V is held back for six periods; all others before and after it are of zero volts."""
     bench.serve()
-    host = bench.host(0.0)
+    host = bench.host(0.0, *(["--patient"] if bench.dialect == "cia402" else []))
     expect(host, "moving")
     identifier = 0x200 + bench.node if bench.dialect == "cia402" else frames.COMMAND
     tell(host, f"6.0 {6 * T} {identifier}")
