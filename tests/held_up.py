@@ -1,8 +1,8 @@
 """A test that fails while the computer is held up is void, as a verdict on timing is: it is run again, and told.
 
-Real processes, a real bus and a real browser share two cores here. What they are to do within some time can fail because
-others had the processors. So a failure counts only if it repeats, up to `AGAIN` times, or if nothing had to wait for
-a processor while the test ran. Each void try is printed at the end of the run with its failure and with the time that
+Real processes, a real bus and a real browser share a few cores. What they are to do within some time can fail because
+others had the processors. So a failure counts only if it repeats, up to `AGAIN` times, or if nothing had to wait for a
+processor while the test ran. Each void try is printed at the end of the run with its failure and with the time that
 processes waited; a run with more of them than `--max-suite-reruns` (pyproject.toml) fails.
 """
 

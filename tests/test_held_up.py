@@ -35,7 +35,7 @@ def test_sample():
 
 
 def run(place: Path, waited: float, failures: int, *options: str) -> tuple[int, str, int]:
-    """Exit code, output and tries of a test that fails so often, while processes wait so many seconds for a processor."""
+    """Exit code, output and tries of a test that fails so often, while processes wait so many seconds."""
     (place / "test_sample.py").write_text(SAMPLE.replace("WAITED", str(waited)).replace("FAILURES", str(failures)))
     options = ("-p", "held_up", "-p", "no:cacheprovider", "-rR", "--rerun-show-tracebacks", *options)
     found = subprocess.run(
