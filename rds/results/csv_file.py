@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.results.arrow import to_arrow, to_numpy
 from rds.results.header import FORMAT, describe, parse
 from rds.results.result import Result
 from rds.results.units import heading
@@ -93,7 +94,7 @@ def _write_table(result: Result, stream: _Tee) -> None:
     csv.writer(line, lineterminator="\n").writerow([heading(name, result.units[name]) for name in result.columns])
     stream.write(line.getvalue().encode("utf-8"))
     if len(result):
-        table = pa.table([pa.array(values) for values in result.columns.values()], names=[*result.columns])
+        table = pa.table([to_arrow(values) for values in result.columns.values()], names=[*result.columns])
         arrow_csv.write_csv(table, stream, arrow_csv.WriteOptions(include_header=False))
 
 
@@ -124,7 +125,7 @@ def _read_table(path: Path, described: list[dict[str, Any]] | None) -> dict[str,
         )
     except pa.ArrowInvalid as error:
         raise InputError(f"its table cannot be read: {error}; every cell must be a number") from error
-    return {name: table.column(name).to_numpy() for name in names}
+    return {name: to_numpy(table.column(name)) for name in names}
 
 
 def _layout(path: Path) -> tuple[list[str], str, str, bool]:

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.results.arrow import to_arrow, to_numpy
 from rds.results.header import describe, parse
 from rds.results.result import Result
 
@@ -29,7 +30,7 @@ def writers(result: Result, path: Path) -> dict[Path, Callable[[BinaryIO], None]
         ]
         text = json.dumps(describe(result), allow_nan=False).encode()
         schema = pa.schema(fields, metadata={_DESCRIPTION: text})
-        parquet.write_table(pa.table([pa.array(v) for v in result.columns.values()], schema=schema), stream)
+        parquet.write_table(pa.table([to_arrow(v) for v in result.columns.values()], schema=schema), stream)
 
     return {path: write}
 
@@ -51,4 +52,4 @@ def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any] | None]:
             table = file.read(columns=numbers, use_threads=False)
         except (pa.ArrowException, OSError, ValueError) as error:
             raise InputError(f"it is not a Parquet file, or is truncated ({error}); take another copy") from error
-    return {name: table.column(name).to_numpy() for name in numbers}, None if text is None else parse(text)
+    return {name: to_numpy(table.column(name)) for name in numbers}, None if text is None else parse(text)
