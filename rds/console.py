@@ -112,6 +112,9 @@ def show_result(result: Result, files: Mapping[str, Path]) -> None:
         screen.print(escape(verdict_line(result)))
     for axis, validation in (result.meta.get("validation") or {}).items():
         screen.print(f"model of {escape(axis)}: {escape(validation['sentence'])}", soft_wrap=True)
+        for reason in validation["reasons"]:
+            if reason["side"] in ("against", "cannot tell"):
+                screen.print(f"- {reason['side']}: {escape(reason['what'])}", soft_wrap=True)
     for kind in ("report", "csv"):
         if kind in files:
             screen.print(f"{kind}: {escape(str(files[kind]))}", soft_wrap=True)

@@ -195,4 +195,4 @@ def _show(estimate: Estimate, validation: Validation | None) -> None:
         typer.echo(f"- {sentence}")
     if validation is not None:
         share = round(100 * (1 - FITTED_SHARE))
-        typer.echo(f"Validation on the last {share} % of each log, which the fit has not seen: {validation}")
+        typer.echo(f"Validation on the last {share} % of each log, which the fit has not seen:\n{validation}")

@@ -94,7 +94,4 @@ def _show(made: Validation) -> None:
         show_table(f"Models compared on {name}", columns, rows, " ".join(ranking.warnings))
     verdict = made.verdict
     typer.echo(f"verdict: {verdict.word}{f' {verdict.purpose}' if verdict.purpose else ''}")
-    typer.echo(verdict.sentence)
-    for reason in verdict.reasons:
-        if reason.side == "note":
-            typer.echo(f"- {reason.what}")
+    typer.echo(str(verdict))

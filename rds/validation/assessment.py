@@ -16,6 +16,7 @@ from rds.identification.kstep import STEPS, ahead, errors_of
 from rds.identification.needed_voltage import NeededVoltage, needed_voltage, smoothed_velocity
 from rds.identification.residuals import ResidualTest, bandwidth, block_length, block_means, residual_tests
 from rds.logs.log import Log
+from rds.validation.attainable import Attainable, attainable
 from rds.validation.candidate import Candidate, check_units
 from rds.validation.same_data import Overlap, overlap
 
@@ -61,6 +62,7 @@ class Assessment:
     block_modelled: np.ndarray
     tests: ResidualTest | None
     voltage: NeededVoltage | None
+    attainable: Attainable | None  # None where no fit to this log is a measure of the model
     overlap: Overlap
     ranges: Mapping[str, Range]
 
@@ -136,7 +138,16 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
     unit = log.units.get("position", "mm")
     if unstable_at is not None:
         return Assessment(
-            free_run=None, velocity=None, ahead={}, naive={}, drift=None, gain=None, tests=None, voltage=None, **common
+            free_run=None,
+            velocity=None,
+            ahead={},
+            naive={},
+            drift=None,
+            gain=None,
+            tests=None,
+            voltage=None,
+            attainable=None,
+            **common,
         )
     measured = y[first:]
     return Assessment(
@@ -148,6 +159,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
         gain=_gain(rates[0], rates[1]),
         tests=_tests(candidate, log, first, start, modelled, frequency),
         voltage=_voltage(candidate, log, block),
+        attainable=attainable(candidate, log, start),
         **common,
     )
 

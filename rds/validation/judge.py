@@ -37,10 +37,20 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
         *_ahead(a, bands),
         *_voltage(a, bands),
         *_residuals(a, bands),
+        *_attainable(a, bands),
         *_overfit(candidate, a, bands),
         *_extent(a, bands),
     ]
     word, purpose = _conclude(a, reasons, bands)
+    if word is Word.UNTOLD and all(reason.side is not Side.UNTOLD for reason in reasons):
+        reasons.append(
+            Reason(
+                Side.UNTOLD,
+                "closed-loop",
+                "in a closed loop, the free run drifts away while the voltage it needs is right: only a log without "
+                "feedback tells which is at fault",
+            )
+        )
     return Verdict(word, _sentence(candidate, a, word, purpose, reasons), tuple(reasons), purpose)
 
 
@@ -250,6 +260,31 @@ def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
     )
 
 
+def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    found = a.attainable
+    if found is None or a.motion == 0.0:
+        return
+    numbers = f"{found.rmse:.3g} {a.unit} (RMSE) for the model, {found.reached:.3g} {a.unit} for the fit"
+    if found.reached < found.noise:
+        numbers += f", {found.noise:.3g} {a.unit} for the measurement's noise"
+    if found.ratio > bands.attainable:
+        text = (
+            f"the free run is {found.ratio:.3g} times as far off as that of the same structure fitted to this log "
+            f"({numbers}): noise and structure do not explain that, the parameters are off"
+        )
+        yield Reason(Side.AGAINST, "attainable", text)
+    elif all(_passes(a, bands)):
+        text = f"no other parameters of this structure would come much nearer ({numbers})"
+        yield Reason(Side.FOR, "attainable", text)
+    if off := [p for p in found.parameters if p.apart > bands.apart]:
+        said = ", ".join(
+            f"{p.name} {p.model:.4g} {p.unit}".rstrip()
+            + f" where this log says {p.here:.4g} ({p.apart:.1f} standard errors)"
+            for p in off
+        )
+        yield Reason(Side.AGAINST, "parameters", f"beyond their intervals: {said}")
+
+
 def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reason]:
     known = [e.rmse for e in candidate.fit_errors() if e.rmse > 0.0 and e.unit == a.unit]
     if a.free_run is None or not known or a.overlap.share > bands.seen:
@@ -315,7 +350,12 @@ def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Wo
         purposes.append("simulating position and velocity")
     limits = list(_limits(a, bands))
     short = not (position and velocity)
-    if short or limits or against & {"whiteness", "command", "voltage", "overfitted", "ahead"} or a.log.closed_loop:
+    if (
+        short
+        or limits
+        or against & {"whiteness", "command", "voltage", "overfitted", "ahead", "attainable", "parameters"}
+        or a.log.closed_loop
+    ):
         return Word.PARTLY, " ".join([*purposes, *limits])
     return Word.VALID, ""
 
@@ -341,21 +381,15 @@ def _limits(a: Assessment, bands: Bands) -> Iterator[str]:
 def _sentence(candidate: Candidate, a: Assessment, word: Word, purpose: str, reasons: list[Reason]) -> str:
     name, log = candidate.name, f"{a.log.name} ({_tried(a)})"
     if word is Word.UNTOLD:
-        why = [reason.what for reason in reasons if reason.side is Side.UNTOLD]
-        if not why:
-            why = [
-                "in a closed loop, the free run drifts away while the voltage it needs is right: only a log without "
-                "feedback tells which is at fault"
-            ]
-        return f"Cannot tell whether {name} is valid, from {log}: {'; '.join(why)}."
-    against = [reason.what for reason in reasons if reason.side is Side.AGAINST]
-    speaks = [reason.what for reason in reasons if reason.side is Side.FOR]
+        return f"Cannot tell whether {name} is valid, from {log}."
     if word is Word.NOT:
-        return f"{name} is not valid for {log}: {'; '.join(against)}."
+        return f"{name} is not valid for {log}."
     if word is Word.VALID:
-        return f"{name} is valid for {log}: {'; '.join(speaks)}."
-    but = f"; but {'; '.join(against)}" if against else ""
-    return f"{name} is valid for {purpose} only, by {log}: {'; '.join(speaks) or 'see the predictions'}{but}."
+        return f"{name} is valid for {log}."
+    sentence = f"{name} is valid for {purpose} only, by {log}."
+    if any(reason.kind == "parameters" for reason in reasons):
+        sentence += " Do not take its parameters for the axis's own: this log contradicts them."
+    return sentence
 
 
 def _tried(a: Assessment) -> str:

@@ -18,7 +18,7 @@ from rds.results.report import page
 from rds.results.units import heading
 from rds.validation.assessment import Assessment
 from rds.validation.criterion import Ranking
-from rds.validation.verdict import Side, Verdict, Word
+from rds.validation.verdict import Verdict, Word
 
 if TYPE_CHECKING:
     from rds.results.figure import Picture
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 PAGE, NUMBERS = "validation.html", "validation.json"
 _LOOK = {Word.VALID: "met", Word.PARTLY: "void", Word.NOT: "missed", Word.UNTOLD: "void"}
-_SIDES = {Side.AGAINST: "against", Side.UNTOLD: "cannot tell", Side.FOR: "for", Side.NOTE: "to know"}
 
 
 def write(validation: Validation, folder: Path) -> list[Path]:
@@ -89,8 +88,7 @@ def verdict_line(verdict: Verdict) -> str:
 
 
 def _reasons(verdict: Verdict) -> str:
-    rows = [[_SIDES[side], r.what] for side in _SIDES for r in verdict.reasons if r.side is side]
-    return table(["", "reason"], rows)
+    return table(["", "reason"], [[str(reason.side), reason.what] for reason in verdict.ranked()])
 
 
 def _bands(validation: Validation) -> str:

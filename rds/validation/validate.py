@@ -3,7 +3,7 @@
 from rds.validation.validate import validate
 
 validation = validate("fitted.toml", logs)
-print(validation.verdict.sentence)
+print(validation)
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Validation:
         return f"<Validation of {self.candidate.name} on {', '.join(self.assessments)}: {self.verdict.word}>"
 
     def __str__(self) -> str:
-        return self.verdict.sentence
+        return str(self.verdict)
 
     def _repr_html_(self) -> str:
         from rds.validation.report import fragment

@@ -1,4 +1,4 @@
-"""The verdict of a validation: what the model is good for, in a sentence, with the reasons.
+"""The verdict of a validation: what the model is good for, in a sentence, and a list of reasons.
 
 Cannot tell      the data do not allow a verdict: they are the fit's own, hold too little motion, or are too good to be
                  a measurement; or feedback hides what the model does by itself
@@ -48,7 +48,9 @@ class Reason:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict: `purpose` is what a model that is valid for something only is valid for, `sentence` says it all."""
+    """The verdict: `sentence` says it, `reasons` why; `purpose` is what a model that is valid for something only is
+    valid for.
+    """
 
     word: Word
     sentence: str
@@ -59,6 +61,15 @@ class Verdict:
     def ok(self) -> bool:
         """Whether the model may be used, for `purpose` if that is said: exit code 0."""
         return self.word in (Word.VALID, Word.PARTLY)
+
+    def ranked(self) -> list[Reason]:
+        """The reasons, those that decide first: what nobody can tell, what speaks against, what for, and notes."""
+        order = (Side.UNTOLD, Side.AGAINST, Side.FOR, Side.NOTE)
+        return [reason for side in order for reason in self.reasons if reason.side is side]
+
+    def __str__(self) -> str:
+        """The sentence, and a line for each reason."""
+        return "\n".join([self.sentence, *(f"- {reason.side}: {reason.what}" for reason in self.ranked())])
 
     def to_json(self) -> dict[str, Any]:
         """As JSON's own types."""
@@ -82,6 +93,8 @@ class Bands:
     least_steps: float = 20.0  # of the encoder, that the axis must at least move
     skill: float = 0.5  # a prediction's RMSE must be less than so much of that without a model
     worse: float = 2.0  # RMSE here over RMSE on the fit's data, beyond which the fit has followed its own noise
+    attainable: float = 2.0  # RMSE over that of the same structure fitted to this very log
+    apart: float = 3.5  # standard errors by which a parameter may differ from what this log says of it
     beyond: float = 1.1  # speeds and voltages here over the fit's, beyond which the model extrapolates
     covered: float = 0.5  # share of the fit's speeds that a log must cover to speak for all of them
     floor: float = 0.8  # RMSE over the encoder's own rounding (step / √12), below which no measurement comes

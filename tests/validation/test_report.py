@@ -95,7 +95,8 @@ def test_a_copy_of_the_fit_s_data_in_another_format_is_known(tmp_path: Path) -> 
     np.savetxt(copy, rows, delimiter=",", header="time [s],command [V],position [mm]", comments="", fmt="%.7g")
     answer = json.loads(rds(model, copy, "--json").stdout)
     assert answer["verdict"] == "cannot tell"
-    assert "holds the same numbers" in answer["sentence"]
+    (reason,) = [reason["what"] for reason in answer["reasons"] if reason["side"] == "cannot tell"]
+    assert "holds the same numbers" in reason
 
 
 def test_a_student_s_file_and_others_against_it(tmp_path: Path) -> None:

@@ -34,7 +34,11 @@ def test_the_true_model_is_valid_on_data_of_another_signal() -> None:
     assert a.free_run is not None and a.free_run.fit_percent > 99.9
     assert a.free_run.rmse < 0.5e-3  # mm: half a step of the encoder
     assert a.voltage is not None and a.voltage.relative_percent is not None and a.voltage.relative_percent < 3.0
-    assert found.verdict.sentence.startswith("model is valid for fresh (up to ")
+    assert found.verdict.sentence == "model is valid for fresh (up to 7.17 mm/s and 4.2 V)."
+    first, *reasons = str(found).splitlines()
+    assert first == found.verdict.sentence and len(reasons) == len(found.verdict.reasons)
+    sides = [line.split(":")[0] for line in reasons]
+    assert sides == sorted(sides, key=["- cannot tell", "- against", "- for", "- note"].index)
 
 
 def test_a_gain_that_is_a_per_cent_off_simulates_but_leaves_a_residual_that_follows_the_command() -> None:
@@ -115,7 +119,7 @@ def test_the_fit_s_own_data_prove_nothing_and_are_known_by_file_and_by_content()
         found = validate(seen, data)
         assert found.verdict.word is Word.UNTOLD, data.name
         assert kinds(found, "cannot tell") == {"same-data"}
-        assert "validate on another log" in found.verdict.sentence
+        assert "validate on another log" in str(found)
     other = validate(seen, log(square(8.0, 2.0, 0.9), sha256="ef" * 32))
     assert "same-data" not in kinds(other, "cannot tell")
 
