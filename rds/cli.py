@@ -33,7 +33,8 @@ from rds.commands import (
     validate,
 )
 from rds.commands.app import app as app_page
-from rds.commands.common import Interface, Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
+from rds.commands.buses import Channel, Experiment, Interface, bus_table_of
+from rds.commands.common import Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
 from rds.commands.guard import guarded
 
 app = typer.Typer(
@@ -189,9 +190,13 @@ def machine_list(json: Json = False) -> None:
 @machine_app.command("serve")
 def machine_serve(
     name: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
-    interface: Interface = "rds",
-    channel: Annotated[str | None, typer.Option(help="Channel of the bus; by default the machine's name.")] = None,
-    dialect: Annotated[str, typer.Option(help="What the modules speak: rds, oacs or cia402.")] = "rds",
+    interface: Interface = None,
+    channel: Channel = None,
+    experiment: Experiment = None,
+    dialect: Annotated[
+        str | None,
+        typer.Option(help="What the modules speak: rds, oacs or cia402; by default as in \\[bus], or rds."),
+    ] = None,
     bitrate: Annotated[
         int | None, typer.Option(min=1, help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
     ] = None,
@@ -199,23 +204,27 @@ def machine_serve(
 ) -> None:
     """Run the machine's axis modules as CAN nodes, until Ctrl-C."""
     with refusals():
+        from rds.bus.dialects import DEFAULT
+        from rds.bus.link import BUILTIN, bus_name, bus_options, default_channel
         from rds.bus.serving import serve_machine
         from rds.machines import load_machine
 
         machine = load_machine(name)
-        place = machine.name if channel is None else channel
+        table = bus_table_of(experiment, interface, channel)
+        where = str(table.get("interface", BUILTIN))
+        place = default_channel(machine, where, table.get("channel"))
 
         def ready() -> None:
-            typer.echo(
-                f"{machine.name}: {', '.join(machine.axes)} on {interface} channel {place}; Ctrl-C ends", err=True
-            )
+            typer.echo(f"{machine.name}: {', '.join(machine.axes)} on {bus_name(where, place)}; Ctrl-C ends", err=True)
 
-        options: dict[str, Any] = {} if bitrate is None else {"bitrate": bitrate}
+        options = bus_options(table)  # its faults are the run's, and [bus.cia402] tells a host of its drives
+        if bitrate is not None:
+            options["bitrate"] = bitrate
         if faults is not None:
             from rds.bus.fault_file import read_faults
 
             options["faults"] = read_faults(faults)
-        serve_machine(machine, dialect, interface, place, ready, **options)
+        serve_machine(machine, dialect or table.get("dialect", DEFAULT), where, place, ready, **options)
 
 
 def explain(result: Any) -> None:

@@ -1,4 +1,4 @@
-"""The options of the built-in bus: what a node may ask for when it opens a channel."""
+"""The options of the built-in bus: what a node may ask for when it opens a channel; and what is no bus's option."""
 
 from __future__ import annotations
 
@@ -11,6 +11,12 @@ BITRATES = (10_000, 1_000_000)  # bit/s, least and most: what CAN controllers do
 DATA_BITRATES = (10_000, 8_000_000)
 OPTIONS = ("bitrate", "data_bitrate", "name", "error_frames", "restart_ms")
 _LONGEST_RESTART = 3_600_000  # ms
+
+# what drivers, servers and scans are told beside an adapter's options: a key of this name would be taken for it
+_OF_BUSES = ("identifiers", "mask", "can_filters", "ignore_config", "node", "timeout", "first")
+_OF_DRIVERS = ("machine", "axes", "bus", "sample_period", "dry_run")
+_OF_SERVERS = ("nodes", "ready", "stop", "orphaned", "afterlife", "chores", "exact")
+OUR_WORDS = frozenset((*_OF_BUSES, *_OF_DRIVERS, *_OF_SERVERS))
 
 
 def read_settings(options: Mapping[str, Any]) -> wire.Settings:

@@ -11,7 +11,7 @@ from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 
 BUILTIN = "rds"  # the built-in bus's name among python-can's interfaces
-_OURS = ("dialect", "cia402", "faults", "interface", "channel")  # keys of a [bus] table that are not can.Bus's options
+_NO_OPTIONS = ("dialect", "cia402", "faults", "interface", "channel")  # keys of a [bus] table that are not can.Bus's
 
 
 def bus_name(interface: str, channel: str | None) -> str:
@@ -21,7 +21,7 @@ def bus_name(interface: str, channel: str | None) -> str:
 
 def bus_options(table: Mapping[str, Any]) -> dict[str, Any]:
     """What of a `[bus]` table goes to can.Bus beside interface and channel, such as the bit rate."""
-    return {key: value for key, value in table.items() if key not in _OURS}
+    return {key: value for key, value in table.items() if key not in _NO_OPTIONS}
 
 
 def default_channel(machine: Machine, interface: str, channel: str | None) -> str | None:

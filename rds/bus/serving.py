@@ -10,7 +10,7 @@ from rds.machines import Machine
 
 
 def serve_machine(
-    machine: Machine, dialect: str, interface: str, channel: str, ready: Callable[[], Any], **options: Any
+    machine: Machine, dialect: str, interface: str, channel: str | None, ready: Callable[[], Any], **options: Any
 ) -> None:
     """Serve `machine` until the process is told to end; `options` as of `serve_loop.serve_nodes`.
 

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from rds.commands.common import Experiment, bus_table_of, refusals
+from rds.commands.buses import Experiment, Machine, bus_table_of, machine_of
+from rds.commands.common import refusals
 
 
 def app(
     folder: Annotated[Path, typer.Argument(help="The folder with your files; runs are kept in its runs/.")] = Path("."),
-    machine: Annotated[str, typer.Option(help="A machine's name, or its TOML file.")] = "mini-cnc",
+    machine: Machine = None,
     panel: Annotated[str, typer.Option(help="The panel to begin with.")] = "menu",
     experiment: Experiment = None,
     port: Annotated[int | None, typer.Option(min=1, max=65535, help="Port; by default the first free one.")] = None,
@@ -25,6 +26,6 @@ def app(
         try:
             from rds.panels.app.serve import serve
 
-            serve(folder, machine, panel, port, browser, bus=bus_table_of(experiment))
+            serve(folder, machine or machine_of(experiment), panel, port, browser, bus=bus_table_of(experiment))
         except ModuleNotFoundError as error:
             raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error

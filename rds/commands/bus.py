@@ -11,7 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands.common import Channel, Interface, Json, print_json, refusals, stdout_kept, until_ctrl_c
+from rds.commands.buses import BUILTIN, Channel, ChosenBus, Experiment, Interface, chosen_bus
+from rds.commands.common import Json, print_json, refusals, stdout_kept, until_ctrl_c
 
 app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
 
@@ -24,13 +25,13 @@ Identifiers = Annotated[
 WithCommands = Annotated[
     bool, typer.Option("--with-commands", help="Let frames through that can move a machine on this bus.")
 ]
-BUILTIN, DEMO = "rds", "mini-cnc"
 
 
 @app.command()
 def monitor(
-    interface: Interface = BUILTIN,
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     seconds: Seconds = None,
     bitrate: Annotated[
         int | None, typer.Option(help="Bit rate, bit/s, that the load is of; by default the bus's, or 1000000.", min=1)
@@ -49,16 +50,18 @@ def monitor(
         from rds.bus.monitor import to_json
         from rds.bus.statistics import BITRATE, Statistics
 
-        channel = _channel(interface, channel)
-        given = None if interface == BUILTIN else bitrate
-        opener = _opener(interface, channel, given, "monitor", errors=True)
-        statistics = Statistics(bitrate or (interface == BUILTIN and _timing(opener)) or BITRATE, data_bitrate)
+        place = chosen_bus(interface, channel, experiment)
+        builtin = place.interface == BUILTIN
+        opener = _opener(place, None if builtin else bitrate, "monitor", errors=True)
+        its_own = _timing(opener) if builtin else _bits(place.options.get("bitrate"))
+        data_bitrate = data_bitrate or _bits(place.options.get("data_bitrate")) or None
+        statistics = Statistics(bitrate or its_own or BITRATE, data_bitrate)
         decode = decoder(dbc or ())
         with _quiet_log(live := _is_live(json)), _live(decode, live) as refresh, until_ctrl_c() as stop:
             view = watch(
                 opener,
                 statistics,
-                name=_name(interface, channel),
+                name=place.name,
                 seconds=seconds,
                 stop=stop,
                 refresh=refresh,
@@ -78,8 +81,9 @@ def record(
     file: Annotated[
         Path, typer.Argument(help="The log: .asc .blf .log (candump) .trc .csv .db .mf4, or text with .gz.")
     ],
-    interface: Interface = BUILTIN,
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     bitrate: Bitrate = None,
     seconds: Seconds = None,
     count: Annotated[int | None, typer.Option(help="End after so many frames.", min=1)] = None,
@@ -92,20 +96,20 @@ def record(
         from rds.bus.record import record as record_bus
         from rds.bus.selection import Selection
 
-        channel = _channel(interface, channel)
+        place = chosen_bus(interface, channel, experiment)
         selection = Selection(identifiers or ())
         with _quiet_log(False), until_ctrl_c() as stop, _counter("frames recorded") as show:
             result = record_bus(
                 file,
-                _opener(interface, channel, bitrate, "recorder", errors=True),
-                name=_name(interface, channel),
+                _opener(place, bitrate, "recorder", errors=True),
+                name=place.name,
                 seconds=seconds,
                 count=count,
                 selection=selection,
                 force=force,
                 stop=stop,
                 progress=lambda recording: show(recording.frames),
-                ready=lambda: _say(f"recording {_name(interface, channel)} to {file}; Ctrl-C ends"),
+                ready=lambda: _say(f"recording {place.name} to {file}; Ctrl-C ends"),
             )
     if json:
         print_json({**vars(result), "complete": result.complete})
@@ -121,8 +125,9 @@ def record(
 @app.command()
 def replay(
     file: Annotated[Path, typer.Argument(help="A log of any of python-can's formats.")],
-    interface: Interface = BUILTIN,
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     bitrate: Bitrate = None,
     speed: Annotated[
         float, typer.Option(help="2: twice as fast as recorded; inf: as fast as the bus takes them.")
@@ -140,12 +145,12 @@ def replay(
         from rds.bus.replay import replay as replay_log
         from rds.bus.selection import Selection
 
-        channel = _channel(interface, channel)
+        place = chosen_bus(interface, channel, experiment)
         log = LogFile(file)
         selection = Selection(identifiers or ())
         with (
-            _command_of(interface, channel, with_commands),
-            _opener(interface, channel, bitrate, "replay")() as bus,
+            _command_of(place, with_commands),
+            _opener(place, bitrate, "replay")() as bus,
             _quiet_log(False),
             until_ctrl_c() as stop,
             _counter("frames sent") as show,
@@ -175,8 +180,9 @@ def replay(
 
 @app.command("serve-socketcand")
 def serve_socketcand(
-    interface: Interface = BUILTIN,
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     bitrate: Bitrate = None,
     host: Annotated[str, typer.Option(help="Loopback address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="TCP port; 0 takes a free one.")] = 29536,
@@ -186,55 +192,53 @@ def serve_socketcand(
     with refusals():
         from rds.bus.socketcand import Server
 
-        channel = _channel(interface, channel)
-        opener = _opener(interface, channel, bitrate, "socketcand", errors=True)
-        name = channel or interface  # what clients open
+        place = chosen_bus(interface, channel, experiment)
+        opener = _opener(place, bitrate, "socketcand", errors=True)
+        name = place.interface if place.channel in (None, "") else str(place.channel)  # what clients open
         with (
             _quiet_log(False),
             until_ctrl_c() as stop,
-            _command_of(interface, channel, with_commands),
+            _command_of(place, with_commands),
             Server(opener, name, host=host, port=port, with_commands=with_commands) as server,
         ):
-            _say(f"{_name(interface, channel)} on {server.address[0]} port {server.address[1]}; Ctrl-C ends")
+            _say(f"{place.name} on {server.address[0]} port {server.address[1]}; Ctrl-C ends")
             while server.alive() and not stop.wait(0.2):
                 pass
             alive = server.alive()
     raise typer.Exit(0 if alive else 1)
 
 
-def _channel(interface: str, channel: str | None) -> str | None:
-    return DEMO if channel is None and interface == BUILTIN else channel
-
-
-def _opener(interface: str, channel: str | None, bitrate: int | None, node: str, errors: bool = False) -> Any:
+def _opener(place: ChosenBus, bitrate: int | None, node: str, errors: bool = False) -> Any:
     """Opens the bus; on the built-in one as `node`, and with `errors` hearing of its controller's errors."""
     from rds.bus.link import open_bus
 
-    options: dict[str, Any] = {} if bitrate is None else {"bitrate": bitrate}
-    if interface == BUILTIN and errors:
+    options = place.options | ({} if bitrate is None else {"bitrate": bitrate})
+    if place.interface == BUILTIN and errors:
         options["error_frames"] = True
-    return partial(open_bus, interface, channel, node=node, **options)
+    return partial(open_bus, place.interface, place.channel, node=node, **options)
 
 
 def _timing(opener: Any) -> int:
     """The bit rate of a channel of the built-in bus, bit/s; 0 if it has no bit timing."""
     with opener() as bus:
-        return bus.bitrate
+        return int(bus.bitrate)
 
 
-def _name(interface: str, channel: str | None) -> str:
-    from rds.bus.link import bus_name
+def _bits(said: Any) -> int:
+    """A bit rate of a [bus] table, bit/s; 0 where it is none, which the interface refuses when it is opened."""
+    try:
+        return max(int(said), 0)
+    except (TypeError, ValueError):
+        return 0
 
-    return bus_name(interface, channel)
 
-
-def _command_of(interface: str, channel: str | None, wanted: bool) -> Any:
+def _command_of(place: ChosenBus, wanted: bool) -> Any:
     """Holds the command of a channel of the built-in bus, so that no run commands the machine at the same time."""
-    if not wanted or interface != BUILTIN:
+    if not wanted or place.interface != BUILTIN:
         return nullcontext()
     from rds.bus.command import Command
 
-    return Command(str(channel))
+    return Command(str(place.channel))
 
 
 @contextmanager

@@ -18,22 +18,6 @@ from typing import Annotated, Any
 import typer
 
 Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
-Interface = Annotated[str, typer.Option(help="python-can interface.")]
-Channel = Annotated[
-    str | None, typer.Option("--channel", "-c", help="Channel of the bus; on the built-in one by default mini-cnc.")
-]
-
-Experiment = Annotated[Path | None, typer.Option(help="An experiment's TOML file, for its \\[bus].")]
-
-
-def bus_table_of(experiment: Path | None) -> dict[str, Any]:
-    """The [bus] table of an experiment; empty for the built-in bus. InputError for one that will not do."""
-    if experiment is None:
-        return {}
-    from rds.core.words import Words
-    from rds.experiment.resolve import bus_table
-
-    return bus_table(Words.read(experiment), experiment.parent)
 
 
 @contextmanager

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.commands.common import Experiment, Json, bus_table_of, ends_as_ctrl_c, print_json, refusals
+from rds.commands.buses import Channel, Experiment, Interface, Machine, bus_table_of, machine_of
+from rds.commands.common import Json, ends_as_ctrl_c, print_json, refusals
 
 if TYPE_CHECKING:
     from rds.session.jog import Jog
@@ -32,9 +33,9 @@ def jog(
         typer.Option(help="mm/s or degrees/s, by default 5, or the fastest; a spindle's in rev/min, - turns it back."),
     ] = None,
     seconds: Annotated[float | None, typer.Option("--for", help="How long a spindle turns, s.")] = None,
-    machine: Annotated[str, typer.Option(help="A machine's name, or the path of its TOML file.")] = "mini-cnc",
-    interface: Annotated[str | None, typer.Option(help="python-can interface; by default rds, the built-in.")] = None,
-    channel: Annotated[str | None, typer.Option("--channel", "-c", help="By default the machine's name.")] = None,
+    machine: Machine = None,
+    interface: Interface = None,
+    channel: Channel = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
@@ -44,10 +45,10 @@ def jog(
         from rds.session.jog import Jog
         from rds.session.session import Session
 
-        given = {"interface": interface, "channel": channel}
-        bus = bus_table_of(experiment) | {key: value for key, value in given.items() if value is not None}
+        bus = bus_table_of(experiment, interface, channel)
         with tempfile.TemporaryDirectory(prefix="rds-jog-") as folder, ends_as_ctrl_c():
-            hand = Jog(Session(Path(folder), machine, bus))
+            hand = Jog(Session(Path(folder), machine or machine_of(experiment), bus))
+            hand.check(axis)
             ways = {"--by": by, "--to": to, "--find-home": find_home, "--for": seconds}
             named = [way for way, value in ways.items() if value is not None]
             allowed = ["--for"] if axis in hand.spindles else ["--by", "--to", "--find-home"]

@@ -11,28 +11,14 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.commands.common import Channel, Interface, Json, ends_as_ctrl_c, print_json, progress_bars, refusals
+from rds.commands.buses import Channel, Experiment, Interface, chosen_bus
+from rds.commands.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals
 
 module_app = typer.Typer(
     no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
 )
 
-
-@contextmanager
-def bus_of(interface: str, channel: str | None) -> Iterator[Any]:
-    """An open bus, closed at the end. The built-in bus's channel is by default the mini CNC's."""
-    from rds.bus.link import open_bus
-
-    bus = open_bus(interface, channel_of(interface, channel))
-    try:
-        yield bus
-    finally:
-        bus.shutdown()
-
-
-def channel_of(interface: str, channel: str | None) -> str | None:
-    """The channel that was asked for, else the mini CNC's on the built-in bus."""
-    return channel if channel is not None or interface != "rds" else "mini-cnc"
+Place = tuple[str | None, str | None, Path | None]  # --interface, --channel, --experiment
 
 
 def scan(
@@ -48,8 +34,9 @@ def scan(
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="With --watch: end after so long.")] = None,
     force: Annotated[bool, typer.Option("--force", help="With --events: overwrite the file.")] = False,
-    interface: Interface = "rds",
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """List the modules on a bus: number, type, dialect, version, state. Numbers used twice are refused."""
@@ -57,20 +44,21 @@ def scan(
         _check_watch(watching, events=events, modules=modules, seconds=seconds, force=force or None)
         if force and events is None:
             raise _refused("--force overwrites the file of --events, which is not given")
+        place = chosen_bus(interface, channel, experiment)
         if watching:
             from rds.commands.watch import watch
 
-            with bus_of(interface, channel) as bus:
+            with place.opened() as bus:
                 watch(bus, json, events, modules, seconds, force)
             return
         from rds.bus.scan import scan_all
 
-        rows = scan_all(interface, channel_of(interface, channel))
+        rows = scan_all(place.interface, place.channel, **place.options)
     if json:
-        print_json({"channel": channel_of(interface, channel), "interface": interface, "modules": rows})
+        print_json({"channel": place.channel, "interface": place.interface, "modules": rows})
         return
     if not rows:
-        typer.echo(f"no module answers on {interface} channel {channel_of(interface, channel)}; is a machine served?")
+        typer.echo(f"no module answers on {place.name}; is a machine served, or switched on?")
         return
     from rds.console import show_table
 
@@ -100,17 +88,21 @@ def module(
 
 
 @contextmanager
-def _module(context: typer.Context, interface: str, channel: str | None) -> Iterator[Any]:
+def _module(context: typer.Context, place: Place) -> Iterator[Any]:
     from rds.bus.oacs.remote import Module
 
-    with refusals(), bus_of(interface, channel) as bus:
-        yield Module(bus, context.obj)
+    with refusals():
+        chosen = chosen_bus(*place)
+        if chosen.dialect == "cia402":
+            raise _refused(f'[bus] of {place[2]} says dialect = "cia402": drives are moved and homed by `rds jog`')
+        with chosen.opened() as bus:
+            yield Module(bus, context.obj)
 
 
 @contextmanager
-def _moving(context: typer.Context, interface: str, channel: str | None) -> Iterator[Any]:
+def _moving(context: typer.Context, place: Place) -> Iterator[Any]:
     """A module that moves: Ctrl-C, a polite kill and a closed terminal stop it."""
-    with ends_as_ctrl_c(), _module(context, interface, channel) as module:
+    with ends_as_ctrl_c(), _module(context, place) as module:
         try:
             yield module
         except KeyboardInterrupt:
@@ -119,9 +111,15 @@ def _moving(context: typer.Context, interface: str, channel: str | None) -> Iter
 
 
 @module_app.command()
-def info(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+def info(
+    context: typer.Context,
+    interface: Interface = None,
+    channel: Channel = None,
+    experiment: Experiment = None,
+    json: Json = False,
+) -> None:
     """Download what the module says of itself, and its tuning."""
-    with _module(context, interface, channel) as module:
+    with _module(context, (interface, channel, experiment)) as module:
         found = module.info().as_dict()
     if json:
         print_json(found)
@@ -139,12 +137,13 @@ def tune(
     from_step: Annotated[
         Path | None, typer.Option(help="Gains by Ziegler and Nichols from a recorded step (rds module ID step).")
     ] = None,
-    interface: Interface = "rds",
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Select PI or PID and set gains and limits; without options, show what is in force."""
-    with _module(context, interface, channel) as module:
+    with _module(context, (interface, channel, experiment)) as module:
         parameters = _pairs(set_ or ())
         if from_step is not None:
             parameters = _gains(from_step, controller or "PID") | parameters
@@ -197,8 +196,9 @@ def move(
     context: typer.Context,
     by: Annotated[float | None, typer.Option(help="Distance, mm or degrees, positive clockwise.")] = None,
     to: Annotated[float | None, typer.Option(help="Point, mm or degrees.")] = None,
-    interface: Interface = "rds",
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Move by a distance or to a point, and say where it stands then."""
@@ -206,7 +206,9 @@ def move(
         with refusals():
             given = "neither is given" if by is None else "both are given"
             raise _refused(f"{given}: move by a distance with --by, or to a point with --to, as in --by 5")
-    _moved(context, interface, channel, json, lambda module, show: module.move(by=by, to=to, progress=show))
+    _moved(
+        context, (interface, channel, experiment), json, lambda module, show: module.move(by=by, to=to, progress=show)
+    )
 
 
 @module_app.command(context_settings={"ignore_unknown_options": True})  # or -1 would be taken for an option
@@ -215,22 +217,29 @@ def jog(
     direction: Annotated[int, typer.Argument(help="1 clockwise, -1 counter-clockwise.")],
     seconds: Annotated[float, typer.Option(help="How long, s.")] = 0.5,
     duty: Annotated[float, typer.Option(help="Share of the supply voltage, up to 1.")] = 1.0,
-    interface: Interface = "rds",
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Run for a time, a tool too; it also ends if this command is killed."""
-    _moved(context, interface, channel, json, lambda module, show: module.jog(direction, seconds, duty))
+    _moved(context, (interface, channel, experiment), json, lambda module, show: module.jog(direction, seconds, duty))
 
 
 @module_app.command()
-def home(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+def home(
+    context: typer.Context,
+    interface: Interface = None,
+    channel: Channel = None,
+    experiment: Experiment = None,
+    json: Json = False,
+) -> None:
     """Find the zero."""
-    _moved(context, interface, channel, json, lambda module, show: module.home(progress=show))
+    _moved(context, (interface, channel, experiment), json, lambda module, show: module.home(progress=show))
 
 
-def _moved(context: typer.Context, interface: str, channel: str | None, json: bool, act: Any) -> None:
-    with _moving(context, interface, channel) as module:
+def _moved(context: typer.Context, place: Place, json: bool, act: Any) -> None:
+    with _moving(context, place) as module:
         unit = module.description.unit
         with _position(f"module {context.obj}", unit) as show:
             reached = act(module, show)
@@ -258,9 +267,15 @@ def _position(name: str, unit: str) -> Iterator[Any]:
 
 
 @module_app.command()
-def stop(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+def stop(
+    context: typer.Context,
+    interface: Interface = None,
+    channel: Channel = None,
+    experiment: Experiment = None,
+    json: Json = False,
+) -> None:
     """Zero volts now."""
-    with _module(context, interface, channel) as module:
+    with _module(context, (interface, channel, experiment)) as module:
         module.stop()
     if json:
         print_json({"stopped": context.obj})
@@ -269,9 +284,15 @@ def stop(context: typer.Context, interface: Interface = "rds", channel: Channel 
 
 
 @module_app.command()
-def reset(context: typer.Context, interface: Interface = "rds", channel: Channel = None, json: Json = False) -> None:
+def reset(
+    context: typer.Context,
+    interface: Interface = None,
+    channel: Channel = None,
+    experiment: Experiment = None,
+    json: Json = False,
+) -> None:
     """Release the latch of the emergency stop."""
-    with _module(context, interface, channel) as module:
+    with _module(context, (interface, channel, experiment)) as module:
         module.reset_emergency()
     if json:
         print_json({"reset": context.obj})
@@ -293,12 +314,13 @@ def step(
         typer.Option("--out", "-o", help="Folder for the record and its plot; default: a new one, step-1..."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what is in the folder of --out.")] = False,
-    interface: Interface = "rds",
+    interface: Interface = None,
     channel: Channel = None,
+    experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Step the set point, record the response and plot it."""
-    with _moving(context, interface, channel) as module, progress_bars() as bar:
+    with _moving(context, (interface, channel, experiment)) as module, progress_bars() as bar:
         folder = folder_for(out, force)
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.bus.bus_settings import BITRATES, DATA_BITRATES
+from rds.bus.bus_settings import BITRATES, DATA_BITRATES, OUR_WORDS
 from rds.bus.dialects import DEFAULT, dialect_names
 from rds.bus.fault_file import read_faults
 from rds.core.clock import LatePolicy
@@ -84,10 +84,16 @@ def _samples(words: Words, T: float) -> int:
     return samples
 
 
-def _machine(words: Words, folder: Path) -> Machine:
+def machine_name(words: Words, folder: Path) -> str:
+    """The machine's name, or the path of its file, which an experiment names as seen from its own folder."""
     name = words.text("machine", "mini-cnc") or ""
+    return str(folder / name) if name.endswith(".toml") else name
+
+
+def _machine(words: Words, folder: Path) -> Machine:
+    name = machine_name(words, folder)
     try:
-        return load_machine(str(folder / name) if name.endswith(".toml") else name)
+        return load_machine(name)
     except InputError as error:
         raise error if error.where else InputError(str(error), words.place("machine")) from error
 
@@ -275,6 +281,8 @@ def bus_table(words: Words, folder: Path) -> dict[str, Any]:
         raise table.fault("faults", "can be injected on the built-in bus only; remove it, or the interface")
     from can.interfaces import VALID_INTERFACES
 
+    if ours := sorted(OUR_WORDS & table.table.keys()):
+        raise table.fault(ours[0], f"cannot be said: {ours[0]} is no option of a bus, but a word of our own; remove it")
     table.choice("interface", "", sorted(VALID_INTERFACES))
     return dict(table.table)
 

@@ -9,7 +9,7 @@ import ipywidgets as widgets
 
 from rds.core.errors import RdsError
 from rds.panels.hold import HoldButtons
-from rds.panels.kit.button import button, follow
+from rds.panels.kit.button import attempt, button, follow
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
@@ -74,10 +74,7 @@ class JogView:
         self._set_way()
         self._show()
         if not rows:
-            self.notice.say(
-                "nothing of this machine can be jogged: it has no spindle, and no axis with limits or a model with K",
-                "error",
-            )
+            attempt("jogging", jog.check, self.notice)
         shell.ticker.add(self._show)
 
     def take(self) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from rds.bus.bus_settings import OUR_WORDS
 from rds.bus.link import BUILTIN, bus_name
 from rds.core.errors import InputError, MachineError
 from rds.machines import Machine, load_machine
@@ -30,7 +31,6 @@ HOMING = {  # methods of object 0x6098 that every drive of ours has
     "34": "34: next index pulse, positive way",
     "37": "37: here",
 }
-_OURS = {"machine", "axes", "bus", "sample_period", "dry_run", "timeout", "node", "first"}  # words of the drivers
 _STANDS = 0.01  # of its highest speed: a spindle that is slower stands
 _STARTS_IN = 15.0  # s at most
 _ENDED = "the loop that jogs has ended; take the machine again"
@@ -94,22 +94,28 @@ class Jog:
         """Whether the modules have a homing of their own, as drives do."""
         return self.ready and self.dialect == "cia402"
 
-    def begin(self) -> Task[None]:
-        """Take the machine, and hold its axes where they are. InputError where it is in use or cannot be jogged."""
-        if not self.axes and not self.spindles:
+    def check(self, name: str | None = None) -> None:
+        """InputError where nothing can be jogged, or no axis and no spindle has this name."""
+        there = [*self.axes, *self.spindles]
+        if not there:
             raise InputError(
                 "nothing of this machine can be jogged: it has no spindle, and no axis with limits or a model with K"
             )
-        self.session.take_machine("jogging", self)
-        self._taking = self.session.work("taking the machine", self._begin)
+        if name not in (None, *there):
+            raise InputError(f"there is nothing called {name!r} to jog; there are {', '.join(there)}")
+
+    def begin(self) -> Task[None]:
+        """Take the machine, and hold its axes where they are. InputError where it is in use or cannot be jogged."""
+        self.check()
+        self._taking = self.session.work_on_machine(self, "taking the machine", self._begin, held_for="jogging")
         return self._taking
 
     def _begin(self, task: Task[None]) -> None:
         try:
             self.positions, self.speeds, self.left_out, self.homed, self.error = {}, {}, {}, set(), ""
             bus = dict(self.session.bus)
-            if ours := sorted(_OURS & bus.keys()):
-                raise InputError(f"[bus] {ours[0]} is no option of a bus, but what jogging sets itself; remove it")
+            if ours := sorted(OUR_WORDS & bus.keys()):
+                raise InputError(f"[bus] {ours[0]} is no option of a bus, but a word of our own; remove it")
             if "faults" in bus:
                 raise InputError("[bus] faults are injected in runs; take them out of the table to jog")
             if "cia402" in bus and bus.get("dialect") != "cia402":
@@ -262,9 +268,9 @@ class Jog:
 
         InputError for a speed beyond the spindle's own, and while an axis is homed.
         """
+        self.check(spindle)
         if spindle not in self.spindles:
-            names = ", ".join(self.spindles) or "none"
-            raise InputError(f"there is no spindle {spindle!r} to turn; there are: {names}")
+            raise InputError(f"{spindle} is an axis, which is moved, not turned")
         if spindle in self.left_out:
             raise InputError(f"{spindle} cannot be jogged: {self.left_out[spindle]}")
         if self.homing:
@@ -281,8 +287,9 @@ class Jog:
             self._order(turn=spindle, speed=0.0)
 
     def _axis(self, name: str) -> JogAxis:
-        if name not in self.axes:
-            raise InputError(f"there is no axis {name!r} to jog; there are {', '.join(self.axes)}")
+        self.check(name)
+        if name in self.spindles:
+            raise InputError(f"{name} is a spindle, which is turned, not moved")
         if name in self.left_out:
             raise InputError(f"{name} cannot be jogged: {self.left_out[name]}")
         return self.axes[name]

@@ -169,10 +169,18 @@ class Session:
             self._claim, self.machine_user = claim, user
 
     def work_on_machine(
-        self, user: Any, title: str, work: Callable[[Task[T]], T], on_stop: Callable[[], None] | None = None
+        self,
+        user: Any,
+        title: str,
+        work: Callable[[Task[T]], T],
+        on_stop: Callable[[], None] | None = None,
+        held_for: str | None = None,
     ) -> Task[T]:
-        """Take the machine for `user` and begin; the work itself gives it back. InputError if it is in use."""
-        self.take_machine(title, user)
+        """Take the machine for `user` and begin; the work itself gives it back. InputError if it is in use.
+
+        Other pages are told `held_for`, by default `title`.
+        """
+        self.take_machine(held_for or title, user)
         try:
             return self.work(title, work, on_stop)
         except BaseException:  # there is no thread to be had

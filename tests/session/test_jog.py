@@ -92,6 +92,18 @@ def test_who_is_stopped_while_taking_the_machine_does_not_have_it_after_all(alon
     assert jog.session.machine_user is None and jog._loop is None and jog._server is None
 
 
+def test_the_machine_is_given_back_where_no_thread_is_to_be_had(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_left(*_: object) -> None:
+        raise RuntimeError("can't start new thread")
+
+    jog = Jog(Session(alone))
+    monkeypatch.setattr("rds.session.session.Task.start", none_left)
+    with pytest.raises(RuntimeError):
+        jog.begin()
+    assert jog.session.machine_user is None
+    Session(alone).take_machine("something else", object())
+
+
 def test_a_loop_that_cannot_read_an_order_lets_the_machine_go(jog: Jog) -> None:
     assert jog._loop is not None and jog._loop.stdin is not None
     jog._loop.stdin.write('{"hold": "Q", "direction": 1, "speed": 1}\n')
@@ -177,6 +189,7 @@ def test_an_axis_is_moved_from_the_command_line_as_from_the_panel(alone: Path) -
         (["spindle", "--for", "1"], "say how fast it shall turn"),
         (["X", "--find-home", "17", "--speed", "1"], "a drive homes at speeds of its own"),
         (["X", "--to", "999"], "would leave its travel"),
+        (["Q", "--by", "1"], "there is nothing called 'Q' to jog; there are X, Y, Z, spindle"),
     ):
         refused = runner.invoke(app, ["jog", *words, "--json"])
         assert refused.exit_code == 2 and why in refused.stderr and not refused.stdout

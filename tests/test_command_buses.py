@@ -1,0 +1,114 @@
+"""Commands on a bus of one's own: what its [bus] table says reaches them, the emergency stop above all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+from typer.testing import CliRunner
+
+import rds.bus.link
+from rds.cli import app
+from rds.commands.buses import ChosenBus, bus_table_of, chosen_bus, machine_of
+from rds.core.errors import InputError
+
+ADAPTER = '[bus]\ninterface = "virtual"\nchannel = 0\nbitrate = 250000\n'
+SECONDS = ["--seconds", "0.1"]
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
+    """With what each bus was opened; the real ones of this test have no bit rate."""
+    calls: list[dict[str, Any]] = []
+    real = can.Bus
+
+    def bus(**options: Any) -> Any:
+        calls.append(options)
+        return real(**{key: value for key, value in options.items() if key != "bitrate"})
+
+    monkeypatch.setattr(rds.bus.link.can, "Bus", bus)
+    yield calls
+
+
+def experiment(folder: Path, text: str) -> Path:
+    """A file with this text, in a folder of its own."""
+    path = folder / "experiment.toml"
+    path.write_text(text)
+    return path
+
+
+def told(opened: list[dict[str, Any]]) -> set[tuple[Any, ...]]:
+    """Interface, channel and bit rate of each bus that was opened."""
+    return {(call["interface"], call["channel"], call.get("bitrate")) for call in opened}
+
+
+@pytest.mark.parametrize(
+    "words, code",
+    [
+        (["estop"], 1),  # nobody is there to acknowledge it
+        (["scan"], 0),
+        (["module", "4", "stop"], 2),
+        (["bus", "record", "log.asc", *SECONDS], 0),
+    ],
+)
+def test_the_bit_rate_of_an_adapter_reaches_the_command(
+    words: list[str], code: int, opened: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("rds.bus.estop.drives.cut", lambda bus: {})  # it asks 127 nodes
+    done = CliRunner().invoke(app, [*words, "--experiment", str(experiment(tmp_path, ADAPTER))])
+    assert done.exit_code == code, done.output
+    assert told(opened) == {("virtual", 0, 250_000)}
+
+
+def test_a_monitor_reckons_the_load_by_the_bit_rate_of_the_table(opened: list[Any], tmp_path: Path) -> None:
+    file = str(experiment(tmp_path, ADAPTER))
+    done = CliRunner().invoke(app, ["bus", "monitor", *SECONDS, "--json", "--experiment", file])
+    assert '"bitrate": 250000' in done.stdout and told(opened) == {("virtual", 0, 250_000)}
+
+
+def test_the_built_in_bus_is_joined_on_the_channel_of_the_experiment_s_machine(tmp_path: Path) -> None:
+    """`rds estop` for an experiment on another machine went to the mini CNC's channel, and stopped nothing."""
+    timed = experiment(tmp_path, 'machine = "mrmt-oacs"\n[bus]\nbitrate = 500000\n')
+    assert chosen_bus(None, None, timed) == ChosenBus("rds", "mrmt-oacs")
+    assert chosen_bus(None, "bench", timed) == ChosenBus("rds", "bench")
+    assert chosen_bus(None, None, None) == ChosenBus("rds", "mini-cnc")
+    assert (machine_of(timed), machine_of(None)) == ("mrmt-oacs", "mini-cnc")
+    own = experiment(tmp_path, 'machine = "own.toml"\n')
+    assert machine_of(own) == str(tmp_path / "own.toml")
+
+
+def test_an_option_goes_before_the_table_and_another_interface_is_refused(tmp_path: Path) -> None:
+    file = experiment(tmp_path, ADAPTER)
+    assert bus_table_of(file, "virtual", "1") == {"interface": "virtual", "channel": "1", "bitrate": 250_000}
+    with pytest.raises(InputError, match=r"--interface slcan, and \[bus\] of .* is for virtual"):
+        bus_table_of(file, "slcan")
+
+
+def test_what_a_command_sets_itself_is_no_option_of_a_bus(tmp_path: Path) -> None:
+    """`node` in the table was a traceback in a scan, `timeout` shortened it without a word."""
+    for word in ("node = 3", "timeout = 0.001", "mask = 1"):
+        file = experiment(tmp_path, ADAPTER + word + "\n")
+        refused = CliRunner().invoke(app, ["scan", "--experiment", str(file)])
+        assert refused.exit_code == 2 and "is no option of a bus" in refused.stderr and "line 5" in refused.stderr
+
+
+def test_drives_are_no_distributed_modules(tmp_path: Path) -> None:
+    file = str(experiment(tmp_path, ADAPTER + 'dialect = "cia402"\n'))
+    refused = CliRunner().invoke(app, ["module", "4", "info", "--experiment", file])
+    assert refused.exit_code == 2 and "drives are moved and homed by `rds jog`" in refused.stderr
+
+
+def test_a_machine_is_served_on_the_bus_and_in_the_dialect_of_the_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served: list[Any] = []
+    monkeypatch.setattr("rds.bus.serving.serve_machine", lambda *words, **options: served.append((words, options)))
+    file = str(experiment(tmp_path, ADAPTER + 'dialect = "oacs"\n'))
+    done = CliRunner().invoke(app, ["machine", "serve", "mrmt-oacs", "--experiment", file])
+    assert done.exit_code == 0, done.output
+    (words, options) = served[0]
+    assert words[1:4] == ("oacs", "virtual", 0) and options == {"bitrate": 250_000}
