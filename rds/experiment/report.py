@@ -11,6 +11,7 @@ from rds.experiment.experiment import Experiment
 from rds.experiment.folder import new_folder
 from rds.modes.host import Progress
 from rds.results import Result
+from rds.results.atomic import write_whole
 from rds.results.files import saved_files
 from rds.results.report import write_report
 
@@ -38,12 +39,19 @@ def save_with_report(result: Result, folder: Path, title: str, beside: Sequence[
 
     The tables are in `folder` already: the run has saved them there before anything else could go wrong.
     """
+    from rds.results.plots import overview
+
     files = saved_files(folder)
-    for axis in result.axes:
-        files[f"plot_{axis}"] = folder / f"{axis}.png"
-        result.plot(axis).savefig(files[f"plot_{axis}"])
+    drawn = {axis: overview(result, axis).png() for axis in result.axes}
+    for axis, picture in drawn.items():
+        files[f"plot_{axis}"] = write_whole(folder / f"{axis}.png", picture)
     files["report"] = write_report(
-        folder / "report.html", title, [result], files=[*beside, *files.values()], sections=_validations(result)
+        folder / "report.html",
+        title,
+        [result],
+        files=[*beside, *files.values()],
+        sections=_validations(result),
+        overviews=list(drawn.values()) if len(drawn) == 1 else (),  # several axes stand beside each other there
     )
     return files
 

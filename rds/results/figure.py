@@ -5,6 +5,8 @@ from __future__ import annotations
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
+from matplotlib.backend_bases import FigureCanvasBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -57,8 +59,14 @@ class Picture(Figure):
 
     def png(self) -> bytes:
         """The picture as PNG, 128 pixels per inch."""
-        stream = BytesIO()
-        self.savefig(stream, format="png", metadata={"Software": None})
+        stream, canvas = BytesIO(), self.canvas
+        if type(canvas) is not FigureCanvasBase or self.dpi != DPI:  # it is on a screen, which savefig puts aside
+            self.savefig(stream, format="png", metadata={"Software": None})
+            return stream.getvalue()
+        try:  # savefig would draw all of it twice, the first time for the layout, which a drawing begins with anyway
+            FigureCanvasAgg(self).print_png(stream, metadata={"Software": None})
+        finally:
+            self.set_canvas(canvas)
         return stream.getvalue()
 
     def _repr_png_(self) -> bytes:

@@ -7,7 +7,7 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 from urllib.parse import quote
 
 from rds.core.errors import InputError
@@ -17,9 +17,6 @@ from rds.results.late import total_time
 from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_units
 from rds.results.result import Result
 from rds.results.units import heading
-
-if TYPE_CHECKING:
-    from rds.results.figure import Picture
 
 # no script, nothing loaded from outside, even if a text from a student's file slipped through
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
@@ -33,16 +30,17 @@ def write_report(
     notes: Sequence[str] = (),
     files: Sequence[str | Path] = (),
     sections: Sequence[str] = (),
+    overviews: Sequence[bytes] = (),
 ) -> Path:
     """Write the report of `results`, one section each, to `path`; whole or not at all.
 
     `tables` are shown first, each {title, columns, rows, note}; `notes` are sentences under the title; `files` are
     linked by their way from the report. All text is escaped; `sections` are HTML, and stand as they are after the
-    tables. Raises InputError for a table that lacks its columns
-    or rows, no results, or a path that can't be written.
+    tables; `overviews` are the pictures (PNG) that `plots.overview` gives of the results, if they are drawn already.
+    Raises InputError for a table that lacks its columns or rows, no results, or a path that can't be written.
     """
     path = Path(path)
-    text = report(title, results, tables, notes, [_link(path, file) for file in files], sections)
+    text = report(title, results, tables, notes, [_link(path, file) for file in files], sections, overviews)
 
     def write(stream: BinaryIO) -> None:
         stream.write(text.encode("utf-8", "backslashreplace"))
@@ -58,11 +56,15 @@ def report(
     notes: Sequence[str] = (),
     files: Sequence[str] = (),
     sections: Sequence[str] = (),
+    overviews: Sequence[bytes] = (),
 ) -> str:
-    """The report as HTML text; `files` are relative paths, `sections` HTML."""
+    """The report as HTML text; `files` are relative paths, `sections` HTML, `overviews` PNG or none."""
+    from rds.results import plots
+
     if not results:
         raise InputError("there is nothing to report; give at least one result")
     labels = _labels(results)
+    overviews = overviews or [plots.overview(result).png() for result in results]
     parts = [
         f"<header><h1>{escape(title)}</h1>{_subtitle(results)}{html.notes_list(notes)}</header>",
         f"<section><h2>Runs</h2>{_runs(results, labels)}{_verdicts(results, labels)}</section>",
@@ -70,7 +72,7 @@ def report(
         *sections,
         f"<section><h2>Tracking and fit</h2>{_metrics(results, labels)}</section>",
         _together(results, labels),
-        *(_run_section(result, label) for result, label in zip(results, labels, strict=True)),
+        *(_run_section(*of_one) for of_one in zip(results, labels, overviews, strict=True)),
         _files(files),
     ]
     return page(title, "\n".join(filter(None, parts)))
@@ -157,15 +159,15 @@ def _together(results: Sequence[Result], labels: Sequence[str]) -> str:
         return ""
     from rds.results.plots_overlay import modes
 
-    return f"<section><h2>All runs over each other</h2>{_image(modes(results, labels), 'all runs')}</section>"
+    return f"<section><h2>All runs over each other</h2>{_image(modes(results, labels).png(), 'all runs')}</section>"
 
 
-def _run_section(result: Result, label: str) -> str:
-    from rds.results import plots, plots_timing
+def _run_section(result: Result, label: str, overview: bytes) -> str:
+    from rds.results import plots_timing
 
-    pictures = [_image(plots.overview(result), f"{label}: response, error and voltage")]
+    pictures = [_image(overview, f"{label}: response, error and voltage")]
     if total_time(result) is not None and len(result):
-        pictures.append(_image(plots_timing.timing(result), f"{label}: timing"))
+        pictures.append(_image(plots_timing.timing(result).png(), f"{label}: timing"))
     return (
         f"<section><h2>{escape(label.capitalize())}</h2>{''.join(pictures)}"
         f"{_environment(result)}{_timing(result)}{_details('Controller', result.meta.get('controller'))}"
@@ -200,8 +202,8 @@ def _details(title: str, values: Any) -> str:
     return f"<details><summary>{escape(title)}</summary>{shown}</details>"
 
 
-def _image(picture: Picture, text: str) -> str:
-    data = b64encode(picture.png()).decode("ascii")
+def _image(picture: bytes, text: str) -> str:
+    data = b64encode(picture).decode("ascii")
     return f'<img alt="{escape(text)}" src="data:image/png;base64,{data}">'
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,18 @@ def test_a_picture_is_labelled_and_not_cut_off(name: str, tmp_path: Any) -> None
             assert legend.get_window_extent().x1 <= picture.bbox.x1, "legend cut off"
             assert legend.get_window_extent().y1 <= picture.bbox.y1, "legend cut off"
     assert any("[" in axes.get_xlabel() for axes in picture.axes)
+
+
+def test_a_picture_is_drawn_once_and_as_matplotlib_saves_it(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    from matplotlib.axes import Axes
+
+    saved = BytesIO()
+    plots.response(result, "X").savefig(saved, format="png", metadata={"Software": None})
+    draw, calls = Axes.draw, []
+    monkeypatch.setattr(Axes, "draw", lambda self, renderer: calls.append(self) or draw(self, renderer))  # type: ignore[func-returns-value]
+    picture = plots.response(result, "X")
+    assert picture.png() == saved.getvalue()
+    assert calls == picture.axes
 
 
 def labels(picture: Picture) -> str:

@@ -11,7 +11,9 @@ import pytest
 from made_results import make_result
 
 from rds.core.errors import InputError
+from rds.experiment.report import save_with_report
 from rds.results import Result, write_report
+from rds.results.figure import Picture
 from rds.results.report import page
 
 HOSTILE = "<script>alert('x')</script>\"><img src=http://evil.example/x onerror=alert(1)>{title}"
@@ -45,6 +47,17 @@ def report(tmp_path: Path, results: list[Result], **more: object) -> tuple[str, 
     page = Page(text)
     assert not page.open
     return text, page
+
+
+def test_a_plot_that_is_drawn_is_the_reports_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    png, pictures = Picture.png, []
+    monkeypatch.setattr(Picture, "png", lambda self: pictures.append(png(self)) or pictures[-1])  # type: ignore[func-returns-value]
+    files = save_with_report(make_result("simulation", "X", seconds=0.5), tmp_path, "one axis")
+    assert pictures == [files["plot_X"].read_bytes()]
+    shown = Page(files["report"].read_text(encoding="utf-8"))
+    assert [attrs["src"] for tag, attrs in shown.tags if tag == "img"] == [
+        f"data:image/png;base64,{base64.b64encode(pictures[0]).decode()}"
+    ]
 
 
 def test_the_report_holds_runs_metrics_verdicts_tables_pictures_files(tmp_path: Path) -> None:
