@@ -34,7 +34,7 @@ ALLOWED: dict[str, set[str]] = {
     "modes": {"core", "interface", "runtime", "bus"},
     "results": {"core", "runtime"},  # see ONLY
     "reports": {"core", "results", "bus"},
-    "logs": {"core", "machines", "results", "bus", "motion"},  # see ONLY
+    "logs": {"core", "machines", "results", "bus", "motion", "spread"},  # see ONLY; files read in a process apart
     "identification": {
         *("core", "machines", "results", "models", "motion", "signals", "logs"),
         *("controllers", "checks"),  # what a model file is for: a design, a check

@@ -3,43 +3,45 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.logs.log import Finding
+from rds.logs.mat_parts import Part, parts_of
 from rds.logs.table import Column, Table, since_first
 from rds.logs.units import unit_of_name
 from rds.results.units import split_heading
 
-_MOST_COLUMNS = 1000  # of a matrix; a picture is no log
-
 
 def read_mat(path: Path) -> Table:
-    """The vectors of a MAT file (up to version 7.2) that have the length that most have; single numbers as constants.
+    """The vectors of a MAT file that have the length that most have; single numbers as constants.
 
     A matrix gives a column each: `data_1`, `data_2`, ...; a struct its fields: `data.position`. InputError where there
     are no vectors.
     """
-    from rds.results.mat_file import variables
-
     constants: dict[str, float] = {}
     vectors: dict[str, np.ndarray] = {}
     left_out: list[str] = []
-    for name, values in variables(path).items():
-        if not name.startswith("__"):
-            for part, array in _parts(name, values):
-                if array is None:
-                    left_out.append(part)
-                elif array.size == 1:
-                    constants[part] = float(array.item())
-                else:
-                    vectors[part] = array
+    objects: dict[str, list[str]] = {}  # names by class
+    for part in _parts(path):
+        if part.of_class:
+            objects.setdefault(part.of_class, []).append(part.name)
+        elif part.values is None:
+            left_out.append(part.name)
+        elif part.values.size == 1:
+            constants[part.name] = float(part.values.item())
+        else:
+            vectors[part.name] = part.values
+    unread = [
+        f"{', '.join(names)}: of MATLAB's class {of_class}, which only MATLAB can read; save its vectors instead, as "
+        f"in {_as_vectors(of_class, names[0])}"
+        for of_class, names in objects.items()
+    ]
     if not vectors:
-        raise InputError("it holds no vectors of numbers; save time, command and position as vectors", str(path))
+        advice = "; ".join(unread) or "save time, command and position as vectors"
+        raise InputError(f"it holds no vectors of numbers; {advice}", str(path))
     length = Counter(map(len, vectors.values())).most_common(1)[0][0]
     others = [f"{name} ({len(values)})" for name, values in vectors.items() if len(values) != length]
     findings = []
@@ -48,6 +50,7 @@ def read_mat(path: Path) -> Table:
         findings.append(Finding("columns", what))
     if left_out:
         findings.append(Finding("columns", f"left out, as they hold no real numbers: {', '.join(left_out)}"))
+    findings += [Finding("columns", f"left out {sentence}") for sentence in unread]
     columns = {
         name: Column(name, unit_of_name(name), values.astype(np.float64))
         for name, values in vectors.items()
@@ -56,22 +59,27 @@ def read_mat(path: Path) -> Table:
     return Table(path, "mat", columns, constants, tuple(findings))
 
 
-def _parts(name: str, values: Any) -> Iterator[tuple[str, np.ndarray | None]]:
-    if not isinstance(values, np.ndarray):  # a sparse matrix, an object of a class
-        yield name, None
-    elif values.dtype.names and values.size == 1:
-        for field in values.dtype.names:
-            yield from _parts(f"{name}.{field}", values.reshape(-1)[0][field])
-    elif values.dtype.kind not in "fiub" or values.size == 0:
-        yield name, None
-    elif values.size == max(values.shape):
-        yield name, values.reshape(-1)
-    elif values.ndim == 2 and min(values.shape) <= _MOST_COLUMNS:
-        tall = values if values.shape[0] > values.shape[1] else values.T
-        for i in range(tall.shape[1]):
-            yield f"{name}_{i + 1}", np.ascontiguousarray(tall[:, i])
-    else:
-        yield name, None
+def _parts(path: Path) -> list[Part]:
+    from rds.logs import hdf5_mat
+
+    if hdf5_mat.is_hdf5(path):
+        return hdf5_mat.parts(path)
+    from rds.results.mat_file import variables
+
+    return [
+        part for name, values in variables(path).items() if not name.startswith("__") for part in parts_of(name, values)
+    ]
+
+
+def _as_vectors(of_class: str, name: str) -> str:
+    """What to type in MATLAB."""
+    if of_class == "timeseries":
+        return f"t = {name}.Time; y = {name}.Data; save('log.mat', 't', 'y')"
+    if of_class == "timetable":
+        return f"t = seconds({name}.Time - {name}.Time(1)); y = {name}.(1); save('log.mat', 't', 'y')"
+    if of_class == "table":
+        return f"s = table2struct({name}, 'ToScalar', true); save('log.mat', 's')"
+    return "t = ...; y = ...; save('log.mat', 't', 'y')"
 
 
 def read_parquet(path: Path) -> Table:

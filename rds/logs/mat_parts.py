@@ -1,0 +1,60 @@
+"""What a variable of a MAT file holds: vectors of numbers, single numbers, or nothing that a log can have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+_MOST_COLUMNS = 1000  # of a matrix; a picture is no log
+_DEEPEST = 20  # structs in structs
+
+
+class Part(NamedTuple):
+    """A vector (one value: a constant) by its name. None where there are no real numbers; `of_class` is an object's."""
+
+    name: str
+    values: np.ndarray | None
+    of_class: str = ""
+
+
+def numbers(name: str, values: np.ndarray) -> Iterator[Part]:
+    """An array as vectors: a matrix gives a column each, `data_1`, `data_2`, ..."""
+    if values.dtype.kind not in "fiub" or values.size == 0:
+        yield Part(name, None)
+    elif values.size == max(values.shape, default=1):
+        yield Part(name, values.reshape(-1))
+    elif values.ndim == 2 and min(values.shape) <= _MOST_COLUMNS:
+        tall = values if values.shape[0] > values.shape[1] else values.T
+        for i in range(tall.shape[1]):
+            yield Part(f"{name}_{i + 1}", np.ascontiguousarray(tall[:, i]))
+    else:
+        yield Part(name, None)
+
+
+def parts_of(name: str, values: Any, depth: int = 0) -> Iterator[Part]:
+    """A variable as scipy gives it, structs taken apart: `run.time`."""
+    of_class = _class_of(values)
+    if of_class:
+        yield Part(name, None, of_class)
+    elif not isinstance(values, np.ndarray) or depth > _DEEPEST:  # a sparse matrix
+        yield Part(name, None)
+    elif values.dtype.names and values.size == 1:
+        for field in values.dtype.names:
+            yield from parts_of(f"{name}.{field}", values.reshape(-1)[0][field], depth + 1)
+    else:
+        yield from numbers(name, values)
+
+
+def _class_of(values: Any) -> str:
+    """The class of an object that MATLAB saved without saying how (a timetable, a timeseries); "" for others."""
+    from scipy.io.matlab import MatlabObject, MatlabOpaque
+
+    if isinstance(values, MatlabObject):
+        return str(values.classname)
+    if isinstance(values, MatlabOpaque) and values.size and "s2" in (values.dtype.names or ()):
+        name = values.reshape(-1)[0]["s2"]
+        text = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
+        return text[:60] if text.isprintable() else "unknown"
+    return ""
