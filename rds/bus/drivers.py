@@ -18,6 +18,7 @@ from rds.bus.frames import Answer, Kind, Status
 from rds.bus.identity import WAIT as LISTENING
 from rds.bus.identity import listen, refuse_clashes
 from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus, standard_filters
+from rds.bus.listening import frames_within
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Axis, Machine
 
@@ -413,11 +414,11 @@ def find_machine(
     bus = open_bus(interface, channel, sorted(names), node="scan", **options)
     try:
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), timeout)
-        deadline = time.monotonic() + timeout
-        while len(found) < len(names) and (left := deadline - time.monotonic()) > 0:
-            message = bus.recv(left)
-            if message is not None and message.arbitration_id in names:
+        for message in frames_within(bus, timeout):
+            if message.arbitration_id in names:
                 found.add(names[message.arbitration_id])
+                if len(found) == len(names):
+                    break
     except can.CanError as error:
         raise MachineError(f"bus {bus_name(interface, channel)} failed: {error}") from error
     finally:

@@ -10,6 +10,7 @@ import can
 from rds.bus import frames
 from rds.bus.cia402 import emergency as drives
 from rds.bus.frames import Status
+from rds.bus.listening import frames_within
 from rds.bus.oacs.host import estop as stop_oacs
 from rds.core.errors import MachineError
 
@@ -80,11 +81,9 @@ def reset_everything(bus: can.BusABC) -> list[int]:
 def _reports(bus: can.BusABC) -> dict[int, int]:
     """The status of every module that speaks within a tenth of a second; MachineError if the bus fails."""
     found: dict[int, int] = {}
-    deadline = time.monotonic() + _ANSWERS
     try:
-        while (left := deadline - time.monotonic()) > 0:
-            message = bus.recv(left)
-            if message is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+        for message in frames_within(bus, _ANSWERS):
+            if message.is_extended_id or message.is_error_frame or message.is_remote_frame:
                 continue
             node = message.arbitration_id - frames.ANSWER
             if node in frames.NODES and len(message.data) == 8:

@@ -6,7 +6,6 @@ collision. What else is heard meanwhile tells whether a host commands the bus al
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -14,6 +13,7 @@ import can
 
 from rds.bus import frames
 from rds.bus.frames import Identity
+from rds.bus.listening import frames_within
 from rds.core.errors import MachineError
 
 WAIT = 0.1  # s for all answers
@@ -37,10 +37,8 @@ def listen(bus: can.BusABC, wait: float = WAIT) -> Heard:
     found: set[Identity] = set()
     try:
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=frames.WHO), wait)
-        deadline = time.monotonic() + wait
-        while (left := deadline - time.monotonic()) > 0:
-            message = bus.recv(left)
-            if message is None or message.is_error_frame or message.is_remote_frame or not message.is_rx:
+        for message in frames_within(bus, wait):
+            if message.is_error_frame or message.is_remote_frame or not message.is_rx:
                 continue
             if not message.is_extended_id:
                 heard.commands += message.arbitration_id in _COMMANDS

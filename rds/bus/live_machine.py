@@ -6,12 +6,11 @@ with a module's identifier is taken for a position that was measured.
 
 from __future__ import annotations
 
-import time
-
 import can
 
 from rds.bus import frames
 from rds.bus.frames import Kind
+from rds.bus.listening import frames_within
 from rds.core.errors import InputError, MachineError
 
 LISTEN = 0.3  # s for modules to answer a call
@@ -51,11 +50,8 @@ def live_modules(bus: can.BusABC, listen: float = LISTEN) -> list[str]:
     found: set[tuple[str, int]] = set()
     try:
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), listen)
-        deadline = time.monotonic() + listen
-        while (left := deadline - time.monotonic()) > 0:
-            message = bus.recv(left)
-            if message is not None:
-                found |= _senders(message)
+        for message in frames_within(bus, listen):
+            found |= _senders(message)
     except (can.CanError, OSError) as error:
         raise MachineError(f"the bus failed: {error}") from error
     return [f"{what} {number}" for what, number in sorted(found)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -11,6 +10,7 @@ import can
 
 from rds.bus import frames
 from rds.bus.link import BUILTIN, open_bus
+from rds.bus.listening import frames_within
 from rds.core.errors import MachineError
 
 _WAIT = 0.2  # s for the answers to the cyclic call
@@ -65,10 +65,8 @@ def _cyclic(opened: Callable[[], can.BusABC], distributed: dict[int, Row]) -> li
         bus.send(can.Message(arbitration_id=frames.CALL, is_extended_id=False, data=b""), 0.5)
         answers = {frames.answer_identifier(node): node for node in frames.NODES}
         found: dict[int, Row] = {}
-        deadline = time.monotonic() + _WAIT
-        while (left := deadline - time.monotonic()) > 0:
-            message = bus.recv(left)
-            if message is None or message.is_extended_id or message.arbitration_id not in answers:
+        for message in frames_within(bus, _WAIT):
+            if message.is_extended_id or message.arbitration_id not in answers:
                 continue
             node = answers[message.arbitration_id]
             if node not in distributed:

@@ -67,8 +67,10 @@ def jog(hand: Hand, orders: Orders) -> None:
     due, report_at = time.monotonic(), 0.0
     while not orders.ended:
         if orders.homing and reference.rests:
-            _home(hand, orders)
+            homed = _home(hand, orders)
             reference = _introduce(hand, orders)
+            if homed:  # after where they are now: who waits for this word reads the position that came before it
+                _say({"homed": homed})
             due = time.monotonic()
         now = time.monotonic()
         measured = hand.read()
@@ -86,8 +88,8 @@ def jog(hand: Hand, orders: Orders) -> None:
             due -= left  # what is late is not made up for
 
 
-def _home(hand: Hand, orders: Orders) -> None:
-    """Let drives find home, as long as that is wanted."""
+def _home(hand: Hand, orders: Orders) -> list[str]:
+    """Let drives find home, as long as that is wanted; the axes that did."""
     methods = orders.homing
     places = dict(orders.places)
     report_at = 0.0
@@ -104,14 +106,17 @@ def _home(hand: Hand, orders: Orders) -> None:
     with contextlib.suppress(NotWanted):
         hand.home(methods, watch)
         orders.homed()
-        _say({"homed": list(methods)})
+        return list(methods)
+    return []
 
 
 def _introduce(hand: Hand, orders: Orders) -> Reference:
     """After a start: where the axes stand and are held, and their travel, which may be another one."""
-    reference = Reference(hand, hand.read())
+    measured = hand.read()
+    reference = Reference(hand, measured)
     orders.axes, orders.spindles, orders.places = dict(hand.axes), dict(hand.spindles), reference.places
     _say({"travel": {name: axis.travel for name, axis in hand.axes.items()}, "left_out": hand.left_out})
+    _report(measured, False)
     return reference
 
 

@@ -214,7 +214,9 @@ class Session:
         if stopped:
             text = f"emergency stop: {len(stopped)} modules are at zero volts and stay so until they are released"
         else:
-            text = "emergency stop sent; no module is on the bus, so nothing moves"
+            text = (
+                "emergency stop sent; no module is on the bus that acknowledges it. If something moves, cut the power"
+            )
         self.say(text, "warning")
         return text
 

@@ -167,5 +167,8 @@ def test_a_release_where_the_machine_has_ended_says_why_there_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))  # a built-in bus on which nobody is
-    said = Session(tmp_path).release_emergency_stop()
+    session = Session(tmp_path)
+    said = session.release_emergency_stop()
     assert said.startswith("no module is on the bus") and "a machine that a run or Jog starts ends with it" in said
+    said = session.emergency_stop()  # silence is no proof that nothing moves
+    assert "no module is on the bus that acknowledges it. If something moves, cut the power" in said

@@ -28,6 +28,7 @@ LOG = logging.getLogger(__name__)
 _SEND = 0.5  # s for a frame to be taken
 _LOOK = 0.02  # s between two looks at whether the library's receiving thread shall end
 _SEARCH = 0.5  # s for a drive to answer
+_ANSWERS_IN = 1.0  # s for one that was found to answer a request; computers stall for less
 _SECOND_ANSWER = 0.03  # s more for one that has the same node-ID
 _CHANGE = 2.0  # s for a drive to change its state or mode
 _LOST_AFTER = 3  # heartbeats that may be missing
@@ -220,7 +221,7 @@ def _load(network: canopen.Network, drive: DriveSettings) -> canopen.RemoteNode:
         node = network.add_node(drive.node, drive.eds)
     except Exception as error:  # the library raises whatever its parser stumbles over
         raise InputError(f"not a readable EDS: {error}", drive.eds) from error
-    node.sdo.RESPONSE_TIMEOUT = 0.5
+    node.sdo.RESPONSE_TIMEOUT = _ANSWERS_IN
     return node
 
 

@@ -11,6 +11,7 @@ import time
 import can
 
 from rds.bus.cia402.codes import DISABLE_VOLTAGE, State, state_of
+from rds.bus.listening import frames_within
 
 NODES = range(1, 128)
 _REQUEST, _ANSWER = 0x600, 0x580
@@ -36,8 +37,9 @@ def cut(bus: can.BusABC) -> dict[int, bool]:
                 bus.send(_frame(node, _CUT), 0.2)
         found |= set(_answers(bus, _CUT_DONE))
     off: dict[int, bool] = dict.fromkeys(found, False)
-    until = time.monotonic() + _RAMPS
-    while not all(off.values()) and time.monotonic() < until:
+    until, is_over = time.monotonic() + _RAMPS, False
+    while not all(off.values()) and not is_over:
+        is_over = time.monotonic() >= until  # then they are asked once more: this process may have stood still
         asked = [node for node, is_off in off.items() if not is_off]
         for node in asked:
             bus.send(_frame(node, _LOOK), 0.2)
@@ -50,14 +52,14 @@ def cut(bus: can.BusABC) -> dict[int, bool]:
 def _answers(bus: can.BusABC, begin: bytes, enough: int = len(NODES)) -> dict[int, bytes]:
     """The SDO answers of the next tenth of a second that begin so, by node-ID; `enough` of them end the wait."""
     found: dict[int, bytes] = {}
-    until = time.monotonic() + _ANSWERS
-    while len(found) < enough and (left := until - time.monotonic()) > 0:
-        message = bus.recv(left)
-        if message is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+    for message in frames_within(bus, _ANSWERS):
+        if message.is_extended_id or message.is_error_frame or message.is_remote_frame:
             continue
         node = message.arbitration_id - _ANSWER
         if node in NODES and bytes(message.data[:4]) == begin:
             found[node] = bytes(message.data)
+            if len(found) >= enough:
+                break
     return found
 
 

@@ -20,6 +20,7 @@ from rds.bus.link import BUILTIN, bus_name, open_bus
 from rds.core.errors import MachineError
 
 _WAIT = 0.3  # s for the devices to answer
+_ANSWERS_IN = 1.0  # s for one that was heard to answer a question: a busy computer's drive is no silent device
 _DRIVE = 402
 
 
@@ -89,7 +90,7 @@ def _quiet() -> Iterator[None]:
 
 def _ask(network: canopen.Network, number: int) -> Found:
     node = network.add_node(number, canopen.ObjectDictionary())
-    node.sdo.RESPONSE_TIMEOUT = 0.2
+    node.sdo.RESPONSE_TIMEOUT = _ANSWERS_IN
     try:
         kind = int.from_bytes(node.sdo.upload(0x1000, 0), "little")
     except SdoCommunicationError:  # every device has this object: nobody answers

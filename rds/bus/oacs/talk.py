@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import can
 
+from rds.bus.listening import frames_within
 from rds.bus.oacs import messages
 from rds.bus.oacs.messages import Decoded, Frame
 from rds.core.errors import MachineError
@@ -45,22 +46,31 @@ def hear(bus: can.BusABC, until: float) -> Heard | None:
             if left <= 0.0:
                 return None
             continue
-        if frame.is_error_frame or frame.is_remote_frame:
-            continue
-        if messages.kind_of(frame.arbitration_id, frame.is_extended_id) is None:
-            continue
-        try:
-            message = messages.decode(frame.arbitration_id, frame.data, frame.is_extended_id)
-        except MachineError:
-            continue
-        return Heard(message, frame.timestamp, time.monotonic())
+        if (heard := _heard(frame)) is not None:
+            return heard
 
 
 def hear_all(bus: can.BusABC, seconds: float) -> Iterator[Heard]:
-    """Every message of the next `seconds`."""
-    until = time.monotonic() + seconds
-    while (heard := hear(bus, until)) is not None:
-        yield heard
+    """Every message of the next `seconds`. MachineError: bus failed."""
+    try:
+        for frame in frames_within(bus, seconds):
+            if (heard := _heard(frame)) is not None:
+                yield heard
+    except (can.CanError, OSError) as error:
+        raise broken(bus, error) from error
+
+
+def _heard(frame: can.Message) -> Heard | None:
+    """The message that a frame is; None if it is somebody else's, or makes no sense."""
+    if frame.is_error_frame or frame.is_remote_frame:
+        return None
+    if messages.kind_of(frame.arbitration_id, frame.is_extended_id) is None:
+        return None
+    try:
+        message = messages.decode(frame.arbitration_id, frame.data, frame.is_extended_id)
+    except MachineError:
+        return None
+    return Heard(message, frame.timestamp, time.monotonic())
 
 
 def broken(bus: can.BusABC, error: Exception) -> MachineError:
