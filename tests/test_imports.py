@@ -161,6 +161,11 @@ def test_importing_rds_is_light() -> None:
     assert len(new) < 25, sorted(new)
 
 
+def test_the_recorder_of_a_run_does_without_numpy() -> None:
+    """It is a process more of every real-time run, and starts the target."""
+    assert not {*HEAVY, "numpy"} & loaded("import rds.runtime.recorder")
+
+
 @pytest.mark.parametrize(
     "code",
     [

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
-
-import numpy as np
+from math import ceil
+from typing import TYPE_CHECKING, NamedTuple
 
 from rds.runtime.desk import Channel
+
+if TYPE_CHECKING:
+    import numpy as np
 
 OVERRIDE, HOLD, RESUME, HOME, OPTIONAL_STOP = "override", "hold", "resume", "home", "optional_stop"
 COLUMNS = {"program_line": "", "program_sample": "", "program_override": "", "program_state": ""}
@@ -56,7 +58,7 @@ class Program:
 
 def dwell_samples(seconds: float, T: float) -> int:
     """A dwell lasts for at least so long."""
-    return int(np.ceil(seconds / T - 1e-9))
+    return ceil(seconds / T - 1e-9)
 
 
 def program_channels() -> list[Channel]:
