@@ -227,7 +227,9 @@ def _clocks(
 ) -> tuple[Clock, ...]:
     """Where each quantity's times come from, and how sure they are where nobody says: a step of the stamps' digits."""
     where = mapping.time.source or (
-        "times of receipt by the recorder of the bus" if table.format == "can" else f"{mapping.time.column or 'rate'}"
+        "times of receipt by the recorder of the bus"
+        if table.format == "can"
+        else f"{mapping.time.column or ('times of the rasters' if table.own_times else 'rate')}"
     )
     jitter = next((f.what for f in base.findings if f.kind == "jitter"), "")
     stated = mapping.time.uncertainty

@@ -16,15 +16,14 @@ _LATE = 1e7  # s: times beyond are dates, of which a float64 in s keeps 0.1 µs 
 
 def column_time(table: Table, about: TimeMap) -> np.ndarray:
     """The time of each row in s. InputError where nothing tells it, or its unit."""
-    if table.format == "can" and (about.rate is not None or about.column is not None):
+    if table.own_times and (about.rate is not None or about.column is not None):
         given = f"rate = {about.rate:g}" if about.rate is not None else f"column = {about.column!r}"
-        raise InputError(
-            f"{table.path.name} is a bus log, whose times are those of receipt; leave {given} out", about.place
-        )
+        own = "is a bus log, whose times are those of receipt" if table.format == "can" else "has times for each signal"
+        raise InputError(f"{table.path.name} {own}; leave {given} out", about.place)
     if about.rate is not None:
         return np.arange(table.rows) / about.rate
     if about.column is None:
-        if table.format == "can":
+        if table.own_times:
             return np.empty(0)  # each signal has its own
         raise InputError(
             'nothing tells the time of the rows; give column = "..." and unit under [time], or rate (Hz) where they '

@@ -48,7 +48,7 @@ def guess(table: Table) -> Guess:
     if problem:
         spoiled = _spoiled(table, "time")
         return Guess(None, spoiled or problem, is_log=not spoiled and problem[: len(_NO_LOG)] != _NO_LOG)
-    said = ["each signal has its own time of receipt"]
+    said = ["each signal has its own times"]
     if time:
         said = [f"time is {time!r} [{table.columns[time].unit}]"]
     groups = _groups(table, time)
@@ -79,7 +79,7 @@ def draft(table: Table) -> str:
     named = next((c.name for c in columns if _role(c.name) == "time"), None)
     if named is None and not any(c.unit or _role(c.name) for c in columns):
         named = next((c.name for c in columns if _rises(c.values)), None)
-    if table.format != "can":
+    if not table.own_times:
         time = time or named
         if time is not None:
             content["time"] = {"column": time, "unit": _unit(table, time, "time")}
@@ -122,8 +122,8 @@ def _unit(table: Table, name: str | None, quantity: str) -> str:
 
 
 def _time(table: Table) -> tuple[str | None, str]:
-    """The column of time, or a sentence why there is none; neither for a bus log."""
-    if table.format == "can":
+    """The column of time, or a sentence why there is none; neither where each column has times of its own."""
+    if table.own_times:
         return None, ""
     columns = [c for c in table.columns.values() if c.text is None]
     in_time = [c for c in columns if dimension(c.unit or "") == "time"]

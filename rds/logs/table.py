@@ -36,7 +36,7 @@ class Table:
     """What a file holds. `constants` are single numbers beside the columns, as MAT files have them."""
 
     path: Path
-    format: str  # csv, mat, parquet, can
+    format: str  # csv, mat, parquet, can, mdf
     columns: Mapping[str, Column]
     constants: Mapping[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # about the file itself: cut, comments inside, encoding
@@ -46,6 +46,11 @@ class Table:
     def rows(self) -> int:
         """The length of the columns; of a bus log, of the longest."""
         return max((len(column.values) for column in self.columns.values()), default=0)
+
+    @property
+    def own_times(self) -> bool:
+        """Whether each column has times of its own, as the signals on a bus."""
+        return any(column.time is not None for column in self.columns.values())
 
     def column(self, name: str, place: str) -> Column:
         """The column called `name`; InputError at `place`, with the names there are, for another or one of words."""

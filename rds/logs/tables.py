@@ -13,6 +13,7 @@ from rds.logs.table import Table
 Progress = Callable[[int, int], None]
 TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn")
 BUSES = (".asc", ".blf", ".log", ".trc", ".mf4", ".db")
+MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus logs
 
 
 def read_table(
@@ -27,9 +28,13 @@ def read_table(
         raise InputError("it is a folder; name the file of data in it", str(path))
     if not path.is_file():
         raise InputError("there is no such file; check the name and the folder", str(path))
+    from rds.logs import mf4_channels
+
     ending = path.suffix.lower()
     try:
-        if ending in BUSES or ending == ".gz" or (ending in TEXTS and _is_bus_csv(path)):
+        if ending in MEASUREMENTS and mf4_channels.is_measurement(path):
+            table = mf4_channels.read_channels(path)
+        elif ending in BUSES or ending == ".gz" or (ending in TEXTS and _is_bus_csv(path)):
             from rds.logs.can_table import read_can
 
             table = read_can(path, dbc, progress)
@@ -42,7 +47,7 @@ def read_table(
 
             table = other_tables.read_mat(path) if ending == ".mat" else other_tables.read_parquet(path)
         else:
-            known = ", ".join((*TEXTS, ".mat", ".parquet", *BUSES))
+            known = ", ".join((*TEXTS, ".mat", ".parquet", *BUSES, ".mdf"))
             raise InputError(f"there is no log of the ending {ending!r}; known: {known}")
         unprintable = next((name for name in table.columns if not name.isprintable()), None)
         if unprintable is not None:  # it would command the terminal that it is shown on
