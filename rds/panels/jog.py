@@ -9,7 +9,7 @@ import ipywidgets as widgets
 
 from rds.core.errors import RdsError
 from rds.panels.hold import HoldButtons
-from rds.panels.kit.button import attempt, button, follow
+from rds.panels.kit.button import attempt, follow, halt, order
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
@@ -43,13 +43,14 @@ class JogView:
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self._here = StillHere()
         say = self.notice
-        self._take = button(
-            "Take the machine", "Hold the axes where they are; nothing moves yet", self.take, say, primary=True
-        )
-        self._free = button("Let it go", "No voltage, and the machine is free for others", self.free, say)
-        self._rest = button("Stop", "Bring all axes and the spindle to rest", self.rest, say)
-        self._home = button("Home", "All axes to zero, one after the other, Z first", jog.home, say)
-        self._find = button("Find home", "Let the drives look for it, one after the other", self.find_home, say)
+        self._in_time = shell.presence.in_time
+        tip = "Hold the axes where they are; nothing moves yet"
+        self._take = order(shell, "Take the machine", tip, self.take, say, primary=True)
+        self._free = halt("Let it go", "No voltage, and the machine is free for others", self.free, say)
+        self._rest = halt("Stop", "Bring all axes and the spindle to rest", self.rest, say)
+        self._home = order(shell, "Home", "All axes to zero, one after the other, Z first", jog.home, say)
+        tip = "Let the drives look for it, one after the other"
+        self._find = order(shell, "Find home", tip, self.find_home, say)
         self._holds = {name: self._hold(name) for name in jog.axes}
         self._turns = {name: self._turn(name) for name in jog.spindles}
         self._places = {name: widgets.HTML() for name in (*jog.axes, *jog.spindles)}
@@ -104,6 +105,7 @@ class JogView:
                 if kind == "hold":
                     self.jog.hold(name, direction)
                 elif kind == "step":
+                    self._in_time("The step")
                     self.jog.step(name, direction)
                 else:
                     self.jog.rest()
@@ -116,6 +118,7 @@ class JogView:
         def heard(kind: str, direction: int) -> None:
             try:
                 if kind == "turn":
+                    self._in_time(name)
                     self.jog.turn(name, direction)
                 else:
                     self.jog.still(name)

@@ -8,7 +8,7 @@ import ipywidgets as widgets
 
 from rds.bus.oacs.tuning import ADVICE
 from rds.core.errors import InputError
-from rds.panels.kit.button import button, follow
+from rds.panels.kit.button import button, follow, order
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import columns, group, row
@@ -59,7 +59,7 @@ class ControllersView:
             ),
         ]
         acts = row(
-            button("Step", "Step the set point, record and plot the response", self.step, say),
+            order(shell, "Step", "Step the set point, record and plot the response", self.step, say),
             button("Ziegler-Nichols", "Gains from the last response, put into the fields", self.suggest, say),
         )
         rows = [[name, *words] for name, words in ADVICE.items()]

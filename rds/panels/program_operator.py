@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.kit.button import attempt, button
+from rds.panels.kit.button import attempt, halt, order
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
@@ -26,11 +26,13 @@ class Operator:
         self._choices, self._notice = choices, notice
         self.work: ProgramWork | None = None
         self.bar = WorkBar(shell.ticker)
-        self.run_button = button("Run", "Save the program and run it in the mode chosen", run, notice, primary=True)
-        self.hold_button, self.resume_button, self.home_button = (
-            button(text, tip, partial(self._do, text, act), notice)
+        tip = "Save the program and run it in the mode chosen"
+        self.run_button = order(shell, "Run", tip, run, notice, primary=True)
+        tip = "Come to rest on the path"
+        self.hold_button = halt("Hold", tip, partial(self._do, "Hold", ProgramWork.hold), notice)
+        self.resume_button, self.home_button = (
+            order(shell, text, tip, partial(self._do, text, act), notice)
             for text, tip, act in (
-                ("Hold", "Come to rest on the path", ProgramWork.hold),
                 ("Resume", "Go on after a hold, M0, M1 or a tool change", ProgramWork.resume),
                 ("Home", "End the program where it is, go up and move home", ProgramWork.home),
             )

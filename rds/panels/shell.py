@@ -15,7 +15,7 @@ import ipywidgets as widgets
 from rds.core.errors import RdsError
 from rds.panels import PANELS
 from rds.panels.keys import Keys
-from rds.panels.kit.button import button
+from rds.panels.kit.button import button, order
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
 from rds.panels.presence import Presence
@@ -56,8 +56,9 @@ class Shell:
         body = widgets.HBox([nav, self._place])
         body.add_class("rds-body")
         self._rescue = Rescue()
+        self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
         self.widget = widgets.VBox(
-            [Presence(self._shown), Keys(), widgets.HTML(_style()), self._head(), self._notice, body, self._rescue]
+            [self.presence, Keys(), widgets.HTML(_style()), self._head(), self._notice, body, self._rescue]
         )
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
@@ -115,7 +116,8 @@ class Shell:
         )
         stop.add_class("rds-stop")
         stop.on_click(lambda _: self.emergency_stop())
-        release = button("Release", "Let the modules be used again after an emergency stop", self._release, self)
+        tip = "Let the modules be used again after an emergency stop"
+        release = order(self, "Release", tip, self._release, self)
         guide = button("Help", "The page of the documentation on this panel", self._help, self)
         theme = widgets.ToggleButton(description="Dark", tooltip="Dark or light colours", value=False)
         theme.observe(lambda change: self._darken(change["new"]), "value")

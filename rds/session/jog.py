@@ -18,6 +18,7 @@ from rds.core.errors import InputError, MachineError
 from rds.machines import Machine, load_machine
 from rds.session.fields import Choice, Field, Number
 from rds.session.jog_axes import JogAxis, JogSpindle, jog_axes, jog_spindles
+from rds.session.late import refusal
 from rds.session.session import Session
 from rds.session.task import Task
 
@@ -300,9 +301,8 @@ class Jog:
             raise InputError(self.error or "the machine is not taken yet: press Take the machine first")
         try:
             with self._lock:
-                loop.stdin.write(
-                    json.dumps(order | {"speed": self.choices["speed"] if speed is None else speed}) + "\n"
-                )
+                order |= {"speed": self.choices["speed"] if speed is None else speed, "at": time.monotonic()}
+                loop.stdin.write(json.dumps(order) + "\n")
                 loop.stdin.flush()
         except OSError as error:
             raise MachineError(self.error or _ENDED) from error
@@ -314,6 +314,8 @@ class Jog:
             for name, travel in words["travel"].items():
                 self.axes[name] = replace(self.axes[name], travel=tuple(travel))
             self.left_out = dict(words["left_out"])
+        elif "late" in words:
+            self.session.say(refusal("The motion", words["late"]), "warning")
         elif "homed" in words:
             self.homed |= set(words["homed"])
         else:

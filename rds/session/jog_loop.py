@@ -79,6 +79,8 @@ def jog(hand: Hand, orders: Orders) -> None:
         hand.write(reference.places, reference.speeds)
         if now >= report_at:
             report_at = now + 1.0 / REPORTS
+            if (age := orders.late()) is not None:
+                _say({"late": age})
             _report(measured, wanted is not None or not reference.rests)
         due += hand.period
         left = due - time.monotonic()

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rds.session.jog_axes import JogAxis, JogSpindle
+from rds.session.late import LATE
 
 DEAD_MAN = 0.2  # s without a word after which a held axis comes to rest
 SPINDLE_DEAD_MAN = 1.0  # s without a word after which a spindle does
@@ -26,19 +27,27 @@ class Orders:
         self._until = 0.0  # s, time.monotonic: when the hold ends
         self._turns: dict[str, tuple[float, float]] = {}  # spindle -> rev/min, and when that ends
         self._homing: dict[str, int] = {}
+        self._late: float | None = None
         self._lock = threading.Lock()
 
     def hear(self, order: Mapping[str, Any], now: float) -> None:
         """One order, which takes the place of the one before; any of them ends a homing.
 
+        Its "at" is when it was given, s of time.monotonic(), by default `now`: from then on a hold and a turn last.
+        Goals and a homing that are older than LATE come too late: the axes come to rest, and `late` tells.
+
         {"hold": AXIS, "direction": ±1, "speed"}; {"goals": [[AXIS, position], ...], "speed"}; {"rest": true}: the axes
         come to rest; {"turn": SPINDLE, "speed": ±rev/min}, which leaves the axes alone; {"home": {AXIS: METHOD}};
         {"halt": true}: everything comes to rest.
         """
+        given = float(order.get("at", now))
         with self._lock:
             self._homing = {}
+            if now - given > LATE and ("goals" in order or "home" in order):
+                self._late = now - given
+                order = {"rest": True}
             if "turn" in order:
-                self._turns[order["turn"]] = float(order["speed"]), now + SPINDLE_DEAD_MAN
+                self._turns[order["turn"]] = float(order["speed"]), given + SPINDLE_DEAD_MAN
                 return
             self._goals.clear()
             self._held = None
@@ -46,7 +55,7 @@ class Orders:
                 axis = self.axes[order["hold"]]
                 goal = axis.end(self.places.get(axis.name, 0.0), order["direction"])
                 self._held = axis.name, goal, min(order["speed"], axis.speed)
-                self._until = now + DEAD_MAN
+                self._until = given + DEAD_MAN
             elif "goals" in order:
                 self._goals.extend(
                     (name, goal, min(order["speed"], self.axes[name].speed)) for name, goal in order["goals"]
@@ -55,6 +64,12 @@ class Orders:
                 self._homing = dict(order["home"])
             if "home" in order or "halt" in order:
                 self._turns.clear()
+
+    def late(self) -> float | None:
+        """The age of an order that came too late, s; once."""
+        with self._lock:
+            age, self._late = self._late, None
+            return age
 
     def wanted(self, now: float) -> Wanted | None:
         """Axis, goal and speed at this instant; None: all come to rest."""

@@ -23,6 +23,7 @@ from rds.session import Session
 from rds.session.jog import Jog, _listen
 from rds.session.jog_axes import jog_axes, jog_spindles
 from rds.session.jog_orders import DEAD_MAN, Orders
+from rds.session.late import LATE
 
 pytestmark = pytest.mark.realtime
 PATIENCE = 30.0  # s, on a busy computer
@@ -161,6 +162,31 @@ def test_a_hold_lasts_as_long_as_it_is_renewed_and_goals_follow_each_other() -> 
     assert orders.wanted(20.0) == ("X", 1.0, 2.0)
     orders.hear({"stop": True}, 21.0)
     assert orders.wanted(21.0) is None
+
+
+def test_orders_that_come_late_move_nothing() -> None:
+    """Whoever gave them may have gone: a loop that stood still carried them out when it went on."""
+    machine = load_machine("mini-cnc")
+    orders = Orders(jog_axes(machine), jog_spindles(machine))
+    late = 10.0 - LATE - 4.0
+    orders.hear({"goals": [["Z", 5.0]], "speed": 2.0}, 9.0)
+    orders.hear({"goals": [["X", 1.0]], "speed": 2.0, "at": late}, 10.0)
+    assert orders.wanted(10.0) is None and orders.late() == 7.0 and orders.late() is None
+    orders.hear({"home": {"X": 17}, "speed": 2.0, "at": late}, 10.0)
+    assert not orders.homing and orders.late() == 7.0
+    orders.hear({"hold": "X", "direction": 1, "speed": 2.0, "at": 9.9}, 10.0)
+    assert orders.wanted(9.9 + DEAD_MAN) is not None and orders.wanted(9.91 + DEAD_MAN) is None
+    orders.hear({"turn": "spindle", "speed": 900.0, "at": 9.0}, 10.1)
+    assert orders.turning(10.1) == {"spindle": 0.0}
+    orders.hear({"turn": "spindle", "speed": 900.0, "at": 10.1}, 10.2)
+    orders.hear({"halt": True, "speed": 2.0, "at": late}, 10.3)  # what stops is never too late
+    assert orders.turning(10.3) == {"spindle": 0.0} and orders.late() is None
+
+
+def test_what_came_late_to_the_loop_is_said_on_the_page(tmp_path: Path) -> None:
+    jog = Jog(Session(tmp_path))
+    jog._hear({"late": 7.2})
+    assert "was pressed 7 s ago" in jog.session.messages[-1].text
 
 
 def test_the_machine_is_taken_again_at_once_while_its_bus_outlives_its_modules(jog: Jog) -> None:

@@ -30,6 +30,27 @@ def button(text: str, tip: str, act: Callable[[], Any], notice: Notice, primary:
     return made
 
 
+def order(
+    shell: Any, text: str, tip: str, act: Callable[[], Any], notice: Notice, primary: bool = False
+) -> widgets.Button:
+    """A button that moves the machine: a press that comes late, because the page was busy, is refused."""
+
+    def in_time() -> None:
+        shell.presence.in_time(text)
+        act()
+
+    made = button(text, tip, in_time, notice, primary)
+    made.add_class("rds-order")
+    return made
+
+
+def halt(text: str, tip: str, act: Callable[[], Any], notice: Notice) -> widgets.Button:
+    """A button that brings the machine to rest: it waits for nothing, and no order pressed before it comes after it."""
+    made = button(text, tip, act, notice)
+    made.add_class("rds-halt")
+    return made
+
+
 def attempt(what: str, act: Callable[[], Any], notice: Notice) -> None:
     """Call `act()`; what it refuses, and whatever else goes wrong in it, is said in `notice`."""
     try:

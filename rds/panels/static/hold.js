@@ -1,5 +1,6 @@
 // Two buttons of an axis, minus and plus. Held: a word every 50 ms, so that whoever listens notices when they end; and
-// a word when they are let go, by whatever happens to the pointer, the focus or the page. By step: one word a press.
+// a word when they are let go, by whatever happens to the pointer, the focus or the page. By step: one word a click, which
+// is an order that presence.js lets go if it is not late.
 const BEAT = 50; // ms
 const UNHEARD = 10; // words without an answer, after which it counts as let go: a kernel that was held up, or a
 // connection that broke, would hand on all of them later, when nobody holds the button any more
@@ -18,12 +19,7 @@ function render({ model, el }) {
     model.send({ kind: "release" });
   };
   const press = (button, direction) => {
-    if (button.disabled) return;
-    if (model.get("by_step")) {
-      model.send({ kind: "step", direction });
-      return;
-    }
-    if (held !== null) return;
+    if (button.disabled || held !== null || model.get("by_step")) return;
     const say = () => {
       unheard += 1;
       model.send({ kind: "hold", direction });
@@ -44,13 +40,16 @@ function render({ model, el }) {
       button.setPointerCapture(event.pointerId);
       press(button, direction);
     });
+    button.addEventListener("click", () => { if (model.get("by_step")) model.send({ kind: "step", direction }); });
     for (const name of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(name, release);
     button.addEventListener("contextmenu", (event) => event.preventDefault());
     button.addEventListener("keydown", (event) => {
       const way = keys[event.key] ?? (event.key === " " || event.key === "Enter" ? direction : 0);
       if (!way) return;
       event.preventDefault();
-      if (!event.repeat) press(button, way);
+      if (event.repeat) return;
+      if (model.get("by_step")) buttons[way < 0 ? 0 : 1].click();
+      else press(button, way);
     });
     button.addEventListener("keyup", release);
     box.append(button);
@@ -64,14 +63,21 @@ function render({ model, el }) {
     for (const button of buttons) button.disabled = model.get("disabled");
     if (model.get("disabled")) release();
   };
+  const set_way = () => {
+    for (const button of buttons) button.classList.toggle("rds-order", model.get("by_step"));
+    release();
+  };
   const told = (word) => { if (word.kind === "heard") unheard = 0; };
   model.on("change:disabled", enable);
+  model.on("change:by_step", set_way);
   model.on("msg:custom", told);
   enable();
+  set_way();
   el.append(box);
   return () => {
     release();
     model.off("change:disabled", enable);
+    model.off("change:by_step", set_way);
     model.off("msg:custom", told);
     window.removeEventListener("blur", release);
     window.removeEventListener("pagehide", release);

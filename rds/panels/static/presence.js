@@ -1,16 +1,24 @@
-// Says that a browser shows the page; and sees to it that a click does not overtake what was typed before it.
+// Says that a browser shows the page; and sees to it that a click neither overtakes what was typed before it nor, where
+// it moves the machine, is carried out when nobody expects it any more.
 //
 // A field that changes again before the kernel has answered is sent only after that answer, a click at once. So the
-// first click after a change waits for one word there and back, behind which every change has been sent.
+// first click after a change waits for one word there and back, behind which every change has been sent. An order to the
+// machine always does: if the answer comes late, the kernel stood still, or the connection did, and the order is given up.
 
 const FIELDS = ".widget-toggle-button, .widget-toggle-buttons button, .widget-upload"; // buttons that are fields
-const AT_ONCE = ".rds-stop, .rds-work button, .rds-rescue button"; // what stops something waits for nothing
+const AT_ONCE = ".rds-stop, .rds-halt, .rds-work button, .rds-rescue button"; // what stops something waits for nothing
+const ORDER = ".rds-order"; // what moves the machine
+
+// the later of two clocks: one may be set back, the other one stands still while the computer sleeps
+const clocks = () => [performance.now(), Date.now()];
+const since = (then) => Math.max(...clocks().map((now, each) => now - then[each]));
 
 function render({ model, el }) {
   el.style.display = "none";
   model.send({ kind: "here" });
-  let touched = 0, settled = 0, number = 0, through = null;
-  const waiting = new Map(); // number of the word: the button, and what had been touched
+  let touched = 0, settled = 0, through = null;
+  let number = Math.floor(Math.random() * 2 ** 40); // another browser on this page hears the answers, too
+  const waiting = new Map(); // number of the word: the button, when it was pressed, and what had been touched
 
   const pressed = (event) => {
     const app = el.closest(".rds-app");
@@ -18,17 +26,21 @@ function render({ model, el }) {
     const button = event.target.closest("button");
     return button && !button.matches(FIELDS) ? button : null;
   };
+  const forget = (which) => { for (const [other, each] of waiting) if (which(each.button)) waiting.delete(other); };
   const touch = (event) => { if (pressed(event) === null) touched += 1; };
   const click = (event) => {
     const button = pressed(event);
-    if (!button) return;
-    if (button === through || touched === settled || button.matches(AT_ONCE)) return;
+    if (!button || button === through) return;
+    if (button.matches(AT_ONCE)) {
+      forget((each) => each.matches(ORDER)); // nothing that was pressed before may move the machine after it
+      return;
+    }
+    if (touched === settled && waiting.size === 0 && !button.matches(ORDER)) return;
     event.stopImmediatePropagation();
     event.preventDefault();
-    // pressed again: once, and not never where the first word was lost with its connection
-    for (const [other, each] of waiting) if (each.button === button) waiting.delete(other);
+    forget((each) => each === button); // pressed again: once, and not never where the first word was lost
     number += 1;
-    waiting.set(number, { button, touched });
+    waiting.set(number, { button, touched, at: clocks() });
     model.send({ kind: "settle", number });
   };
   const answered = (message) => {
@@ -36,6 +48,16 @@ function render({ model, el }) {
     if (each === undefined) return; // of another browser on this page
     waiting.delete(message.number);
     settled = Math.max(settled, each.touched);
+    if (each.button.matches(ORDER)) {
+      const age = since(each.at);
+      const { button } = each; // a sign such as ▶ names nothing
+      const what = button.closest(".rds-hold") ? button.getAttribute("aria-label") : button.textContent.trim();
+      if (age > model.get("patience")) {
+        model.send({ kind: "late", what, age });
+        return;
+      }
+      model.send({ kind: "go", number: message.number, age });
+    }
     through = each.button;
     each.button.click();
     through = null;

@@ -30,9 +30,10 @@ function render({ model, el }) {
     button.setAttribute("aria-pressed", "true");
     say();
   };
-  const add = (text, name, title, act) => {
+  const add = (text, name, kind, title, act) => {
     const button = document.createElement("button");
     button.type = "button";
+    button.classList.add(kind);
     button.textContent = text;
     button.setAttribute("aria-label", `${model.get("spindle")} ${name}`);
     button.title = title;
@@ -42,12 +43,12 @@ function render({ model, el }) {
   };
   const while_here = "It turns until Stop, and no longer than this page is in sight";
   const buttons = [
-    add("↺ −", "reverse", while_here, (button) => turn(button, -1)),
-    add("■", "stop", "Bring the spindle to rest", () => {
+    add("↺ −", "reverse", "rds-order", while_here, (button) => turn(button, -1)),
+    add("■", "stop", "rds-halt", "Bring the spindle to rest", () => {
       forget();
       model.send({ kind: "stop" });
     }),
-    add("+ ↻", "forward", while_here, (button) => turn(button, 1)),
+    add("+ ↻", "forward", "rds-order", while_here, (button) => turn(button, 1)),
   ];
   const hidden = () => document.hidden && stop();
   window.addEventListener("pagehide", stop);

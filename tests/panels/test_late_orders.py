@@ -1,0 +1,101 @@
+"""An order to the machine that was pressed while the page's kernel stood still is not carried out when that is over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.panels.jog import JogView
+from rds.panels.presence import Presence
+from rds.panels.shell import Shell
+from rds.session import Session
+from rds.session.jog import Jog
+from rds.session.late import LATE
+
+KEEPS = """
+window.sent = []; // what the page said of its buttons
+window.kept = null; // words under way, while nothing goes through
+const words = ['"kind":"settle"', '"kind":"go"', '"kind":"late"', '"kind":"step"', '"event":"click"'];
+const Real = window.WebSocket;
+window.WebSocket = class extends Real {
+  send(data) {
+    const text = typeof data === "string" ? data : new TextDecoder().decode(data);
+    for (const word of words) if (text.includes(word)) window.sent.push(word.split('"')[3]);
+    if (window.kept === null) super.send(data);
+    else window.kept.push(() => super.send(data));
+  }
+};
+window.goOn = () => { const kept = window.kept; window.kept = null; for (const each of kept) each(); };
+"""
+STEP, HOME, STOP = 'button[aria-label="X plus"]', 'button:visible:text-is("Home")', 'button:visible:text-is("Stop")'
+
+
+def test_what_was_pressed_while_the_kernel_stood_still_moves_nothing_when_it_comes_back(
+    app: Any, new_page: Callable[..., Any]
+) -> None:
+    page = new_page(1280, 800, clock=True)
+    page.add_init_script(KEEPS)
+    page.goto(app.url)
+    page.click('.rds-nav button:text-is("Jog")')
+    page.click('button:text-is("by step")')
+    page.wait_for_selector(f"{STEP}.rds-order")  # the choice has come back
+    for each in (STEP, HOME, STOP):  # as if the machine were taken
+        page.locator(each).first.evaluate("(button) => { button.disabled = false; }")
+    page.click('.rds-group:has-text("Motion") input')  # what was typed before is settled
+
+    def press(wait: int, *buttons: str) -> None:
+        """The kernel comes back `wait` ms after these buttons were pressed."""
+        page.evaluate("window.kept = []")
+        for each in buttons:
+            page.locator(each).first.press("Enter")
+        page.clock.run_for(wait)
+        page.evaluate("window.goOn()")
+
+    for button, said in ((STEP, "X plus was pressed 7 s ago"), (HOME, "Home was pressed 7 s ago")):
+        page.evaluate("window.sent = []")
+        press(7000, button)
+        page.wait_for_selector(f'.rds-notice-warning:has-text("{said}, while this page was busy")')
+        assert page.evaluate("window.sent") == ["settle", "late"]
+    page.evaluate("window.sent = []")
+    press(500, HOME, STOP)  # nothing that was pressed before Stop comes after it
+    press(500, STEP)
+    page.wait_for_function("window.sent.includes('step')")
+    assert page.evaluate("window.sent") == ["settle", "click", "settle", "go", "step"]
+
+
+def test_an_order_that_the_kernel_comes_to_late_is_refused_and_the_next_one_is_not() -> None:
+    late: list[str] = []
+    page = Presence(lambda: None, late.append)
+    for stood_still in (False, True):
+        page._said(None, {"kind": "settle", "number": 7}, None)
+        if stood_still:
+            page._answered[7] -= LATE + 3.5
+        page._said(None, {"kind": "go", "number": 7, "age": 500.0}, None)
+        if stood_still:
+            with pytest.raises(InputError, match=r"Home was pressed 7 s ago, .* press it again"):
+                page.in_time("Home")
+        page.in_time("Home")
+    page._said(None, {"kind": "go", "number": 7, "age": 1.0}, None)  # an answer lets one press go
+    with pytest.raises(InputError):
+        page.in_time("Home")
+    for word in ({"kind": "late", "what": "Home", "age": float("nan")}, {"kind": "go", "number": "7"}, {}, 3, None):
+        page._said(None, word, None)
+    assert late == []
+
+
+@pytest.mark.parametrize("kind", ["step", "turn"])
+def test_a_late_step_and_a_late_turn_are_said_and_not_done(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shell = Shell(Session(tmp_path))
+    jog = Jog(shell.session)
+    monkeypatch.setattr(jog, kind, lambda *_: pytest.fail("it moves"))
+    view = JogView(shell, jog)
+    shell.presence._age = 7.0
+    buttons = view._holds["X"] if kind == "step" else view._turns["spindle"]
+    buttons._told(None, {"kind": kind, "direction": 1}, None)
+    assert "pressed 7 s ago" in view.notice.value
