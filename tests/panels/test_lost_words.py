@@ -69,6 +69,7 @@ def test_a_hand_that_is_not_heard_lets_go(page: Any, kind: str, label: str, most
     page.evaluate(f"window.lost = '{kind}'")
     press.focus()
     page.keyboard.down("Enter")
+    page.wait_for_selector(".rds-hold-on")
     page.clock.run_for(5000)
     assert page.evaluate("window.tried") == most
     assert page.locator(".rds-hold-on").count() == 0
