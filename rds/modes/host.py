@@ -15,7 +15,7 @@ from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -147,23 +147,25 @@ def _recorded(
     ring = Ring.create(_ring_path(about["run"]), columns, capacity, **about)
     desk = Desk.create(ring.desk_path, plan.channels())
     try:
-        recorder = subprocess.Popen(
-            [sys.executable, "-P", "-m", "rds.runtime.recorder", str(directory), str(ring.path), "rds.modes.target"],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-            pass_fds=(lock,) if os.name == "posix" else (),
-        )
-        try:
-            with live.attach(plan, desk, columns, units, ring=ring):
-                _follow(recorder, ring, plan, progress)
-        finally:
-            if recorder.poll() is None:
-                ring.ask_to_stop()
-                recorder.wait()
-            if recorder.returncode != 0:
-                _take_over(directory, ring, plan.T)
+        with tempfile.TemporaryFile() as said:  # by the recorder, which says something only if it fails
+            command = [sys.executable, "-P", "-m", "rds.runtime.recorder", str(directory), str(ring.path)]
+            recorder = subprocess.Popen(
+                [*command, "rds.modes.target"],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=said,
+                start_new_session=True,
+                pass_fds=(lock,) if os.name == "posix" else (),
+            )
+            try:
+                with live.attach(plan, desk, columns, units, ring=ring):
+                    _follow(recorder, ring, plan, progress)
+            finally:
+                if recorder.poll() is None:
+                    ring.ask_to_stop()
+                    recorder.wait()
+                if recorder.returncode != 0:
+                    _take_over(directory, ring, plan.T, _why_it_ended(recorder.returncode, said))
         return bool(ring.head)
     finally:
         ring.close()
@@ -220,7 +222,18 @@ def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress:
         progress(ring.head, plan.samples)
 
 
-def _take_over(directory: Path, ring: Ring, period: float) -> None:
+def _why_it_ended(code: int, said: IO[bytes]) -> str:
+    """What became of a recorder that did not end well, by its exit code and what it said on stderr."""
+    if code < 0:
+        how = f"was ended from outside, by signal {-code}"
+    else:
+        said.seek(0)
+        lines = said.read().decode(errors="replace").strip().splitlines()
+        how = f"failed with code {code}" + (f"; the last that it said: {lines[-1][:300]}" if lines else "")
+    return f"the recorder process {how}; the samples up to then are kept"
+
+
+def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
     """The recorder died: ask the target for a safe end, copy what it still writes, and conclude."""
     recorder = Recorder(directory, ring)
     ring.ask_to_stop()
@@ -236,7 +249,6 @@ def _take_over(directory: Path, ring: Ring, period: float) -> None:
             break
         time.sleep(_POLL)
     recorder.close()
-    reason = "the recorder process was ended from outside; the samples up to then are kept"
     finish(directory, ring, {"ending": Ending.KILLED, "reason": reason, "rows": ring.head})
 
 

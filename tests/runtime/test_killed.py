@@ -181,11 +181,18 @@ def test_a_killed_recorder(experiment: Maker, during: During, alone: Path) -> No
 
     result = experiment(duration=5.0).run("emulation", out=alone / "run", progress=during(kill))
     assert result.meta["ending"] == "killed"
-    assert "recorder" in result.meta["ending_reason"]
+    assert "the recorder process was ended from outside, by signal 9" in result.meta["ending_reason"]
     check_readable(alone / "run", "killed", 200)
     command = Path(f"/proc/{numbers[0]}/cmdline")
     assert not command.is_file() or not command.read_bytes()  # gone, or waiting for an init that doesn't look
     assert not {"plan.pickle", "target.json", "processes.json"} & {path.name for path in (alone / "run").iterdir()}
+
+
+def test_a_recorder_that_fails_by_itself_says_why(experiment: Maker, alone: Path) -> None:
+    """It was said to have been ended from outside."""
+    (alone / "run" / "target.log").mkdir(parents=True)  # where it would write what the target says
+    with pytest.raises(rds.RdsError, match=r"recorder process failed with code 1; .* IsADirectoryError.*target\.log"):
+        experiment(duration=0.1).run("emulation", out=alone / "run")
 
 
 def test_a_machine_that_is_lost_in_the_middle(alone: Path) -> None:
