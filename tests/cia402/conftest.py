@@ -29,6 +29,7 @@ from rds.machines import Machine, load_machine
 
 NODE = 2
 T = 0.001
+PATIENCE = 50  # periods that a served drive and its host wait for each other; their own 10 are less than a hold-up
 
 
 class Abort(Exception):
@@ -151,8 +152,9 @@ def rig(machine: Machine) -> Rig:
 
 
 @pytest.fixture
-def served(machine: Machine) -> Iterator[Callable[..., tuple[str, list[DriveNode]]]]:
+def served(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., tuple[str, list[DriveNode]]]]:
     """Serves drives on python-can's `virtual` bus, in a thread; gives the channel and the nodes."""
+    monkeypatch.setattr("rds.bus.cia402.host.LOST_AFTER", PATIENCE)
     with contextlib.ExitStack() as stack:
 
         def starter(*axes: str) -> tuple[str, list[DriveNode]]:
@@ -164,7 +166,10 @@ def served(machine: Machine) -> Iterator[Callable[..., tuple[str, list[DriveNode
             thread.start()
             stack.callback(thread.join)
             stack.callback(stop.set)
-            assert ready.wait(5.0)
+            assert ready.wait(30.0)
+            for node in nodes:
+                node.drive.objects.values |= {(0x2000, 1): PATIENCE - 10, (0x2000, 2): PATIENCE}
+                node.drive.operation.look_up()
             return channel, nodes
 
         yield starter
@@ -208,7 +213,7 @@ def bus() -> Iterator[Callable[..., can.BusABC]]:
         yield opener
 
 
-def wait_for(condition: Callable[[], Any], timeout: float = 5.0) -> None:
+def wait_for(condition: Callable[[], Any], timeout: float = 30.0) -> None:
     """Wait until the condition holds; fail after `timeout` s."""
     deadline = time.monotonic() + timeout
     while not condition():

@@ -26,10 +26,10 @@ from rds.core.errors import MachineError
 from rds.machines import load_machine
 from rds.results import open_result
 
-from .host_process import MACHINES
+from .host_process import HEARTBEAT, MACHINES
 
 HERE = Path(__file__).parent
-T = 0.02  # s: nothing here is about speed, and a busy computer shall not decide it
+T = 0.04  # s: nothing here is about speed, and ten periods are longer than a busy computer holds a process up
 PATIENCE = 20.0  # s
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
@@ -68,13 +68,13 @@ class Bench:
     def moving(self, volts: float = 6.0, *flags: str, period: float = T) -> subprocess.Popen[str]:
         """A host under whose command axis X has voltage and moves."""
         host = self.host(volts, *flags, period=period)
-        self.wait_until_moving()
+        self.wait_until_moving(host)
         return host
 
     def run(self, folder: Path) -> subprocess.Popen[str]:
         """The same of start_run(), once axis X moves."""
         run = self.start_run(folder)
-        self.wait_until_moving()
+        self.wait_until_moving(run)
         return run
 
     def start_run(self, folder: Path) -> subprocess.Popen[str]:
@@ -84,6 +84,8 @@ class Bench:
             f'sample_period = {T}\n[signal]\nkind = "constant"\nvalue = 6.0\n'
             f'[bus]\nchannel = "{self.channel}"\ndialect = "{self.dialect}"\n'
         )
+        if self.dialect == "cia402":
+            text += f"[bus.cia402]\nheartbeat = {HEARTBEAT}\n"
         (folder / "run.toml").write_text(text)
         return self.start(str(HERE / "run_process.py"), str(folder / "run.toml"), str(folder / "out"))
 
@@ -98,14 +100,15 @@ class Bench:
         with can.Bus(interface="rds", channel=self.channel) as bus:
             yield bus
 
-    def wait_until_moving(self, patience: float = PATIENCE) -> None:
-        """Listen until axis X has moved on by a few counts under command."""
+    def wait_until_moving(self, host: subprocess.Popen[str], patience: float = PATIENCE) -> None:
+        """Listen until axis X has moved on by a few counts under command of this process; fails if that ends."""
         identifier = self.node + (0x180 if self.dialect == "cia402" else frames.ANSWER)
         place = slice(2, 6) if self.dialect == "cia402" else slice(0, 4)
         first, deadline = None, time.monotonic() + patience
         with self.bus() as bus:
             while time.monotonic() < deadline:
                 message = bus.recv(0.5)
+                assert host.poll() is None, host.communicate()
                 if message is not None and message.arbitration_id == identifier:
                     counts = int.from_bytes(message.data[place], "little", signed=True)
                     first = counts if first is None else first

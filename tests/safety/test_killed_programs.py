@@ -29,7 +29,7 @@ def start(bench: Bench, folder: Path) -> subprocess.Popen[str]:
     (folder / "bus.toml").write_text(f'[bus]\nchannel = "{bench.channel}"\n')
     words = ["--mode", "implementation", "--controller", str(folder / "bus.toml"), "--out", str(folder / "out")]
     run = bench.start("-m", "rds.cli", "nc", "run", str(folder / "part.ngc"), *words)
-    bench.wait_until_moving(60.0)  # it is checked and planned first
+    bench.wait_until_moving(run, 60.0)  # it is checked and planned first
     return run
 
 
