@@ -19,6 +19,7 @@ from rds.results.report import write_report
 
 AXES = ("X", "Y", "Z")
 MODES = ("simulation", "emulation", "implementation")
+FREQUENCY = 0.2  # Hz, of the sine
 DURATION = 10.0  # s: two periods, of which the metrics leave out the first
 OBSERVER_POLE = 320.0  # 1/s
 
@@ -60,7 +61,7 @@ def run_demo(folder: Path, bar: Callable[[str], Callable[[int, int], None]], dur
     experiment = Experiment(
         axis=AXES,
         duration=duration,
-        reference={"kind": "sinusoid", "amplitude": 5.0, "frequency": 0.2},
+        reference={"kind": "sinusoid", "amplitude": 5.0, "frequency": FREQUENCY},
         controller={"name": "tracking", "poles": [[-32, 24], [-32, -24]], "observer_pole": -OBSERVER_POLE},
     )
     results = {}
@@ -110,7 +111,7 @@ def error_table(results: dict[str, Result]) -> Table:
             cells = [_micrometres(ours["mean_abs_error"]), _micrometres(ours["std_abs_error"])]
             rows.append([f"{axis} {mode}", *cells, "" if fit is None else f"{fit:.2f}"])
     return {
-        "title": "Tracking error, 5 mm at 0.2 Hz (table 3)",
+        "title": f"Tracking error, 5 mm at {FREQUENCY:g} Hz (table 3)",
         "columns": ["axis", "mean |e| [µm]", "std |e| [µm]", "fit of the model [%]"],
         "rows": rows,
         "note": "The first period is left out. The paper's machine is its authors'; ours differs from the model by "
