@@ -20,6 +20,7 @@ from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
 from rds.panels.presence import Presence
 from rds.panels.rescue import Rescue
+from rds.session.emergency import emergency_stop
 from rds.session.session import Message, Session
 
 _STYLE = Path(__file__).parent / "static" / "style.css"
@@ -88,13 +89,7 @@ class Shell:
 
     def emergency_stop(self) -> None:
         """What the red button does."""
-        try:
-            self.say(self.session.emergency_stop(), "warning")
-        except RdsError as error:
-            self.say(str(error), "error")
-        except Exception as error:  # nobody may believe that the machine was stopped
-            logging.getLogger(__name__).exception("emergency stop")
-            self.say(f"emergency stop failed: {error}; cut the power", "error")
+        self.say(*emergency_stop(self.session))
 
     def _built(self, module: ModuleType) -> Any:
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import logging
 import os
 from collections.abc import Iterable
 from importlib import import_module
@@ -15,7 +14,6 @@ from jupyter_core.utils import ensure_async
 from jupyter_server.base.handlers import APIHandler
 from tornado import web
 
-from rds.core.errors import RdsError
 from rds.panels.app.page import BUS, FOLDER, MACHINE, WHEREABOUTS
 from rds.panels.app.whereabouts import ask
 
@@ -81,16 +79,11 @@ class Kernel(APIHandler):
 def emergency_stop(channels: Iterable[str]) -> tuple[str, str]:
     """What the page's kernel would do: the sentence, and whether it is a warning or an error."""
     from rds.session import Session
+    from rds.session.emergency import emergency_stop as stop
 
     session = Session(os.environ[FOLDER], os.environ[MACHINE], json.loads(os.environ.get(BUS, "{}")))
     session.channels.update(channels)
-    try:
-        return session.emergency_stop(), "warning"
-    except RdsError as error:
-        return str(error), "error"
-    except Exception as error:  # nobody may believe that the machine was stopped
-        logging.getLogger(__name__).exception("emergency stop")
-        return f"emergency stop failed: {error}; cut the power", "error"
+    return stop(session)
 
 
 def _held(where: str | None) -> str:
