@@ -6,7 +6,7 @@ import contextlib
 import subprocess
 import weakref
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -37,7 +37,11 @@ class MachineDesk:
         which = Choice(
             "machine", "Machine", "Whose modules are simulated, or are on the bus", session.machine, machines
         )
-        self.choices = session.choices("machine", [which, *SERVED, *STEP])
+        said = str(session.bus.get("dialect"))
+        usual = said if said in SERVED.options else self._fitting(session.machine, DEFAULT)
+        self.choices = session.choices("machine", [which, replace(SERVED, default=usual), *STEP])
+        if said in SERVED.options:  # goes before what was kept of another bus
+            self.choices.set("dialect", said)
         self.choices.watch(self._fit_dialect)
         self.tuning = session.choices("module tuning", TUNING)
         self.rows: list[dict[str, Any]] = []
@@ -48,13 +52,18 @@ class MachineDesk:
         self._end: weakref.finalize[Any, Any] | None = None
 
     def _fit_dialect(self, name: str) -> None:
+        """Another machine is chosen; the dialect stays where the session's bus says it."""
+        if name == "machine" and "dialect" not in self.session.bus:
+            self.choices.set("dialect", self._fitting(self.choices["machine"], self.choices["dialect"]))
+
+    @staticmethod
+    def _fitting(machine: str, now: str) -> str:
         """Modules that a machine's file describes are distributed ones: what they say of themselves is the point."""
-        if name != "machine":
-            return
         with contextlib.suppress(InputError):  # of a file that will not do: said when it is used
-            described = all(axis.module for axis in self.machine.axes.values())
-            if described or self.choices["dialect"] == DESCRIBES_ITSELF:
-                self.choices.set("dialect", DESCRIBES_ITSELF if described else DEFAULT)
+            if all(axis.module for axis in load_machine(machine).axes.values()):
+                return DESCRIBES_ITSELF
+            return DEFAULT if now == DESCRIBES_ITSELF else now
+        return now
 
     # where
 

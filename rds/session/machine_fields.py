@@ -12,14 +12,12 @@ from rds.session.fields import Choice, Field, Number
 _SPEAK = {"rds": "rds: cyclic", "oacs": "oacs: distributed", "cia402": "cia402: drives"}
 CONTROLLERS = {"P": "P", "PI": "PI", "PID": "PID"}
 
-SERVED: tuple[Field, ...] = (
-    Choice(
-        "dialect",
-        "Dialect",
-        "What the simulated modules speak; only distributed ones say what they are, and have a tuning",
-        DEFAULT,
-        {name: _SPEAK.get(name, name) for name in dialect_names()},
-    ),
+SERVED = Choice(
+    "dialect",
+    "Dialect",
+    "What the simulated modules speak; only distributed ones say what they are, and have a tuning",
+    DEFAULT,
+    {name: _SPEAK.get(name, name) for name in dialect_names()},
 )
 STEP: tuple[Field, ...] = (
     Number("step", "Step", "How far the set point jumps", 5.0, unit="mm or °", low=-1000.0, high=1000.0),

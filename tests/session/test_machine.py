@@ -159,6 +159,16 @@ def test_a_monitor_listens_until_it_is_ended(desk: MachineDesk) -> None:
     assert done(task).snapshot.frames > 10
 
 
+def test_the_dialect_is_the_one_that_the_bus_of_the_session_says(tmp_path: Path) -> None:
+    """Modules that were started, and the load that was analysed, spoke another one than the runs of the page did."""
+    assert MachineDesk(Session(tmp_path)).choices["dialect"] == "rds"  # which is kept
+    desk = MachineDesk(Session(tmp_path, bus={"dialect": "cia402"}))
+    assert desk.choices["dialect"] == "cia402"
+    desk.choices.set("machine", "mrmt-oacs")
+    assert desk.choices["dialect"] == "cia402"
+    assert MachineDesk(Session(tmp_path / "new", "mrmt-oacs")).choices["dialect"] == "oacs"
+
+
 def test_a_machine_of_modules_that_describe_themselves_speaks_their_dialect(tmp_path: Path) -> None:
     desk = MachineDesk(Session(tmp_path))
     before = desk.choices["dialect"]
