@@ -77,8 +77,10 @@ class EquipmentRun:
                 if task.stopping:
                     run.stop()
                 running = "running" if self.real_time else "simulating"
-                # before the first sample the loop is still being started, and its note stays
-                self.result = run.wait(lambda taken, of: task.advance(taken, of, running if taken else ""))
+                # before the first sample the loop is still being started, and its note stays; so does that of a stop
+                self.result = run.wait(
+                    lambda taken, of: task.advance(taken, of, running if taken and not task.stopping else "")
+                )
             finally:
                 self.session.give_machine_back(self)
             task.note = "saving tables, pictures and the report"

@@ -64,7 +64,9 @@ class ProgramWork(EquipmentRun):
                 if task.stopping:
                     run.stop()
                 note = "running" if self.real_time else "simulating"
-                self.result = run.wait(lambda taken, of: task.advance(taken, max(of, taken), note))
+                self.result = run.wait(
+                    lambda taken, of: task.advance(taken, max(of, taken), "" if task.stopping else note)
+                )
             finally:
                 self.session.give_machine_back(self)
             task.note = "saving tables, pictures and the report"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import ipywidgets as widgets
@@ -12,9 +14,10 @@ import pytest
 from rds.core.errors import InputError
 from rds.nc.check import Setup
 from rds.panels import PANELS
-from rds.panels.kit.button import button
+from rds.panels.kit.button import button, follow
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
+from rds.panels.kit.work_bar import WorkBar
 from rds.panels.machine_modules import ModulesView
 from rds.panels.program_view import ProgramView
 from rds.panels.result_actions import ResultActions
@@ -22,6 +25,7 @@ from rds.panels.shell import Shell
 from rds.session import Session
 from rds.session.machine import MachineDesk
 from rds.session.program_run import ProgramWork
+from rds.session.task import Task
 
 
 @pytest.mark.parametrize(
@@ -132,6 +136,35 @@ def test_simulated_modules_that_have_ended_can_be_started_again(
     while view.bar.busy:
         shell.ticker.tick()
     assert "start the simulated modules" in view.notice.value and not start.disabled
+
+
+def test_who_was_told_to_wait_is_not_told_so_any_more_when_it_is_done(tmp_path: Path) -> None:
+    shell, notice = Shell(Session(tmp_path)), Notice()
+    bar, ends = WorkBar(shell.ticker), threading.Event()
+
+    def begin() -> Task[bool]:
+        return shell.session.work("check", lambda task: ends.wait(30.0))
+
+    follow(bar, notice, begin, lambda _: None)
+    follow(bar, notice, begin, lambda _: None)
+    assert "wait until it is done" in notice.value
+    ends.set()
+    while bar.busy:
+        shell.ticker.tick()
+    assert notice.value == ""
+
+
+def test_a_bar_says_what_goes_on_after_the_stop(tmp_path: Path) -> None:
+    """It said that a program was stopping for as long as the files of the stopped one were written."""
+    bar = WorkBar(Shell(Session(tmp_path)).ticker)
+    work = SimpleNamespace(share=0.5, seconds_left=None, done=False, note="running", stop=lambda: None)
+    bar.follow(work, lambda: None)
+    bar.stop_button.click()
+    bar._look()
+    assert bar._text.value == "stopping"
+    work.note = "saving tables"
+    bar._look()
+    assert bar._text.value == "saving tables, 50%"
 
 
 def _within(widget: Any) -> Iterator[Any]:

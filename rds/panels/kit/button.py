@@ -9,10 +9,12 @@ from typing import Any, Protocol, TypeVar
 import ipywidgets as widgets
 
 from rds.core.errors import RdsError
+from rds.panels.kit.notice import Notice as Line
 from rds.panels.kit.work_bar import WorkBar
 from rds.session.task import Task
 
 T = TypeVar("T")
+_WAIT = "wait until it is done, or stop it first"
 
 
 class Notice(Protocol):
@@ -70,7 +72,7 @@ def say_error(what: str, error: BaseException, notice: Notice) -> None:
 
 def follow(
     bar: WorkBar,
-    notice: Notice,
+    notice: Line,
     begin: Callable[[], Task[T]],
     show: Callable[[T], Any],
     stopped: str = "stopped",
@@ -81,7 +83,7 @@ def follow(
     What `begin()` refuses is raised; `stopped` is said of work that was stopped, and `failed()` shows more of an error.
     """
     if bar.busy:
-        notice.say("wait until it is done, or stop it first", "warning")
+        notice.say(_WAIT, "warning")
         return
     task = begin()
     notice.say("")
@@ -90,7 +92,7 @@ def follow(
 
 def watch(
     bar: WorkBar,
-    notice: Notice,
+    notice: Line,
     task: Task[T],
     show: Callable[[T], Any],
     stopped: str = "stopped",
@@ -99,6 +101,7 @@ def watch(
     """As `follow`, for work that goes on already."""
 
     def ended() -> None:
+        notice.take_back(_WAIT)
         if task.stopped:
             notice.say(stopped, "warning")
         elif task.error is not None:

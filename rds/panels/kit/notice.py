@@ -14,10 +14,12 @@ class Notice(widgets.HTML):
 
     def __init__(self) -> None:
         super().__init__("")
+        self._said = ""
         self.add_class("rds-notice")
 
     def say(self, text: str, kind: str = "note") -> None:
         """Show `text`; kind is note, good, warning or error. Empty text shows nothing."""
+        self._said = text
         if not text:
             self.value = ""
             return
@@ -27,6 +29,11 @@ class Notice(widgets.HTML):
             f'<div class="rds-notice-{kind}" role="{role}"><b aria-hidden="true">{_SIGNS[kind]}</b> {lines}</div>'
         )
 
+    def take_back(self, text: str) -> None:
+        """Nothing to say any more, if `text` is what was said last."""
+        if self._said == text:
+            self.clear()
+
     def clear(self) -> None:
         """Nothing to say."""
-        self.value = ""
+        self.say("")

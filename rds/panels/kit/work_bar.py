@@ -58,6 +58,7 @@ class WorkBar(widgets.HBox):
         self.layout.display = "none"
         self._ticker = ticker
         self._work: Any = None
+        self._stopped_in: str | None = None  # what it was doing when it was asked to end
         self._ended: Callable[[], None] | None = None
         self._end: Callable[[], None] | None = None
 
@@ -68,7 +69,7 @@ class WorkBar(widgets.HBox):
 
     def follow(self, work: Work, ended: Callable[[], None]) -> None:
         """Show the progress of `work` until it is over."""
-        self._work, self._ended = work, ended
+        self._work, self._ended, self._stopped_in = work, ended, None
         self.layout.display = ""
         self.stop_button.disabled = False
         self._lock(True)
@@ -79,6 +80,7 @@ class WorkBar(widgets.HBox):
     def _stop(self) -> None:
         if self._work is not None:
             self.stop_button.disabled = True
+            self._stopped_in = self._work.note
             self._text.value = "stopping"
             self._work.stop()
 
@@ -88,7 +90,7 @@ class WorkBar(widgets.HBox):
             return
         share, left = work.share, work.seconds_left
         self._bar.value = share or 0.0
-        if not self.stop_button.disabled:
+        if work.note != self._stopped_in:  # after it has stopped there may be files to write
             parts = [work.note, "" if share is None else f"{share:.0%}", "" if left is None else f"{left:.0f} s left"]
             self._text.value = ", ".join(filter(None, parts)) or "working"
         if work.done:
