@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -74,32 +75,45 @@ def app(start_app: Callable[..., App]) -> App:
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
-    """Chromium without a window."""
+    """Chromium without a window, as a context whose pages share a cache on disk: what a page has loaded and compiled
+    the next one has.
+    """
     if CHROMIUM is None:
         pytest.skip(HOW)
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install 'rds[dev]'")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
+    with sync_api.sync_playwright() as playwright, tempfile.TemporaryDirectory(prefix="rds-chromium-") as profile:
+        context = playwright.chromium.launch_persistent_context(
+            profile, executable_path=CHROMIUM, args=["--no-sandbox"]
+        )
+        yield context
+        context.close()
 
 
 @pytest.fixture
-def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[[int, int], Any]]:
+def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
     """An empty page of this width and height, px; fails the test if it asked another host for anything.
 
-    A screenshot of each page is kept at the end of the test, in $RDS_SCREENSHOTS or a temporary folder.
+    With a `clock`, time can be put forward. A screenshot of each page is kept at the end of the test, in
+    $RDS_SCREENSHOTS or a temporary folder.
     """
     pages: list[Any] = []
+    contexts: list[Any] = []
     abroad: list[str] = []
 
     def asked(message: Any) -> None:
         if not re.match(r"(https?|wss?)://(127\.0\.0\.1|localhost)[:/]|data:|blob:|about:", message.url):
             abroad.append(message.url)
 
-    def make(width: int, height: int) -> Any:
-        page = browser.new_page(viewport={"width": width, "height": height})
+    def make(width: int, height: int, clock: bool = False) -> Any:
+        context = browser
+        if clock:  # it is the clock of all pages of a context
+            context = browser.browser.new_context()
+            context.clock.install()
+            contexts.append(context)
+        page = context.new_page()
+        page.set_viewport_size({"width": width, "height": height})
         page.set_default_timeout(PATIENCE)
+        page.wait_for_selector = partial(see, page)
         page.on("request", asked)
         pages.append(page)
         return page
@@ -110,19 +124,34 @@ def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[
     for number, page in enumerate(pages):
         page.screenshot(path=ARTIFACTS / f"{name}-{number}.png")
         page.close()
+    for context in contexts:
+        context.close()
     assert not abroad, f"the page asked other hosts: {abroad}"
 
 
+def see(page: Any, selector: str, state: str = "visible", timeout: float = PATIENCE) -> Any:
+    """Playwright's `wait_for_selector`, which looks twice a second only; here the wait is at most a tenth longer than
+    need be. Gives the first element that fits, for the states visible and hidden as it was seen to be.
+    """
+    first = page.locator(selector).first
+    is_so = {"visible": first.is_visible, "hidden": first.is_hidden, "attached": first.count}[state]
+    begun = time.monotonic()
+    while not is_so():
+        waited = (time.monotonic() - begun) * 1e3
+        if waited > timeout:
+            first.wait_for(state=state, timeout=1)  # which says in its error what is there instead
+        page.wait_for_timeout(min(max(waited / 10, 10), 100))
+    return first
+
+
 @pytest.fixture
-def open_page(new_page: Callable[[int, int], Any], app: App) -> Callable[..., Any]:
+def open_page(new_page: Callable[..., Any], app: App) -> Callable[..., Any]:
     """Open a page of the app, or of another one, at a panel by its title; with a `clock`, time can be put forward."""
 
     def show(
         panel: str | None = None, on: App | None = None, width: int = 1280, height: int = 800, clock: bool = False
     ) -> Any:
-        page = new_page(width, height)
-        if clock:
-            page.clock.install()
+        page = new_page(width, height, clock)
         page.goto((on or app).url)
         page.wait_for_selector(".rds-app .rds-nav button")
         if panel is not None:

@@ -25,11 +25,10 @@ HELD = 7000  # ms of the page's clock after which it says that it gets no answer
 
 
 @pytest.fixture
-def page(app: App, new_page: Callable[[int, int], Any]) -> Any:
+def page(app: App, new_page: Callable[..., Any]) -> Any:
     """A page whose words can be lost."""
-    page = new_page(1280, 800)
+    page = new_page(1280, 800, clock=True)
     page.add_init_script(LOSES)
-    page.clock.install()
     page.goto(app.url)
     page.wait_for_selector(".rds-rescue-box", state="attached")
     return page
