@@ -98,8 +98,9 @@ def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
             os.kill(process, signal.SIGKILL)
     shutil.rmtree(runtime, ignore_errors=True)
     forgotten = _forgotten(rings)
-    if forgotten:  # or of another run on this computer, which is just about to begin or to end
-        time.sleep(1.0)
+    deadline = time.monotonic() + LINGER
+    while forgotten and time.monotonic() < deadline:  # or of another run on this computer, about to begin or to end
+        time.sleep(0.1)
         forgotten = [ring for ring in _forgotten(rings) if ring in forgotten]
     assert not left, f"left running: {left}"
     assert not forgotten, f"left in shared memory: {forgotten}"

@@ -20,6 +20,17 @@ M2
 """
 
 
+SLOW = "F240"  # of what somebody interrupts: over a second for it, on a computer that may be busy
+
+
+@pytest.fixture
+def slow_part(tmp_path: Path) -> Path:
+    """The same, slow enough to be interrupted in the middle of its cuts."""
+    file = tmp_path / "part.ngc"
+    file.write_text(PART.replace("G1 X2 F600", f"G1 X2 {SLOW}"))
+    return file
+
+
 @pytest.fixture
 def part(tmp_path: Path) -> Path:
     file = tmp_path / "part.ngc"

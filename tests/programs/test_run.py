@@ -27,6 +27,7 @@ from rds.runtime.retimed import EXCESS
 
 PERIOD = 0.002  # s: with room for a busy computer
 STOP_LINE = 7
+CUTS = 150  # samples after which it cuts along line 5
 
 
 def wait_for(condition: Callable[[], Any], timeout: float = 60.0) -> Any:
@@ -228,10 +229,10 @@ def test_a_simulation_with_somebody_at_its_desk_waits_for_him(part: Path) -> Non
 
 
 @pytest.mark.realtime
-def test_an_operated_emulation_is_repeated_by_a_simulation(part: Path, alone: Path) -> None:
-    program = PartProgram(part, sample_period=PERIOD)
+def test_an_operated_emulation_is_repeated_by_a_simulation(slow_part: Path, alone: Path) -> None:
+    program = PartProgram(slow_part, sample_period=PERIOD)
     run = program.start("emulation", out=alone / "run")
-    wait_for(lambda: run.progress[0] > 300)
+    wait_for(lambda: run.progress[0] > CUTS)
     run.hold()
     reaches(run, State.HELD)
     held = run.status()
@@ -246,14 +247,14 @@ def test_an_operated_emulation_is_repeated_by_a_simulation(part: Path, alone: Pa
     emulated = run.wait()
     assert emulated.meta["ending"] == "done"
     assert {name for _, name, _, _ in emulated.meta["changes"]} == {"hold", "resume", "override", "X.g1"}
-    simulated = PartProgram(part, sample_period=PERIOD).run(changes=emulated.meta["changes"])
+    simulated = PartProgram(slow_part, sample_period=PERIOD).run(changes=emulated.meta["changes"])
     assert same(simulated, emulated)
 
 
 @pytest.mark.realtime
-def test_an_implementation_is_held_on_its_path_and_goes_home(part: Path, alone: Path) -> None:
-    run = PartProgram(part, sample_period=PERIOD).start("implementation", out=alone / "run")
-    wait_for(lambda: run.progress[0] > 300)
+def test_an_implementation_is_held_on_its_path_and_goes_home(slow_part: Path, alone: Path) -> None:
+    run = PartProgram(slow_part, sample_period=PERIOD).start("implementation", out=alone / "run")
+    wait_for(lambda: run.progress[0] > CUTS)
     run.hold()
     reaches(run, State.HELD)
     run.resume()
@@ -315,16 +316,20 @@ def test_a_program_is_operated_from_another_terminal(part: Path, alone: Path) ->
         env=os.environ | {"PYTHONUNBUFFERED": "1"},
     )
     assert host.stderr is not None
-    said = host.stderr.readline()
-    assert said == f"rds: line {STOP_LINE}: stops; `rds nc operate run --resume` goes on\n"
-    shown = CliRunner().invoke(app, ["nc", "operate", "run", "--json"])
-    assert json.loads(shown.stdout)["override"] == 1.0
-    wrong = CliRunner().invoke(app, ["nc", "operate", "run", "--set", "A.g1=3"])
-    assert wrong.exit_code == 2
-    assert "there is no live value 'A.g1'; this run has X.g1, X.g2" in wrong.stderr
-    faster = CliRunner().invoke(app, ["nc", "operate", "run", "--override", "150", "--resume"])
-    assert faster.exit_code == 0, faster.stderr
-    out, errors = host.communicate(timeout=120)
+    try:
+        said = host.stderr.readline()
+        assert said == f"rds: line {STOP_LINE}: stops; `rds nc operate run --resume` goes on\n"
+        shown = CliRunner().invoke(app, ["nc", "operate", "run", "--json"])
+        assert json.loads(shown.stdout)["override"] == 1.0
+        wrong = CliRunner().invoke(app, ["nc", "operate", "run", "--set", "A.g1=3"])
+        assert wrong.exit_code == 2
+        assert "there is no live value 'A.g1'; this run has X.g1, X.g2" in wrong.stderr
+        faster = CliRunner().invoke(app, ["nc", "operate", "run", "--override", "150", "--resume"])
+        assert faster.exit_code == 0, faster.stderr
+        out, errors = host.communicate(timeout=120)
+    finally:
+        host.kill()
+        host.communicate()
     found = json.loads(out)
     assert found["ending"] == "done", errors
     assert found["program"]["completed"]

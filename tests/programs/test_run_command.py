@@ -161,10 +161,10 @@ def test_keys_come_one_by_one() -> None:
 
 
 @pytest.mark.realtime
-def test_a_terminal_operates_the_run(part: Path, alone: Path) -> None:
+def test_a_terminal_operates_the_run(slow_part: Path, alone: Path) -> None:
     """In a real terminal: faster, hold, on, and home from the stop."""
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "rds.cli", "nc", "run", str(part), "--mode", "emulation", "--out", "run"]
+    command = [sys.executable, "-m", "rds.cli", "nc", "run", str(slow_part), "--mode", "emulation", "--out", "run"]
     host = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, close_fds=True)
     os.close(theirs)
     screen = b""
