@@ -57,6 +57,8 @@ def _same_arrays(a: Any, b: Any, depth: int) -> bool:
     if p.shape != q.shape:
         return False
     if p.dtype.kind in "fcbiu" and q.dtype.kind in "fcbiu":
+        if p.dtype == q.dtype and p.tobytes() == q.tobytes():  # allclose takes a hundred times as long
+            return True
         return bool(np.allclose(p, q, rtol=RELATIVE, atol=ABSOLUTE, equal_nan=True))
     return same(p.tolist(), q.tolist(), depth + 1)
 
