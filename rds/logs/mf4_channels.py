@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rds.bus.logs import asammdf_missing
 from rds.core.errors import InputError
 from rds.logs.apart import read_apart
 from rds.logs.log import Finding
@@ -44,6 +43,8 @@ def is_measurement(path: Path) -> bool:
 def read_channels(path: Path) -> Table:
     """The numeric channels. InputError for a file without any, a damaged one, one that is too large, or no asammdf."""
     if find_spec("asammdf") is None:
+        from rds.bus.logs import asammdf_missing
+
         raise asammdf_missing(path)
     rasters, left_out = read_apart(rasters_here, path)
     if not rasters:
