@@ -7,8 +7,8 @@ the controller's answer Uc and the plant a linear one,
     L(z) = - Uc(z) / (Uc(z) + D(z)),    1 + L = 0 at the closed loop's poles.
 
 The test is the case's own motion with a deviation of micrometres in it, so that a controller is about where it always
-is. (It can notice that the positions are not rounded.) A pulse of another size must change the answer in proportion;
-where it does not there are no margins.
+is. A pulse of another size must change the answer in proportion; where it does not there are no margins. A controller
+can notice that the positions are not rounded: see `same_loop` for what is done about it.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.types import Controller
+from rds.core.types import Controller, Model
 from rds.core.words import Words
 from rds.experiment.resolve import PERIODS, resolve
 from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
@@ -18,6 +18,8 @@ from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
 from rds.grading.linear import PULSE, LinearLoop, linear_loop
+from rds.grading.same_loop import difference, force, free_stretch
+from rds.grading.seeds import part_seed
 from rds.interface import encoder
 from rds.machines import Axis, Machine, load_machine
 from rds.models import library_model
@@ -74,18 +76,8 @@ class ControlCase:
         plan, subjects = self.plan, self._begin(submitted)
         models = [drawn_model(plant, seed, number) for plant in self.plants]
         actual: list[list[float]] = [[] for _ in models]
-        voltage = None if self.disturbance is None else self.disturbance.voltage
-        moved = [
-            disturbed(
-                model,
-                voltage,
-                noise_of(self.noise, plan.samples, seed, self.name, number, axis),
-                actual[axis].append if self.noise else None,
-            )
-            for axis, model in enumerate(models)
-        ]
         meta = {"period": self.periods, "voltage_range": plan.machine.converter.range}
-        done = run_loop(with_parts(plan, self._laws(subjects), moved), meta)
+        done = run_loop(with_parts(plan, self._laws(subjects), self._disturbed(models, seed, number, actual)), meta)
         counts = subjects[0].counts if COUNTS in needs else None
         result = done.result if self.prepared is None else judged(done.result, self.prepared)
         if self.noise:
@@ -94,7 +86,7 @@ class ControlCase:
         facts = {"limits": (low, high), "unit": self.unit, "noisy": bool(self.noise)}
         if self.disturbance is not None:
             facts |= {"disturbed_from": self.disturbance.start, "disturbed_until": self.disturbance.end}
-        linear = self._linear(submitted, models) if LINEAR in needs else None
+        linear = self._linear(submitted, models, done, seed, number) if LINEAR in needs else None
         return CaseRun(self.name, number, result, done.fault, counts, linear, facts)
 
     def _begin(self, submitted: Submitted) -> list[Answers]:
@@ -120,10 +112,59 @@ class ControlCase:
             units[f"{name}_actual"] = axis.axis.unit
         return type(result)(columns, units, result.meta)
 
-    def _linear(self, submitted: Submitted, models: list[Any]) -> LinearLoop | str:
+    def _disturbed(
+        self,
+        models: list[Model],
+        seed: int,
+        number: int,
+        actual: list[list[float]] | None = None,
+        force: np.ndarray | None = None,
+    ) -> list[Model]:
+        """The models of run `number` with their disturbance, `force` (V) and noise.
+
+        `actual` is given the positions before the noise, of each axis.
+        """
+        voltage = None if self.disturbance is None else self.disturbance.voltage
+        if force is not None:
+            voltage = force if voltage is None else voltage + force
+        return [
+            disturbed(
+                model,
+                voltage,
+                noise_of(self.noise, self.plan.samples, seed, self.name, number, axis),
+                actual[axis].append if self.noise and actual is not None else None,
+            )
+            for axis, model in enumerate(models)
+        ]
+
+    def _linear(
+        self, submitted: Submitted, models: list[Model], done: LoopRun, seed: int, number: int
+    ) -> LinearLoop | str:
+        """The loop of run `number`, which is `done`, linearized, and whether that is the loop of this run."""
+        name, plan = self.plan.names[0], self.plan
+        if done.fault:
+            return done.fault
+        u, y = done.result[f"{name}_command"], done.result[f"{name}_measured"]
+        limit = voltage_limits(plan)[1]
+        stretch = free_stretch(u, y, limit)
+        loop = self._ideal(submitted, models, stretch[0])
+        if isinstance(loop, str):
+            return loop
+        drawn = part_seed(seed, self.name, number, "force")
+        pushed = force(models[0], u, (plan.machine.converter.range, limit), stretch, drawn)
+        laws = self._laws(self._begin(submitted))
+        again = run_loop(with_parts(plan, laws, self._disturbed(models, seed, number, force=pushed)), {})
+        if again.fault:
+            return f"under a force on the axis, {again.fault}"
+        part = slice(*stretch)
+        changes = [again.result[f"{name}_{what}"][part] - was[part] for what, was in (("command", u), ("measured", y))]
+        return difference(loop, *changes) or loop
+
+    def _ideal(self, submitted: Submitted, models: list[Model], free_from: int) -> LinearLoop | str:
+        """The loop linearized on the ideal plant, by pulses when the law is at no limit (from `free_from` on)."""
         model, samples = linear_model(models[0]), self.plan.samples
         assert model is not None  # by `can_be_linearized`, which the assignment has checked
-        at = samples // 10
+        at = min(max(samples // 10, free_from + samples // 50), samples // 3)
         runs: list[LoopRun] = []
         for size in (0.0, PULSE, -2.0 * PULSE):
             pulse = np.zeros(samples)
