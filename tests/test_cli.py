@@ -130,7 +130,7 @@ def test_stdout_is_the_json_s_whatever_the_student_prints(folder: Path, mode: st
     assert "loading" in done.stderr
     if mode == "simulation":
         assert all(word in done.stderr for word in ("calling 0.1", "from a shell", "straight to the descriptor"))
-    assert only_json(command("check", "law.py", "--json").stdout)
+        assert only_json(command("check", "law.py", "--json").stdout)
 
 
 @pytest.mark.parametrize(
@@ -168,10 +168,13 @@ def test_bad_input_is_exit_code_2_and_a_sentence(folder: Path, arguments: list[s
 
 def test_bad_usage_is_exit_code_2(folder: Path) -> None:
     forever = ["nc", "time", "part.ngc", "--sample-period", "inf"]
-    for arguments in (["run"], ["fly"], ["run", "e.toml", "--jsn"], ["machine"], [], forever):
-        done = command(*arguments)
-        assert done.returncode == 2, arguments
-        assert "Traceback" not in done.stderr
+    for arguments in (["run"], ["fly"], ["machine"], [], forever):
+        done = call(*arguments)
+        assert done.exit_code == 2, arguments
+        assert isinstance(done.exception, SystemExit), arguments
+    process = command("run", "e.toml", "--jsn")
+    assert process.returncode == 2
+    assert "Traceback" not in process.stderr
 
 
 def test_a_fault_of_the_student_s_code_is_exit_code_2(folder: Path) -> None:
@@ -197,15 +200,15 @@ def test_a_class_of_the_student_s_that_fails_when_it_is_looked_at_is_told_with_i
 
 
 def test_check(folder: Path) -> None:
-    good = command("check", "law.py", "--json")
-    assert good.returncode == 0
+    good = call("check", "law.py", "--json")
+    assert good.exit_code == 0
     assert only_json(good.stdout)
-    assert "controller" in command("check", "law.py").stdout
+    assert "controller" in call("check", "law.py").stdout
     (folder / "bad.py").write_text("def control(t, r, y, state, params):\n    return float('nan'), state\n")
-    bad = command("check", "bad.py", "--json")
-    assert bad.returncode == 1
+    bad = call("check", "bad.py", "--json")
+    assert bad.exit_code == 1
     assert "finite" in json.dumps(only_json(bad.stdout))
-    assert "finite" in command("check", "bad.py").stdout
+    assert "finite" in call("check", "bad.py").stdout
 
 
 def test_a_coupled_controller_is_checked_with_as_many_axes_as_are_said(folder: Path) -> None:
@@ -222,8 +225,8 @@ def test_compare(folder: Path) -> None:
     rds.Experiment.from_toml("e.toml").run(out="a")
     (folder / "law.py").write_text(LAW.replace("20.0", "30.0"))
     rds.Experiment.from_toml("e.toml").run(out="b")
-    same, different = command("compare", "a", "a", "--json"), command("compare", "a", "b/result.csv", "--json")
-    assert same.returncode == different.returncode == 0
+    same, different = call("compare", "a", "a", "--json"), call("compare", "a", "b/result.csv", "--json")
+    assert same.exit_code == different.exit_code == 0
     assert only_json(same.stdout) != only_json(different.stdout)
     assert "X" in command("compare", "a", "b").stdout
 
@@ -231,7 +234,7 @@ def test_compare(folder: Path) -> None:
 def test_machine_list(folder: Path) -> None:
     said = only_json(command("machine", "list", "--json").stdout)
     assert said["mini-cnc"]["axes"] == ["X", "Y", "Z", "spindle"]
-    assert "-75 to 75 mm" in command("machine", "list").stdout
+    assert "-75 to 75 mm" in call("machine", "list").stdout
 
 
 @pytest.mark.realtime
