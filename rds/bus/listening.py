@@ -8,7 +8,9 @@ from collections.abc import Iterator
 import can
 
 _SLICE = 0.02  # s: a wait that took longer was held up, by this computer, and counts as so long only
+_DUST = 1e-6  # s: less than this may be lost in a clock's rounding, and never pass
 _MOST_WAITING = 20_000  # frames that may wait at the end: 2 s of a bus that is full at 1 Mbit/s
+_LONGEST_REST = 0.5  # s to take them: a busy computer takes them more slowly than one who babbles sends them
 
 
 def frames_within(bus: can.BusABC, seconds: float) -> Iterator[can.Message]:
@@ -18,15 +20,29 @@ def frames_within(bus: can.BusABC, seconds: float) -> Iterator[can.Message]:
     computer it takes longer than `seconds`, therefore. Raises what `bus.recv` raises.
     """
     left, before = seconds, time.monotonic()
-    while left > 0.0:
+    while left > _DUST:
         message = bus.recv(min(left, _SLICE))
         if message is not None:
             yield message
         now = time.monotonic()
         left -= min(now - before, _SLICE)
         before = now
+    left = _LONGEST_REST
     for _ in range(_MOST_WAITING):
         message = bus.recv(0.0)
-        if message is None:
+        if message is None or left <= 0.0:
             return
         yield message
+        now = time.monotonic()
+        left -= min(now - before, _SLICE)
+        before = now
+
+
+def pause(seconds: float) -> None:
+    """Wait while another thread listens: as with `frames_within`, time in which this process stood still is none."""
+    left, before = seconds, time.monotonic()
+    while left > _DUST:
+        time.sleep(min(left, _SLICE))
+        now = time.monotonic()
+        left -= min(now - before, _SLICE)
+        before = now

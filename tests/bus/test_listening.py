@@ -9,8 +9,9 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus import estop, frames, listening
+from rds.bus import estop, frames, listening, traffic
 from rds.bus.frames import Status
+from rds.core.errors import MachineError
 
 
 class Bus:
@@ -63,6 +64,12 @@ def test_listening_to_one_who_babbles_ends(clock: Any) -> None:
     assert heard == pytest.approx(0.1 / 1e-5 + listening._MOST_WAITING, rel=0.01)
 
 
+def test_a_listener_who_is_slower_than_one_who_babbles_ends_soon(clock: Any) -> None:
+    """At 1 ms a frame, 20,000 frames took 20 s, and a scan listens several times."""
+    bus = clock(Bus(iter(lambda: (1e-3, frame(1)), None)))
+    assert sum(1 for _ in listening.frames_within(bus, 0.1)) == pytest.approx(600, abs=5)
+
+
 def test_the_emergency_stop_of_a_host_that_is_held_up_hears_who_acknowledged(
     clock: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -72,3 +79,47 @@ def test_the_emergency_stop_of_a_host_that_is_held_up_hears_who_acknowledged(
     answer = frames.encode_answer(frames.Answer(0, Status.EMERGENCY, frames.Kind.REPORT, 0))
     bus = clock(Bus(iter([(0.3, None), (0.0, frame(frames.answer_identifier(2), answer))])))
     assert estop.stop_everything(bus) == [2]
+
+
+def test_a_pause_for_another_thread_does_not_count_standing_still(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, slept = 0.0, []
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        slept.append(seconds)
+        now += seconds + (3.0 if len(slept) == 1 else 1e-4)  # a little late, as always
+
+    monkeypatch.setattr(listening, "time", SimpleNamespace(monotonic=lambda: now, sleep=sleep))
+    listening.pause(0.1)
+    assert sum(slept) == pytest.approx(0.1, abs=2e-3)
+
+
+def dense(every: float, seconds: float) -> list[can.Message]:
+    """Frames of 8 bytes, 0.125 ms at 1 Mbit/s, sent each `every` s for so long."""
+    return [
+        can.Message(timestamp=every * k, arbitration_id=5, is_extended_id=False, data=b"UUUUUUUU")
+        for k in range(round(seconds / every))
+    ]
+
+
+def test_a_babbler_is_heard_by_one_who_is_held_up(clock: Any) -> None:
+    """Of 0.25 s the listener gets the first 0.12: less than half of the time, and all of it is taken."""
+    bus = clock(Bus(iter([*((0.00014, message) for message in dense(0.00014, 0.12)), (5.0, None)])))
+    bus.bitrate = 1_000_000
+    with pytest.raises(MachineError, match="is taken"):
+        traffic.refuse_taken(bus)
+
+
+def test_what_has_piled_up_while_the_listener_stood_still_is_no_babble(clock: Any) -> None:
+    """A fifth of the time is taken, for 3 s that are heard at once."""
+    bus = clock(Bus(iter([(3.0, None), *((0.0, message) for message in dense(0.0006, 3.0))])))
+    bus.bitrate = 1_000_000
+    traffic.refuse_taken(bus)
+
+
+def test_a_babbler_is_heard_by_one_who_reads_slowly(clock: Any) -> None:
+    """In 0.75 s it reads 75 of the 6000 frames, which were sent within 0.01 s."""
+    bus = clock(Bus(iter((0.01, message) for message in dense(0.00014, 0.84))))
+    bus.bitrate = 1_000_000
+    with pytest.raises(MachineError, match=r"is taken; \d\d frames in 0\.01 s"):
+        traffic.refuse_taken(bus)

@@ -21,6 +21,7 @@ from rds.bus.cia402 import codes
 from rds.bus.cia402.codes import Mode, NmtCommand, State, error_text, state_of, status_text
 from rds.bus.cia402.presence import refuse_clashes
 from rds.bus.cia402.settings import DriveSettings, Settings
+from rds.bus.listening import pause
 from rds.core.errors import InputError, MachineError
 
 LOG = logging.getLogger(__name__)
@@ -28,6 +29,7 @@ LOG = logging.getLogger(__name__)
 _SEND = 0.5  # s for a frame to be taken
 _LOOK = 0.02  # s between two looks at whether the library's receiving thread shall end
 _SEARCH = 0.5  # s for a drive to answer
+_STEP = 0.002  # s between two looks whether it has
 _ANSWERS_IN = 1.0  # s for one that was found to answer a request; computers stall for less
 _SECOND_ANSWER = 0.03  # s more for one that has the same node-ID
 _CHANGE = 2.0  # s for a drive to change its state or mode
@@ -120,10 +122,11 @@ def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
         for drive in drives:  # one that was stopped, as by an emergency stop, answers to nothing else
             network.send_message(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, drive.node]))
             network.send_message(0x600 + drive.node, b"\x40" + _DEVICE_TYPE + bytes(4))
-    deadline = time.monotonic() + _SEARCH
-    while time.monotonic() < deadline and not all(answers.values()):
-        time.sleep(0.002)
-    time.sleep(_SECOND_ANSWER)
+    for _ in range(round(_SEARCH / _STEP)):
+        if all(answers.values()):
+            break
+        pause(_STEP)
+    pause(_SECOND_ANSWER)
     for drive in drives:
         network.unsubscribe(0x580 + drive.node, note)
     network.check()  # if the bus has failed, nobody could answer

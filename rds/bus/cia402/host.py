@@ -25,6 +25,7 @@ from rds.bus.cia402.remote import Remote
 from rds.bus.cia402.settings import read_settings
 from rds.bus.identity import WAIT as LISTENING
 from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus
+from rds.bus.listening import frames_within
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 
@@ -139,10 +140,8 @@ class Cia402Drivers:
         self.counters = Counters()
 
     def _refuse_company(self) -> None:
-        deadline = time.monotonic() + LISTENING
-        while (left := deadline - time.monotonic()) > 0.0:
-            message = self._bus.recv(left)
-            if message is not None and message.arbitration_id not in self._table:
+        for message in frames_within(self._bus, LISTENING):
+            if message.arbitration_id not in self._table:
                 self._take_foreign(message)
 
     def _take_foreign(self, message: can.Message) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Iterable
 
 import can
 import canopen
 
 from rds.bus.identity import clash
+from rds.bus.listening import pause
 from rds.core.errors import MachineError
 
 _SERIAL = b"\x18\x10\x04"  # object 0x1018:04 in an SDO frame
@@ -37,7 +37,7 @@ def refuse_clashes(network: canopen.Network, nodes: Iterable[int], wait: float =
         with contextlib.suppress(can.CanTimeoutError):  # with bit timing, nobody acknowledges where nobody is
             for node in answers:
                 network.send_message(0x600 + node, bytes([_UPLOAD]) + _SERIAL + bytes(4))
-        time.sleep(wait)
+        pause(wait)
     finally:
         for node in answers:
             network.unsubscribe(0x580 + node, note)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from rds.bus.cia402.codes import State, state_of
 from rds.bus.cia402.configure import library
 from rds.bus.cia402.presence import refuse_clashes
 from rds.bus.link import BUILTIN, bus_name, open_bus
+from rds.bus.listening import pause
 from rds.core.errors import MachineError
 
 _WAIT = 0.3  # s for the devices to answer
@@ -65,7 +65,7 @@ def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = 
     try:
         with library(bus) as network, _quiet():
             network.scanner.search()
-            time.sleep(timeout)
+            pause(timeout)
             nodes = sorted(network.scanner.nodes)
             refuse_clashes(network, nodes)
             return [_ask(network, node) for node in nodes]
