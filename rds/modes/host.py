@@ -30,7 +30,7 @@ from rds.modes.machine import BUILTIN, machine_behind
 from rds.runtime.changes import Change, read_changes, timed
 from rds.runtime.desk import Desk
 from rds.runtime.plan import Plan, dump
-from rds.runtime.processes import is_alive
+from rds.runtime.processes import is_alive, wait_for_end
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
 from rds.runtime.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
 from rds.runtime.ring import Ring
@@ -213,7 +213,7 @@ def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress:
         try:
             if progress:
                 progress(ring.head, plan.samples)
-            time.sleep(_POLL)
+            wait_for_end(recorder, _POLL)
         except KeyboardInterrupt:
             if ring.stop_asked():
                 raise

@@ -1,13 +1,37 @@
-"""Whether a process that was noted down is still the one that was meant: numbers of processes are used again."""
+"""Processes: waiting for the end of one, and whether one that was noted down is still the one that was meant."""
 
 from __future__ import annotations
 
+import contextlib
 import os
+import select
+import subprocess
 from pathlib import Path
 
 
+def wait_for_end(process: subprocess.Popen[bytes], seconds: float) -> None:
+    """Sleep until a process that was started here has ended, `seconds` at most."""
+    if process.poll() is not None:
+        return
+    try:
+        descriptor = os.pidfd_open(process.pid)
+    except (AttributeError, OSError):  # not Linux, or one of before 2019
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(seconds)  # which looks again and again, in the end 20 times a second
+        return
+    try:
+        ends = select.poll()
+        ends.register(descriptor, select.POLLIN)
+        ends.poll(seconds * 1e3)
+    finally:
+        os.close(descriptor)
+
+
 def is_alive(process: int, argument: str) -> bool:
-    """Whether the process runs and has `argument` in its command; without /proc, whether any of that number runs."""
+    """Whether the process runs and has `argument` in its command; without /proc, whether any of that number runs.
+
+    Numbers of processes are used again.
+    """
     try:
         return argument.encode() in Path(f"/proc/{process}/cmdline").read_bytes()
     except OSError:

@@ -21,6 +21,7 @@ from rds.core.types import Ending
 from rds.runtime.changes import FILE as CHANGES
 from rds.runtime.changes import STOP, as_text, read_changes, timed
 from rds.runtime.desk import Desk
+from rds.runtime.processes import wait_for_end
 from rds.runtime.program import HOLD
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
 from rds.runtime.ring import Ring
@@ -89,7 +90,7 @@ def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) ->
     host = os.getppid()
     seen, since = (-1, -1), time.monotonic()
     while target.poll() is None:
-        time.sleep(DRAIN_EVERY)
+        wait_for_end(target, DRAIN_EVERY)
         if host and os.getppid() != host:
             recorder.host_is_gone()
             host = 0
