@@ -143,7 +143,8 @@ def _parts(text: str) -> Iterator[str]:
 
 
 def _fingerprint(documents: dict[str, Path]) -> str:
-    digest = hashlib.sha256((_HERE / "conf.py").read_bytes() + Path(__file__).read_bytes())
+    ours = [_HERE / "conf.py", Path(__file__), *sorted((_HERE / "static").iterdir())]
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in ours))
     for name, path in sorted(documents.items()):
         digest.update(name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]

@@ -51,11 +51,11 @@ class Guide:
         from rds.help.build import page_file
         from rds.help.serve import help_server
 
-        address = escape(help_server().url(page_file(self._subject)))
+        address = escape(f"{help_server().url(page_file(self._subject))}?colours={self.shell.colours.name}")
         self.frame.value = (
             f'<a href="{address}" target="_blank" rel="noopener">open in a page of its own</a>'
-            f'<iframe src="{address}" title="Help" style="width: 100%; height: 72vh; border: 1px solid #888; '
-            'background: white"></iframe>'
+            f'<iframe src="{address}" title="Help" style="width: 100%; height: 72vh; border: 1px solid #888">'
+            "</iframe>"
         )
 
 

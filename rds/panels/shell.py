@@ -14,6 +14,7 @@ import ipywidgets as widgets
 
 from rds.core.errors import RdsError
 from rds.panels import PANELS
+from rds.panels.colours import Colours
 from rds.panels.keys import Keys
 from rds.panels.kit.button import button, order
 from rds.panels.kit.notice import Notice
@@ -57,10 +58,10 @@ class Shell:
         body = widgets.HBox([nav, self._place])
         body.add_class("rds-body")
         self._rescue = Rescue()
+        self.colours = Colours(self._darken)
         self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
-        self.widget = widgets.VBox(
-            [self.presence, Keys(), widgets.HTML(_style()), self._head(), self._notice, body, self._rescue]
-        )
+        unseen = [self.presence, self.colours, Keys(), widgets.HTML(_style())]
+        self.widget = widgets.VBox([*unseen, self._head(), self._notice, body, self._rescue])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
         self.ticker.add(self._show_messages)
@@ -114,10 +115,7 @@ class Shell:
         tip = "Let the modules be used again after an emergency stop"
         release = order(self, "Release", tip, self._release, self)
         guide = button("Help", "The page of the documentation on this panel", self._help, self)
-        theme = widgets.ToggleButton(description="Dark", tooltip="Dark or light colours", value=False)
-        theme.observe(lambda change: self._darken(change["new"]), "value")
-        theme.layout.width = "auto"
-        head = widgets.HBox([self._title, guide, theme, release, stop])
+        head = widgets.HBox([self._title, guide, self.colours.button, release, stop])
         head.add_class("rds-head")
         return head
 
