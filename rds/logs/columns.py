@@ -11,6 +11,7 @@ from rds.logs.steps import BEYOND_MEASURE
 from rds.logs.table import Column, Table
 from rds.logs.units import base, check_unit, dimension, factor, plain
 
+_AMBIGUOUS = 0.4  # of a counter's range, in a sample: it may have gone the other way round
 _LATE = 1e7  # s: times beyond are dates, of which a float64 in s keeps 0.1 µs only: they are counted from the first
 
 
@@ -59,6 +60,14 @@ def quantity(
         findings.append(Finding("units", what, Gravity.WARNING))
     values = column.values
     _check_size(values, f"{name} ({column.name!r})", about.place)
+    if about.wrap is not None:
+        values, most = _unwrapped(values, about.wrap)
+        if most > _AMBIGUOUS * about.wrap:
+            what = (
+                f"{name} moves by up to {100.0 * most / about.wrap:.0f} % of its wrap-around ({about.wrap:g}) in a "
+                "sample: which way it went is a guess; sample faster, or check wrap in the map"
+            )
+            findings.append(Finding("wrap", what, Gravity.FAULT))
     if about.scale != 1.0 or about.offset != 0.0 or about.sign != 1:
         values = about.sign * (about.scale * values + about.offset)
     if of in ("counts", "count speed"):
@@ -75,6 +84,14 @@ def quantity(
         unit_out = "deg/s"
     times = factor(unit, unit_out)
     return (values if times == 1.0 else values * times), unit_out, findings
+
+
+def _unwrapped(values: np.ndarray, period: float) -> tuple[np.ndarray, float]:
+    """The numbers of a counter that begins again at `period`, going on instead; and the largest step then."""
+    going_on = values.copy()
+    known = np.flatnonzero(np.isfinite(values))
+    going_on[known] = np.unwrap(values[known], period=period)
+    return going_on, float(np.abs(np.diff(going_on[known])).max(initial=0.0))
 
 
 def _check_size(values: np.ndarray, what: str, place: str) -> None:

@@ -17,6 +17,7 @@ from rds.machines.machine import Machine
 
 UNKNOWN = "?"  # what a draft has for the column of a quantity that nothing in the file tells
 SUFFIX = ".map.toml"
+WRAPPING = ("position", "reference")  # what a counter that begins again may count
 JITTER_LIMIT = 0.1  # of the sample period: how far a step of the time may be from it
 ROTARY = ("angle", "angular speed")
 # what each quantity may be measured in
@@ -32,13 +33,17 @@ DIMENSIONS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """A column that is a quantity: `sign * (scale * number + offset)` in `unit`; None: the unit that the file gives."""
+    """A column that is a quantity: `sign * (scale * number + offset)` in `unit`; None: the unit that the file gives.
+
+    `wrap`: the number at which the counter begins again, for a position that is to go on beyond it.
+    """
 
     column: str
     unit: str | None = None
     scale: float = 1.0
     offset: float = 0.0
     sign: int = 1
+    wrap: float | None = None
     second: bool = False  # it is in the second file
     place: str = ""  # of the map, for errors
 
@@ -280,10 +285,13 @@ def _column(axis: Words, quantity: str) -> ColumnMap:
         scale=_scale(words),
         offset=words.number("offset", 0.0, "the column's unit", -1e15, 1e15),
         sign=int(sign),
+        wrap=words.number("wrap", None, "numbers of the column", 1e-9, 1e15) if "wrap" in words else None,
         second=words.flag("second", False),
         place=axis.place(quantity),
     )
     words.done()
+    if made.wrap is not None and quantity not in WRAPPING:
+        raise words.fault("wrap", f"is for {' and '.join(WRAPPING)}, where a counter begins again; remove it")
     return made
 
 

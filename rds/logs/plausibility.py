@@ -13,6 +13,7 @@ from rds.machines.machine import Axis
 _LAGS = 10  # windows by which a motion may follow its command
 _CLEAR, _FAINT = 0.5, 0.15  # correlations
 _JUMP, _SMOOTH = 0.3, 0.1  # of the range, in one sample: what a command may do, and a position does not
+_LEAP = 0.8  # of the range of a position, in one sample: no axis does that
 _FACTOR = 30.0  # of the expected size: beyond it a unit is wrong, not an axis
 _DRIVEN = 3.0  # times the voltage that overcomes friction
 _FASTEST, _LONGEST = 20e3, 100e3  # mm/s, mm
@@ -26,6 +27,8 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
     """Whether the motion follows the command, against it, or the two columns are swapped."""
     if np.ptp(log.command) == 0.0 or np.ptp(log.position) == 0.0:
         return []
+    if around := _wraps(log):
+        return [around]
     jump = {name: float(np.abs(np.diff(v)).max() / np.ptp(v)) for name, v in _both(log).items()}
     if log.units.get("position") != "rev/min" and jump["position"] > _JUMP and jump["command"] < _SMOOTH:
         what = (
@@ -96,6 +99,25 @@ def loop(log: Log, axis: Axis | None) -> list[Finding]:
             what += "; the log is stated to be open loop"
         return [Finding("closed-loop", what, Gravity.WARNING)]
     return []
+
+
+def _wraps(log: Log) -> Finding | None:
+    """A position that leaps by nearly its whole range, always as far, and creeps between: a counter begins again."""
+    steps = np.diff(log.position)
+    leaps = np.flatnonzero(np.abs(steps) > _LEAP * np.ptp(log.position))
+    others = np.delete(np.abs(steps), leaps)
+    if log.units.get("position") == "rev/min" or not len(leaps) or not len(others) or others.max() == 0.0:
+        return None
+    size = np.abs(steps[leaps])
+    if np.ptp(size) > 2.0 * others.max() or others.max() > _SMOOTH * size.min():
+        return None
+    unit = log.units.get("position", "mm")
+    what = (
+        f"the position leaps by {size.mean():.4g} {unit} {len(leaps)} times, first before sample {leaps[0] + 1}, and "
+        f"moves by {others.max():.3g} {unit} at most else: a counter that begins again? Say in the map at which number "
+        "of the column, as in position = { column = ..., wrap = 65536 }"
+    )
+    return Finding("wrap", what, Gravity.FAULT, int(leaps[0]) + 1)
 
 
 def _both(log: Log) -> dict[str, np.ndarray]:
