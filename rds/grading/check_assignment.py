@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from rds.grading.assignment import Assignment
 from rds.grading.cases.case import COUNTS
 from rds.grading.grade import Band, Grade, Status
 from rds.grading.grade_one import Opener, grade, grade_with_runs
+from rds.grading.scratch import scratch
 
 SEEDS = 20
 WORK_SEEDS = 3  # students for whom work is counted: it hardly depends on the plant, and takes a hundred times as long
@@ -157,8 +157,8 @@ def _judge_solution(assignment: Assignment, grades: list[Grade], found: _Found) 
 
 def _idle(assignment: Assignment, pool: Opener, reference: Grade, found: _Found) -> Grade:
     """The grade of doing nothing; an empty file and the template must not earn anything either."""
-    with tempfile.TemporaryDirectory(prefix="rds-check-") as folder:
-        path = Path(folder) / "submission.py"
+    with scratch("check") as folder:
+        path = folder / "submission.py"
         path.write_text("")
         empty = grade(assignment, path, reference.student, pool)
         if empty.score:

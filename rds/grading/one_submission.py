@@ -14,7 +14,6 @@ import os
 import shutil
 import stat
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +26,7 @@ from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.exported import Wanted
 from rds.grading.grade import Grade, Status
 from rds.grading.intake.layouts import TIMES
+from rds.grading.scratch import scratch
 from rds.results.atomic import write_whole
 
 RESULTS = "results/results.json"
@@ -79,8 +79,7 @@ def _grade(container: Container, platform: str, root: Path, target: Path) -> Non
     about = json.loads((root / container.about).read_bytes())
     student, time = container.who(about)
     student = student.replace("/", "_") or "student"
-    with tempfile.TemporaryDirectory(prefix="rds-one-") as name:
-        work = Path(name)
+    with scratch("one") as work:
         folder = work / "submissions" / student
         shutil.copytree(root / container.submission, folder, symlinks=True, copy_function=_copied)
         if time:

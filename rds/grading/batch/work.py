@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,6 +17,7 @@ from rds.grading.assignment import FILE, Assignment, read_assignment
 from rds.grading.feedback import feedback_page
 from rds.grading.grade_one import grade_with_runs
 from rds.grading.sandbox import Pool, available
+from rds.grading.scratch import scratch
 from rds.spread import worker_number
 
 if TYPE_CHECKING:
@@ -80,8 +80,8 @@ def graded(setup: Setup, task: Task) -> Answer:
     if task.path:
         found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
     else:
-        with tempfile.TemporaryDirectory(prefix="rds-grade-") as folder:
-            path = Path(folder) / CODE
+        with scratch("submission") as folder:
+            path = folder / CODE
             path.write_bytes(task.code)
             found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
     grade, seconds = found.grade, time.monotonic() - began
@@ -119,25 +119,32 @@ def columns_of(runs: tuple[CaseRun, ...]) -> bytes:
 @lru_cache(maxsize=1)
 def _assignment(setup: Setup) -> tuple[Assignment, bytes]:
     """Read once for each worker, with the reference solution if there is one."""
-    with tempfile.TemporaryDirectory(prefix="rds-assignment-") as own:
-        for name, data in setup.files:
-            path = Path(own) / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-        read = read_assignment(setup.folder or own)
-        solution = read.path(read.solution)
-        code = b"" if solution is None else solution.read_bytes()
+    if setup.folder:
+        read, code = _with_solution(setup.folder)
+    else:
+        with scratch("assignment") as own:
+            for name, data in setup.files:
+                path = own / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(data)
+            read, code = _with_solution(own)
     if read.sha256 != setup.sha256:
         raise InputError("the assignment's files were changed while it was graded; put them back and resume")
     return read, code
+
+
+def _with_solution(folder: str | Path) -> tuple[Assignment, bytes]:
+    read = read_assignment(folder)
+    solution = read.path(read.solution)
+    return read, b"" if solution is None else solution.read_bytes()
 
 
 @lru_cache(maxsize=1)
 def _expected(setup: Setup) -> tuple[CaseRun, ...]:
     """The runs of the reference solution, once for each worker."""
     assignment, code = _assignment(setup)
-    with tempfile.TemporaryDirectory(prefix="rds-solution-") as folder:
-        path = Path(folder) / CODE
+    with scratch("solution") as folder:
+        path = folder / CODE
         path.write_bytes(code)
         return grade_with_runs(assignment, path, _SOLUTION, _pool(setup.jobs)).runs
 
