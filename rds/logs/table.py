@@ -13,6 +13,8 @@ from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.logs.log import Finding
 
+_DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}([ T,]|$)")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
 
@@ -71,6 +73,13 @@ class Table:
 
 def remedy(cell: str) -> str:
     """What to do about a cell that is no number."""
+    if _DATE.match(cell):
+        return "write dates as 2024-05-01 12:00:00.001 (of others nobody knows which is the day), or the time in s"
+    if _THOUSANDS.fullmatch(cell):
+        return (
+            "every cell must be a number: if this comma parts the thousands, export the file without it; if it is a "
+            'decimal comma, say decimal = "comma" under [table] in a map'
+        )
     if _DECIMAL_COMMA.fullmatch(cell):
         return 'every cell must be a number: if this is a decimal comma, say decimal = "comma" under [table] in a map'
     return "every cell must be a number: repair it or choose another column"

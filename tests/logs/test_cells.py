@@ -10,6 +10,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.logs.describe import describe
 from rds.logs.read_log import read_log
+from rds.logs.table import remedy
 from tests.logs.data_files import axis, headed, write
 
 
@@ -59,3 +60,18 @@ def test_a_heading_that_would_command_the_terminal_is_refused(tmp_path: Path) ->
     path.write_text(path.read_text().replace("voltage", "\x1b[31mvoltage"))
     with pytest.raises(InputError, match=r"column '\\x1b\[31mvoltage' has characters in its name"):
         describe(path)
+
+
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        ("01.05.2024 12:00:00.000", "write dates as 2024-05-01 12:00:00.001"),
+        ("05/01/2024 12:00:00 PM", "write dates as 2024-05-01 12:00:00.001"),
+        ("-1,002", "if this comma parts the thousands, export the file without it"),
+        ("1,5", 'if this is a decimal comma, say decimal = "comma"'),
+        ("overflow", "repair it or choose another column"),
+    ],
+)
+def test_what_to_do_about_a_cell(cell: str, words: str) -> None:
+    """A file of which a thousands separator were read as a decimal comma would be wrong by a factor of 1000."""
+    assert words in remedy(cell)
