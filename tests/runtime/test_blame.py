@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lost_machines import unless_lost
 from misbehaviour import busy, every, send
 
 import rds
@@ -33,7 +34,8 @@ Maker = Callable[..., rds.Experiment]
     ],
 )
 def test_two_milliseconds_of_one_are_missed(experiment: Maker, wait: Any, samples: int, mode: str) -> None:
-    result = experiment(every(samples, lambda: wait(0.002)), duration=0.5).run(mode)
+    slow = experiment(every(samples, lambda: wait(0.002)), duration=0.5)
+    result = unless_lost(lambda: slow.run(mode))
     assert result.verdict == "missed"
     assert "control() and the model took " in result.meta["verdict_reason"]
     assert result.meta["ending"] == "done"
@@ -45,11 +47,13 @@ def test_a_slow_model_is_missed(experiment: Maker) -> None:
         busy(0.0015)
         return x
 
-    assert experiment(model=advance, duration=0.5).run("emulation").verdict == "missed"
+    slow = experiment(model=advance, duration=0.5)
+    assert unless_lost(lambda: slow.run("emulation")).verdict == "missed"
 
 
 def test_a_single_slow_call_comes_back_when_it_is_made_again(experiment: Maker) -> None:
-    result = experiment(every(700, lambda: busy(0.03)), duration=1.0).run("emulation")
+    slow_once = experiment(every(700, lambda: busy(0.03)), duration=1.0)
+    result = unless_lost(lambda: slow_once.run("emulation"))
     assert result.verdict == "missed"
 
 
@@ -60,7 +64,8 @@ def test_a_thread_that_takes_the_processor_is_missed(experiment: Maker) -> None:
     def start() -> None:
         threading.Thread(target=spin, daemon=True).start()
 
-    result = experiment(every(80, start), duration=0.1).run("emulation")
+    starting = experiment(every(80, start), duration=0.1)
+    result = unless_lost(lambda: starting.run("emulation"))
     if result.meta["environment"]["rehearsal"]["stalls"] == 0:
         assert result.verdict == "missed"
     assert result.meta["environment"]["threads"] >= 1
@@ -125,7 +130,7 @@ def test_whose_processor_is_taken_is_not_blamed(experiment: Maker) -> None:
         for hog in hogs:
             assert hog.stdout is not None
             hog.stdout.readline()
-        result = experiment(duration=1.0).run("emulation")
+        result = unless_lost(lambda: experiment(duration=1.0).run("emulation"))
     finally:
         for hog in hogs:
             hog.kill()
