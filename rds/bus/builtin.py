@@ -12,7 +12,6 @@ import logging
 import os
 import select
 import socket
-import struct
 import threading
 import time
 from collections import deque
@@ -25,6 +24,7 @@ from rds.bus.address import Address, channels
 from rds.bus.board import Glance
 from rds.bus.bus_settings import read_settings
 from rds.bus.confinement import ErrorState
+from rds.bus.wire_messages import filters_of, message_of, record_of
 
 LOG = logging.getLogger(__name__)
 
@@ -82,7 +82,7 @@ class BuiltinBus(can.BusABC):
         self._sending = threading.Lock()
         self._pid = os.getpid()
         try:
-            connection = connect.join(self._channel, receive_own_messages, _as_filters(can_filters), settings)
+            connection = connect.join(self._channel, receive_own_messages, filters_of(can_filters), settings)
             self._glance = Glance(Address(self._channel).board_path, connection.node) if connection.bitrate else None
         except OSError as error:
             raise can.CanInitializationError(f"{self.channel_info}: {error}") from error
@@ -97,7 +97,7 @@ class BuiltinBus(can.BusABC):
 
     def _apply_filters(self, filters: Any) -> None:
         try:
-            connect.retune(self._channel, self._node, _as_filters(filters))
+            connect.retune(self._channel, self._node, filters_of(filters))
         except OSError as error:
             raise can.CanOperationError(f"{self.channel_info}: filters not set: {error}") from error
 
@@ -132,7 +132,7 @@ class BuiltinBus(can.BusABC):
         if record[12] != wire.FRAME:
             raise self._lose(f"the hub let this node go: {wire.goodbye_reason(record)}")
         # frames that were on their way when filters changed are sorted out by python-can; error frames have no filter
-        return self._message(record), self._filters is None or bool(record[13] & wire.ERROR)
+        return message_of(record, self._channel_given), self._filters is None or bool(record[13] & wire.ERROR)
 
     def _next_record(self, timeout: float | None) -> bytes | None:
         """The next record, or None if there is none in time. OSError if the connection broke."""
@@ -167,34 +167,6 @@ class BuiltinBus(can.BusABC):
                 timeout = deadline - time.monotonic()
         return None
 
-    def _message(self, record: bytes) -> can.Message:
-        stamp, identifier, _, flags, dlc, length = wire.HEADER.unpack_from(record)
-        if not flags:
-            return can.Message(
-                stamp * 1e-9,
-                identifier,
-                False,
-                False,
-                False,
-                self._channel_given,
-                dlc,
-                bytearray(record[16 : 16 + length]),
-            )
-        return can.Message(
-            timestamp=stamp * 1e-9,
-            arbitration_id=identifier,
-            is_extended_id=bool(flags & wire.EXTENDED),
-            is_remote_frame=bool(flags & wire.REMOTE),
-            is_error_frame=bool(flags & wire.ERROR),
-            channel=self._channel_given,
-            dlc=dlc,
-            data=bytearray(record[16 : 16 + length]),
-            is_fd=bool(flags & wire.FD),
-            is_rx=not flags & wire.OWN,
-            bitrate_switch=bool(flags & wire.BITRATE_SWITCH),
-            error_state_indicator=bool(flags & wire.ERROR_STATE),
-        )
-
     # --- sending
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -203,7 +175,7 @@ class BuiltinBus(can.BusABC):
         Raises can.CanTimeoutError if it could not be taken in time (then nothing of it was sent),
         can.CanOperationError if the bus is gone, ValueError for a frame that can't exist.
         """
-        record = _record(msg)
+        record = record_of(msg)
         if msg.is_fd and self._can_protocol is can.CanProtocol.CAN_20:
             raise ValueError(f"{self.channel_info}: opened with fd=False, it sends no CAN FD frames; leave fd away")
         if self._lost is not None:
@@ -300,7 +272,7 @@ class BuiltinBus(can.BusABC):
 
     def _after_the_end(self) -> tuple[can.Message, bool]:
         if self._early:
-            return self._message(self._early.popleft()), self._filters is None
+            return message_of(self._early.popleft(), self._channel_given), self._filters is None
         raise can.CanOperationError(self._lost or "")
 
     def _describe(self, error: OSError) -> str:
@@ -364,38 +336,6 @@ class BuiltinBus(can.BusABC):
     @staticmethod
     def _detect_available_configs() -> list[Any]:
         return [{"interface": "rds", "channel": channel} for channel in channels()]
-
-
-def _record(msg: can.Message) -> bytes:
-    data = msg.data
-    length = len(data)
-    flags = 0
-    if msg.is_extended_id:
-        flags = wire.EXTENDED
-    if msg.is_remote_frame:
-        flags |= wire.REMOTE
-    if msg.is_error_frame:
-        flags |= wire.ERROR
-    if msg.is_fd:
-        flags |= wire.FD
-        if msg.bitrate_switch:
-            flags |= wire.BITRATE_SWITCH
-        if msg.error_state_indicator:
-            flags |= wire.ERROR_STATE
-    try:
-        # the stamp tells the hub how late it is
-        header = wire.HEADER.pack(time.monotonic_ns(), msg.arbitration_id, wire.FRAME, flags, msg.dlc, length)
-        if flags or length > 8 or msg.arbitration_id > 0x7FF or msg.dlc != length:
-            wire.check_frame(header[wire.KEY_AT])
-    except (wire.WireError, struct.error) as error:
-        raise ValueError(f"no such frame can be sent: {msg!r}: {error}") from None
-    return (header + data).ljust(_SIZE, b"\0")
-
-
-def _as_filters(filters: Any) -> list[wire.Filter]:
-    if filters is None:
-        return []
-    return [wire.Filter(f["can_id"] & 0xFFFFFFFF, f["can_mask"] & 0xFFFFFFFF, f.get("extended")) for f in filters]
 
 
 def _wait(sock: socket.socket, writing: bool, timeout: float | None) -> bool:
