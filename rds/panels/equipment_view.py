@@ -10,7 +10,7 @@ import ipywidgets as widgets
 from rds.core.errors import InputError
 from rds.panels.earlier_runs import EarlierRuns
 from rds.panels.equipment_settings import EquipmentSettings
-from rds.panels.kit.button import attempt, button, follow, order, say_error
+from rds.panels.kit.button import attempt, button, follow, run_order, say_error
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -45,7 +45,7 @@ class EquipmentView:
         viewed = "What will run, as a block diagram; your files; the experiment's file"
         loaded = "Make everything ready and look for the machine, without running"
         tip = "Run with these settings; files are checked first"
-        self.run_button = order(shell, "Run", tip, self.start, say, primary=True)
+        self.run_button = run_order(shell, tip, self.start, say, equipment.choices)
         self.bar.locks = [
             self.run_button,
             button("Build", built, self.build, say),

@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.kit.button import attempt, halt, order
+from rds.panels.kit.button import attempt, halt, order, run_order
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
@@ -27,7 +27,7 @@ class Operator:
         self.work: ProgramWork | None = None
         self.bar = WorkBar(shell.ticker)
         tip = "Save the program and run it in the mode chosen"
-        self.run_button = order(shell, "Run", tip, run, notice, primary=True)
+        self.run_button = run_order(shell, tip, run, notice, choices)
         tip = "Come to rest on the path"
         self.hold_button = halt("Hold", tip, partial(self._do, "Hold", ProgramWork.hold), notice)
         self.resume_button, self.home_button = (

@@ -10,9 +10,14 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.panels.jog import JogView
+from rds.panels.kit.button import run_order
+from rds.panels.kit.notice import Notice
 from rds.panels.presence import Presence
 from rds.panels.shell import Shell
 from rds.session import Session
+from rds.session.choices import Choices
+from rds.session.equipment_fields import MODES
+from rds.session.fields import Choice
 from rds.session.jog import Jog
 from rds.session.late import LATE
 
@@ -85,6 +90,21 @@ def test_an_order_that_the_kernel_comes_to_late_is_refused_and_the_next_one_is_n
     for word in ({"kind": "late", "what": "Home", "age": float("nan")}, {"kind": "go", "number": "7"}, {}, 3, None):
         page._said(None, word, None)
     assert late == []
+
+
+def test_a_late_run_is_refused_only_where_something_moves(tmp_path: Path) -> None:
+    modes = MODES["control"] | MODES["model"]
+    choices, said = Choices([Choice("mode", "Mode", "what runs", "simulation", modes)]), Notice()
+    begun: list[str] = []
+    shell = Shell(Session(tmp_path))
+    run = run_order(shell, "", lambda: begun.append(choices["mode"]), said, choices)
+    for mode in modes:
+        choices.set("mode", mode)
+        shell.presence._age = 7.0
+        run.click()
+        shell.presence._age = 0.0
+    assert begun == ["simulation", "emulation"]
+    assert "Run was pressed 7 s ago" in said.value
 
 
 @pytest.mark.parametrize("kind", ["step", "turn"])

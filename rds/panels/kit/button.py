@@ -11,9 +11,12 @@ import ipywidgets as widgets
 from rds.core.errors import RdsError
 from rds.panels.kit.notice import Notice as Line
 from rds.panels.kit.work_bar import WorkBar
+from rds.session.choices import Choices
+from rds.session.late import STILL
 from rds.session.task import Task
 
 T = TypeVar("T")
+_ORDER = "rds-order"  # what static/presence.js lets go only in time
 _WAIT = "wait until it is done, or stop it first"
 
 
@@ -38,11 +41,25 @@ def order(
     """A button that moves the machine: a press that comes late, because the page was busy, is refused."""
 
     def in_time() -> None:
-        shell.presence.in_time(text)
+        if _ORDER in made._dom_classes:
+            shell.presence.in_time(text)
         act()
 
     made = button(text, tip, in_time, notice, primary)
-    made.add_class("rds-order")
+    made.add_class(_ORDER)
+    return made
+
+
+def run_order(shell: Any, tip: str, act: Callable[[], Any], notice: Notice, choices: Choices) -> widgets.Button:
+    """The Run button: an order in those modes in which something moves."""
+
+    def follow_mode(name: str) -> None:
+        if name == "mode":
+            (made.remove_class if choices["mode"] in STILL else made.add_class)(_ORDER)
+
+    made = order(shell, "Run", tip, act, notice, primary=True)
+    follow_mode("mode")
+    choices.watch(follow_mode)
     return made
 
 
