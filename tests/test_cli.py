@@ -254,7 +254,7 @@ def test_a_served_machine_ends_by_ctrl_c(folder: Path) -> None:
         done = command("run", "e.toml", "-m", "implementation", "-o", "out", "--json")
         assert only_json(done.stdout)["mode"] == "implementation"
         served.send_signal(signal.SIGINT)
-        _, errors = served.communicate(timeout=10)
+        _, errors = served.communicate(timeout=60)
     finally:
         served.kill()
     assert "Traceback" not in errors

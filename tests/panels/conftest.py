@@ -145,13 +145,39 @@ def see(page: Any, selector: str, state: str = "visible", timeout: float = PATIE
 
 
 @pytest.fixture
-def open_page(new_page: Callable[..., Any], app: App) -> Callable[..., Any]:
+def folders() -> Iterator[set[Path]]:
+    """Those of the pages that a test opens. At its end, and however it ends, no run goes on there, and the machine is
+    free: the next test, or the same one tried again, would find it in use.
+    """
+    from rds.core.errors import InputError
+    from rds.session import Session
+
+    used: set[Path] = set()
+    yield used
+    for folder in used:
+        session, nobody = Session(folder), object()
+        for run in session.runs_that_go_on():
+            run.stop()
+        deadline = time.monotonic() + PATIENCE / 1e3
+        while time.monotonic() < deadline:
+            try:
+                session.take_machine("the next test", nobody)
+            except InputError:
+                time.sleep(0.1)
+            else:
+                session.give_machine_back(nobody)
+                break
+
+
+@pytest.fixture
+def open_page(folders: set[Path], new_page: Callable[..., Any], app: App) -> Callable[..., Any]:
     """Open a page of the app, or of another one, at a panel by its title; with a `clock`, time can be put forward."""
 
     def show(
         panel: str | None = None, on: App | None = None, width: int = 1280, height: int = 800, clock: bool = False
     ) -> Any:
         page = new_page(width, height, clock)
+        folders.add((on or app).folder)
         page.goto((on or app).url)
         page.wait_for_selector(".rds-app .rds-nav button")
         if panel is not None:

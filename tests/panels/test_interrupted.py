@@ -57,12 +57,17 @@ def wait_for(look: Callable[[], Any]) -> Any:
     raise AssertionError("it did not come about")
 
 
+def recorded(folder: Path) -> int:
+    """Samples of a run until now: a run goes on for a while before its first."""
+    return len(open_result(folder)) if (folder / "record.rds").is_file() else 0
+
+
 def test_a_reload_during_a_run_loses_nothing(begin: Callable[..., Any]) -> None:
     _, page, folder = begin(LONG)
     page.reload()  # its kernel goes on until the run is kept
     page.wait_for_selector('.rds-notice:has-text("a run goes on")')
-    before = len(open_result(folder))
-    wait_for(lambda: len(open_result(folder)) > before + 500)  # the loop goes on, too
+    before = wait_for(lambda: recorded(folder))
+    wait_for(lambda: recorded(folder) > before + 500)  # the loop goes on, too
     page.click("button.rds-stop")
     wait_for(lambda: state_of(folder) is State.WHOLE)
     result = open_result(folder)
@@ -91,7 +96,7 @@ def test_a_kernel_that_dies_leaves_the_record_and_no_claim(
     begin: Callable[..., Any], open_page: Callable[..., Any]
 ) -> None:
     app, _, folder = begin(ORPHANED)
-    wait_for(lambda: len(open_result(folder)) > 300 if (folder / "record.rds").is_file() else False)
+    wait_for(lambda: recorded(folder) > 300)
     os.kill(json.loads((app.folder / ".machine.json").read_text())["process"], signal.SIGKILL)
     wait_for(lambda: state_of(folder) is State.CUT_SHORT)
     assert len(open_result(folder)) == ORPHANED * 1000  # the loop has gone on to its end

@@ -33,7 +33,7 @@ def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_pag
     page.select_option(DIALECT, "oacs: distributed")
     press(page, "Start modules")
     page.wait_for_selector('.rds-notice-good:has-text("4 say what they are")')
-    assert page.locator("caption:has-text('What they say of themselves')").is_visible()
+    page.wait_for_selector("caption:has-text('What they say of themselves')")
     tab(page, "2 Configuration")
     page.wait_for_selector('.rds-notice-good:visible:has-text("this order makes a machine")')
     page.locator('button:visible:text-is("▼")').first.click()
@@ -47,8 +47,9 @@ def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_pag
     page.wait_for_selector("td:visible:has-text('met')")
     press(page, "Listen")
     tab(page, "3 Controllers")
-    modules = page.locator('.widget-dropdown:has-text("Module") select')
-    assert modules.evaluate("(box) => box.selectedOptions[0]?.label").startswith("2:")  # one of them, before any choice
+    modules = page.locator('.widget-dropdown:has-text("Module") select').element_handle()
+    one = "(box) => box.selectedOptions[0]?.label.startsWith('2:')"  # of them, before any choice
+    page.wait_for_function(one, arg=modules)
     page.select_option('.widget-dropdown:has-text("Module") select', "4: LinrXa")
     press(page, "Step")
     page.wait_for_selector(".rds-figure canvas, .rds-figure img")
