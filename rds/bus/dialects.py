@@ -79,7 +79,7 @@ def _answers(dialect: str, machine: Machine, interface: str, channel: str | None
         from rds.bus.cia402.scan import scan
 
         return any(device.is_drive for device in scan(interface, channel, **options))
-    from rds.bus.drivers import find_machine
+    from rds.bus.calling import find_machine
 
     # the modules of the oacs dialect answer cyclic frames as well
     nodes = {machine.axis(name).node for name in find_machine(machine, interface, channel, **options)}

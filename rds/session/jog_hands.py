@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from rds.bus import frames
+from rds.bus.calling import find_machine
 from rds.bus.dialects import open_drivers
-from rds.bus.drivers import find_machine
 from rds.bus.link import default_channel
 from rds.controllers import library_controller
 from rds.controllers.axis_data import SPINDLE_UNIT

@@ -103,7 +103,7 @@ class MachineDesk:
 
         def begin(task: Task[None]) -> None:
             from rds.bus.address import channels
-            from rds.bus.drivers import find_machine
+            from rds.bus.calling import find_machine
             from rds.bus.server_process import end_server, start_server
 
             if channel in channels() and find_machine(machine, interface, channel):

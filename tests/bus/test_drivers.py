@@ -16,7 +16,8 @@ import can
 import pytest
 
 from rds.bus import frames
-from rds.bus.drivers import AxisDrivers, find_machine
+from rds.bus.calling import find_machine
+from rds.bus.drivers import AxisDrivers
 from rds.bus.frames import Answer, Kind, Status
 from rds.bus.server import serve
 from rds.core.errors import InputError, MachineError

@@ -20,7 +20,7 @@ from lost_machines import TRIES, unless_lost
 from misbehaviour import every, process, send
 
 import rds
-from rds.bus.drivers import find_machine
+from rds.bus.calling import find_machine
 from rds.bus.frames import CALL, Kind, Status, answer_identifier, decode_answer
 from rds.results import Result
 from rds.runtime.ring import Ring
