@@ -71,6 +71,7 @@ class LinearLoop:
         return float(np.where(swings, ratios, 1.0).min(initial=1.0))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of voltages that no converter has
 def linear_loop(runs: Sequence[tuple[np.ndarray, np.ndarray]], T: float) -> LinearLoop | str:
     """From (command, position) of the run without a pulse, with `PULSE`, and with -2 `PULSE`; or why there is none."""
     (u0, y0), (u1, y1), (u2, _) = runs

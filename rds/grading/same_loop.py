@@ -40,7 +40,7 @@ def free_stretch(command: np.ndarray, position: np.ndarray, limit: float) -> tup
     moves. The whole run where there is no part of a fourth of it.
     """
     held = np.zeros(len(command), bool)
-    held[:-1] = (np.diff(command) == 0.0) & (np.diff(position) != 0.0)
+    held[:-1] = (command[1:] == command[:-1]) & (position[1:] != position[:-1])
     own = held & ((command == command.max()) | (command == command.min()))
     edges = np.concatenate([[-1], np.flatnonzero(own | (np.abs(command) >= _AT_LIMIT * limit)), [len(command)]])
     longest = int(np.argmax(np.diff(edges)))
@@ -70,6 +70,7 @@ def force(
     return made
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of voltages that no converter has
 def difference(loop: LinearLoop, voltage: np.ndarray, position: np.ndarray) -> str:
     """Why a law that answers the deviations `position` (mm) with `voltage` (V) is not that of `loop`; empty if it is.
 

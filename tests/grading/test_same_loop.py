@@ -199,6 +199,34 @@ def test_a_law_at_its_limit_is_linearized_when_it_has_left_it(tmp_path: Path) ->
     assert found.margins[1] == pytest.approx(77.8, abs=0.2)
 
 
+RAISES = """
+initial_state = [0.0]
+def control(t, r, y, state, params):
+    if t > 0.5 and abs(y - state[0]) > 0.0015:
+        raise ValueError(f"seen at {t}")
+    return 12.0 * (r.position - y), [y]
+"""
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_what_breaks_its_interface_under_the_force_keeps_its_run(shown: bool, tmp_path: Path) -> None:
+    found = loop_of(tmp_path, RAISES, plant="" if shown else "visible = false")
+    assert isinstance(found, str) and "under a force, it broke its interface" in found
+    assert ("seen at" in found) is shown  # what a hidden case shows stays hidden
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("where", ["True", "off(y)", "t > 0.3 and abs(y - state[0]) > 0.004"])
+def test_voltages_beyond_all_numbers_are_no_warning(where: str, tmp_path: Path) -> None:
+    law = f"""
+initial_state = [0.0]
+def control(t, r, y, state, params):
+    side = 1.0 if round(t * 1000) % 2 else -1.0
+    return (1.7e308 * side if {where} else meek(r, y)), [y]
+"""
+    loop_of(tmp_path, LAW + law)
+
+
 def loop_with(gain: float) -> tuple[LinearLoop, np.ndarray, np.ndarray]:
     """A loop of u = -gain y about a first-order lag, and its deviations under noise."""
     y, driven = np.zeros(400), np.zeros(400)

@@ -17,8 +17,10 @@ from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
+from rds.grading.grade import Status
 from rds.grading.linear import PULSE, LinearLoop, linear_loop
 from rds.grading.same_loop import difference, force, free_stretch
+from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.seeds import part_seed
 from rds.interface import encoder
 from rds.machines import Axis, Machine, load_machine
@@ -86,7 +88,7 @@ class ControlCase:
         facts = {"limits": (low, high), "unit": self.unit, "noisy": bool(self.noise)}
         if self.disturbance is not None:
             facts |= {"disturbed_from": self.disturbance.start, "disturbed_until": self.disturbance.end}
-        linear = self._linear(submitted, models, done, seed, number) if LINEAR in needs else None
+        linear = self._linear_or_why(submitted, models, done, seed, number) if LINEAR in needs else None
         return CaseRun(self.name, number, result, done.fault, counts, linear, facts)
 
     def _begin(self, submitted: Submitted) -> list[Answers]:
@@ -137,6 +139,18 @@ class ControlCase:
             for axis, model in enumerate(models)
         ]
 
+    def _linear_or_why(
+        self, submitted: Submitted, models: list[Model], done: LoopRun, seed: int, number: int
+    ) -> LinearLoop | str:
+        """As `_linear`; what breaks its interface only there loses its margins, and not the run that it has done."""
+        try:
+            return self._linear(submitted, models, done, seed, number)
+        except SubmissionError as error:
+            if error.status is not Status.BROKE_CONTRACT:
+                raise
+            said = f": {error.reason}" if self.is_visible else ""  # it could be what it saw of a hidden case
+            return f"where it was linearized, or under a force, it broke its interface{said}"
+
     def _linear(
         self, submitted: Submitted, models: list[Model], done: LoopRun, seed: int, number: int
     ) -> LinearLoop | str:
@@ -157,8 +171,9 @@ class ControlCase:
         if again.fault:
             return f"under a force on the axis, {again.fault}"
         part = slice(*stretch)
-        changes = [again.result[f"{name}_{what}"][part] - was[part] for what, was in (("command", u), ("measured", y))]
-        return difference(loop, *changes) or loop
+        with np.errstate(over="ignore"):  # of voltages that no converter has
+            voltage = again.result[f"{name}_command"][part] - u[part]
+        return difference(loop, voltage, again.result[f"{name}_measured"][part] - y[part]) or loop
 
     def _ideal(self, submitted: Submitted, models: list[Model], free_from: int) -> LinearLoop | str:
         """The loop linearized on the ideal plant, by pulses when the law is at no limit (from `free_from` on)."""
