@@ -22,6 +22,8 @@ from typing import Any
 import can
 import pytest
 
+from rds.bus import connect
+
 FORK = multiprocessing.get_context("fork")  # quick, and these tests hold no threads when they fork
 
 
@@ -109,11 +111,20 @@ def hub(program: Callable[..., subprocess.Popen[str]], runtime_directory: Path) 
 
     def starter(channel: str = "test", *arguments: str) -> subprocess.Popen[str]:
         process = program("rds.bus.hub", channel, *arguments)
-        addresses = [runtime_directory / "rds" / f"{channel}{suffix}" for suffix in (".sock", ".tcp")]
-        wait_for(lambda: any(address.exists() for address in addresses))
+        wait_for(lambda: greets(channel) or process.poll() is not None)  # its address is there before it listens
         return process
 
     return starter
+
+
+def greets(channel: str) -> bool:
+    """Whether the channel's hub takes connections."""
+    with contextlib.suppress(OSError, ValueError):
+        connection = connect.visit(channel)
+        if connection is not None:
+            connection.sock.close()
+            return True
+    return False
 
 
 def is_free(lock: Path) -> bool:

@@ -29,9 +29,9 @@ def served() -> Iterator[Callable[[str], tuple[Machine, str]]]:
             serve = server.serve_oacs if dialect == "oacs" else server.serve
             thread = threading.Thread(target=lambda: serve(machine, "virtual", channel, ready=ready.set, stop=stop))
             thread.start()
-            stack.callback(thread.join, 5.0)
+            stack.callback(thread.join, 30.0)
             stack.callback(stop.set)
-            assert ready.wait(10.0)
+            assert ready.wait(30.0)
             return machine, channel
 
         yield start

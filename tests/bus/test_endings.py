@@ -50,15 +50,16 @@ def read_to_the_end(ready: Any, result: Any) -> None:
 
 
 def fill(bus: can.BusABC) -> int:
-    """Send until the bus takes no more; return how many frames it took."""
-    sent = 0
-    try:
-        while sent < 100_000:
+    """Send until the bus takes no more, twice in a row: a hub that is held up refuses once; return how many it took."""
+    sent = refused = 0
+    while sent < 100_000 and refused < 2:
+        try:
             bus.send(numbered(sent), timeout=0.1)
-            sent += 1
-    except can.CanTimeoutError:
-        return sent
-    raise AssertionError("the bus never filled")
+            sent, refused = sent + 1, 0
+        except can.CanTimeoutError:
+            refused += 1
+    assert refused, "the bus never filled"
+    return sent
 
 
 def test_a_killed_reader_holds_nobody_up(start: Callable[..., Any], hub: Callable[..., Any], open_bus: Opener) -> None:
@@ -70,7 +71,7 @@ def test_a_killed_reader_holds_nobody_up(start: Callable[..., Any], hub: Callabl
     fill(bus)
     reader.kill()
     for k in range(2000):
-        bus.send(numbered(k), timeout=1.0)
+        bus.send(numbered(k), timeout=0.8 * STALL)
 
 
 def test_a_stopped_reader_is_let_go_and_told_why(
@@ -83,10 +84,12 @@ def test_a_stopped_reader_is_let_go_and_told_why(
     os.kill(reader.pid, signal.SIGSTOP)
     bus, witness = open_bus(), open_bus()
     seen: list[int] = []
+    over = threading.Event()
 
     def read() -> None:
-        while (message := witness.recv(1.0)) is not None:
-            seen.append(int.from_bytes(message.data, "little"))
+        while not over.is_set():
+            if (message := witness.recv(0.1)) is not None:
+                seen.append(int.from_bytes(message.data, "little"))
 
     thread = threading.Thread(target=read)
     thread.start()
@@ -94,14 +97,16 @@ def test_a_stopped_reader_is_let_go_and_told_why(
     begin = time.monotonic()
     bus.send(numbered(sent), timeout=2 * STALL)
     assert time.monotonic() - begin < STALL, "it was let go after 0.5 s, not after the time that is usual"
+    wait_for(lambda: len(seen) == sent + 1)
+    over.set()
     thread.join()
     assert seen == list(range(sent + 1))
     os.kill(reader.pid, signal.SIGCONT)
-    count, error = result.get(timeout=5)
+    count, error = result.get(timeout=30)
     assert "read nothing for 0.5 s while others waited" in error
     assert 0 < count < sent
     process.terminate()
-    assert "read nothing for 0.5 s" in process.communicate(timeout=5)[1]
+    assert "read nothing for 0.5 s" in process.communicate(timeout=30)[1]
 
 
 def test_a_node_that_was_let_go_learns_it_when_it_sends(
@@ -110,7 +115,7 @@ def test_a_node_that_was_let_go_learns_it_when_it_sends(
     hub("test", "--queue", "8000", "--stall", "0.3")
     bus, lazy = open_bus(), open_bus()
     fill(bus)
-    bus.send(numbered(0), timeout=2.0)
+    bus.send(numbered(0), timeout=0.8 * STALL)
     with pytest.raises(can.CanOperationError, match=r"read nothing for 0\.3 s"):
         lazy.send(numbered(0))
     assert "read nothing" in caplog.text
@@ -133,7 +138,7 @@ def test_a_killed_sender_leaves_whole_frames(start: Callable[..., Any], open_bus
     bus, other = open_bus(), open_bus(can_filters=[{"can_id": 2, "can_mask": 0x7FF}])
     sender = start(send_for_ever)
     for k in range(2000):
-        message = bus.recv(2.0)
+        message = bus.recv(10.0)
         assert message is not None and int.from_bytes(message.data, "little") == k
     sender.kill()
     k = 2000
@@ -141,7 +146,7 @@ def test_a_killed_sender_leaves_whole_frames(start: Callable[..., Any], open_bus
         assert int.from_bytes(message.data, "little") == k
         k += 1
     bus.send(can.Message(arbitration_id=2, is_extended_id=False))
-    assert other.recv(1.0) is not None
+    assert other.recv(10.0) is not None
 
 
 def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest.LogCaptureFixture) -> None:
@@ -159,10 +164,10 @@ def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest
     hub: int = first.hub_pid  # type: ignore[attr-defined]
     os.kill(hub, signal.SIGKILL)
     with pytest.raises(can.CanOperationError, match=rf"hub \(process {hub}\) ended without a word"):
-        first.recv(1.0)
+        first.recv(10.0)
     with pytest.raises(can.CanOperationError, match="ended without a word"):
         second.send(numbered(0))
-    thread.join(1.0)
+    thread.join(30.0)
     assert len(waiting) == 1
     assert caplog.text.count("ended without a word") >= 3
     for bus in (first, second, third):
@@ -170,7 +175,7 @@ def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest
             bus.recv(0)
     again, other = open_bus(), open_bus()
     again.send(numbered(5))
-    assert other.recv(1.0) is not None
+    assert other.recv(10.0) is not None
 
 
 def test_a_hub_that_is_told_to_end_says_so(hub: Callable[..., Any], open_bus: Opener) -> None:
@@ -178,14 +183,14 @@ def test_a_hub_that_is_told_to_end_says_so(hub: Callable[..., Any], open_bus: Op
     bus = open_bus()
     process.terminate()
     with pytest.raises(can.CanOperationError, match="the hub was told to end"):
-        bus.recv(1.0)
+        bus.recv(10.0)
 
 
 def test_an_address_that_was_removed_ends_the_bus_loudly(open_bus: Opener, runtime_directory: Path) -> None:
     bus = open_bus()
     (runtime_directory / "rds" / "test.sock").unlink()
     with pytest.raises(can.CanOperationError, match="was removed"):
-        bus.recv(3.0)
+        bus.recv(30.0)
 
 
 def test_an_event_loop_hears_of_the_end_once(open_bus: Opener) -> None:
@@ -197,7 +202,11 @@ def test_an_event_loop_hears_of_the_end_once(open_bus: Opener) -> None:
         loop.set_exception_handler(lambda _, context: errors.append(str(context["exception"])))
         notifier = can.Notifier(bus, [can.AsyncBufferedReader()], timeout=0.1, loop=loop)
         os.kill(bus.hub_pid, signal.SIGKILL)  # type: ignore[attr-defined]
-        await asyncio.sleep(0.2)
+        for _ in range(3000):
+            if errors:
+                break
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(0.1)  # not twice
         notifier.stop()
 
     asyncio.run(watch())
@@ -238,7 +247,7 @@ def test_rubbish_ends_only_its_own_connection(
 ) -> None:
     first, second = open_bus(), open_bus()
     with socket.socket(socket.AF_UNIX) as visitor:
-        visitor.settimeout(2.0)
+        visitor.settimeout(30.0)
         visitor.connect(str(runtime_directory / "rds" / "test.sock"))
         try:
             visitor.sendall(rubbish)
@@ -252,7 +261,7 @@ def test_rubbish_ends_only_its_own_connection(
             pass
     assert reason.encode() in answer
     first.send(numbered(1))
-    assert second.recv(1.0) is not None
+    assert second.recv(10.0) is not None
 
 
 @pytest.mark.parametrize("part", [b"", HELLO[:50], HELLO + HELLO[:79]])
@@ -262,22 +271,22 @@ def test_partial_records_hurt_nobody(open_bus: Opener, runtime_directory: Path, 
         visitor.connect(str(runtime_directory / "rds" / "test.sock"))
         visitor.sendall(part)
         first.send(numbered(1))
-        assert second.recv(1.0) is not None
+        assert second.recv(10.0) is not None
     first.send(numbered(2))
-    assert second.recv(1.0) is not None
+    assert second.recv(10.0) is not None
 
 
 def test_many_connections_that_say_nothing(open_bus: Opener, runtime_directory: Path) -> None:
     first, second = open_bus(), open_bus()
     visitors = [socket.socket(socket.AF_UNIX) for _ in range(300)]
     for visitor in visitors:
-        visitor.settimeout(2.0)
+        visitor.settimeout(30.0)
         visitor.connect(str(runtime_directory / "rds" / "test.sock"))
     first.send(numbered(1))
-    assert second.recv(1.0) is not None
+    assert second.recv(10.0) is not None
     for visitor in visitors:
         visitor.close()
-    wait_for(lambda: first.send(numbered(2)) is None and second.recv(1.0) is not None)
+    wait_for(lambda: first.send(numbered(2)) is None and second.recv(10.0) is not None)
 
 
 def test_one_that_stood_still_long_enough_before_is_let_go_without_a_wait(
@@ -303,7 +312,7 @@ def test_a_frame_whose_length_is_not_that_of_its_data_is_not_sent(bitrate: int |
     with pytest.raises(ValueError, match="1 bytes of data, and its length \\(dlc\\) says 3"):
         sender.send(can.Message(arbitration_id=1, is_extended_id=False, data=b"a", dlc=3))
     sender.send(can.Message(arbitration_id=2, is_extended_id=False, is_remote_frame=True, dlc=3))
-    message = receiver.recv(2.0)
+    message = receiver.recv(10.0)
     assert message is not None and (message.arbitration_id, message.dlc) == (2, 3)
 
 

@@ -51,7 +51,7 @@ def test_a_schedule_that_is_too_long_is_refused_and_the_bus_goes_on(
     code, error = run("bus", "fault", "--file", str(path), "--channel", "test")
     assert code == 2 and "give the schedule in parts" in error
     one.send(can.Message(arbitration_id=1, is_extended_id=False, data=b"on"), 1.0)
-    message = other.recv(2.0)
+    message = other.recv(10.0)
     assert message is not None and bytes(message.data) == b"on"
 
 

@@ -48,10 +48,10 @@ def test_all_fields_arrive(opener: Opener, message: can.Message) -> None:
     sender, receiver = opener(), opener()
     before = time.time()
     sender.send(message)
-    received = receiver.recv(2.0)
+    received = receiver.recv(10.0)
     assert received is not None
     assert received.equals(message, timestamp_delta=None, check_channel=False)
-    assert abs(received.timestamp - before) < 1.0
+    assert before - 0.01 < received.timestamp < time.time() + 0.01
     assert received.is_rx
 
 
@@ -59,10 +59,10 @@ def test_a_node_does_not_hear_itself_unless_it_asks(opener: Opener) -> None:
     deaf, hearing, other = opener(), opener(receive_own_messages=True), opener()
     deaf.send(frame(1))
     hearing.send(frame(2))
-    seen = [(m.arbitration_id, m.is_rx) for m in (hearing.recv(1.0), hearing.recv(1.0)) if m]
+    seen = [(m.arbitration_id, m.is_rx) for m in (hearing.recv(10.0), hearing.recv(10.0)) if m]
     assert seen == [(1, True), (2, False)]
-    assert [m.arbitration_id for m in (other.recv(1.0), other.recv(1.0)) if m] == [1, 2]
-    heard = deaf.recv(1.0)
+    assert [m.arbitration_id for m in (other.recv(10.0), other.recv(10.0)) if m] == [1, 2]
+    heard = deaf.recv(10.0)
     assert heard is not None and heard.arbitration_id == 2
     assert deaf.recv(0) is None
 
@@ -85,10 +85,8 @@ def test_filters(opener: Opener, filters: Any, passing: list[int]) -> None:
     for identifier in (0x10, 0x11, 0x110, 0x10010):
         sender.send(frame(identifier, extended=identifier > 0x7FF))
     for bus in (at_open, later):
-        received = []
-        while (message := bus.recv(0.05)) is not None:
-            received.append(message.arbitration_id)
-        assert received == passing
+        received = [message.arbitration_id for _ in passing if (message := bus.recv(10.0))]
+        assert received == passing and bus.recv(0.05) is None
 
 
 def test_filters_hold_for_what_waits_already(opener: Opener) -> None:
@@ -97,7 +95,7 @@ def test_filters_hold_for_what_waits_already(opener: Opener) -> None:
         sender.send(frame(identifier))
     time.sleep(0.05)
     receiver.set_filters([{"can_id": 3, "can_mask": 0x7FF}])
-    message = receiver.recv(1.0)
+    message = receiver.recv(10.0)
     assert message is not None and message.arbitration_id == 3
 
 
@@ -115,7 +113,7 @@ def test_recv_waits_as_long_as_asked(opener: Opener) -> None:
 def test_periodic_sending(opener: Opener) -> None:
     sender, receiver = opener(), opener()
     task = sender.send_periodic(frame(7), 0.01)
-    messages = [receiver.recv(1.0) for _ in range(5)]
+    messages = [receiver.recv(10.0) for _ in range(5)]
     task.stop()
     assert all(m is not None and m.arbitration_id == 7 for m in messages)
 
@@ -126,7 +124,7 @@ def test_notifier_thread(opener: Opener) -> None:
     notifier = can.Notifier(receiver, [listener], timeout=0.1)
     for identifier in range(100):
         sender.send(frame(identifier))
-    seen = [message.arbitration_id for _ in range(100) if (message := listener.get_message(1.0))]
+    seen = [message.arbitration_id for _ in range(100) if (message := listener.get_message(10.0))]
     notifier.stop()
     assert seen == list(range(100))
 
@@ -139,7 +137,7 @@ def test_notifier_with_asyncio(opener: Opener) -> None:
         notifier = can.Notifier(receiver, [reader], timeout=0.1, loop=asyncio.get_running_loop())
         for identifier in range(100):
             sender.send(frame(identifier))
-        seen = [(await asyncio.wait_for(reader.get_message(), 1.0)).arbitration_id for _ in range(100)]
+        seen = [(await asyncio.wait_for(reader.get_message(), 10.0)).arbitration_id for _ in range(100)]
         notifier.stop()
         return seen
 
@@ -161,13 +159,13 @@ def test_messages_bear_the_channel_as_it_was_given(opener: Opener) -> None:
     with can.Bus(7341, interface=interface) as sender, can.Bus(7341, interface=interface) as receiver:
         sender.send(frame(1))
         sender.send(frame(1, extended=True))
-        assert [message.channel for message in (receiver.recv(2.0), receiver.recv(2.0)) if message] == [7341, 7341]
+        assert [message.channel for message in (receiver.recv(10.0), receiver.recv(10.0)) if message] == [7341, 7341]
 
 
 def test_fd_as_the_tools_of_python_can_give_it(opener: Opener) -> None:
     sender, receiver = opener(fd=True), opener(fd=True)
     sender.send(frame(5, bytes(64), is_fd=True))
-    received = receiver.recv(2.0)
+    received = receiver.recv(10.0)
     assert received is not None and received.is_fd and len(received.data) == 64
 
 
@@ -179,7 +177,7 @@ def test_a_node_without_fd_sends_no_fd_frames() -> None:
             classic.send(frame(5, is_fd=True))
         other.send(frame(6, bytes(12), is_fd=True))
         classic.send(frame(7))
-        heard, last = classic.recv(2.0), other.recv(2.0)
+        heard, last = classic.recv(10.0), other.recv(10.0)
         assert heard is not None and heard.is_fd
         assert last is not None and last.arbitration_id == 7
     with pytest.raises(ValueError, match="fd 'maybe' must be true or false"):
@@ -205,7 +203,7 @@ def test_a_thread_that_is_woken_for_nothing_waits_to_its_own_time_and_no_longer(
     wait, woken = builtin._wait, iter([True, True])
     monkeypatch.setattr(builtin, "_wait", lambda *given: next(woken, False) or wait(*given))
     with ThreadPoolExecutor(1) as pool, can.Bus(uuid4().hex, interface="rds") as bus:
-        assert pool.submit(bus.recv, 0.05).result(timeout=5.0) is None
+        assert pool.submit(bus.recv, 0.05).result(timeout=30.0) is None
     assert next(woken, None) is None
 
 
@@ -216,5 +214,5 @@ def test_a_wait_ends_in_peace_when_another_thread_shuts_the_bus_down(opener: Ope
     time.sleep(0.05)
     notifier.stop(0)
     bus.shutdown()
-    notifier.stop(5.0)
+    notifier.stop(30.0)
     assert failures.seen == [] and notifier.exception is None

@@ -51,7 +51,7 @@ def test_all_nodes_see_all_frames_in_one_order(start: Callable[..., Any]) -> Non
     for identifier in senders:
         start(flood, identifier, 3000, go)
     go.set()
-    first, second = (result.get(timeout=20) for result in results)
+    first, second = (result.get(timeout=30) for result in results)
     assert first == second
     for identifier in senders:
         assert [k for who, k, _ in first if who == identifier] == list(range(3000))
@@ -71,24 +71,28 @@ def test_a_slow_reader_gets_every_frame_of_a_burst(
     for k in range(BURST):
         bus.send(numbered(1, k))
     assert time.monotonic() - begin > 0.5, "the sender did not wait for the reader, which takes 0.8 s"
-    assert [k for _, k, _ in result.get(timeout=20)] == list(range(BURST))
+    assert [k for _, k, _ in result.get(timeout=30)] == list(range(BURST))
 
 
 def test_a_full_bus_refuses_within_the_timeout(hub: Callable[..., Any], open_bus: Callable[..., can.BusABC]) -> None:
     hub("test", "--queue", "8000")
     sender, reader = open_bus(), open_bus()
-    sent = 0
-    with pytest.raises(can.CanTimeoutError, match=r"not taken within 0\.05 s"):
-        while sent < 5000:
-            sender.send(numbered(1, sent), timeout=0.05)
-            sent += 1
-    with pytest.raises(can.CanTimeoutError):
-        sender.send(numbered(1, sent), timeout=0)
+    sent, refused = 0, ""
+    while not refused and sent < 5000:
+        for timeout in (0.05, 0):  # refused twice: a hub that is held up refuses once
+            try:
+                sender.send(numbered(1, sent), timeout=timeout)
+            except can.CanTimeoutError as error:
+                refused += f"{error}\n"
+            else:
+                sent, refused = sent + 1, ""
+                break
+    assert "not taken within 0.05 s" in refused and "not taken within 0 s" in refused
     received = []
-    while (message := reader.recv(0.2)) is not None:
+    while (message := reader.recv(0.2 if len(received) >= sent else 10.0)) is not None:
         received.append(int.from_bytes(message.data, "little"))
     assert received == list(range(sent)), "what was refused must not arrive, all else must"
-    sender.send(numbered(1, 0), timeout=0.5)
+    sender.send(numbered(1, 0), timeout=10.0)
 
 
 def join_once(go: Any, result: Any) -> None:
@@ -105,15 +109,15 @@ def test_twenty_processes_opening_at_once_share_one_hub(start: Callable[..., Any
     for _ in range(20):
         start(join_once, go, result)
     go.set()
-    assert len({result.get(timeout=10) for _ in range(20)}) == 1
+    assert len({result.get(timeout=30) for _ in range(20)}) == 1
 
 
 def test_the_hub_ends_after_the_last_node_and_starts_again(
     hub: Callable[..., Any], open_bus: Callable[..., can.BusABC], runtime_directory: Path
 ) -> None:
-    process = hub("test", "--linger", "0.2")
+    process = hub("test", "--linger", "0.5")
     bus = open_bus()
-    time.sleep(0.5)
+    time.sleep(0.7)
     assert process.poll() is None
     bus.shutdown()
     assert process.wait(30) == 0
@@ -132,7 +136,7 @@ def test_joining_while_the_hub_is_ending(start: Callable[..., Any], hub: Callabl
     hub("test", "--linger", "0")
     processes = [start(open_and_close, 30) for _ in range(3)]
     for process in processes:
-        process.join(20)
+        process.join(60)
         assert process.exitcode == 0
 
 
@@ -144,7 +148,7 @@ def test_filters_keep_the_hub_from_waking_a_node(open_bus: Callable[..., can.Bus
     assert select.select([other.fileno()], [], [], 0.1)[0] == []
     other.set_filters(None)
     sender.send(numbered(0x11, 2))
-    message = other.recv(1.0)
+    message = other.recv(10.0)
     assert message is not None and message.data[0] == 2
 
 
@@ -185,5 +189,5 @@ def test_frames_sent_before_leaving_arrive(open_bus: Callable[..., can.BusABC]) 
     for k in range(200):
         sender.send(numbered(1, k))
     sender.shutdown()
-    assert all(receiver.recv(1.0) is not None for _ in range(200))
+    assert all(receiver.recv(10.0) is not None for _ in range(200))
     wait_for(lambda: receiver.recv(0) is None)

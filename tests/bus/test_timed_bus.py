@@ -58,12 +58,14 @@ def state_of(line: Faults, name: str) -> dict[str, Any]:
 def test_stamps_are_spaced_by_exact_frame_times(timed: Callable[..., can.BusABC]) -> None:
     sender, receiver = timed("A"), timed("B")
     with Faults("test") as line:
-        line.inject("babble", node="B", identifier=0, duration=0.02)  # so that all wait for the bus together
+        line.inject("babble", node="B", identifier=0)  # so that all wait for the bus together
         for number in range(30):
             sender.send(frame(0x100 + number, bytes(range(number % 9))))
+        wait_for(lambda: state_of(line, "A")["waiting"] == 30)
+        line.clear()
         seen: list[can.Message] = []
         while len(seen) < 30:
-            message = receiver.recv(2.0)
+            message = receiver.recv(10.0)
             assert message is not None
             seen.append(message)
     assert [message.arbitration_id for message in seen] == list(range(0x100, 0x100 + 30))
@@ -93,7 +95,7 @@ def test_all_see_one_order_and_nobody_overtakes_himself(
         go.set()
         seen = []
         for bus in (first, second):
-            got = [bus.recv(5.0) for _ in range(600)]
+            got = [bus.recv(10.0) for _ in range(600)]
             seen.append([(m.arbitration_id, int.from_bytes(m.data, "little"), m.timestamp) for m in got if m])
         assert seen[0] == seen[1] and len(seen[0]) == 600
         for identifier in senders:
@@ -102,7 +104,7 @@ def test_all_see_one_order_and_nobody_overtakes_himself(
         assert statistics["frames"] == 600 and statistics["delivery_lateness"]["count"] == 600
     first.send(frame(0x7FF))
     for process in processes:
-        process.join(5)
+        process.join(30)
         assert process.exitcode == 0
 
 
@@ -111,7 +113,7 @@ def test_statistics_begin_anew_when_asked(timed: Callable[..., can.BusABC]) -> N
     with Faults("test") as line:
         line.inject("corrupt", node="A", count=2)
         sender.send(frame(0x123))
-        assert listener.recv(5.0) is not None
+        assert listener.recv(10.0) is not None
         found = line.statistics(reset=True)
         assert (found["frames"], found["error_frames"], found["struck"]) == (1, 2, 2)
         again = line.statistics()
@@ -178,7 +180,7 @@ def test_alone_a_node_waits_for_somebody_who_acknowledges(timed: Callable[..., c
         for _ in range(5000):
             alone.send(frame(6), timeout=0.05)
     other = timed("B")
-    message = other.recv(1.0)
+    message = other.recv(10.0)
     assert message is not None and message.arbitration_id == 5
     wait_for(lambda: alone.state is can.BusState.ACTIVE)
 
@@ -201,7 +203,7 @@ def test_bus_off_and_back_on_request(timed: Callable[..., can.BusABC], faults: F
     with pytest.raises(can.CanOperationError, match="not bus off"):
         node.restart()  # type: ignore[attr-defined]
     node.send(frame(7))
-    message = quick.recv(1.0)
+    message = quick.recv(10.0)
     assert message is not None and message.arbitration_id == 7
     reports = []
     while (message := node.recv(0.05)) is not None:
@@ -246,14 +248,14 @@ def test_a_question_that_makes_no_sense_hurts_nobody(timed: Callable[..., can.Bu
     assert "error" in connect.ask(visitor, question)
     visitor.sock.close()
     first.send(frame(1))
-    assert second.recv(1.0) is not None
+    assert second.recv(10.0) is not None
 
 
 def test_a_lone_node_that_is_killed_keeps_no_hub(start: Callable[..., Any], hub: Callable[..., Any]) -> None:
     process = hub("test", "--linger", "0.2")
     flood = start(flood_alone)
-    flood.join(10)
-    assert process.wait(3) == 0
+    flood.join(60)
+    assert process.wait(30) == 0
 
 
 def flood_alone() -> None:
@@ -280,13 +282,13 @@ def test_an_untimed_bus_refuses_what_needs_bits(open_bus: Callable[..., can.BusA
         line.inject("lose", node="A")
         for number in range(2):
             sender.send(frame(number))
-        message = receiver.recv(1.0)
+        message = receiver.recv(10.0)
         assert message is not None and message.arbitration_id == 1
         line.inject("unplug", node="B", duration=0.2)
         sender.send(frame(2))
         time.sleep(0.4)
         sender.send(frame(3))
-        message = receiver.recv(1.0)
+        message = receiver.recv(10.0)
         assert message is not None and message.arbitration_id == 3
 
 
@@ -436,15 +438,15 @@ def test_the_machine_brings_its_own_faults(program: Callable[..., Any], tmp_path
         assert not state_of(line, "X")["plugged"] and state_of(line, "Y")["plugged"]
     schedule.write_text('[[fault]]\nkind = "unplugg"\nnode = "X"\n')
     other = program("rds.bus.server", "mini-cnc", "--channel", "n", "--faults", str(schedule))
-    assert other.wait(10) == 2 and f"{schedule}, line 2" in other.stderr.read()
+    assert other.wait(30) == 2 and f"{schedule}, line 2" in other.stderr.read()
 
 
 def test_the_board_and_the_hub_leave_nothing_behind(
     hub: Callable[..., Any], open_bus: Callable[..., can.BusABC], runtime_directory: Path
 ) -> None:
-    process = hub("test", "--linger", "0.2")
+    process = hub("test", "--linger", "0.5")
     bus = open_bus(bitrate=MBIT)
     assert (runtime_directory / "rds" / "test.states").exists()
     bus.shutdown()
-    assert process.wait(3) == 0
+    assert process.wait(30) == 0
     assert os.listdir(runtime_directory / "rds") == []
