@@ -201,13 +201,21 @@ def test_functions_of_a_notebook_run_the_same_in_real_time() -> None:
         cell,
     )
     gain = 15.0
-    for options in (
-        {"controller": cell},
-        {"controller": rds.Controller(cell["control"], (0,)), "model": cell["advance"]},
-        {"controller": lambda t, r, y, state, params: (gain * (r.position - y), state)},
-    ):
-        own = rds.Experiment(duration=0.2, sample_period=PERIOD, reference=rds.sinusoid(1.0, 5.0), **options)
-        assert_same(own.run(), own.run("emulation"))
+    own = rds.Experiment(
+        axis=("X", "Y", "Z"),
+        duration=0.2,
+        sample_period=PERIOD,
+        reference=rds.sinusoid(1.0, 5.0),
+        controller=cell,
+        overrides={
+            "Y": {"controller": rds.Controller(cell["control"], (0,)), "model": cell["advance"]},
+            "Z": {"controller": lambda t, r, y, state, params: (gain * (r.position - y), state)},
+        },
+    )
+    simulated = own.run()
+    assert_same(simulated, own.run("emulation"))
+    gains = {name: simulated[f"{name}_command"][1] / simulated[f"{name}_reference"][1] for name in "XYZ"}
+    assert gains == pytest.approx({"X": 20.0, "Y": 20.0, "Z": 15.0}, rel=0.2)  # each its own
 
 
 def contour(t: float, r: Reference, y: np.ndarray, state: Any, params: Any) -> tuple[np.ndarray, Any]:
