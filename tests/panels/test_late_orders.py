@@ -70,6 +70,11 @@ def test_what_was_pressed_while_the_kernel_stood_still_moves_nothing_when_it_com
     press(500, STEP)
     page.wait_for_function("window.sent.includes('step')")
     assert page.evaluate("window.sent") == ["settle", "click", "settle", "go", "step"]
+    page.evaluate("window.sent = []")
+    page.locator('.rds-group:has-text("Motion") input').first.press("End")  # a field that may have made an order of it
+    press(500, '.rds-nav button:text-is("Jog")')
+    page.wait_for_function("window.sent.includes('click')")
+    assert page.evaluate("window.sent") == ["settle", "go", "click"]
 
 
 def test_an_order_that_the_kernel_comes_to_late_is_refused_and_the_next_one_is_not() -> None:

@@ -48,18 +48,18 @@ function render({ model, el }) {
     if (each === undefined) return; // of another browser on this page
     waiting.delete(message.number);
     settled = Math.max(settled, each.touched);
-    if (each.button.matches(ORDER)) {
-      const age = since(each.at);
-      const { button } = each; // a sign such as ▶ names nothing
+    const { button } = each;
+    const age = since(each.at);
+    if (button.matches(ORDER) && age > model.get("patience")) {
+      // a sign such as ▶ names nothing
       const what = button.closest(".rds-hold") ? button.getAttribute("aria-label") : button.textContent.trim();
-      if (age > model.get("patience")) {
-        model.send({ kind: "late", what, age });
-        return;
-      }
-      model.send({ kind: "go", number: message.number, age });
+      model.send({ kind: "late", what, age });
+      return;
     }
-    through = each.button;
-    each.button.click();
+    // for any button: whether it is an order may hang on a change of which only the kernel has heard
+    model.send({ kind: "go", number: message.number, age });
+    through = button;
+    button.click();
     through = null;
   };
   const touches = ["input", "change", "pointerup", "keyup", "click"];
