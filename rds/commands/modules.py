@@ -324,12 +324,12 @@ def step(
         folder = folder_for(out, force)
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")
+        from rds.results.atomic import write_whole
         from rds.results.files import save_all
         from rds.session.step_plot import plot
 
         files = {kind: str(path) for kind, path in save_all(result, folder).items()}
-        files["plot"] = str(folder / "step.png")
-        plot(result).savefig(files["plot"])
+        files["plot"] = str(write_whole(folder / "step.png", plot(result).png()))
     if json:
         print_json({"samples": len(result), "notes": result.meta.get("notes", []), "files": files})
     else:
