@@ -18,13 +18,18 @@ _LITTLE = 100.0  # times the measurement's noise: with less motion than that, a 
 _NONE = 12.0  # times the noise: it alone spans 8 in 10^4 samples, 10.4 in 10^7
 _WHITE = 2.576  # 99 % band, in units of 1/√N
 _LAGS = (1, 10, 100)
+_NARROW = ": intervals hold for errors that are small beside the motion, and may be too narrow here; record more motion"
+_WIDENED = (
+    ": derivatives mislead there, so intervals reach to where the residuals grow by more than chance; "
+    "record more motion"
+)
 _OR_HELD = ". Where a controller held the axis (closed_loop in the map), that alone lets a free run drift away"
 
 
 def fitted_doubts(structure: Structure, log: Log, error: np.ndarray) -> list[str]:
     """Doubts where the free run is what was fitted; `error` is measurement minus free run (samples,)."""
     motion, size, unit = motion_of(log), _rms(error), structure.output_unit
-    said = [*_little(log, motion, unit), *_poor(log, motion, error)]
+    said = [*_little(log, motion, unit, _WIDENED), *_poor(log, motion, error)]
     if motion.noise > 0.0 and size > _MISSED * motion.noise:
         said.append(
             f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / motion.noise:.3g} times the measurement's "
@@ -41,7 +46,7 @@ def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str)
     motion, size, unit = motion_of(log), _rms(error), structure.output_unit
     # forces are right in a closed loop as well, whose free run drifts; the other methods are for open loops
     is_open = log.closed_loop is False or method != "inverse-dynamics"
-    said = [*_little(log, motion, unit), *_poor(log, motion, error, is_open)]
+    said = [*_little(log, motion, unit, _NARROW), *_poor(log, motion, error, is_open)]
     if motion.noise > 0.0 and size > _MISSED * motion.noise:
         said.append(
             f"{log.name}: the free run of these parameters is {size:.3g} {unit} off (RMS), {size / motion.noise:.3g} "
@@ -52,23 +57,27 @@ def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str)
     return said
 
 
-def _little(log: Log, motion: Motion, unit: str) -> list[str]:
+def is_little(structure: Structure, log: Log) -> bool:
+    """Whether the motion of a log, or that in one direction, is so small beside the noise that derivatives mislead."""
+    return bool(_little(log, motion_of(log), structure.output_unit, ""))
+
+
+def _little(log: Log, motion: Motion, unit: str, so: str) -> list[str]:
     noise = motion.noise
     if (reach := float(np.ptp(log.position))) < _LITTLE * noise:
-        return [_too_small(log, "", reach, "in all", noise, unit)]
+        return [_too_small(log, "", reach, "in all", noise, unit) + so]
     said = []
     for way, word in ((1.0, "forward "), (-1.0, "backward ")):
         reach = travel(log.position, way)
         if unit != SPEED and _NONE * noise < reach < _LITTLE * noise:
-            said.append(_too_small(log, word, reach, "at most", noise, unit))
+            said.append(_too_small(log, word, reach, "at most", noise, unit) + so)
     return said
 
 
 def _too_small(log: Log, way: str, reach: float, how: str, noise: float, unit: str) -> str:
     return (
         f"{log.name}: the axis moves {way}by {reach:.3g} {unit} {how}, only {reach / noise:.0f} times the "
-        f"measurement's noise ({noise:.2g} {unit}): intervals hold for errors that are small beside the motion, "
-        "and may be too narrow here; record more motion"
+        f"measurement's noise ({noise:.2g} {unit})"
     )
 
 

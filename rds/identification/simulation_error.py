@@ -19,13 +19,16 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.options import check_known
 from rds.identification.estimate import Estimate
-from rds.identification.made_estimate import made_estimate
-from rds.identification.search import find, from_plain
+from rds.identification.free_run_doubts import is_little
+from rds.identification.made_estimate import made_estimate, t_quantile
+from rds.identification.problem import Problem
+from rds.identification.profile import widening
+from rds.identification.search import Found, find, from_plain
 from rds.identification.smoothing import encoder_step
 from rds.identification.solve import EVALUATIONS, first_state
 from rds.identification.structure import Start, Structure
 from rds.identification.suspicions import suspicions
-from rds.identification.uncertainty import uncertainty_of
+from rds.identification.uncertainty import Uncertainty, uncertainty_of
 from rds.identification.untold import untold_by
 from rds.logs.log import Log
 
@@ -70,7 +73,9 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     if not solution.converged:  # what is still to go may be as wrong as it is large
         left = solution.step[:free][:, None]
         covariance[np.ix_(places, places)] += left @ left.T
-    for name in found.unmoved:
+    open_ended = _widen(covariance, order, logs, structure, holding, found, uncertainty)
+    for name in (*found.unmoved, *open_ended):
+        covariance[order.index(name), :] = covariance[:, order.index(name)] = 0.0
         covariance[order.index(name), order.index(name)] = np.inf
     return made_estimate(
         structure,
@@ -82,6 +87,11 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         untold=[
             *(sentence for name, (_, sentence) in held.items()),
             *untold_by(structure, problem.names, values, uncertainty, found.unmoved),
+            *(
+                f"{name}: {values[name]:.4g} {structure.units[name]}".rstrip()
+                + " is a guess; values far from it explain these data as well, the other parameters with them"
+                for name in open_ended
+            ),
         ],
         warnings=suspicions(problem, solution, uncertainty),
         details={
@@ -94,6 +104,37 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         },
         states=[problem.state(solution.point, number) for number in range(len(logs))],
     )
+
+
+def _widen(
+    covariance: np.ndarray,
+    order: list[str],
+    logs: Sequence[Log],
+    structure: Structure,
+    holding: Mapping[str, float],
+    found: Found,
+    uncertainty: Uncertainty,
+) -> list[str]:
+    """Widen the covariance where the motion is small beside the noise; the parameters whose intervals have no end."""
+    if not any(is_little(structure, log) for log in logs):
+        return []
+    problem, solution = found.problem, found.solution
+    values = problem.values(solution.point)
+    whole = Problem(logs, structure, holding)  # with those that were held for want of an occasion to tell them
+    states = [problem.state(solution.point, number) for number in range(len(logs))]
+    samples = sum(len(log) for log in logs)
+    freedom = max(uncertainty.effective - problem.size, 1.0)
+    reaches = {
+        name: t_quantile(freedom) * float(np.sqrt(variance))
+        for name in problem.names
+        if 0.0 < (variance := covariance[order.index(name), order.index(name)]) < np.inf
+    }
+    allowed = t_quantile(freedom) ** 2 * solution.squares / samples * (samples / uncertainty.effective)
+    factors = widening(whole, whole.point(values, states), solution.squares, reaches, allowed)
+    open_ended = [name for name, factor in factors.items() if not np.isfinite(factor)]
+    scale = np.array([factors.get(name, 1.0) if name not in open_ended else 1.0 for name in order])
+    covariance *= np.outer(scale, scale)
+    return open_ended
 
 
 def _starts(

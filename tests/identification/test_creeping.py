@@ -1,0 +1,42 @@
+"""An axis that moves little beside the noise: intervals that hold, or none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rds.identification.axis_structure import make
+from rds.identification.fit import fit
+from rds.logs.log import Log
+from tests.identification.fit_logs import mini_cnc
+
+AXIS = make()
+
+
+def creeping(seed: int, kind: str, share: float) -> Log:
+    """3 s in which the X axis's whole reach is 40 times the noise; `share` of the voltage that overcomes friction."""
+    values, t = mini_cnc("X"), np.arange(3000) * 1e-3
+    draw = np.random.default_rng(seed)
+    u = share * values["friction_plus"] / values["K"] * np.sin(2.0 * np.pi * 3.0 * t)
+    u = np.abs(u).max() * np.sign(u) if kind == "square" else u
+    y = AXIS.respond(t, u, (0.0, 0.0), values)
+    return Log(kind, t, u, y + np.ptp(y) / 40.0 * draw.standard_normal(len(t)), units={"position": "mm"})
+
+
+@pytest.mark.parametrize("kind", ["square", "sine"])
+def test_intervals_hold_or_are_refused(kind: str) -> None:
+    """The axis goes backward only, or nearly. Under a square voltage a K a thousand times too large explains that."""
+    inside, told = [], 0
+    for seed in (1, 3):
+        found = fit([creeping(seed, kind, 1.1)], AXIS)
+        assert any("intervals reach to where the residuals grow by more than chance" in w for w in found.warnings)
+        for name, truth in mini_cnc("X").items():
+            parameter = found.parameters[name]
+            if kind == "square" and name == "K":
+                assert parameter.value > 100.0 * truth and np.isinf(parameter.std_error)
+            if np.isfinite(parameter.std_error):
+                told += 1
+                inside.append(parameter.low <= truth <= parameter.high)
+            else:
+                assert any(name in sentence for sentence in found.untold)
+    assert told >= 2 and all(inside)
