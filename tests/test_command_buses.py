@@ -81,6 +81,20 @@ def test_the_built_in_bus_is_joined_on_the_channel_of_the_experiment_s_machine(t
     assert machine_of(own) == str(tmp_path / "own.toml")
 
 
+def test_jog_and_the_page_are_for_the_machine_of_the_experiment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the travel of the mini CNC another machine would be driven into its ends."""
+    file = str(experiment(tmp_path, 'machine = "mrmt-oacs"\n'))
+    refused = CliRunner().invoke(app, ["jog", "Y", "--by", "1", "--experiment", file])
+    assert refused.exit_code == 2 and "there is nothing called 'Y' to jog; there are X, Z, A" in refused.stderr
+    served: list[Any] = []
+    monkeypatch.setattr("rds.panels.app.serve.serve", lambda folder, machine, *words, bus: served.append(machine))
+    for words in (["--experiment", file], ["--experiment", file, "--machine", "mini-cnc"], []):
+        assert CliRunner().invoke(app, ["app", *words]).exit_code == 0
+    assert served == ["mrmt-oacs", "mini-cnc", "mini-cnc"]
+
+
 def test_an_option_goes_before_the_table_and_another_interface_is_refused(tmp_path: Path) -> None:
     file = experiment(tmp_path, ADAPTER)
     assert bus_table_of(file, "virtual", "1") == {"interface": "virtual", "channel": "1", "bitrate": 250_000}
