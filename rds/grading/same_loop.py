@@ -30,6 +30,7 @@ _SPREAD = 0.4, 1.2  # of that: so that small and large deviations are tried
 _OF_WHAT_IS_LEFT, _LEAST = 0.5, 0.01  # of the voltage up to the limit, and of the range: the largest force there
 _HOLDS = 4, 25  # samples from jump to jump
 _AT_LIMIT = 0.9  # of the converter's limit
+_OFTEN = 0.2  # of the samples before, or after: a sine that would need 1.02 times the limit is above 0.9 of it for more
 _SHORTEST = 4  # a stretch of less than a fourth of the run says too little
 
 
@@ -37,15 +38,23 @@ def free_stretch(command: np.ndarray, position: np.ndarray, limit: float) -> tup
     """First sample and end of the longest part of a run (V, mm) in which the law is not at a limit.
 
     The limit is the converter's (V), or one of its own: its largest or smallest voltage, held though the position
-    moves. The whole run where there is no part of a fourth of it.
+    moves. The whole run where there is no part of a fourth of it. What goes before or comes after is left out only
+    where the law is at a limit for a good part of it: a law that is another one behind a spike shall not be missed.
     """
     held = np.zeros(len(command), bool)
     held[:-1] = (command[1:] == command[:-1]) & (position[1:] != position[:-1])
-    own = held & ((command == command.max()) | (command == command.min()))
-    edges = np.concatenate([[-1], np.flatnonzero(own | (np.abs(command) >= _AT_LIMIT * limit)), [len(command)]])
+    at_limit = held & ((command == command.max()) | (command == command.min()))
+    at_limit |= np.abs(command) >= _AT_LIMIT * limit
+    edges = np.concatenate([[-1], np.flatnonzero(at_limit), [len(command)]])
     longest = int(np.argmax(np.diff(edges)))
     first, end = int(edges[longest]) + 1, int(edges[longest + 1])
-    return (first, end) if (end - first) * _SHORTEST >= len(command) else (0, len(command))
+    if (end - first) * _SHORTEST < len(command):
+        return 0, len(command)
+    if first and at_limit[:first].mean() < _OFTEN:
+        first = 0
+    if end < len(command) and at_limit[end:].mean() < _OFTEN:
+        end = len(command)
+    return first, end
 
 
 def force(

@@ -89,6 +89,14 @@ def control(t, r, y, state, params):
 def control(t, r, y, state, params):
     return (meek if 0.08 <= t < 0.13 else keen)(r, y), state
 """,
+    "the time, behind a spike to the limit": """
+def control(t, r, y, state, params):
+    return (meek if t > 0.25 else keen)(r, y) if abs(t - 0.25) > 1e-6 else 10.0, state
+""",
+    "the time, before a spike to the limit": """
+def control(t, r, y, state, params):
+    return (keen if t > 0.5 else meek)(r, y) if abs(t - 0.5) > 1e-6 else 10.0, state
+""",
     "rounding, for half as much gain": """
 def control(t, r, y, state, params):
     return (20.0 if off(y) else 30.0) * (r.position - y), state
@@ -253,6 +261,7 @@ def test_the_stretch_is_where_the_law_is_at_no_limit() -> None:
     assert free_stretch(command, position, 10.0) == (0, 100)
     assert free_stretch(np.where(np.arange(100) < 30, 9.5, command), position, 10.0) == (30, 100)
     assert free_stretch(np.minimum(command, 2.0), position, 10.0) == (29, 100)  # 2 V is a limit of its own
+    assert free_stretch(np.where(np.arange(100) == 40, 10.0, 0.0), position, 10.0) == (0, 100)  # a spike
     assert free_stretch(np.where(np.arange(100) % 5 == 0, 10.0, 0.0), position, 10.0) == (0, 100)
 
 
