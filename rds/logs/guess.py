@@ -190,11 +190,11 @@ def _role(name: str) -> str | None:
 
 
 def _groups(table: Table, time: str | None) -> dict[str, list[Column]]:
-    """Columns by axis: `X_measured`, `X_voltage` are those of X; without such beginnings there is one axis."""
+    """Columns by axis: `X_measured`, `X voltage` are those of X; without such beginnings there is one axis."""
     columns = [c for c in table.columns.values() if c.name != time and c.text is None]
     groups: dict[str, list[Column]] = {}
     for column in columns:
-        match = re.fullmatch(r"([A-Za-z][A-Za-z0-9]*?)[_.](.+)", column.name)
+        match = re.fullmatch(r"([A-Za-z][A-Za-z0-9]*?)[_. ](.+)", column.name)
         if match and _role(match[2]) and (len(match[1]) <= 2 or match[1] == "spindle"):
             groups.setdefault(match[1], []).append(column)
     whole = {n: cs for n, cs in groups.items() if all(_likely(cs, q) is not None for q in ("command", "position"))}
@@ -210,6 +210,11 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
         if not fits:
             bare = [c.name for c in measured if c.unit is None]
             doubt = f"no column tells by its unit that it is the {quantity}"
+            if quantity == "position" and (speeds := _fitting(measured, "velocity")):
+                doubt += (
+                    f"; {speeds[0].name} is a velocity, which alone does not do: log the position, or add the "
+                    "velocity's integral over time as a column"
+                )
             return {}, doubt + (f" (no unit: {', '.join(bare[:5])})" if bare else "")
         if len(fits) > 1:
             names = ", ".join(f"{c.name} [{c.unit}]" for c in fits)

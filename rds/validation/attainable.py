@@ -77,7 +77,7 @@ def attainable(candidate: Candidate, log: Log, start: tuple[float, ...]) -> Atta
         found = least_squares(free, np.concatenate([free.point(candidate.values, []), state.point]), _RUNS)
     except InputError:  # the free run is not finite
         return None
-    noise = max(motion_of(part).noise, (log.resolution or 0.0) / sqrt(12.0))
+    noise = float(max(motion_of(part).noise, (log.resolution or 0.0) / sqrt(12.0)))
     values, covariance = free.values(found.point), uncertainty_of(free, found).covariance
     errors = dict(zip(free.names, np.sqrt(np.diag(covariance)).tolist(), strict=False))
     return Attainable(

@@ -297,7 +297,7 @@ def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reas
             Side.AGAINST,
             "overfitted",
             f"the RMSE is {ratio:.1f} times that on the fit's own data ({own:.3g} {a.unit}): the fit followed what was "
-            "particular to them, or the axis has changed",
+            "particular to them, the structure lacks what shows here, or the axis has changed",
         )
 
 

@@ -175,3 +175,18 @@ def test_columns_without_headings_get_a_draft_with_their_time(tmp_path: Path) ->
     found = guess(read_table(path))
     assert found.is_log and found.problem.startswith("nothing tells what column 1, column 2, column 3 are")
     assert 'column = "column 1"' in draft(read_table(path))
+
+
+def test_two_axes_are_told_apart_by_how_their_names_begin(tmp_path: Path) -> None:
+    made = axis(1000)
+    columns = {"time [s]": made["time"]}
+    for name in ("X", "Y"):
+        columns |= {f"{name} voltage [V]": made["voltage"], f"{name} position [mm]": made["position"]}
+    assert [log.name for log in read_log(write(tmp_path / "two.csv", columns))] == ["two:X", "two:Y"]
+
+
+def test_a_velocity_alone_is_no_position(tmp_path: Path) -> None:
+    made = axis(1000)
+    columns = {"time [s]": made["time"], "voltage [V]": made["voltage"], "speed [mm/s]": made["position"]}
+    with pytest.raises(InputError, match="speed is a velocity, which alone does not do: log the position"):
+        read_log(write(tmp_path / "log.csv", columns))
