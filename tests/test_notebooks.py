@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import nbformat
 import pytest
 from documents import ROOT
-from nbclient import NotebookClient
 
 from rds.grading.sandbox import available
+
+if TYPE_CHECKING:
+    import nbformat
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 SHORTER = {"duration=5.0": "duration=3.0", "duration=3.0": "duration=1.0"}  # s: in real time, five runs of the first
@@ -20,6 +22,9 @@ SHORTER = {"duration=5.0": "duration=3.0", "duration=3.0": "duration=1.0"}  # s:
 @pytest.mark.realtime
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_runs(path: Path, alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import nbformat  # not above: it takes a second, which every process that collects tests would take
+    from nbclient import NotebookClient
+
     if path.stem == "03_grading" and (fault := available()):
         pytest.skip(fault)
     monkeypatch.setenv("JUPYTER_PREFER_ENV_PATH", "1")  # the kernel of this environment, not one of the user's
@@ -37,6 +42,8 @@ def test_it_runs(path: Path, alone: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_is_stored_without_outputs(path: Path) -> None:
+    import nbformat
+
     for cell in nbformat.read(path, as_version=4).cells:
         if cell.cell_type == "code":
             assert cell.outputs == [] and cell.execution_count is None
