@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +21,9 @@ import pytest
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 HOW = "no Chromium here: install it (Debian: apt-get install chromium) to run the tests in a browser"
 PATIENCE = 60_000  # ms, on a busy computer
-ARTIFACTS = Path(os.environ.get("RDS_SCREENSHOTS", Path(tempfile.gettempdir()) / "rds-screenshots"))
+SEEN = Path(tempfile.gettempdir()) / "rds-screenshots"  # of tests that fail
+KEPT = Path(os.environ["RDS_SCREENSHOTS"]) if "RDS_SCREENSHOTS" in os.environ else None  # of all tests
+FAILED = pytest.StashKey[bool]()
 
 
 class App(NamedTuple):
@@ -30,6 +33,14 @@ class App(NamedTuple):
     folder: Path
     process: subprocess.Popen[bytes]
     runtime: str  # its XDG_RUNTIME_DIR, where the built-in bus is
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Lets the fixtures of a test see that it has failed."""
+    report = yield
+    item.stash[FAILED] = report.failed or item.stash.get(FAILED, False)
+    return report
 
 
 @pytest.fixture(scope="package")
@@ -74,6 +85,17 @@ def app(start_app: Callable[..., App]) -> App:
 
 
 @pytest.fixture(scope="package")
+def second_app(start_app: Callable[..., App]) -> App:
+    """One for tests that say what its panels begin with, by `begin_with`, or do worse to it."""
+    return start_app()
+
+
+def begin_with(app: App, **chosen: Any) -> None:
+    """Let an app's next page begin with these choices of equipment control, and with the defaults else."""
+    (app.folder / "session.json").write_text(json.dumps({"equipment control": chosen}))
+
+
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
     """Chromium without a window, as a context whose pages share a cache on disk: what a page has loaded and compiled
     the next one has.
@@ -93,8 +115,8 @@ def browser() -> Iterator[Any]:
 def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
     """An empty page of this width and height, px; fails the test if it asked another host for anything.
 
-    With a `clock`, time can be put forward. A screenshot of each page is kept at the end of the test, in
-    $RDS_SCREENSHOTS or a temporary folder.
+    With a `clock`, time can be put forward. A screenshot of each page is kept at the end of a test that fails, in a
+    temporary folder, and of any test in $RDS_SCREENSHOTS.
     """
     pages: list[Any] = []
     contexts: list[Any] = []
@@ -119,10 +141,10 @@ def new_page(browser: Any, request: pytest.FixtureRequest) -> Iterator[Callable[
         return page
 
     yield make
-    ARTIFACTS.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"\W+", "-", request.node.name).strip("-")
     for number, page in enumerate(pages):
-        page.screenshot(path=ARTIFACTS / f"{name}-{number}.png")
+        if KEPT or request.node.stash.get(FAILED, False):
+            page.screenshot(path=(KEPT or SEEN) / f"{name}-{number}.png")
         page.close()
     for context in contexts:
         context.close()

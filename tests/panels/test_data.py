@@ -16,7 +16,7 @@ def fill(page: Any, label: str, value: str) -> None:
     page.keyboard.press("Tab")
 
 
-def test_from_a_log_to_a_model(app: App, open_page: Callable[..., Any]) -> None:
+def test_a_log_becomes_a_model_and_one_that_is_not_there_is_refused(app: App, open_page: Callable[..., Any]) -> None:
     import rds
 
     run = rds.Experiment(
@@ -26,6 +26,9 @@ def test_from_a_log_to_a_model(app: App, open_page: Callable[..., Any]) -> None:
     header = "time [s],command [V],position [mm]"
     np.savetxt(app.folder / "x.csv", rows, delimiter=",", header=header, comments="", fmt="%.9g")
     page = open_page("Data")
+    fill(page, "File with logged data", "no.csv")
+    page.click('button:text-is("Describe")')
+    page.wait_for_selector('.rds-notice:has-text("no.csv")')
     fill(page, "File with logged data", "x.csv")
     page.click('button:text-is("Describe")')
     page.wait_for_selector('.rds-notice:has-text("can be fitted")')
@@ -35,13 +38,6 @@ def test_from_a_log_to_a_model(app: App, open_page: Callable[..., Any]) -> None:
     page.click('button:text-is("Save model")')
     page.wait_for_selector('.rds-notice:has-text("fitted.toml")')
     assert (app.folder / "fitted.toml").is_file()
-
-
-def test_a_file_that_is_not_there_is_refused(open_page: Callable[..., Any]) -> None:
-    page = open_page("Data")
-    fill(page, "File with logged data", "no.csv")
-    page.click('button:text-is("Describe")')
-    page.wait_for_selector('.rds-notice:has-text("no.csv")')
 
 
 def test_a_log_of_some_size_is_imported(app: App, open_page: Callable[..., Any], tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-SETTLE = 300  # ms that a person takes, too: a choice may bring other fields, in the place of those that are there
+from tests.panels.conftest import App, begin_with
+
 FAULTY = "def control(t, r, y, state, params):\n    error = r.positoin - y\n    return 10.0 * error, state\n"
 MODEL = """initial_state = [0.0, 0.0]
 
@@ -36,7 +37,19 @@ class Equipment:
         box = self.field(label).locator("select")
         if box.evaluate("(box) => box.selectedOptions[0]?.label") != option:
             box.select_option(label=option)
-            self.page.wait_for_timeout(SETTLE)
+            self.settle()
+
+    def settle(self) -> None:
+        """A choice may bring other fields, in the place of those that are there: wait as a click does, until the kernel
+        has answered (presence.js), and until the page has nothing to do.
+        """
+        self.page.evaluate("""() => {
+            const here = document.querySelector(".rds-nav .rds-here");
+            window.settled = false;
+            here.addEventListener("click", () => requestIdleCallback(() => { window.settled = true; }), { once: true });
+            here.click();
+        }""")
+        self.page.wait_for_function("window.settled")
 
     def type(self, label: str, value: str) -> None:
         box = self.field(label).locator("input")
@@ -99,10 +112,9 @@ def at(open_page: Callable[..., Any]) -> Callable[..., Equipment]:
     return show
 
 
-def test_three_actions_from_the_page_to_a_tracked_sine(
-    start_app: Callable[..., Any], open_page: Callable[..., Any]
-) -> None:
-    page = open_page(on=start_app())
+def test_three_actions_from_the_page_to_a_tracked_sine(second_app: App, open_page: Callable[..., Any]) -> None:
+    begin_with(second_app)
+    page = open_page(on=second_app)
     page.evaluate("window.actions = 0; document.addEventListener('click', () => { window.actions += 1 }, true)")
     page.click('button:text-is("Track a sine")')
     page.click('button:visible:text-is("Run")')

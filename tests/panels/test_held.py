@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -19,7 +18,7 @@ from rds.panels.app.whereabouts import ask, own_line
 from rds.panels.rescue import Rescue
 from rds.panels.shell import Shell
 from rds.session import Session
-from tests.panels.conftest import App
+from tests.panels.conftest import App, begin_with
 from tests.panels.test_interrupted import wait_for
 
 CONTROLLER = '''"""Proportional control, until a sample that no check gets to."""
@@ -38,13 +37,11 @@ def control(t, r, y, state, params):
 HELD = 7000  # ms of the page's clock after which it says that it gets no answer
 
 
-@pytest.fixture(scope="module")
-def held_app(start_app: Callable[..., App], tmp_path_factory: pytest.TempPathFactory) -> App:
+@pytest.fixture
+def held_app(second_app: App) -> App:
     """An app whose equipment control is about to run a student's controller."""
-    folder = tmp_path_factory.mktemp("held")
-    chosen = {"mode": "simulation", "controller": "user", "controller_file": "own.py"}
-    (folder / "session.json").write_text(json.dumps({"equipment control": chosen}))
-    return start_app(folder)
+    begin_with(second_app, mode="simulation", controller="user", controller_file="own.py")
+    return second_app
 
 
 @pytest.fixture

@@ -16,19 +16,18 @@ import pytest
 from rds.results import open_result
 from rds.session import Session
 from rds.session.kept_runs import State, state_of
-from tests.panels.conftest import App
+from tests.panels.conftest import App, begin_with
 
-LONG = 60.0  # s of a run that is stopped
-ORPHANED = 12.0  # s of one that is waited for, whose kernel is killed at its beginning
+LONG = 120.0  # s of a run that is stopped
+ORPHANED = 6.0  # s of one that is waited for, whose kernel is killed at its beginning
 PATIENCE = 120.0  # s
 
 
-@pytest.fixture(scope="module")
-def busy_app(start_app: Callable[..., App], tmp_path_factory: pytest.TempPathFactory) -> App:
-    """An app for the runs of these tests alone."""
-    folder = tmp_path_factory.mktemp("busy")
-    (folder / "session.json").write_text(json.dumps({"equipment control": {"mode": "emulation"}}))
-    return start_app(folder)
+@pytest.fixture
+def busy_app(second_app: App) -> App:
+    """An app that is about to emulate."""
+    begin_with(second_app, mode="emulation")
+    return second_app
 
 
 @pytest.fixture
@@ -62,13 +61,19 @@ def recorded(folder: Path) -> int:
     return len(open_result(folder)) if (folder / "record.rds").is_file() else 0
 
 
-def test_a_reload_during_a_run_loses_nothing(begin: Callable[..., Any]) -> None:
-    _, page, folder = begin(LONG)
+def test_a_run_outlives_a_reload_and_a_second_page_finds_the_machine_in_use_and_can_stop_it(
+    begin: Callable[..., Any], open_page: Callable[..., Any]
+) -> None:
+    app, page, folder = begin(LONG)
+    second = open_page("Equipment control", on=app)
     page.reload()  # its kernel goes on until the run is kept
-    page.wait_for_selector('.rds-notice:has-text("a run goes on")')
+    for each in (page, second):
+        each.wait_for_selector('.rds-notice:has-text("a run goes on")')
+    second.click('button:visible:text-is("Run")')
+    second.wait_for_selector(':text("in use by another page")')
     before = wait_for(lambda: recorded(folder))
     wait_for(lambda: recorded(folder) > before + 500)  # the loop goes on, too
-    page.click("button.rds-stop")
+    second.click("button.rds-stop")
     wait_for(lambda: state_of(folder) is State.WHOLE)
     result = open_result(folder)
     assert result.meta["ending"] == "machine lost" and len(result) > before + 500
@@ -79,19 +84,6 @@ def test_a_reload_during_a_run_loses_nothing(begin: Callable[..., Any]) -> None:
     assert earlier.inner_text().endswith(folder.name.partition("-")[2].partition("-")[2])
 
 
-def test_a_second_page_finds_the_machine_in_use_and_can_stop_it(
-    begin: Callable[..., Any], open_page: Callable[..., Any]
-) -> None:
-    app, _, folder = begin(LONG)
-    second = open_page("Equipment control", on=app)
-    second.wait_for_selector('.rds-notice:has-text("goes on")')
-    second.click('button:visible:text-is("Run")')
-    second.wait_for_selector(':text("in use by another page")')
-    second.click("button.rds-stop")
-    wait_for(lambda: state_of(folder) is State.WHOLE)
-    assert open_result(folder).meta["ending"] != "done"
-
-
 def test_a_kernel_that_dies_leaves_the_record_and_no_claim(
     begin: Callable[..., Any], open_page: Callable[..., Any]
 ) -> None:
@@ -100,8 +92,9 @@ def test_a_kernel_that_dies_leaves_the_record_and_no_claim(
     os.kill(json.loads((app.folder / ".machine.json").read_text())["process"], signal.SIGKILL)
     wait_for(lambda: state_of(folder) is State.CUT_SHORT)
     assert len(open_result(folder)) == ORPHANED * 1000  # the loop has gone on to its end
-    session = Session(app.folder)
-    session.take_machine("a run after it", object())  # whoever died holds nothing
+    session, nobody = Session(app.folder), object()
+    session.take_machine("a run after it", nobody)  # whoever died holds nothing
+    session.give_machine_back(nobody)
     page = open_page(on=app)
     page.wait_for_selector('.rds-notice:has-text("was cut short")')
 
