@@ -90,7 +90,9 @@ class WorkBar(widgets.HBox):
             return
         share, left = work.share, work.seconds_left
         self._bar.value = share or 0.0
-        if work.note != self._stopped_in:  # after it has stopped there may be files to write
+        if self._stopped_in is not None:  # after it has stopped there may be files to write, which are no share of it
+            self._text.value = "stopping" if work.note == self._stopped_in else work.note
+        else:
             parts = [work.note, "" if share is None else f"{share:.0%}", "" if left is None else f"{left:.0f} s left"]
             self._text.value = ", ".join(filter(None, parts)) or "working"
         if work.done:
