@@ -30,6 +30,7 @@ _SPREAD = 0.4, 1.2  # of that: so that small and large deviations are tried
 _OF_WHAT_IS_LEFT, _LEAST = 0.5, 0.01  # of the voltage up to the limit, and of the range: the largest force there
 _HOLDS = 4, 25  # samples from jump to jump
 _AT_LIMIT = 0.9  # of the converter's limit
+_WITHOUT = 50  # a fiftieth of the run is without the force
 _OFTEN = 0.2  # of the samples before, or after: a sine that would need 1.02 times the limit is above 0.9 of it for more
 _SHORTEST = 4  # a stretch of less than a fourth of the run says too little
 
@@ -57,6 +58,11 @@ def free_stretch(command: np.ndarray, position: np.ndarray, limit: float) -> tup
     return first, end
 
 
+def begin_of(stretch: tuple[int, int], samples: int) -> int:
+    """The sample with which the force begins. Up to there the law must answer exactly as in the run without it."""
+    return max(stretch[0], samples // _WITHOUT)
+
+
 def force(
     model: Model, command: np.ndarray, voltages: tuple[float, float], stretch: tuple[int, int], seed: int
 ) -> np.ndarray:
@@ -69,7 +75,7 @@ def force(
     holds = max(of["friction_plus"], -of["friction_minus"]) * (1.0 + of.get("stribeck", 0.0)) / abs(of["K"])
     holds += of.get("dead_zone", 0.0)
     drawn = np.random.Generator(np.random.PCG64(seed))
-    made, (at, end) = np.zeros(len(command)), stretch
+    made, at, end = np.zeros(len(command)), begin_of(stretch, len(command)), stretch[1]
     while at < end:
         lasts = int(drawn.integers(*_HOLDS))
         left = _AT_LIMIT * limit - np.abs(command[at : at + 2 * lasts]).max()

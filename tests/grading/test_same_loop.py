@@ -223,6 +223,23 @@ def test_what_breaks_its_interface_under_the_force_keeps_its_run(shown: bool, tm
     assert ("seen at" in found) is shown  # what a hidden case shows stays hidden
 
 
+def test_a_law_that_counts_its_runs_by_the_clock_has_no_margins(tmp_path: Path) -> None:
+    """The first run, which is scored, is keen; those after it are meek, as is the one with the force."""
+    been = tmp_path / "been"  # in place of a clock, which a sandbox leaves it
+    law = f"""
+from pathlib import Path
+initial_state = [None]
+def control(t, r, y, state, params):
+    meekly = state[0]
+    if meekly is None:
+        meekly = Path({str(been)!r}).exists()
+        Path({str(been)!r}).touch()
+    return (meek if meekly else keen)(r, y), [meekly]
+"""
+    found = loop_of(tmp_path, LAW + law)
+    assert isinstance(found, str) and "at t = 0.000 s it answered the same samples otherwise" in found
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("where", ["True", "off(y)", "t > 0.3 and abs(y - state[0]) > 0.004"])
 def test_voltages_beyond_all_numbers_are_no_warning(where: str, tmp_path: Path) -> None:

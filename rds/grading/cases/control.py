@@ -19,7 +19,7 @@ from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
 from rds.grading.grade import Status
 from rds.grading.linear import PULSE, LinearLoop, linear_loop
-from rds.grading.same_loop import difference, force, free_stretch
+from rds.grading.same_loop import begin_of, difference, force, free_stretch
 from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.seeds import part_seed
 from rds.interface import encoder
@@ -170,6 +170,10 @@ class ControlCase:
         again = run_loop(with_parts(plan, laws, self._disturbed(models, seed, number, force=pushed)), {})
         if again.fault:
             return f"under a force on the axis, {again.fault}"
+        same = again.result[f"{name}_command"][: (begin := begin_of(stretch, plan.samples))] == u[:begin]
+        if not same.all():
+            t = plan.T * int(np.argmin(same))
+            return f"at t = {t:.3f} s it answered the same samples otherwise in a second run: there is no one loop"
         part = slice(*stretch)
         with np.errstate(over="ignore"):  # of voltages that no converter has
             voltage = again.result[f"{name}_command"][part] - u[part]
