@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
+from rds.logs.tables import TEXTS
 from rds.session.choices import Choices
 from rds.session.fields import Choice, Field, Several, Text
 from rds.session.session import Session
@@ -41,7 +42,7 @@ OPTIONS = {
     "backlash": "backlash",
 }
 LISTED = 200  # runs, the latest; others are named by hand
-SUFFIXES = (".csv", ".txt", ".mat", ".parquet", ".asc", ".blf", ".trc", ".log", ".mf4")
+SUFFIXES = (*TEXTS, ".mat", ".parquet", ".asc", ".blf", ".trc", ".log", ".mf4", ".mdf")
 
 
 @dataclass

@@ -40,12 +40,13 @@ class Refitted:
 class Attainable:
     """RMSE of the free run with the model's parameters, and with those that fit this log best, the initial state
     estimated over the whole log for both; in the unit of the position. `noise` is the measurement's, which no free run
-    undercuts for long.
+    undercuts for long. `samples` of the log were fitted.
     """
 
     rmse: float
     reached: float
     noise: float
+    samples: int
     parameters: tuple[Refitted, ...]
 
     @property
@@ -84,6 +85,7 @@ def attainable(candidate: Candidate, log: Log, start: tuple[float, ...]) -> Atta
         rmse=alone.rms(state.squares),
         reached=free.rms(found.squares),
         noise=noise,
+        samples=len(part),
         parameters=tuple(
             _compared(name, candidate.parameters, values[name], errors[name], structure.units[name])
             for name in free.names

@@ -267,6 +267,8 @@ def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
     numbers = f"{found.rmse:.3g} {a.unit} (RMSE) for the model, {found.reached:.3g} {a.unit} for the fit"
     if found.reached < found.noise:
         numbers += f", {found.noise:.3g} {a.unit} for the measurement's noise"
+    if found.samples < len(a.log):
+        numbers += f", over the first {found.samples * a.log.sample_period:.3g} s"
     if found.ratio > bands.attainable:
         text = (
             f"the free run is {found.ratio:.3g} times as far off as that of the same structure fitted to this log "

@@ -45,7 +45,7 @@ def test_from_a_log_to_a_validated_model_file(desk: DataDesk) -> None:
     desk.choices.set("validation_file", "b.csv")
     validated = desk.validate()
     assert validated.wait(PATIENCE) and validated.error is None
-    assert desk.validation is not None and "fit 99" in desk.validation.verdict.sentence
+    assert desk.validation is not None and "fit 99" in str(desk.validation)
 
 
 def test_what_is_missing_is_said_at_once(desk: DataDesk) -> None:

@@ -8,6 +8,7 @@ import pytest
 from rds.identification.fit import fit
 from rds.identification.structures import structure
 from rds.logs.log import Log
+from rds.validation import attainable
 from rds.validation.validate import validate
 from rds.validation.verdict import Bands, Side, Word
 from tests.validation.validation_logs import STEP, X, candidate, log, square
@@ -55,6 +56,13 @@ def test_a_parameter_beyond_its_interval_is_named_with_what_the_log_says() -> No
     assert found.verdict.sentence.endswith("Do not take its parameters for the axis's own: this log contradicts them.")
     mild = validate(candidate(X | {"tau": 0.9 * X["tau"]}, share=0.01), log(square()), bands=Bands(apart=50.0))
     assert "parameters" not in {reason.kind for reason in mild.verdict.reasons}
+
+
+def test_of_a_long_log_only_the_beginning_is_fitted_and_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(attainable, "_LONGEST", 3000)
+    found = validate(candidate(share=0.01), log(square()))
+    (reason,) = [reason for reason in found.verdict.reasons if reason.kind == "attainable"]
+    assert reason.side is Side.FOR and reason.what.endswith("over the first 3 s)")
 
 
 def test_no_fit_is_a_measure_in_a_closed_loop_or_of_a_model_that_was_never_fitted() -> None:
