@@ -22,6 +22,7 @@ from rds.bus.faults import Faults
 from rds.bus.link import BUILTIN, bus_name, default_channel, open_bus
 from rds.bus.poller import READ, Poller, SelectPoller, make_poller
 from rds.core.errors import InputError
+from rds.core.interrupt import SignalEvent
 from rds.machines import Machine
 from rds.machines.machine import Axis
 from rds.runtime.scheduling import lock_memory, raise_priority
@@ -99,7 +100,7 @@ def serve_nodes(
     channel = default_channel(machine, interface, channel)
     if faults and interface != BUILTIN:
         raise InputError(f"faults can be injected on the built-in bus only, not on {bus_name(interface, channel)}")
-    stop = stop or threading.Event()
+    stop = stop or SignalEvent()
     for name in axes or ():
         machine.axis(name)
     nodes = [] if nodes is None else nodes

@@ -105,7 +105,9 @@ def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
 @contextmanager
 def until_ctrl_c() -> Iterator[threading.Event]:
     """An event that Ctrl-C and a polite kill set."""
-    stop = threading.Event()
+    from rds.core.interrupt import SignalEvent
+
+    stop = SignalEvent()
     before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stop

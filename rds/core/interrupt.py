@@ -59,3 +59,37 @@ def interruptible(
 def _raise_in(thread: threading.Thread, error: type[BaseException]) -> None:
     if thread.ident is not None:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(error))
+
+
+class SignalEvent(threading.Event):
+    """An event that a signal's handler may set in the thread that waits for it.
+
+    A handler runs between two steps of whatever its thread does. `threading.Event.set` takes a lock there that the
+    interrupted `wait` or `set` may hold: the thread would wait for itself without end, and hear no further signal.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._was_set = False
+
+    def set(self) -> None:
+        """No lock, so that nothing can be waited for."""
+        self._was_set = True
+
+    def clear(self) -> None:
+        """Not set any more."""
+        self._was_set = False
+
+    def is_set(self) -> bool:
+        """Whether somebody has set it."""
+        return self._was_set
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Until it is set, or `timeout` s have passed; noticed within 0.05 s."""
+        end = None if timeout is None else time.monotonic() + timeout
+        while not self._was_set:
+            left = _POLL if end is None else min(_POLL, end - time.monotonic())
+            if left <= 0.0:
+                break
+            time.sleep(left)
+        return self._was_set
