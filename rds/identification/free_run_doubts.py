@@ -29,7 +29,8 @@ _OR_HELD = ". Where a controller held the axis (closed_loop in the map), that al
 def fitted_doubts(structure: Structure, log: Log, error: np.ndarray) -> list[str]:
     """Doubts where the free run is what was fitted; `error` is measurement minus free run (samples,)."""
     motion, size, unit = motion_of(log), _rms(error), structure.output_unit
-    said = [*_little(log, motion, unit, _WIDENED), *_poor(log, motion, error)]
+    so = _NARROW if structure.sensitivities is None else _WIDENED  # see profile.py
+    said = [*_little(log, motion, unit, so), *_poor(log, motion, error)]
     if motion.noise > 0.0 and size > _MISSED * motion.noise:
         said.append(
             f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / motion.noise:.3g} times the measurement's "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,3 +42,9 @@ def test_intervals_hold_or_are_refused(kind: str) -> None:
             else:
                 assert any(name in sentence for sentence in found.untold)
     assert told >= 2 and all(inside)
+
+
+def test_a_structure_without_derivatives_keeps_its_intervals_and_says_so() -> None:
+    slow = replace(AXIS, sensitivities=None)
+    found = fit([creeping(0, "sine", 1.1).part(0, 1000)], slow, options={"fixed": {"tau": mini_cnc("X")["tau"]}})
+    assert any("may be too narrow here" in warning for warning in found.warnings)
