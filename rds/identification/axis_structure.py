@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.options import Option
-from rds.identification.structure import Idle, Start, Structure
+from rds.identification.structure import PLAY, Idle, Start, Structure
 from rds.logs.log import Log
 
 OPTIONS = ("viscous", "stribeck", "offset", "dead-zone", "delay", "backlash")
@@ -121,7 +121,7 @@ def make(options: Sequence[str] = ()) -> Structure:
         sensitivities=sensitivities,
         as_model=_as_model if set(options) <= {"viscous", "offset"} else None,
         at_most={"friction_minus": 0.0} if "friction_minus" in table else {},
-        state_names=("position", "velocity", "place in the play")[:states],
+        state_names=("position", "velocity", PLAY)[:states],
         state_bounds=((-np.inf, np.inf), (-np.inf, np.inf), (-1.0, 1.0))[:states],
         start=start,
         neutral={name: value for name, value in NEUTRAL.items() if name in table},

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rds.identification.structure import Structure
+from rds.identification.structure import PLAY, Structure
 from rds.logs.log import Log
 
 _BLOCKS = 400  # at most; of a longer log, blocks spread evenly
@@ -74,6 +74,8 @@ def needed_voltage(
         state[0] = float(log.position[first])
         if not is_rate and structure.states > 1:
             state[1] = float(velocity[first])
+        if PLAY in structure.state_names[: structure.states]:
+            state[structure.state_names.index(PLAY)] = float(np.sign(moved))  # it moves that way, pushed by the motor
         extra = _extra(structure, values, log.time[part], log.command[part], state, log.position[first + block], trial)
         if extra is not None:
             middle = first + block // 2

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rds.logs.log import Log
 
 SPEED = "rev/min"  # of a structure whose output is a speed
+PLAY = "place in the play"  # the state that says where in a backlash the motor is, from -1 to 1
 
 
 class Response(Protocol):

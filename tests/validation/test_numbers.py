@@ -13,8 +13,10 @@ from rds.core.errors import InputError
 from rds.identification.initial_state import estimate_start
 from rds.identification.needed_voltage import needed_voltage, static_curve
 from rds.identification.residuals import BAND, bandwidth, block_length, effective_samples, residual_tests
+from rds.identification.structures import structure
 from rds.logs.fingerprint import fingerprint, shared
 from rds.validation.assessment import assess, smoothed_velocity
+from rds.validation.candidate import Candidate
 from rds.validation.criterion import Rival, rank
 from rds.validation.validate import compare_models
 from tests.validation.validation_logs import STEP, T, X, candidate, moved, square
@@ -210,3 +212,16 @@ def test_models_are_compared_on_one_log() -> None:
     assert found.ranks[0].rmse < 0.5 * STEP and found.ranks[0].aicc_weight > 0.999
     with pytest.raises(InputError, match="a comparison needs two models or more"):
         compare_models(models[:1], data)
+
+
+def test_an_exact_model_with_backlash_needs_hardly_another_voltage() -> None:
+    """A block begins with the play taken up in the direction of motion; begun in its middle, a third of the voltage was
+    missing.
+    """
+    made = structure("axis", ["backlash"])
+    values = X | {"backlash": 0.02}
+    u = np.repeat(np.random.default_rng(0).uniform(-4.0, 4.0, 20), 200)
+    t = np.arange(len(u)) * T
+    y = np.rint(made.respond(t, u, (0.0, 0.0, 0.0), values) / STEP) * STEP
+    found = assess(Candidate("play", made, values), made_log(u, y)).voltage
+    assert found is not None and found.relative_percent is not None and found.relative_percent < 10.0
