@@ -91,12 +91,12 @@ def test_it_goes_on_or_says_so(make: Callable[[], BaseException], caplog: pytest
     with receiving(first, second) as (receiver, faults):
         frames = receiver.subscribe()
         receiver.start()
-        assert number(frames.get(2.0)) == 1
+        assert number(frames.get(10.0)) == 1
         if isinstance(error, Exception):
-            assert number(frames.get(2.0)) == 2
+            assert number(frames.get(10.0)) == 2
             assert receiver.alive()
         else:
-            assert frames.get(2.0) is None
+            assert frames.get(10.0) is None
             wait_for(lambda: not receiver.alive())
     assert [fault.trouble for fault in faults] == [Trouble.BUS if isinstance(error, Exception) else Trouble.ENDED]
     assert (str(error) or type(error).__name__) in faults[0].text
@@ -127,7 +127,7 @@ def test_an_outage_is_reported_once_and_its_end_too() -> None:
     broken = [FakeBus([RAISES[0]]) for _ in range(5)]
     with receiving(*broken, FakeBus([]), FakeBus([]), on_recovery=recovered.set) as (receiver, faults):
         receiver.start()
-        assert recovered.wait(2.0)
+        assert recovered.wait(30.0)
         assert len(faults) == 1 and "test bus failed: bus error; it is opened again" in faults[0].text
         assert receiver.outages == 1
         receiver.bus.script.append(RAISES[2])  # type: ignore[union-attr]
@@ -150,7 +150,7 @@ def test_a_bus_that_cannot_be_opened_again_is_tried_until_it_can() -> None:
     receiver = Receiver(opener, faults.append)
     frames = receiver.subscribe()
     with receiver:
-        assert number(frames.get(2.0)) == 7
+        assert number(frames.get(10.0)) == 7
     assert len(faults) == 1
 
 
@@ -158,7 +158,7 @@ def test_bus_off_is_reported_and_the_bus_opened_again() -> None:
     with receiving(FakeBus([], can.BusState.ERROR), FakeBus([numbered(1)])) as (receiver, faults):
         frames = receiver.subscribe()
         receiver.start()
-        assert number(frames.get(2.0)) == 1
+        assert number(frames.get(10.0)) == 1
     assert [fault.trouble for fault in faults] == [Trouble.BUS_OFF]
 
 
@@ -180,7 +180,7 @@ def test_a_subscriber_that_fails_is_reported_and_the_others_go_on(make: Callable
         receiver.subscribe(fail, name="plotter")
         frames = receiver.subscribe()
         receiver.start()
-        assert [number(frames.get(2.0)) for _ in range(3)] == [0, 1, 2]
+        assert [number(frames.get(10.0)) for _ in range(3)] == [0, 1, 2]
         wait_for(lambda: faults)
         assert receiver.alive()
     assert [fault.trouble for fault in faults] == [Trouble.SUBSCRIBER] and "plotter failed" in faults[0].text
@@ -195,7 +195,7 @@ def test_an_error_callback_that_fails_does_no_harm(caplog: pytest.LogCaptureFixt
     receiver = Receiver(lambda: buses.pop(0), fail)
     frames = receiver.subscribe()
     with receiver:
-        assert number(frames.get(2.0)) == 1
+        assert number(frames.get(10.0)) == 1
     assert "callback for bus errors failed itself" in caplog.text
 
 
@@ -204,9 +204,9 @@ def test_a_slow_subscriber_loses_frames_visibly_and_holds_nobody_up() -> None:
         slow = receiver.subscribe(name="slow one", limit=10)
         quick = receiver.subscribe()
         receiver.start()
-        assert [number(quick.get(2.0)) for _ in range(100)] == list(range(100))
+        assert [number(quick.get(10.0)) for _ in range(100)] == list(range(100))
         assert slow.lost == 90
-        assert [number(slow.get(1.0)) for _ in range(10)] == list(range(10))
+        assert [number(slow.get(10.0)) for _ in range(10)] == list(range(10))
     assert [fault.trouble for fault in faults] == [Trouble.OVERFLOW]
     assert "slow one is 10 frames behind test bus" in faults[0].text
 
@@ -229,12 +229,12 @@ def test_a_killed_hub_is_reported_and_a_new_one_found(hub: Callable[..., Any], o
         frames = receiver.subscribe()
         with open_bus() as sender:
             sender.send(numbered(1))
-            assert number(frames.get(2.0)) == 1
+            assert number(frames.get(10.0)) == 1
             os.kill(process.pid, signal.SIGKILL)
-        assert recovered.wait(10.0)
+        assert recovered.wait(30.0)
         with open_bus() as sender:
             sender.send(numbered(2))
-            assert number(frames.get(2.0)) == 2
+            assert number(frames.get(10.0)) == 2
         assert receiver.alive()
     assert [fault.trouble for fault in faults] == [Trouble.BUS]
     assert "ended without a word" in faults[0].text

@@ -188,8 +188,9 @@ def builtin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @pytest.fixture
-def program() -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """Runs `python ...`; kills what is left at the end."""
+def program(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Runs `python ...`; kills what is left at the end. A host here waits for drives as long as patient ones for it."""
+    monkeypatch.setattr("rds.bus.cia402.host.LOST_AFTER", 250)
     with contextlib.ExitStack() as stack:
 
         def runner(*arguments: str) -> subprocess.Popen[str]:

@@ -120,7 +120,7 @@ def test_killed_drives_are_told(builtin: Path, program: Program, machine: Machin
 def test_a_server_ends_when_it_is_told(builtin: Path, program: Program) -> None:
     server = serve(program, "X")
     server.send_signal(signal.SIGTERM)
-    assert server.wait(5.0) == 0
+    assert server.wait(30.0) == 0
 
 
 def test_a_server_ends_when_its_starter_has_gone(builtin: Path, program: Program) -> None:
@@ -130,13 +130,13 @@ def test_a_server_ends_when_its_starter_has_gone(builtin: Path, program: Program
     assert server.stdout is not None and server.stdin is not None
     assert server.stdout.readline().startswith("ready")
     server.stdin.close()
-    assert server.wait(5.0) == 0
+    assert server.wait(30.0) == 0
 
 
 def sdo(client: can.BusABC, index: int) -> int:
     request = bytes([0x40, index & 0xFF, index >> 8, 0, 0, 0, 0, 0])
     client.send(can.Message(arbitration_id=0x602, data=request, is_extended_id=False))
-    deadline = time.monotonic() + 2.0
+    deadline = time.monotonic() + 30.0
     while (left := deadline - time.monotonic()) > 0:
         message = client.recv(left)
         if message is not None and message.arbitration_id == 0x582:

@@ -135,7 +135,7 @@ def test_what_ends_the_command_ends_the_motion(
         hear(bus, lambda message: message.arbitration_id == 0 and message.data[:2] == b"\x04\x04")  # it is accepted
         process.send_signal(number)
         hear(bus, lambda message: message.arbitration_id == 4 and message.data[:2] == b"\x03\x00")
-        _, said = process.communicate(timeout=20)
+        _, said = process.communicate(timeout=60)
     assert process.returncode != 0 and b"Traceback" not in said
 
 

@@ -64,7 +64,10 @@ def test_a_module_replaced_by_another_is_a_reconfiguration_that_ends_when_it_is_
 
 
 @pytest.mark.realtime
-def test_it_is_not_ready_while_a_number_is_used_twice_or_modules_are_missing(serve: Serve, bus: can.BusABC) -> None:
+def test_it_is_not_ready_while_a_number_is_used_twice_or_modules_are_missing(
+    serve: Serve, bus: can.BusABC, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rds.bus.oacs.watch.PATIENCE", 12)  # calls: they follow each other without a pause here
     serve("X")
     watching = Reconfigurations(bus, modules=2)
     watching.look()
