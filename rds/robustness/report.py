@@ -13,7 +13,6 @@ import numpy as np
 
 from rds.results import html
 from rds.results.atomic import write_files
-from rds.results.figure import Picture
 from rds.results.report import page
 from rds.results.units import heading
 from rds.robustness.figures import FIGURES
@@ -32,9 +31,10 @@ def write_study(study: Study, folder: Path, title: str) -> dict[str, Path]:
         if study.task.axes[number].spread.varied:
             pictures[f"{axis}_dependence"] = dependence(study, number)
     files = {name: folder / f"{name}.png" for name in pictures}
-    data = {files[name]: picture.png() for name, picture in pictures.items()}
+    drawn = {name: picture.png() for name, picture in pictures.items()}
+    data = {files[name]: picture for name, picture in drawn.items()}
     files |= {"report": folder / "report.html", "draws": folder / "draws.csv"}
-    data[files["report"]] = study_page(study, title, pictures).encode()
+    data[files["report"]] = study_page(study, title, drawn).encode()
     data[files["draws"]] = draws_table(study).encode()
     write_files({path: partial(_write, content) for path, content in data.items()})
     return files
@@ -73,8 +73,8 @@ PARAMETER_NOTE = (
 )
 
 
-def study_page(study: Study, title: str, pictures: dict[str, Picture]) -> str:
-    """The page as HTML that fetches nothing."""
+def study_page(study: Study, title: str, pictures: dict[str, bytes]) -> str:
+    """The page as HTML that fetches nothing, with the `pictures` (PNG) of each axis."""
     runs = len(study.figures)
     drawn = f"{runs} runs of {study.task.plan.samples * study.task.plan.T:g} s, seed {study.task.seed}"
     parts = [
@@ -83,7 +83,7 @@ def study_page(study: Study, title: str, pictures: dict[str, Picture]) -> str:
     ]
     for found in summaries(study):
         images = "".join(
-            f'<img alt="{escape(name)}" src="data:image/png;base64,{b64encode(picture.png()).decode("ascii")}">'
+            f'<img alt="{escape(name)}" src="data:image/png;base64,{b64encode(picture).decode("ascii")}">'
             for name, picture in pictures.items()
             if name.startswith(f"{found.axis}_")
         )

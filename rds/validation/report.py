@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64encode
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from html import escape
 from math import isfinite
@@ -31,11 +31,12 @@ _LOOK = {Word.VALID: "met", Word.PARTLY: "void", Word.NOT: "missed", Word.UNTOLD
 def write(validation: Validation, folder: Path) -> list[Path]:
     """Write the page, its pictures as PNG and the numbers as JSON into `folder`, all or none; the page is first."""
     contents: dict[Path, bytes] = {}
-    for name, pictures in _pictures(validation).items():
+    drawn = _pictures(validation)
+    for name, pictures in drawn.items():
         for what, picture in pictures.items():
-            contents[folder / f"{_file_name(name)}-{what.replace(' ', '-')}.png"] = picture.png()
+            contents[folder / f"{_file_name(name)}-{what.replace(' ', '-')}.png"] = picture
     title = f"Validation of {validation.candidate.name}"
-    body = f"<header><h1>{escape(title)}</h1></header>{fragment(validation)}"
+    body = f"<header><h1>{escape(title)}</h1></header>{_fragment(validation, drawn)}"
     numbers = json.dumps(validation.to_json(), indent=2, allow_nan=False)
     files = {
         folder / PAGE: page(title, body).encode(),
@@ -57,26 +58,30 @@ def section(title: str, validation: Validation) -> str:
 
 def fragment(validation: Validation, pictures: bool = True) -> str:
     """The validation as HTML without a page around it, for a report or a notebook; all text is escaped."""
+    return _fragment(validation, _pictures(validation) if pictures else None)
+
+
+def _fragment(validation: Validation, drawn: Mapping[str, Mapping[str, bytes]] | None) -> str:
+    """The same with the pictures that are `drawn` of each log; None: without pictures."""
     parts = [f"<section>{verdict_line(validation.verdict)}{_bands(validation)}</section>"]
-    drawn = _pictures(validation) if pictures else {}
     for name, a in validation.assessments.items():
         verdict = validation.verdicts[name]
         line = verdict_line(verdict) if len(validation.assessments) > 1 else ""
-        shown = "".join(_image(picture, f"{name}: {what}") for what, picture in drawn.get(name, {}).items())
+        shown = "".join(_image(picture, f"{name}: {what}") for what, picture in (drawn or {}).get(name, {}).items())
         parts.append(
             f"<section><h2>On {escape(name)}</h2>{line}{_reasons(verdict)}"
             f"{_conditions(a)}{_errors(a)}{_ahead(a)}{_rest(a)}{shown}</section>"
         )
         if ranking := validation.rankings.get(name):
             parts.append(f"<section><h2>Models compared on {escape(name)}</h2>{_ranking(ranking)}</section>")
-    if pictures:
+    if drawn is not None:
         from rds.validation.plots import intervals
 
         drawing = intervals([validation.candidate, *validation.others])
         if drawing is not None:
             parts.append(
                 "<section><h2>Parameters with 95 % intervals</h2>"
-                f"{_image(drawing, 'parameters')}{_parameters(validation)}</section>"
+                f"{_image(drawing.png(), 'parameters')}{_parameters(validation)}</section>"
             )
     return "".join(parts)
 
@@ -197,7 +202,8 @@ def _parameters(validation: Validation) -> str:
     return table(["model", "parameter", "value", "standard error", "low", "high", "unit"], rows)
 
 
-def _pictures(validation: Validation) -> dict[str, dict[str, Picture]]:
+def _pictures(validation: Validation) -> dict[str, dict[str, bytes]]:
+    """What is drawn of each log: PNG by what it shows."""
     from rds.validation import plots as plots
 
     def of(a: Assessment) -> Iterator[tuple[str, Picture]]:
@@ -209,11 +215,11 @@ def _pictures(validation: Validation) -> dict[str, dict[str, Picture]]:
             yield "friction curve", plots.friction_curve(validation.candidate, a)
             yield "voltage errors", plots.voltage_errors(a)
 
-    return {name: dict(of(a)) for name, a in validation.assessments.items()}
+    return {name: {what: picture.png() for what, picture in of(a)} for name, a in validation.assessments.items()}
 
 
-def _image(picture: Picture, text: str) -> str:
-    return f'<img alt="{escape(text)}" src="data:image/png;base64,{b64encode(picture.png()).decode("ascii")}">'
+def _image(picture: bytes, text: str) -> str:
+    return f'<img alt="{escape(text)}" src="data:image/png;base64,{b64encode(picture).decode("ascii")}">'
 
 
 def _file_name(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
@@ -195,6 +196,7 @@ def test_it_leaves_a_page_pictures_and_every_draw(tmp_path: Path) -> None:
     assert set(files) == {"X_figures", "X_dependence", "report", "draws"}
     text = files["report"].read_text()
     assert "A &lt;title&gt;" in text and 'src="http' not in text and text.count("<img") == 2
+    assert all(b64encode(files[name].read_bytes()).decode() in text for name in ("X_figures", "X_dependence"))
     table = np.genfromtxt(files["draws"], delimiter=",", names=True)
     assert np.array_equal(table["X_max_error_mm"], found.figure(0, "max_error")) and len(table) == 30
 

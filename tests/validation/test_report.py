@@ -20,6 +20,7 @@ from rds.identification.fitted_stretch import fitted_stretch
 from rds.identification.model_file import write_model
 from rds.logs.log import Log
 from rds.results import Result
+from rds.results.figure import Picture
 from rds.results.report import report
 from rds.validation.validate import validate
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
@@ -109,7 +110,9 @@ def test_a_student_s_file_and_others_against_it(tmp_path: Path) -> None:
     assert ranking["ranks"][0]["aicc_weight"] > 0.999
 
 
-def test_the_page_holds_verdict_numbers_and_pictures(tmp_path: Path) -> None:
+def test_the_page_holds_verdict_numbers_and_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    png, drawn = Picture.png, []
+    monkeypatch.setattr(Picture, "png", lambda self: drawn.append(self) or png(self))  # type: ignore[func-returns-value]
     bare = candidate(X | {"friction_plus": 0.0, "friction_minus": 0.0}, name="<b>bare</b>")
     found = validate(candidate(name="<i>full</i>", share=1e-3), log(square(4.0), name="a/b"), against=[bare])
     files = found.write(tmp_path / "report")
@@ -118,7 +121,7 @@ def test_the_page_holds_verdict_numbers_and_pictures(tmp_path: Path) -> None:
     assert "a_b-overlay.png" in names and "a_b-friction-curve.png" in names
     page = files[0].read_text()
     assert "<i>" not in page and "&lt;i&gt;full&lt;/i&gt;" in page
-    assert page.count("data:image/png;base64") == 5
+    assert page.count("data:image/png;base64") == 5 == len(drawn)  # the files' and the page's are the same
     for words in ("free run, position", "10 samples ahead", "RMSE without a model", "AICc", "voltage error [%]"):
         assert words in page
     assert json.loads(files[1].read_text())["verdict"] == str(found.verdict.word)
