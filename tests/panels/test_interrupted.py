@@ -114,3 +114,27 @@ def test_a_click_does_not_overtake_what_was_typed_before_it(app: App, open_page:
         page.click('button:visible:text-is("Save the file")')
         written = wait_for(lambda file=app.folder / f"typed-{last}.toml": file.is_file() and file.read_text())
         assert f"amplitude = {last}.0" in written, written
+
+
+ONCE_WITHOUT_MODEL = """
+if (sessionStorage.getItem("made") === null) {
+  sessionStorage.setItem("made", "once");
+  const parse = JSON.parse;
+  const model = /("application.vnd.jupyter.widget-view.json": ?{"model_id": ?")[0-9a-f]{32}/;
+  JSON.parse = (text, ...more) => parse(String(text).replace(model, "$1" + "0".repeat(32)), ...more);
+}
+"""
+
+
+def test_a_page_whose_kernel_was_lost_before_it_was_shown_is_loaded_again(
+    app: App, new_page: Callable[..., Any]
+) -> None:
+    """It stayed empty but for "model not found"."""
+    page = new_page(1280, 800)
+    page.add_init_script(ONCE_WITHOUT_MODEL)
+    loaded: list[str] = []
+    page.on("domcontentloaded", lambda _: loaded.append(page.url))
+    page.goto(app.url)
+    page.wait_for_selector(".rds-app .rds-nav button")
+    assert len(loaded) == 2
+    page.wait_for_function("sessionStorage.getItem('rds-loaded-again') === null")
