@@ -230,7 +230,7 @@ def test_a_drive_that_restarts_is_told(machine: Machine, served: Served, bus: Ca
 
 def test_a_drive_that_dies_is_told(machine: Machine, served: Served) -> None:
     channel, nodes = served("X")
-    with drivers(machine, channel, ["X"]) as host:
+    with drivers(machine, channel, ["X"], cia402={"heartbeat": 5.0}) as host:  # which is missed later
         host.start()
         powered(host, 0.0)
         nodes[0].close()

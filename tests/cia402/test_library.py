@@ -26,7 +26,7 @@ def drive(served: Callable[..., tuple[str, list[DriveNode]]]) -> Iterator[tuple[
     network.connect(interface="virtual", channel=channel)
     try:
         node = BaseNode402(2, EDS)
-        node.TIMEOUT_RESET_FAULT = node.TIMEOUT_SWITCH_OP_MODE = PATIENCE
+        node.TIMEOUT_CHECK_TPDO = node.TIMEOUT_SWITCH_OP_MODE = PATIENCE
         node.TIMEOUT_SWITCH_STATE_FINAL = node.TIMEOUT_SWITCH_STATE_SINGLE = node.sdo.RESPONSE_TIMEOUT = PATIENCE
         network.add_node(node)
         node.nmt.state = "PRE-OPERATIONAL"
