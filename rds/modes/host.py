@@ -34,6 +34,7 @@ from rds.runtime.processes import is_alive, wait_for_end
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
 from rds.runtime.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
 from rds.runtime.ring import Ring
+from rds.runtime.shared import remove_left, ring_path
 from rds.runtime.stopwatch import TIMING_COLUMNS
 
 Progress = Callable[[int, int], None]  # samples taken, samples in all
@@ -144,7 +145,9 @@ def _recorded(
     if plan.bus.get("interface") == BUILTIN:
         about["channel"] = plan.bus["channel"]
     capacity = min(plan.most_samples, max(_RING_BYTES // (8 * len(columns)), 1000))
-    ring = Ring.create(_ring_path(about["run"]), columns, capacity, **about)
+    path = ring_path(about["run"])
+    remove_left(path.parent)
+    ring = Ring.create(path, columns, capacity, **about)
     desk = Desk.create(ring.desk_path, plan.channels())
     try:
         with tempfile.TemporaryFile() as said:  # by the recorder, which says something only if it fails
@@ -250,10 +253,3 @@ def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
         time.sleep(_POLL)
     recorder.close()
     finish(directory, ring, {"ending": Ending.KILLED, "reason": reason, "rows": ring.head})
-
-
-def _ring_path(run: str) -> Path:
-    """In memory where the system has a file system for that: a disk that is busy must not stop the loop."""
-    shared = Path("/dev/shm")
-    folder = shared if os.access(shared, os.W_OK) else Path(tempfile.gettempdir())
-    return folder / f"rds-{run}.ring"

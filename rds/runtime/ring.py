@@ -10,9 +10,10 @@ import json
 import mmap
 import struct
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from rds.core.errors import InputError
+from rds.runtime.shared import hold
 from rds.runtime.words import read_word, write_word
 
 _MAGIC = b"RDSRING1"
@@ -23,8 +24,9 @@ _HEAD, _STOP, _HEARTBEAT, _TEXT_SIZE, _TEXT = 8, 16, 24, 32, 64
 class Ring:
     """Rows of `len(columns)` float64 values, `capacity` of them kept."""
 
-    def __init__(self, path: str | Path, memory: mmap.mmap, about: dict[str, Any]):
+    def __init__(self, path: str | Path, memory: mmap.mmap, about: dict[str, Any], file: IO[bytes]):
         self.path = Path(path)
+        self._file = file  # which is held, see runtime.shared
         self.about = about
         self.columns: list[str] = about["columns"]
         self.capacity: int = about["capacity"]
@@ -40,22 +42,23 @@ class Ring:
         if len(text) > _HEADER - _TEXT:
             raise InputError(f"the run's description takes {len(text)} bytes; at most {_HEADER - _TEXT} fit")
         size = _HEADER + capacity * 8 * len(columns)
-        with open(path, "wb") as file:
-            file.truncate(size)
-        memory = _map(path)
+        with open(path, "wb") as new:
+            new.truncate(size)
+        memory, file = _map(path)
         memory[_TEXT : _TEXT + len(text)] = text
         write_word(memory, _TEXT_SIZE, len(text))
         memory[: len(_MAGIC)] = _MAGIC
-        return cls(path, memory, description)
+        return cls(path, memory, description, file)
 
     @classmethod
     def open(cls, path: str | Path) -> Ring:
         """The ring in an existing file."""
-        memory = _map(path)
+        memory, file = _map(path)
         if memory[: len(_MAGIC)] != _MAGIC:
+            file.close()
             raise InputError("not a run's shared memory", str(path))
         size = read_word(memory, _TEXT_SIZE)
-        return cls(path, memory, json.loads(memory[_TEXT : _TEXT + size]))
+        return cls(path, memory, json.loads(memory[_TEXT : _TEXT + size]), file)
 
     @property
     def head(self) -> int:
@@ -112,8 +115,14 @@ class Ring:
     def close(self) -> None:
         """Unmap; the file stays."""
         self._memory.close()
+        self._file.close()
 
 
-def _map(path: str | Path) -> mmap.mmap:
-    with open(path, "r+b") as file:
-        return mmap.mmap(file.fileno(), 0)
+def _map(path: str | Path) -> tuple[mmap.mmap, IO[bytes]]:
+    file = open(path, "r+b")  # noqa: SIM115 (held as long as it is mapped)
+    try:
+        hold(file)
+        return mmap.mmap(file.fileno(), 0), file
+    except BaseException:
+        file.close()
+        raise

@@ -1,0 +1,51 @@
+"""Where the shared memory of runs lies: in memory where the system has a file system for that, for a disk that is busy
+must not stop the loop. What a run left there whose processes were all killed, the next run removes.
+
+Each process holds a lock on the ring that it has mapped, and the kernel gives it back when the process ends, however it
+ends: a ring whose lock is free is nobody's any more.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+_YOUNG = 60.0  # s: a ring may just have been made, and its lock not yet taken
+
+
+def ring_path(run: str) -> Path:
+    """Of the ring of the run with this name, in a folder that has room; its desk is beside it."""
+    memory = Path("/dev/shm")
+    folder = memory if os.access(memory, os.W_OK) else Path(tempfile.gettempdir())
+    return folder / f"rds-{run}.ring"
+
+
+def hold(ring: IO[bytes]) -> None:
+    """Until this open file is closed, or the process ends, the ring is somebody's."""
+    with suppress(ImportError, OSError):  # Windows keeps a file that is mapped by itself
+        import fcntl
+
+        fcntl.flock(ring, fcntl.LOCK_SH)
+
+
+def remove_left(folder: Path) -> None:
+    """Remove this user's rings that nobody holds, with their desks. What cannot be removed stays."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    for ring in folder.glob("rds-*.ring"):
+        with suppress(OSError):
+            lock = os.open(ring, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+            try:
+                about = os.fstat(lock)
+                if about.st_uid == os.geteuid() and time.time() - about.st_ctime > _YOUNG:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    ring.with_suffix(".desk").unlink(missing_ok=True)
+                    ring.unlink()
+            finally:
+                os.close(lock)

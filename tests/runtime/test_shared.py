@@ -1,0 +1,56 @@
+"""Shared memory of runs that were killed is removed by the next run, that of living ones is not."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rds.runtime import shared
+from rds.runtime.desk import Desk
+from rds.runtime.ring import Ring
+
+pytest.importorskip("fcntl")
+
+HOLDER = """
+import sys
+from rds.runtime.ring import Ring
+ring = Ring.open(sys.argv[1])
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_ring_is_removed_when_the_last_of_its_processes_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ring = Ring.create(tmp_path / "rds-0.ring", ["a"], 100)
+    Desk.create(ring.desk_path, [])
+    files = {ring.path, ring.desk_path}
+    command = [sys.executable, "-c", HOLDER, str(ring.path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "held\n"
+        monkeypatch.setattr(shared, "_YOUNG", 0.0)
+        shared.remove_left(tmp_path)
+        assert set(tmp_path.iterdir()) == files
+        ring.close()
+        shared.remove_left(tmp_path)
+        assert set(tmp_path.iterdir()) == files
+        other.kill()
+    shared.remove_left(tmp_path)
+    assert set(tmp_path.iterdir()) == set()
+
+
+def test_a_ring_that_was_just_made_and_what_is_none_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "rds-0.ring").write_bytes(b"")
+    shared.remove_left(tmp_path)
+    assert (tmp_path / "rds-0.ring").exists()
+    monkeypatch.setattr(shared, "_YOUNG", 0.0)
+    (tmp_path / "mine").write_text("")
+    (tmp_path / "rds-1.ring").symlink_to(tmp_path / "mine")
+    (tmp_path / "rds-2.ring").mkdir()
+    (tmp_path / "other.ring").write_text("")
+    shared.remove_left(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "other.ring", "rds-1.ring", "rds-2.ring"]
