@@ -104,5 +104,5 @@ def test_it_falls_back_with_a_note(alone: Path, monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.realtime
 def test_real_time_is_not_compiled_and_says_so(alone: Path) -> None:
     own = rds.Experiment(duration=0.2, reference=REFERENCES[0], controller="p", compiled=True)
-    (note,) = own.run("emulation").meta["notes"]
+    note, *_ = own.run("emulation").meta["notes"]  # what follows is of the bus, if it was late
     assert note == "not compiled: emulation runs in real time; only simulations can be compiled"

@@ -169,6 +169,8 @@ def test_a_folder_that_is_taken_away_during_a_run_is_said_so(alone: Path) -> Non
 
 ORPHAN = """
 import os, sys, time
+from rds import open_result
+from rds.runtime.record import NAME
 from rds.session import Session
 from rds.session.equipment import Equipment
 
@@ -176,8 +178,8 @@ equipment = Equipment(Session(sys.argv[1]), "control")
 equipment.choices.set("mode", "implementation")
 equipment.choices.set("duration", 60.0)
 run = equipment.run().start()
-while not len(run.new_rows()):
-    time.sleep(0.02)
+while not (len(run.new_rows()) and (run.folder / NAME).is_file() and len(open_result(run.folder))):
+    time.sleep(0.02)  # until there are samples on the disk
 os._exit(0)  # as a kernel that is killed
 """
 
