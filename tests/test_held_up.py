@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -70,3 +71,11 @@ def test_one_on_a_quiet_computer_is_a_failure_at_once(tmp_path: Path, waited: fl
 
 def test_many_void_tries_in_one_run_are_a_failure(tmp_path: Path) -> None:
     assert run(tmp_path, 0.25, 2, "--max-suite-reruns=1")[0] == 1
+
+
+def test_a_worker_s_words_are_not_kept_back(request: pytest.FixtureRequest, worker_id: str) -> None:
+    """Each test would take 40 ms more."""
+    if worker_id == "master":
+        pytest.skip("not a worker of pytest-xdist")
+    line = request.config.failures_db.sock  # type: ignore[attr-defined]
+    assert line.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
