@@ -123,12 +123,14 @@ class LogFile:
         return self.path.open(encoding="utf-8", errors="replace")
 
     def _records(self) -> Iterator[can.Message]:
+        damage: tuple[type[Exception], ...] = (*_DAMAGE, zlib.error, sqlite3.Error, BLFParseError)
         if self._ending == ".blf":
             from rds.bus.blf import check_containers
 
             check_containers(self.path)
         elif self._ending == ".mf4":
             bring_mf4()
+            damage = (Exception,)  # asammdf raises whatever its decoder trips over
         number = 0
         reader: Any = None
         try:
@@ -140,7 +142,7 @@ class LogFile:
                 yield message
         except NotImplementedError as error:
             raise asammdf_missing(self.path) from error
-        except (*_DAMAGE, zlib.error, sqlite3.Error, BLFParseError) as error:
+        except damage as error:
             what = f"after {number} frames" if number else "it"
             raise InputError(
                 f"{what} can't be read as {self._ending}: {error or 'damaged'}; record it again, or use another log",

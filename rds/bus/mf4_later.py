@@ -7,12 +7,14 @@ for a kind of log that few of them touch. While python-can itself is being impor
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
+from typing import Any
 
 _WHAT, _WHILE = "asammdf", "can"
 
@@ -40,3 +42,21 @@ def bring_mf4() -> None:
     if can.io.mf4.asammdf is None and sys.modules.get(_WHAT, can) is not None:  # None: it is not to be had
         # into the same module: the classes that python-can has registered look for their names there
         importlib.reload(can.io.mf4)
+    if can.io.mf4.asammdf is not None:
+        end_quietly()
+
+
+def end_quietly() -> None:
+    """asammdf closes a file in `__del__`, also one that it could not open: Python would print that error on stderr,
+    after ours has been said.
+    """
+    from asammdf.blocks.mdf_v3 import MDF3
+    from asammdf.blocks.mdf_v4 import MDF4
+
+    def end(self: Any) -> None:
+        with contextlib.suppress(Exception):
+            self.close()
+
+    for kind in (MDF3, MDF4):
+        if "__del__" in vars(kind):
+            kind.__del__ = end

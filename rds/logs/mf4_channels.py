@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rds.bus.mf4_later import end_quietly
 from rds.core.errors import InputError
 from rds.logs.apart import read_apart
 from rds.logs.log import Finding
@@ -78,6 +79,7 @@ def rasters_here(path: Path) -> tuple[list[Raster], list[str]]:
     try:
         from asammdf import MDF
 
+        end_quietly()
         with MDF(path) as file:
             groups = [group.channel_group.cycles_nr * max(len(group.channels), 1) for group in file.groups]
             if sum(groups) > _MOST_VALUES:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
+import random
 import sqlite3
 import subprocess
 import sys
@@ -135,6 +136,28 @@ def test_what_is_written_as_mf4_comes_back(tmp_path: Path) -> None:
     assert sorted(kept(message) for message in found) == expected
     with can.LogReader(tmp_path / "a.mf4") as reader:  # python-can's own way
         assert sum(not message.is_error_frame for message in reader) == len(expected)
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_a_damaged_mf4_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    """asammdf raises whatever its decoder trips over, and again in its `__del__`."""
+    pytest.importorskip("asammdf")
+    path = tmp_path / "a.mf4"
+    write(path, of_every_kind())
+    whole, drawn = path.read_bytes(), random.Random(7)
+    damaged = [b"", drawn.randbytes(300), b"MDF     4.10    " + bytes(200), whole[:64], whole[: len(whole) // 2]]
+    for _ in range(30):
+        place = drawn.randrange(len(whole))
+        damaged.append(whole[:place] + drawn.randbytes(8) + whole[place + 8 :])
+    refused = 0
+    for content in damaged:
+        path.write_bytes(content)
+        try:
+            list(LogFile(path))
+        except InputError as error:
+            refused += 1
+            assert str(path) in str(error)
+    assert refused > 5
 
 
 def test_nobody_waits_for_the_package_of_mf4_who_needs_it_not(tmp_path: Path) -> None:
