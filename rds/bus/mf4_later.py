@@ -59,4 +59,4 @@ def end_quietly() -> None:
 
     for kind in (MDF3, MDF4):
         if "__del__" in vars(kind):
-            kind.__del__ = end
+            kind.__del__ = end  # type: ignore[method-assign]
