@@ -65,7 +65,8 @@ ONLY = {
     ("paths", "results"): {"rds.results.figure"},  # pictures
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     ("reports", "bus"): {"rds.bus.frames", "rds.bus.logs"},  # which frames are commands and answers; their logs
-    ("logs", "bus"): {"rds.bus", "rds.bus.frames", "rds.bus.decode", "rds.bus.logs"},  # what a log holds
+    # what a log holds
+    ("logs", "bus"): {"rds.bus", "rds.bus.frames", "rds.bus.decode", "rds.bus.logs", "rds.bus.mf4_later"},
     ("identification", "controllers"): {"rds.controllers.tracking", "rds.controllers.design"},
     ("motion", "results"): {"rds.results.figure"},  # what all plots share
     ("spread", "runtime"): {"rds.runtime.scheduling"},  # a worker ends with who started it

@@ -34,6 +34,8 @@ def read_table(
     try:
         if ending in MEASUREMENTS and mf4_channels.is_measurement(path):
             table = mf4_channels.read_channels(path)
+        elif ending == ".mdf":
+            raise InputError("it is no MDF file with measurements; let the name of a bus log end in .mf4")
         elif ending in BUSES or ending == ".gz" or (ending in TEXTS and _is_bus_csv(path)):
             from rds.logs.can_table import read_can
 

@@ -76,6 +76,10 @@ def test_cut_and_hollow_files_are_refused(tmp_path: Path, monkeypatch: pytest.Mo
         small.setattr(mf4_channels, "_MOST_VALUES", 100)
         with pytest.raises(InputError, match=r"its channels hold 4e\+03 values"):
             rasters_here(path)
+    other = tmp_path / "other.mdf"
+    other.write_bytes(b"something else")
+    with pytest.raises(InputError, match=r"other\.mdf: it is no MDF file"):
+        tables.read_table(other)
     whole = path.read_bytes()
     for end in (8, 64, 200, len(whole) // 2):
         path.write_bytes(whole[:end])
