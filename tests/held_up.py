@@ -1,15 +1,22 @@
 """A test that fails while the computer is held up is void, as a verdict on timing is: it is run again, and told.
 
 Real processes, a real bus and a real browser share a few cores. What they are to do within some time can fail because
-others had the processors. So a failure counts only if it repeats, up to `AGAIN` times, or if nothing had to wait for a
-processor while the test ran. Each void try is printed at the end of the run with its failure and with the time that
+others had the processors. So a failure of a test that waits for others (real time, a browser, a process or a thread of
+its file) counts only if it repeats, up to `AGAIN` times, or if nothing had to wait for a processor while it ran. All
+other tests fail at once. Each void try is printed at the end of the run with its failure and with the time that
 processes waited; a run with more of them than `--max-suite-reruns` (pyproject.toml) fails.
+
+With tests side by side something waits nearly always: there it means that what fails once in many runs is told, and
+does not fail the run. `ARGS="--force-reruns 0"` shows each failure as one.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import socket
+import sys
+import threading
 from collections.abc import Generator
 from functools import partial
 from pathlib import Path
@@ -20,7 +27,11 @@ PRESSURE = Path("/proc/pressure/cpu")  # Linux: pressure stall information
 AGAIN = 2  # times that a failed test is run again, at most
 LONG = 0.1  # s of waiting for a processor that can make a test fail
 
+_STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # Python's audit events; of threads it has none before 3.12
+
 _waited_before = pytest.StashKey[float | None]()
+_started = 0  # processes and threads of this worker
+_started_before: dict[Path, int] = {}  # the first test of a file
 
 
 def waited() -> float | None:
@@ -34,9 +45,19 @@ def waited() -> float | None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Before each test, a worker of pytest-xdist asks over TCP whether it has crashed there before, in two small words.
+    """Count what is started, and let a worker's words go at once.
+
+    Before each test, a worker of pytest-xdist asks over TCP whether it has crashed there before, in two small words.
     TCP keeps the second one back for 40 ms unless it is told not to: 150 s of this project's tests.
     """
+    sys.addaudithook(lambda event, _: _count() if event in _STARTS else None)
+    start = threading.Thread.start
+
+    def counted(self: threading.Thread) -> None:
+        _count()
+        start(self)
+
+    threading.Thread.start = counted  # type: ignore[method-assign]
     line = getattr(getattr(config, "failures_db", None), "sock", None)
     if line is not None:
         line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -49,6 +70,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
+    _started_before.setdefault(item.path, _started)
     item.stash[_waited_before] = waited()
 
 
@@ -61,15 +83,34 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     return report
 
 
+def _count() -> None:
+    global _started
+    _started += 1
+
+
+def _waits_for_others(item: pytest.Item) -> bool:
+    is_marked = item.get_closest_marker("realtime") is not None or "panels" in item.path.parts
+    return is_marked or _started > _started_before.get(item.path, _started)
+
+
 def _was_held_up(item: pytest.Item) -> bool:
+    if not _waits_for_others(item):
+        return False
     waiting = _waiting(item)
-    return waiting is None or waiting >= LONG
+    return _is_loaded() if waiting is None else waiting >= LONG
+
+
+def _is_loaded() -> bool:
+    """By the load average, where the system says no more."""
+    return hasattr(os, "getloadavg") and os.getloadavg()[0] > (os.cpu_count() or 1)
 
 
 def _how_held_up(item: pytest.Item) -> str:
+    if not _waits_for_others(item):
+        return "this test waits for no other process and no thread"
     waiting = _waiting(item)
     if waiting is None:
-        return f"whether processes waited for a processor is not known: no {PRESSURE}"
+        return f"no {PRESSURE} says whether processes waited for a processor; by the load average: {_is_loaded()}"
     return f"processes waited for a processor for {waiting:.2f} s while this test ran"
 
 

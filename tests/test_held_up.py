@@ -12,6 +12,7 @@ import pytest
 
 HERE = Path(__file__).parent
 SAMPLE = """
+import threading
 from pathlib import Path
 
 import held_up
@@ -30,14 +31,17 @@ wait(0.0)
 def test_sample():
     tries = len(TRIES.read_text()) if TRIES.exists() else 0
     TRIES.write_text("+" * (tries + 1))
+    if STARTS:
+        threading.Thread(target=int).start()
     wait(WAITED * (tries + 1))
     assert tries >= FAILURES, "too late"
 """
 
 
-def run(place: Path, waited: float, failures: int, *options: str) -> tuple[int, str, int]:
+def run(place: Path, waited: float, failures: int, *options: str, starts: bool = True) -> tuple[int, str, int]:
     """Exit code, output and tries of a test that fails so often, while processes wait so many seconds."""
-    (place / "test_sample.py").write_text(SAMPLE.replace("WAITED", str(waited)).replace("FAILURES", str(failures)))
+    text = SAMPLE.replace("WAITED", str(waited)).replace("FAILURES", str(failures)).replace("STARTS", str(starts))
+    (place / "test_sample.py").write_text(text)
     options = ("-p", "held_up", "-p", "no:cacheprovider", "-rR", "--rerun-show-tracebacks", *options)
     found = subprocess.run(
         [sys.executable, "-m", "pytest", *options, "test_sample.py"],
@@ -67,6 +71,12 @@ def test_one_on_a_quiet_computer_is_a_failure_at_once(tmp_path: Path, waited: fl
     code, out, tries = run(tmp_path, waited, 1)
     assert (code, tries) == (1, 1)
     assert f"processes waited for a processor for {waited:.2f} s" in out
+
+
+def test_one_that_waits_for_nobody_else_is_a_failure_at_once(tmp_path: Path) -> None:
+    code, out, tries = run(tmp_path, 5.0, 1, starts=False)
+    assert (code, tries) == (1, 1)
+    assert "this test waits for no other process and no thread" in out
 
 
 def test_many_void_tries_in_one_run_are_a_failure(tmp_path: Path) -> None:

@@ -123,6 +123,7 @@ def test_stop_cuts_the_voltage_at_once(served: dict[str, Any]) -> None:
     drivers.stop()
     time.sleep(0.08)  # 8 time constants, less than the watchdog's 10 periods
     first = answered(drivers)
+    assert drivers.counters.watchdogs == 0
     assert [answered(drivers) for _ in range(5)] == [first] * 5, "it stands"
     drivers.close()
 
