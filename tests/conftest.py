@@ -106,6 +106,24 @@ def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     assert not forgotten, f"left in shared memory: {forgotten}"
 
 
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
+    """With what each bus of this process was opened; python-can's virtual one knows no bit rate."""
+    import can
+
+    import rds.bus.link
+
+    calls: list[dict[str, Any]] = []
+    real = can.Bus
+
+    def bus(**options: Any) -> Any:
+        calls.append(options)
+        return real(**{key: value for key, value in options.items() if key != "bitrate"})
+
+    monkeypatch.setattr(rds.bus.link.can, "Bus", bus)
+    yield calls
+
+
 def _rings() -> list[str]:
     """What runs share with their hosts: rings, and desks beside them."""
     return [str(path) for path in Path("/dev/shm").glob("rds-*.*") if path.suffix in (".ring", ".desk")]

@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import can
 import pytest
 from typer.testing import CliRunner
 
-import rds.bus.link
 from rds.cli import app
 from rds.commands.buses import ChosenBus, bus_table_of, chosen_bus, machine_of
 from rds.core.errors import InputError
 
 ADAPTER = '[bus]\ninterface = "virtual"\nchannel = 0\nbitrate = 250000\n'
 SECONDS = ["--seconds", "0.1"]
-
-
-@pytest.fixture
-def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
-    """With what each bus was opened; the real ones of this test have no bit rate."""
-    calls: list[dict[str, Any]] = []
-    real = can.Bus
-
-    def bus(**options: Any) -> Any:
-        calls.append(options)
-        return real(**{key: value for key, value in options.items() if key != "bitrate"})
-
-    monkeypatch.setattr(rds.bus.link.can, "Bus", bus)
-    yield calls
 
 
 def experiment(folder: Path, text: str) -> Path:

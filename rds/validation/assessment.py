@@ -35,6 +35,11 @@ class Range:
     unit: str
 
 
+def largest(ends: tuple[float, float]) -> float:
+    """The largest magnitude between the two ends of a range."""
+    return max(abs(ends[0]), abs(ends[1]))
+
+
 @dataclass(frozen=True)
 class Assessment:
     """One model on one log. Arrays are over the samples from `first` on, which the errors count.

@@ -1,16 +1,16 @@
-"""From what was measured of a model to the verdict. Each rule is a function that gives reasons or none."""
+"""From what was measured of a model to the verdict, by reasons. Each rule is a function that gives some or none."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from math import sqrt
 
-import numpy as np
-
 from rds.logs.log import Gravity
-from rds.validation.assessment import Assessment, Range
+from rds.validation.assessment import Assessment, largest
 from rds.validation.candidate import Candidate
+from rds.validation.conclusion import conclude, sentence_of
 from rds.validation.verdict import Bands, Reason, Side, Verdict, Word
+from rds.validation.within import passes, skilled_at
 
 _FACTORS = {  # of measured over modelled, and what makes it
     -1.0: "the sign of the position or of the command is reversed",
@@ -41,7 +41,7 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
         *_overfit(candidate, a, bands),
         *_extent(a, bands),
     ]
-    word, purpose = _conclude(a, reasons, bands)
+    word, purpose = conclude(a, reasons, bands)
     if word is Word.UNTOLD and all(reason.side is not Side.UNTOLD for reason in reasons):
         reasons.append(
             Reason(
@@ -51,7 +51,7 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
                 "feedback tells which is at fault",
             )
         )
-    return Verdict(word, _sentence(candidate, a, word, purpose, reasons), tuple(reasons), purpose)
+    return Verdict(word, sentence_of(candidate, a, word, purpose, reasons), tuple(reasons), purpose)
 
 
 def _data(a: Assessment, bands: Bands) -> Iterator[Reason]:
@@ -128,18 +128,11 @@ def _unstable(candidate: Candidate, a: Assessment) -> Iterator[Reason]:
         )
 
 
-def _passes(a: Assessment, bands: Bands) -> tuple[bool, bool]:
-    """Whether the free run's position and velocity are within the band."""
-    position = a.free_run is not None and a.free_run.fit_percent >= bands.fit_percent
-    velocity = a.velocity is not None and a.velocity.fit_percent >= bands.fit_percent
-    return position, velocity if a.velocity is not None else position
-
-
 def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
     if a.free_run is None or a.motion == 0.0:
         return
     e = a.free_run
-    position, velocity = _passes(a, bands)
+    position, velocity = passes(a, bands)
     what = "speed" if a.velocity is None else "position"
     yield Reason(
         Side.FOR if position else Side.AGAINST,
@@ -163,7 +156,7 @@ def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
 
 
 def _scale(a: Assessment, bands: Bands) -> Iterator[Reason]:
-    if a.gain is None or all(_passes(a, bands)):
+    if a.gain is None or all(passes(a, bands)):
         return
     for factor, meaning in _FACTORS.items():
         if abs(a.gain / factor - 1.0) < _NEAR:
@@ -175,22 +168,10 @@ def _scale(a: Assessment, bands: Bands) -> Iterator[Reason]:
         yield Reason(Side.AGAINST, "sign", text)
 
 
-def _skilled(a: Assessment, bands: Bands) -> list[int]:
-    """The horizons, in samples, at which the model predicts clearly better than no model."""
-    return [k for k, e in a.ahead.items() if k in a.naive and e.rmse < bands.skill * a.naive[k].rmse]
-
-
-def _foreseen(a: Assessment, bands: Bands) -> list[int]:
-    """Those of them at which it foretells the way to the band of the fit, as a free run must."""
-    share = 1.0 - bands.fit_percent / 100.0
-    way = {k: float(np.sqrt(np.mean((a.measured[k:] - a.measured[:-k]) ** 2))) for k in _skilled(a, bands)}
-    return [k for k in way if a.ahead[k].rmse <= share * way[k]]
-
-
 def _ahead(a: Assessment, bands: Bands) -> Iterator[Reason]:
     if not a.ahead or a.motion == 0.0:
         return
-    skilled = _skilled(a, bands)
+    skilled = skilled_at(a, bands)
     said = ", ".join(
         f"{k}: {e.rmse:.3g} ({a.naive[k].rmse:.3g} without a model)" for k, e in a.ahead.items() if k in a.naive
     )
@@ -275,7 +256,7 @@ def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
             f"({numbers}): noise and structure do not explain that, the parameters are off"
         )
         yield Reason(Side.AGAINST, "attainable", text)
-    elif all(_passes(a, bands)):
+    elif all(passes(a, bands)):
         text = f"no other parameters of this structure would come much nearer ({numbers})"
         yield Reason(Side.FOR, "attainable", text)
     if off := [p for p in found.parameters if p.apart > bands.apart]:
@@ -307,7 +288,7 @@ def _extent(a: Assessment, bands: Bands) -> Iterator[Reason]:
     for name, found in a.ranges.items():
         if found.fitted is None:
             continue
-        here, fitted = _size(found.here), _size(found.fitted)
+        here, fitted = largest(found.here), largest(found.fitted)
         if here > bands.beyond * fitted:
             yield Reason(
                 Side.NOTE,
@@ -315,111 +296,3 @@ def _extent(a: Assessment, bands: Bands) -> Iterator[Reason]:
                 f"{name} up to {here:.3g} {found.unit} here, and up to {fitted:.3g} {found.unit} in the fit's data: "
                 "beyond that the model extrapolates",
             )
-
-
-def _size(ends: tuple[float, float]) -> float:
-    return max(abs(ends[0]), abs(ends[1]))
-
-
-def _conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
-    untold = {reason.kind for reason in reasons if reason.side is Side.UNTOLD}
-    if untold - {"same-data"}:
-        return Word.UNTOLD, ""
-    word, purpose = _from_errors(a, reasons, bands)
-    # what fails even on its own data has failed; what passes there has shown nothing
-    return (Word.UNTOLD, "") if untold and word is not Word.NOT else (word, purpose)
-
-
-def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
-    against = {reason.kind for reason in reasons if reason.side is Side.AGAINST}
-    position, velocity = _passes(a, bands)
-    if {"unstable", "sign", "unit"} & against:
-        return Word.NOT, ""
-    if not position and not velocity:
-        if a.log.closed_loop and "voltage" not in against and a.voltage and a.voltage.relative_percent is not None:
-            return Word.UNTOLD, ""
-        foreseen = _foreseen(a, bands)
-        if foreseen and "voltage" not in against:
-            return Word.PARTLY, f"predicting {_and([str(k) for k in foreseen])} samples ahead"
-        return Word.NOT, ""
-    purposes = []
-    rate = "speed" if a.velocity is None else "velocity"
-    if a.velocity is None or not position:
-        purposes.append(f"simulating the {rate}")
-    elif not velocity:
-        purposes.append("simulating the position")
-    else:
-        purposes.append("simulating position and velocity")
-    limits = list(_limits(a, bands))
-    short = not (position and velocity)
-    if (
-        short
-        or limits
-        or against & {"whiteness", "command", "voltage", "overfitted", "ahead", "attainable", "parameters"}
-        or a.log.closed_loop
-    ):
-        return Word.PARTLY, " ".join([*purposes, *limits])
-    return Word.VALID, ""
-
-
-def _limits(a: Assessment, bands: Bands) -> Iterator[str]:
-    """What the log did not try of that which the model claims."""
-    speed: Range = a.ranges["velocity"]
-    low, high = speed.here
-    still = 0.05 * _size(speed.here)
-    if a.velocity is not None and (high <= still or low >= -still):
-        yield "in one direction"
-    if speed.fitted is not None and _size(speed.here) < bands.covered * _size(speed.fitted):
-        yield f"up to {_size(speed.here):.3g} {speed.unit}"
-    elif any(
-        found.fitted is not None and _size(found.here) > bands.beyond * _size(found.fitted)
-        for found in a.ranges.values()
-    ):
-        yield f"up to the {_size(speed.here):.3g} {speed.unit} tried here"
-    if a.log.closed_loop:
-        yield "in a closed loop such as this"
-
-
-def _sentence(candidate: Candidate, a: Assessment, word: Word, purpose: str, reasons: list[Reason]) -> str:
-    name, log = candidate.name, f"{a.log.name} ({_tried(a)})"
-    if word is Word.UNTOLD:
-        return f"Cannot tell whether {name} is valid, from {log}."
-    if word is Word.NOT:
-        return f"{name} is not valid for {log}."
-    if word is Word.VALID:
-        return f"{name} is valid for {log}."
-    sentence = f"{name} is valid for {purpose} only, by {log}."
-    if any(reason.kind == "parameters" for reason in reasons):
-        sentence += " Do not take its parameters for the axis's own: this log contradicts them."
-    return sentence
-
-
-def _tried(a: Assessment) -> str:
-    """How fast and at which voltages the log went: what a verdict by it speaks of."""
-    speed, command = a.ranges["velocity"], a.ranges["command"]
-    return f"up to {_size(speed.here):.3g} {speed.unit} and {_size(command.here):.3g} {command.unit}"
-
-
-def _and(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
-
-
-def overall(verdicts: dict[str, Verdict]) -> Verdict:
-    """The verdict over several logs: not valid if any says so; else the narrowest of those that can tell."""
-    if len(verdicts) == 1:
-        return next(iter(verdicts.values()))
-    for word in (Word.NOT, Word.PARTLY, Word.VALID, Word.UNTOLD):
-        chosen = {name: verdict for name, verdict in verdicts.items() if verdict.word is word}
-        if chosen:
-            break
-    others = {name: verdict for name, verdict in verdicts.items() if name not in chosen}
-    purposes = list(dict.fromkeys(verdict.purpose for verdict in chosen.values() if verdict.purpose))
-    sentence = " ".join(verdict.sentence for verdict in chosen.values())
-    if others:
-        sentence += " Beside that: " + ", ".join(f"{name}: {verdict.word}" for name, verdict in others.items()) + "."
-    reasons = tuple(
-        Reason(reason.side, reason.kind, f"{name}: {reason.what}")
-        for name, verdict in verdicts.items()
-        for reason in verdict.reasons
-    )
-    return Verdict(word, sentence, reasons, "; ".join(purposes))

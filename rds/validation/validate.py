@@ -17,8 +17,9 @@ from rds.core.errors import InputError
 from rds.logs.log import Log
 from rds.validation.assessment import Assessment, assess
 from rds.validation.candidate import Candidate, as_candidate
+from rds.validation.conclusion import overall
 from rds.validation.criterion import Ranking, Rival, rank
-from rds.validation.judge import judge, overall
+from rds.validation.judge import judge
 from rds.validation.verdict import Bands, Verdict
 
 

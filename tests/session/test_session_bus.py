@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import can
 import pytest
 
-import rds.bus.link
 from rds.bus.link import bus_name
 from rds.core.errors import MachineError
 from rds.session import Session
@@ -18,20 +15,6 @@ from rds.session.machine import MachineDesk
 from rds.session.monitor import BusMonitor
 
 REAL = {"interface": "virtual", "channel": 0, "bitrate": 250_000, "dialect": "cia402", "cia402": {"mode": "csp"}}
-
-
-@pytest.fixture
-def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
-    """With what each bus was opened that this test opens; real ones are replaced by nothing at all."""
-    calls: list[dict[str, Any]] = []
-    real = can.Bus
-
-    def bus(**options: Any) -> Any:
-        calls.append(options)
-        return real(**{key: value for key, value in options.items() if key != "bitrate"})
-
-    monkeypatch.setattr(rds.bus.link.can, "Bus", bus)
-    yield calls
 
 
 def as_told(calls: list[dict[str, Any]]) -> bool:
