@@ -12,7 +12,8 @@ release jitter J, lp and hp the messages of lower and higher priority, τ one bi
 
 The analysis of 1994 looked at q = 0 only, which is too good: a later instance can wait longer. C includes the
 interframe space, so R is three bits more than the arrival at the receivers. Times are whole ns, rounded up (periods
-down), so the bound never gets too short.
+down), so the bound never gets too short. A message's instances are sent in the order of their periods, also where the
+jitter is longer than the period.
 
 A message that another one releases (`Message.after`) inherits that one's response as jitter: it is released at the
 earliest when the other's shortest frame can have arrived, at the latest after its worst response and its own delay.
