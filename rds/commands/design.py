@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -46,9 +47,10 @@ def tracking(
             observer_pole=observer_pole,
             voltage_range=voltage_range,
         )
-    _warn(model)
+    _warn(model, designed.doubts)
     if json:
-        print_json({"file": str(out), "tau": designed.tau, "K": designed.K, "left_out": list(designed.left_out)})
+        said = {"left_out": list(designed.left_out), "warnings": list(designed.doubts)}
+        print_json({"file": str(out), "tau": designed.tau, "K": designed.K} | said)
         return
     typer.echo(f"designed for tau = {designed.tau:.6g} s, K = {designed.K:.6g} (mm/s)/V")
     for sentence in designed.left_out:
@@ -70,11 +72,9 @@ def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
     return linear_axis_of_machine(load_machine("mini-cnc" if machine is None else machine), str(axis))
 
 
-def _warn(model: Path | None) -> None:
-    """Repeat what the fit said against using its parameters at all."""
-    from rds.identification.model_file import read_model
-
-    for sentence in read_model(model).unusable() if model is not None else []:
+def _warn(model: Path | None, doubts: Iterable[str]) -> None:
+    """Repeat what the fit said against using its parameters, or some of them."""
+    for sentence in doubts:
         typer.echo(f"warning: {model}: {sentence}", err=True)
 
 
@@ -97,12 +97,15 @@ def machine_from(
     """A machine file whose axis is what was estimated; the rest is that of a known machine."""
     with refusals():
         from rds.identification.machine_file import write_machine
+        from rds.identification.model_file import read_model
         from rds.machines import load_machine
 
-        write_machine(out, model, base, axis)
+        file = read_model(model)
+        write_machine(out, file, base, axis)
         made = load_machine(str(out)).axis(axis)
-    _warn(model)
+    doubts = file.doubts()
+    _warn(model, doubts)
     if json:
-        print_json({"file": str(out), "axis": axis, "model": made.model, "machine": made.machine})
+        print_json({"file": str(out), "axis": axis, "model": made.model, "machine": made.machine, "warnings": doubts})
     else:
         typer.echo(f"wrote {out}: axis {axis} as in {model}, the rest of {base}")

@@ -74,6 +74,8 @@ def _task(machine: Machine, axis: str, model: Path | None, duration: float, nois
         from rds.identification.model_file import read_model
 
         read = read_model(model)
+        for sentence in read.doubts():
+            typer.echo(f"warning: {model}: {sentence}", err=True)
         made, values = structure(read.structure, read.options), read.values()
         for name in made.parameters:
             if name not in values:

@@ -33,12 +33,15 @@ LEFT_OUT = {
 
 @dataclass(frozen=True)
 class Linear:
-    """The linear part of a fitted axis: τ (s), K ((mm/s)/V), and sentences on what is not in it."""
+    """The linear part of a fitted axis: τ (s), K ((mm/s)/V), and sentences on what is not in it, and on what the fit
+    warned of: parameters that are not to be used, or are guesses.
+    """
 
     tau: float
     K: float
     left_out: tuple[str, ...]
     name: str  # of the model file, or of the machine's axis
+    doubts: tuple[str, ...] = ()
 
 
 def left_out_of(params: Mapping[str, Any]) -> tuple[str, ...]:
@@ -65,7 +68,7 @@ def linear_axis_of(model: Linear | ModelFile | str | Path) -> Linear:
     left_out = [*left_out_of(made.params)]
     if file.is_student:
         left_out.append(f"whatever {Path(file.structure).name} has beside tau and K")
-    return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), Path(file.path).name)
+    return Linear(float(params["tau"]), float(params["K"]), tuple(left_out), Path(file.path).name, tuple(file.doubts()))
 
 
 def linear_axis_of_machine(machine: Machine, name: str) -> Linear:
@@ -123,6 +126,8 @@ def write_tracking(path: str | Path, model: Linear | ModelFile | str | Path, **o
     inverse_gain, inertia = made.params["coefficients"][:2]
     left_out = "".join(f"- {sentence}\n" for sentence in axis.left_out)
     not_in_it = f"\nIt knows nothing of:\n{left_out}" if left_out else ""
+    doubts = "".join(f"- {sentence}\n" for sentence in axis.doubts)
+    not_in_it += f"\nThe fit of tau and K warned:\n{doubts}" if doubts else ""
     text = _FILE.format(**locals())
     return write_whole(path, text.encode())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isinf
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,35 @@ UNUSABLE = "do not use these parameters"  # how a warning begins that leaves not
 
 @dataclass(frozen=True)
 class Parameter:
-    """One estimated number, with its 95 % confidence interval [low, high]."""
+    """One estimated number, with its 95 % confidence interval [low, high].
+
+    The standard error is 0 for a number that was held, and infinite for one that the data do not tell.
+    """
 
     value: float
     std_error: float
     low: float
     high: float
     unit: str
+
+    @property
+    def told(self) -> bool:
+        """Whether the data tell it; if not, its value is a guess."""
+        return not isinf(self.std_error)
+
+
+def guesses(parameters: Mapping[str, Parameter]) -> list[str]:
+    """The names of those that the data do not tell."""
+    return [name for name, parameter in parameters.items() if not parameter.told]
+
+
+def said_of_guesses(parameters: Mapping[str, Parameter]) -> list[str]:
+    """A sentence that names the parameters whose values are guesses; none where the data tell all of them."""
+    said = [f"{name} = {parameters[name].value:.3g} {parameters[name].unit}".rstrip() for name in guesses(parameters)]
+    if not said:
+        return []
+    which = "its value is a guess" if len(said) == 1 else "their values are guesses"
+    return [f"not told by the data that were fitted: {', '.join(said)}; {which}"]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from math import hypot, isfinite
 from pathlib import Path
 from typing import Any
 
-from rds.identification.estimate import Errors, Estimate
+from rds.identification.estimate import Errors, Estimate, Parameter
 
 Rows = list[list[Any]]
 
@@ -54,11 +54,17 @@ def finite(value: Any) -> Any:
 
 def parameter_rows(estimate: Estimate) -> tuple[list[str], Rows]:
     """Columns and rows of the parameters with their intervals."""
-    rows: Rows = [
-        [name, f"{p.value:.6g}", f"{p.std_error:.2g}", f"{p.low:.6g} to {p.high:.6g}", p.unit]
-        for name, p in estimate.parameters.items()
-    ]
+    rows: Rows = [[name, *_shown(p), p.unit] for name, p in estimate.parameters.items()]
     return ["parameter", "value", "std error", "95 % interval", "unit"], rows
+
+
+def _shown(p: Parameter) -> tuple[str, str, str]:
+    """Value, standard error and interval; of a guess few digits and no number for how good it is."""
+    if not p.told:
+        return f"({p.value:.2g}, a guess)", "–", "not told by these data"
+    if p.std_error == 0.0:
+        return f"{p.value:.6g}", "–", "held"
+    return f"{p.value:.6g}", f"{p.std_error:.2g}", f"{p.low:.6g} to {p.high:.6g}"
 
 
 def correlation_rows(estimate: Estimate) -> tuple[list[str], Rows]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter
+from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
 from rds.identification.fitted_stretch import fitted_stretch
 from rds.identification.free_run_doubts import other_doubts
 from rds.identification.initial_state import estimate_start
@@ -70,7 +70,7 @@ def made_estimate(
     said += [
         f"{log.name}: {finding.what}" for log in logs for finding in log.findings if finding.gravity is Gravity.WARNING
     ]
-    said += warnings
+    said += [*said_of_guesses(parameters), *warnings]
     for number, log in enumerate(logs):
         state = None if states is None else states[number]
         begun[log.name], modelled = _run(structure, log, values, state)

@@ -25,7 +25,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.toml_text import toml_text
 from rds.core.words import Words
-from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter
+from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
 from rds.results.atomic import write_whole
 
 FORMAT = 1
@@ -73,6 +73,10 @@ class ModelFile:
     def unusable(self) -> list[str]:
         """The fit's warnings that leave nothing to believe in."""
         return [sentence for sentence in self.warnings if UNUSABLE in sentence]
+
+    def doubts(self) -> list[str]:
+        """What whoever uses the parameters must hear: that they are not to be used, and which are guesses."""
+        return [*self.unusable(), *said_of_guesses(self.parameters)]
 
     def fitted_on(self) -> tuple[str, ...]:
         """SHA-256 of the files that it was fitted to: data it must not be validated on alone."""

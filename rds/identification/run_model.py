@@ -52,12 +52,13 @@ def check_model_file(path: str | Path, sample_period: float = 0.001) -> FileRepo
     """The check of a model file: that it can be read and used, and that its model keeps its interface."""
     from rds.checks import FileReport, check_model
 
-    model = replace(run_model(read_model(path)), source=Source(Path(path).name))
+    file = read_model(path)
+    model = replace(run_model(file), source=Source(Path(path).name))
     delay = model.params.get("delay", 0.0) if model.motion in (MachineAxisMotion, SpindleMotion) else 0.0
     if delay:  # the voltages that wait are states, as many as there are samples in the delay
         model = replace(model, params={**model.params, "delay": 0.0})
     report = check_model(model, sample_period)
-    notes = (f"checked without its delay of {delay:g} s",) if delay else ()
+    notes = [*file.doubts(), *([f"checked without its delay of {delay:g} s"] if delay else [])]
     return FileReport(str(path), (replace(report, notes=(*report.notes, *notes)),))
 
 

@@ -157,4 +157,5 @@ def _notes(design: TrackingDesign, cloud: Cloud | None) -> list[str]:
         count = len(cloud.margins)
         lost = f"✖ unstable for {cloud.unstable} of {count}" if cloud.unstable else f"✔ stable for all {count}"
         said.append(f"{lost} axes drawn from the ranges; worst: among the stable ones")
+    said += [f"the fit warned: {sentence}" for sentence in design.axis.doubts]
     return [*said, *(f"the law does not know of {sentence}" for sentence in design.axis.left_out)]

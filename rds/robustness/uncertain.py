@@ -13,6 +13,7 @@ from rds.core.errors import InputError
 from rds.core.load import StudentFile, load_student
 from rds.core.types import Model
 from rds.core.words import Words
+from rds.identification.estimate import said_of_guesses
 from rds.identification.model_file import ModelFile, read_model
 from rds.identification.run_model import checked_structure, library_table, student_structure
 from rds.identification.structure import Structure
@@ -35,7 +36,7 @@ class Uncertain:
     base: Model
     made: Structure | None = None  # of a model file with a library structure
     student: StudentFile | None = None
-    doubts: tuple[str, ...] = ()  # of the fit: why its parameters are not to be used at all
+    doubts: tuple[str, ...] = ()  # of the fit: why its parameters, or which of them, are not to be used
 
     def model(self, values: Mapping[str, float]) -> Model:
         """The model with these values, the others as in the experiment. InputError for what is impossible."""
@@ -64,6 +65,9 @@ def uncertain(axis: AxisPlan, ranges: Mapping[str, tuple[float, float]] | None, 
     student = _student(model, file)
     doubts = () if file is None else tuple(file.unusable())
     if ranges:
+        if file is not None:  # a guess that the ranges replace is none
+            kept = {name: parameter for name, parameter in file.parameters.items() if name not in ranges}
+            doubts += tuple(said_of_guesses(kept))
         return Uncertain(axis.axis.name, _by_ranges(axis, file, ranges), model, made, student, doubts)
     if file is None:
         raise InputError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from rds.identification.estimate import guesses
 from rds.validation.assessment import Assessment, Range, largest
 from rds.validation.candidate import Candidate
 from rds.validation.verdict import Bands, Reason, Side, Verdict, Word
@@ -45,7 +46,7 @@ def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Wo
     if (
         short
         or limits
-        or against & {"whiteness", "command", "voltage", "overfitted", "ahead", "attainable", "parameters"}
+        or against & {"whiteness", "command", "voltage", "overfitted", "ahead", "attainable", "parameters", "guess"}
         or a.log.closed_loop
     ):
         return Word.PARTLY, " ".join([*purposes, *limits])
@@ -82,6 +83,8 @@ def sentence_of(candidate: Candidate, a: Assessment, word: Word, purpose: str, r
     sentence = f"{name} is valid for {purpose} only, by {log}."
     if any(reason.kind == "parameters" for reason in reasons):
         sentence += " Do not take its parameters for the axis's own: this log contradicts them."
+    if guessed := guesses(candidate.parameters):
+        sentence += f" Do not take its {_and(guessed)} for the axis's own: the fit's data did not tell."
     return sentence
 
 

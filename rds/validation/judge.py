@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import sqrt
 
+from rds.identification.estimate import said_of_guesses
 from rds.logs.log import Gravity
 from rds.validation.assessment import Assessment, largest
 from rds.validation.candidate import Candidate
@@ -38,6 +39,7 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
         *_voltage(a, bands),
         *_residuals(a, bands),
         *_attainable(a, bands),
+        *_guesses(candidate),
         *_overfit(candidate, a, bands),
         *_extent(a, bands),
     ]
@@ -266,6 +268,11 @@ def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
             for p in off
         )
         yield Reason(Side.AGAINST, "parameters", f"beyond their intervals: {said}")
+
+
+def _guesses(candidate: Candidate) -> Iterator[Reason]:
+    for sentence in said_of_guesses(candidate.parameters):
+        yield Reason(Side.AGAINST, "guess", f"{sentence}, whatever this log says of the model as a whole")
 
 
 def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reason]:

@@ -139,7 +139,11 @@ def _interval(axes: Axes, model: Candidate, name: str, row: int) -> None:
     colour = CYCLE[row % len(CYCLE)]
     if known is not None and isfinite(known.low) and isfinite(known.high):
         axes.plot([known.low, known.high], [row, row], color=colour, linewidth=2.0)
-    axes.plot([value], [row], "o", color=colour, markersize=5)
+    if known is None or known.told:
+        axes.plot([value], [row], "o", color=colour, markersize=5)
+        return
+    axes.plot([value], [row], "o", color=colour, markersize=5, markerfacecolor="none")
+    axes.annotate("a guess", (value, row), xytext=(0, 6), textcoords="offset points", ha="center", fontsize=7)
 
 
 def _pair(axes: Axes, t: np.ndarray, measured: np.ndarray, modelled: np.ndarray) -> None:

@@ -197,7 +197,9 @@ def _parameters(validation: Validation) -> str:
     for model in (validation.candidate, *validation.others):
         for name, value in model.values.items():
             known = model.parameters.get(name)
-            spread = [known.std_error, known.low, known.high] if known else [None, None, None]
+            spread = [known.std_error, known.low, known.high] if known and known.told else [None, None, None]
+            if known is not None and not known.told:
+                name = f"{name} (a guess: not told by the fit's data)"
             rows.append([model.name, name, float(value), *spread, model.structure.units.get(name, "")])
     return table(["model", "parameter", "value", "standard error", "low", "high", "unit"], rows)
 
