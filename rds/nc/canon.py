@@ -62,6 +62,7 @@ _FORMATS = {
     "SET_FEED_REFERENCE": "%s",
     "COMMENT": '"%s"',
     "MESSAGE": '"%s"',
+    "PRINT": '"%s"',
     "SET_MOTION_CONTROL_MODE": "CANON_%s",  # EXACT_PATH, EXACT_STOP, CONTINUOUS (with its tolerance)
     "USE_TOOL_LENGTH_OFFSET": "%.4f %.4f %.4f, %.4f %.4f %.4f, %.4f %.4f %.4f",
     "SET_SPINDLE_MODE": "%d %.4f",
@@ -103,7 +104,10 @@ def texts(items: Iterable[MotionBlock | Call]) -> Iterator[tuple[str, str]]:
 
 
 def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
-    """The lines that LinuxCNC's `rs274 -g` prints: running number, the program's line number (or N.....), the call."""
+    """The lines that LinuxCNC's `rs274 -g` prints: running number, the program's line number (or N.....), the call.
+
+    Of (PRINT, ...) it prints the text alone.
+    """
     number = 1
     for item in items:
         if isinstance(item, MotionBlock) and len(item) >= MANY and (write := _writer(number)) is not None:
@@ -112,6 +116,8 @@ def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
                 yield from lines or _numbered(_row_texts(item.rows[first : first + count]), number)
                 first += count
                 number += count
+        elif isinstance(item, Call) and item.name == "PRINT":
+            yield from item.args
         else:
             lines = list(_numbered(texts((item,)), number))
             yield from lines

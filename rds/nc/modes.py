@@ -23,9 +23,9 @@ from rds.nc.blocks import (
     UNITS,
     Block,
 )
+from rds.nc.comment_values import expanded
 from rds.nc.compensation import LEFT, RIGHT, Compensation
 from rds.nc.context import Context, rotate
-from rds.nc.debug_comment import expanded
 from rds.nc.expressions import Fault, whole
 from rds.nc.moves import home, move
 from rds.nc.offsets import (
@@ -44,7 +44,7 @@ from rds.nc.outside import active_comment
 from rds.nc.parameters import DEBUG_SHOWN, SYSTEM, SYSTEMS, TOOL
 from rds.nc.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES, XY, YZ
 
-_ACTIVE_COMMENTS = ("print,", "logopen,", "logappend,", "log,", "pyrun,", "py,", "abort,")
+_ACTIVE_COMMENTS = ("logopen,", "logappend,", "log,", "pyrun,", "py,", "abort,", "probeopen", "probeclose")
 _ACTIVE_ALONE = ("logclose", "pyreload")
 
 
@@ -135,7 +135,10 @@ def _g_words(m: Context, block: Block) -> None:
 
 
 def comment(m: Context, text: str) -> None:
-    """A comment in parentheses; (MSG, ...) is a message for the operator, and (DEBUG, ...) one with values in it."""
+    """A comment in parentheses; (MSG, ...) is a message for the operator, and (DEBUG, ...) one with values in it.
+
+    (PRINT, ...), with values too, is for whoever writes the program.
+    """
     with suppress(UnicodeError):  # in another coding: its bytes as they are
         text = text.encode("latin-1").decode("utf-8")
     text = text.lstrip(" \t\r\n\x0b\x0c")
@@ -147,6 +150,9 @@ def comment(m: Context, text: str) -> None:
         message = expanded(text[6:], m.parameters)
         if m.parameters.numbers[DEBUG_SHOWN] > 0.0:
             m.out.call("MESSAGE", message)
+        return
+    if lower.startswith("print,"):
+        m.out.call("PRINT", expanded(text[6:], m.parameters))
         return
     for name in (*_ACTIVE_COMMENTS, *_ACTIVE_ALONE):
         if lower == name if name in _ACTIVE_ALONE else lower.startswith(name):

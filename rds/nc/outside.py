@@ -80,4 +80,5 @@ def no_such_letter(letter: str) -> str:
 
 
 def active_comment(name: str) -> str:
-    return f"({name.upper()}...) is outside this dialect; write a plain comment, (MSG, ...) or (DEBUG, ...)"
+    shown = f"({name.upper().replace(',', ', ...')})"
+    return f"{shown} is outside this dialect; write a plain comment, (MSG, ...), (DEBUG, ...) or (PRINT, ...)"

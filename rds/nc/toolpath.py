@@ -22,7 +22,16 @@ from rds.nc.frame import Frame, only_rotary, segments_of
 BLOCK_SEGMENTS = 65536  # a PathBlock is handed on when it has at least so many
 MODES = {"EXACT_PATH": EXACT_PATH, "EXACT_STOP": EXACT_STOP, "CONTINUOUS": BLEND}
 # Calls that say nothing to axes and spindle. A pallet shuttle (M60, M30) comes with a stop or the end.
-WITHOUT_EFFECT = {"COMMENT", "MESSAGE", "ON_RESET", "SET_FEED_REFERENCE", "START_CHANGE", "PALLET_SHUTTLE", "FINISH"}
+WITHOUT_EFFECT = {
+    "COMMENT",
+    "MESSAGE",
+    "PRINT",
+    "ON_RESET",
+    "SET_FEED_REFERENCE",
+    "START_CHANGE",
+    "PALLET_SHUTTLE",
+    "FINISH",
+}
 
 Report = Callable[[ProgramError], None]
 

@@ -36,6 +36,7 @@ _COMMENTS = [
         "( spaced  Text )",
         "(MSG, hello)",
         "(debug, #1 #<a> %d#5220)",
+        "(print, #2 %.2f#<a>)",
         "(msg,Hi There)",
         "; rest (of) line",
         "X1 (a) Y2 (b)",

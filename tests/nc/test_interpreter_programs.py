@@ -53,7 +53,8 @@ STRICTER = {
     "RETURN under another subroutine's name": "o1 sub\no1 endsub\no2 sub\no1 return\no2 endsub\no2 call\nM2",
     "words outside of the dialect": "M48\nM2",
     "a word outside of the dialect": "G97 S100\nM2",
-    "an active comment": "(print,#5420)\nM2",
+    "an active comment": "(py,1)\nM2",
+    "a comment that opens a file": "(PROBEOPEN p.txt)\nM2",
 }
 # Refused by rs274 or run otherwise, and right here.
 BETTER = {

@@ -1,4 +1,4 @@
-"""(DEBUG, ...): a message in which parameters stand with their values, as in LinuxCNC's interpreter."""
+"""(DEBUG, ...) and (PRINT, ...): texts in which parameters stand with their values, as in LinuxCNC's interpreter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NO_VALUE = "######"
 
 
 def expanded(text: str, parameters: Parameters) -> str:
-    """What the message says. Values have six decimals; after `%d` none, after `%f` four, after `%.3f` three.
+    """What the comment says. Values have six decimals; after `%d` none, after `%f` four, after `%.3f` three.
 
     `######` stands for what has no value. Fault for a name without its `>`.
     """
