@@ -113,6 +113,10 @@ def test_help_opens_at_the_page_of_the_panel(open_page: Callable[..., Any]) -> N
     page.click('.rds-head button:text-is("Dark")')  # the help follows, and stays where it is
     frame.locator(':root[data-colours="dark"] #search-results li').first.wait_for()
     assert page.locator('.rds-guide a[href$="colours=dark"]').count() == 1
+    page.click('.rds-nav button:text-is("Main menu")')
+    page.click('.rds-nav button:text-is("Help")')  # and when it is shown again
+    frame.locator(':root[data-colours="dark"] h1:has-text("Equipment")').wait_for()
+    page.wait_for_selector('.rds-guide a[href$="colours=dark"]')
 
 
 def test_a_page_is_dark_as_its_address_says_or_the_browser_prefers(

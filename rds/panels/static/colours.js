@@ -16,6 +16,8 @@ function render({ model, el }) {
       for (const link of guide.querySelectorAll("a")) link.href = link.href.replace(/colours=\w+/, `colours=${colours}`);
     }
   };
+  const loaded = ({ target }) => target instanceof HTMLIFrameElement && target.closest(".rds-guide") && tell();
+  document.addEventListener("load", loaded, true); // a help that is shown again has the colours of its first time
   const seen = new MutationObserver(say); // of JupyterLab's own choice
   seen.observe(document.body, { attributes: true, attributeFilter: ["data-jp-theme-light"] });
   browsers.addEventListener("change", say);
@@ -23,6 +25,7 @@ function render({ model, el }) {
   say();
   return () => {
     seen.disconnect();
+    document.removeEventListener("load", loaded, true);
     browsers.removeEventListener("change", say);
     model.off("change:dark", tell);
   };
