@@ -232,8 +232,9 @@ def explain(result: Any) -> None:
     if result.meta.get("ending") != "done":
         reason = result.meta.get("ending_reason")
         typer.echo(f"rds: the run ended early ({result.meta['ending']}){f': {reason}' if reason else ''}", err=True)
-    whole = result.meta.get("ending") == "done"
-    if result.verdict == "missed" or (result.verdict == "void" and whole):  # repeating it is no remedy for the others
+    # overloaded says no more than that samples were late; of the other early endings, repeating is no remedy
+    unexplained = result.meta.get("ending") in ("done", "overloaded")
+    if result.verdict == "missed" or (result.verdict == "void" and unexplained):
         typer.echo(f"rds: timing {result.verdict}: {result.meta.get('verdict_reason')}", err=True)
     for note in result.meta.get("notes", ()):
         typer.echo(f"rds: note: {note}", err=True)

@@ -41,6 +41,7 @@ class Counters:
 
     ticks: int = 0  # sent
     missing: int = 0  # answers that did not come in their period
+    silent: int = 0  # periods in which a module gave no answer at all, not even a late one
     late: int = 0  # answers to an earlier tick
     lost_ticks: int = 0  # ticks that a module says it did not hear
     watchdogs: int = 0  # reports that a module's watchdog has cut the voltage
@@ -118,6 +119,7 @@ class AxisDrivers:
         self._number_origin = secrets.randbelow(frames.NUMBERS)
         self._tick = can.Message(arbitration_id=self._identifier, is_extended_id=False, data=bytes(8))
         self._zero = frames.encode_voltages(())
+        self._unheard: set[int] = set()  # identifiers of the modules that have been silent since the last tick
         self._waiting = self._zero  # without its number
         self._waiting_voltages: tuple[float, ...] = (0.0,) * len(used)
         self._sent_voltages = self._waiting_voltages
@@ -200,6 +202,8 @@ class AxisDrivers:
         self._sent_voltages = self._waiting_voltages
         try:
             self._take_stragglers()
+            self.counters.silent += bool(self._unheard)
+            self._unheard.clear()
             tick.data[:] = frames.number_voltages(self._waiting, self._number())
             self._bus.send(tick, self._timeout * SILENT_AFTER)
             self._count_tick()
@@ -237,6 +241,7 @@ class AxisDrivers:
             if answer.kind != Kind.ANSWER:
                 self.counters.watchdogs += bool(answer.status & Status.WATCHDOG)
             elif module.order.seen:
+                self._unheard.discard(module.identifier)
                 self.counters.late += 1
                 if self._place(module, answer) is not Place.ASTRAY:
                     self._count_lost(module.order.straggler(answer))
@@ -326,6 +331,7 @@ class AxisDrivers:
                 module.counts = doubtful[identifier].counts
                 module.missed = 0
             else:
+                self._unheard.add(identifier)
                 module.order.owed += 1
                 module.missed += 1
             self.counters.missing += 1

@@ -54,7 +54,7 @@ def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarr
 
 def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
     """The timing summary and the verdict, with the environment that they were measured in."""
-    environment = rows.report.get("environment", {})
+    environment, drivers = rows.report.get("environment", {}), rows.report.get("drivers", {})
     recorded = dict(zip(rows.columns, rows.values.T, strict=True))
     timing = Timing(sample, *(recorded[name] for name in TIMING_COLUMNS))
     period = round(plan.T * 1e9)
@@ -67,7 +67,8 @@ def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
         discarded=passed - len(sample),
         stalls=environment.get("rehearsal", {}).get("stalls", 0),
         threads=environment.get("threads", 0),
-        missing=rows.report.get("drivers", {}).get("missing", 0),
+        missing=drivers.get("missing", 0),
+        silent=drivers.get("silent", 0),
         again=partial(own_times, plan, rows),
     )
     return {
@@ -76,7 +77,7 @@ def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
         "timing": summary(timing, period)
         | {"discarded": judgement.discarded, "late_without_system": judgement.late_without_system},
         "environment": environment | {"sentence": sentence(environment)} if environment else {},
-        "drivers": rows.report.get("drivers", {}),
+        "drivers": drivers,
         "bus": rows.report.get("bus", {}),
     }
 

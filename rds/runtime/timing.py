@@ -4,8 +4,9 @@ Each sample's time has three owners: the system (waking the loop), the student (
 (I/O). A late sample is the student's only if it would have been late on a system without any delay of its own.
 That is decided by a replay of the run on such a system: every sample starts the moment it is due, or when the
 one before it is complete; the student's code takes the time it took, less what the scheduler took from it;
-I/O takes its median. If the replay keeps the period and the run did not, the system alone could not keep it,
-and the verdict is void: it says nothing about the student's code.
+I/O takes its median of the periods in which every module answered: where one was silent, the loop waited for it in
+vain, and how long says nothing about the bus. If the replay keeps the period and the run did not, the system alone
+(or the machine) could not keep it, and the verdict is void: it says nothing about the student's code.
 
 What the replay cannot see is a stall that struck while the student's code ran (a virtual machine that is not
 given its processor, a process that is stopped): it looks like running time. Such stalls strike waiting as well.
@@ -25,6 +26,7 @@ import numpy as np
 from rds.core.types import Verdict
 
 STAGES = ("lateness", "io", "compute", "model")
+LASTING = 9  # periods of silence, the shortest that ends a run (with a tenth, which has no row)
 FEW = 3  # overruns that may be stalls even if nothing stalled while waiting
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9}
 BIN_EDGES_US = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
@@ -92,14 +94,16 @@ def judge(
     stalls: int = 0,
     threads: int = 0,
     missing: int = 0,
+    silent: int = 0,
     again: Callable[[], np.ndarray | None] | None = None,
 ) -> Judgement:
     """Met, missed or void (see the module's text).
 
     `limit` is how many late samples are allowed; `stalls` is how often the same clock, without the student's
     code, was late by more than a period in the rehearsal before the run; `threads` is how many threads the student's
-    code left running; `missing` is how many answers had not come over the bus at the end of their period. `again()`
-    makes the run's calls once more and gives each one's time in ns, or None if it can't.
+    code left running; `missing` is how many answers had not come over the bus at the end of their period, `silent` in
+    how many periods no answer of a module came at all. `again()` makes the run's calls once more and gives each one's
+    time in ns, or None if it can't.
     """
     count = int(late_samples(timing, period).sum())
     lost = f"{count} of {len(timing.sample)} samples were late"
@@ -107,7 +111,7 @@ def judge(
         lost += f" and {discarded} period{' was' if discarded == 1 else 's were'} discarded"
     if count + discarded <= limit:
         return Judgement(Verdict.MET, _met(count, limit, len(timing.sample)), count, 0, discarded)
-    io = float(np.median(timing.io))
+    io = _usual_io(timing.io, silent)
     student = timing.compute + timing.model
     own = student - np.minimum(timing.taken, student)
     alone = _late_alone(own + io, timing, period)
@@ -128,6 +132,12 @@ def judge(
             f"processor from the loop; without the student's code the same clock was on time"
         )
         return Judgement(Verdict.MISSED, reason, count, alone, discarded)
+    if silent >= LASTING and 2 * silent >= count + discarded:
+        reason = (
+            f"{lost}, but by the machine's doing: in {silent} periods the loop waited for a module that was silent; "
+            "the run says nothing about the code that it tried: see to the machine, and repeat it"
+        )
+        return Judgement(Verdict.VOID, reason, count, alone, discarded)
     owner = "the system's own" if not missing else "the system's or the bus's"
     answers = f", {missing} answer{'s' if missing > 1 else ''} did not come within the period" if missing else ""
     reason = (
@@ -179,6 +189,12 @@ def own_wait(timing: Timing, period: int) -> np.ndarray:
     return np.maximum(start - np.maximum(due, complete), 0)
 
 
+def _usual_io(io: np.ndarray, silent: int) -> float:
+    """The median of the I/O times in ns but for those of `silent` periods, which last longest; 0 if none is left."""
+    answered = np.sort(io)[: max(len(io) - silent, 0)]
+    return float(np.median(answered)) if len(answered) else 0.0
+
+
 def _late_alone(work: np.ndarray, timing: Timing, period: int) -> int:
     """How many samples would be late on a system without delays; the first one is exempt."""
     late = replay(work, timing.sample, period)
@@ -204,13 +220,14 @@ def _is_doubtful(work: np.ndarray, timing: Timing, period: int, stalls: int) -> 
 def _overrun(own: np.ndarray, io: float, period: int) -> str:
     """What took too long, in a sentence's end."""
     over = _overruns(own + io, period)
+    of = f"of a sample period of {period / 1e6:g} ms"
+    bus = f"the bus's I/O took {io / 1e6:.3f} ms at the median"
     if io > period:
-        part, took, where = "the bus's I/O", io, "the median"
-    elif over > len(own) / 100:
-        part, took, where = "control() and the model", float(np.percentile(own, 99)), "the 99th percentile"
-    else:
-        part, took, where = "control() and the model", float(own.max()), "most"
-    return f"{part} took {took / 1e6:.3f} ms at {where}, of a sample period of {period / 1e6:g} ms"
+        return f"{bus}, {of}"
+    often = over > len(own) / 100
+    took, where = (float(np.percentile(own, 99)), "the 99th percentile") if often else (float(own.max()), "most")
+    code = f"control() and the model took {took / 1e6:.3f} ms at {where}"
+    return f"{bus}, and {code}, {of}" if io > took else f"{code}, {of}"
 
 
 def _met(count: int, limit: int, samples: int) -> str:

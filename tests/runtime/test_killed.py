@@ -21,6 +21,7 @@ from misbehaviour import every, process, send
 
 import rds
 from rds.bus.calling import find_machine
+from rds.bus.dialects import server_module
 from rds.bus.frames import CALL, Kind, Status, answer_identifier, decode_answer
 from rds.results import Result
 from rds.runtime.ring import Ring
@@ -61,9 +62,9 @@ main()
 
 
 @contextmanager
-def served(channel: str) -> Iterator[subprocess.Popen[str]]:
+def served(channel: str, dialect: str = "rds") -> Iterator[subprocess.Popen[str]]:
     """A machine of our own on the built-in bus."""
-    command = [sys.executable, "-m", "rds.bus.server", "mini-cnc", "--channel", channel]
+    command = [sys.executable, "-m", server_module(dialect), "mini-cnc", "--channel", channel]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     try:
         assert server.stdout is not None
@@ -210,6 +211,19 @@ def test_a_machine_that_is_lost_in_the_middle(alone: Path) -> None:
     assert json.loads(said)["ending"] == "machine lost"
     assert "no answer from X (node 2)" in errors
     check_readable(alone / "run", "machine lost", 10)
+
+
+@pytest.mark.parametrize("dialect", ["rds", "cia402"])
+def test_a_machine_that_is_lost_at_the_beginning_is_not_the_loops_fault(
+    experiment: Maker, during: During, alone: Path, dialect: str
+) -> None:
+    """Nearly all of such a short run is waiting for the dead machine: its bus was said to be too slow."""
+    with served("own", dialect) as server:
+        own = experiment(bus={"channel": "own", "dialect": dialect}, sample_period=0.02)
+        result = own.run("implementation", out=alone / "run", progress=during(server.kill, 1))
+    assert result.meta["ending"] == "machine lost"
+    assert result.meta["drivers"]["silent"] >= 9, "the tenth ended the run, and has no row"
+    assert result.verdict == "void", result.meta["verdict_reason"]
 
 
 def test_a_machine_that_is_not_there(alone: Path) -> None:

@@ -120,6 +120,35 @@ class TestWhoseFault:
         assert judgement.verdict == Verdict.MISSED
         assert "the bus's I/O took 1.500 ms at the median" in judgement.reason
 
+    def test_a_bus_that_leaves_no_time_to_compute_missed_and_is_named(self, discard: bool) -> None:
+        """The controller was named alone, with its twentieth of the period."""
+        timing, counts = ran(io=0.97, discard=discard)
+        judgement = judge(timing, MS, **counts)
+        assert judgement.verdict == Verdict.MISSED
+        assert (
+            "the bus's I/O took 0.970 ms at the median, and control() and the model took 0.060 ms" in judgement.reason
+        )
+
+    @pytest.mark.parametrize("first", [0, 1, 7, 20, 800])
+    def test_a_module_that_falls_silent_is_not_the_loops_fault(self, discard: bool, first: int) -> None:
+        """Its answers are waited for until the period is over. In a short run that was the median of all I/O."""
+        io = np.r_[np.full(first, 0.1), np.full(100, 1.0)]
+        timing, counts = ran(io=io, samples=len(io), discard=discard)
+        silent = int((timing.io >= MS).sum())
+        judgement = judge(timing, MS, **counts, missing=silent + 1, silent=silent)
+        assert judgement.verdict == Verdict.VOID
+        assert f"by the machine's doing: in {silent} periods the loop waited for a module that was silent" in (
+            judgement.reason
+        )
+        slow, counts = ran(compute=2.0, io=io, samples=len(io), discard=discard)
+        silent = int((slow.io >= MS).sum())
+        assert judge(slow, MS, **counts, missing=silent, silent=silent).verdict == Verdict.MISSED
+
+    def test_a_slow_bus_missed_although_a_module_falls_silent(self, discard: bool) -> None:
+        timing, counts = ran(io=1.5, discard=discard)
+        judgement = judge(timing, MS, **counts, missing=100, silent=100)
+        assert judgement.verdict == Verdict.MISSED and "the bus's I/O took 1.500 ms" in judgement.reason
+
     def test_an_exchange_that_waits_now_and_then_is_void(self, discard: bool) -> None:
         io = np.full(N, 0.1)
         io[50::100] = 2.5

@@ -49,6 +49,7 @@ class Counters:
 
     ticks: int = 0  # SYNCs sent
     missing: int = 0  # answers that did not come in their period
+    silent: int = 0  # periods in which a drive gave no answer at all, not even a late one
     late: int = 0  # answers that came after it
     emergencies: int = 0  # emergency messages with an error
     foreign: int = 0  # frames that no drive of ours sent
@@ -108,6 +109,7 @@ class Cia402Drivers:
         self._armed_at = 0.0
         self._commanded = (0.0,) * len(self.drives)  # what the next SYNC makes act
         self._acting = self._commanded
+        self._unheard: set[int] = set()  # nodes of the drives that have been silent since the last SYNC
         self._stopping = False  # after stop()
         self._started = self._closed = False
         self.limits: list[Limits] = []  # software limits 0x607D since start(), axis units, from the drives' own zero
@@ -206,6 +208,8 @@ class Cia402Drivers:
                 self._send_targets()
             self._is_sent = False
             self._drain()
+            self.counters.silent += bool(self._unheard)
+            self._unheard.clear()
             self._bus.send(self._sync, self._timeout * LOST_AFTER)
             self.counters.ticks += 1
             self._collect(now + self._timeout)
@@ -302,6 +306,7 @@ class Cia402Drivers:
             if drive is None:
                 self._take_foreign(message)
             elif kind == _TPDO:
+                self._unheard.discard(drive.node)
                 self.counters.late += 1
             else:
                 self._note(kind, drive, message)
@@ -324,6 +329,7 @@ class Cia402Drivers:
         lost = []
         for drive in self.drives:
             if drive.node in awaited:
+                self._unheard.add(drive.node)
                 drive.missed += 1
                 self.counters.missing += 1
                 if drive.missed >= LOST_AFTER and drive.seen:
