@@ -101,7 +101,7 @@ for name, number in dict(
     tee=276, vmsplice=278, name_to_handle_at=303, open_by_handle_at=304, seccomp=317, landlock_create_ruleset=444,
     syslog=103, sethostname=170, clock_settime=227, swapon=167, init_module=175, kexec_load=246, modify_ldt=154,
     quotactl=179, acct=163, reboot=169, setxattr=188, sendfile=40, socketpair=53, rt_sigqueueinfo=129, tgsigqueueinfo=297,
-    pidfd_send_signal=424, process_madvise=440, process_mrelease=448, cachestat=451, map_shadow_stack=453, futex_wake=454,
+    pidfd_send_signal=424, flock=73, utimensat=280, statfs=137, fstatfs=138, process_madvise=440, process_mrelease=448, cachestat=451, map_shadow_stack=453, futex_wake=454,
 ).items():
     ctypes.set_errno(0)
     if libc.syscall(number, 0, 0, 0, 0, 0, 0) != -1 or ctypes.get_errno() != errno.EPERM:
@@ -141,6 +141,20 @@ import sys
 sys.modules["left_behind"] = sys
 os.environ["LEFT_BEHIND"] = "1"
 """
+_MARKS = """
+import fcntl, os, struct
+refused = 0
+for name in ("/dev/null", "/dev/random", "/dev/urandom"):
+    try: os.utime(name)  # the computer's own: the time would be there for the next submission
+    except PermissionError: refused += 1
+for name in ("/dev/null", "/opt/rds/rds/__init__.py"):
+    with open(name, "rb") as file:
+        for lock in (lambda: fcntl.flock(file, fcntl.LOCK_EX), lambda: fcntl.lockf(file, fcntl.LOCK_SH),
+                     lambda: fcntl.fcntl(file, fcntl.F_GETLK, struct.pack("hhqqi", 0, 0, 0, 0, 0))):
+            try: lock()
+            except PermissionError: refused += 1
+assert refused == 9, refused
+"""
 _GRADED = """
 import os, sys
 def control(t, r, y, state, params):
@@ -162,5 +176,6 @@ ATTACKS = {
     "setuid programs and shells": Attack(_SETUID),
     "modules beside it": Attack(_SHADOW),
     "what the last one left": Attack(_SIBLING),
+    "marks where others look": Attack(_MARKS),
     "good behaviour when it is graded": Attack(_GRADED),
 }

@@ -9,6 +9,7 @@ import numpy as np
 
 DEEPEST = 12
 MOST = 20_000  # single values
+LARGEST_INTEGER = 10**299  # as long as one that frames take
 
 
 class NotPlain(ValueError):
@@ -34,6 +35,8 @@ def _plain(value: Any, depth: int, left: list[int]) -> Any:
         if value.size > MOST:
             raise NotPlain(f"it holds more than {MOST} values")
         value = value.tolist()
+    if type(value) is int and abs(value) > LARGEST_INTEGER:
+        raise NotPlain("it holds an integer of more than 300 digits")
     if type(value) in (int, float, bool):
         if not isfinite(value):
             raise NotPlain(f"it holds {value!r}")

@@ -6,6 +6,7 @@ import base64
 import importlib.util
 import random
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +19,7 @@ from rds.core.errors import ContractError, InputError
 from rds.core.load import StudentFile, load_student
 from rds.core.signature import INTERFACES, form
 from rds.grading.sandbox.door import Closed
+from rds.grading.sandbox.frames import FrameError
 from rds.grading.sandbox.inside import runs, walls
 from rds.grading.sandbox.inside.channel import Channel
 from rds.grading.sandbox.inside.counting import Counted, counted, work_alone
@@ -74,11 +76,16 @@ def _load(channel: Channel, kind: str, file: Path, count: Counted | None) -> Stu
         channel.tell({"error": said.replace(f"{walls.HOME}/", "")[:2000]})
         return None
     given = loaded if isinstance(loaded, StudentFile) else None
-    names = sorted(given.functions if given else (n for n, v in vars(loaded).items() if callable(v) and n[0] != "_"))
-    params, fault = _shown(dict(given.params) if given else {})
-    state, state_fault = _shown(given.initial_state if given else None)
+    found = given.functions if given else vars(loaded)
+    names = sorted(n for n, v in found.items() if isinstance(n, str) and callable(v) and n[:1] not in ("", "_"))
+    params, fault = _shown(lambda: dict(given.params) if given else {})
+    state, state_fault = _shown(lambda: given.initial_state if given else None)
     problem = "; ".join(f"{name}: {text}" for name, text in [("params", fault), ("initial_state", state_fault)] if text)
-    channel.tell({"defines": names[:1000], "params": params or {}, "initial_state": state, "problem": problem})
+    told = {"defines": names[:1000], "params": params or {}, "initial_state": state, "problem": problem}
+    try:
+        channel.tell(told)
+    except FrameError as error:  # texts without end; it can be used all the same
+        channel.tell({"defines": [], "params": {}, "initial_state": None, "problem": f"what it defines: {error}"})
     return loaded
 
 
@@ -99,11 +106,13 @@ def _functions(file: Path) -> ModuleType:
     return module
 
 
-def _shown(value: Any) -> tuple[Any, str]:
+def _shown(make: Callable[[], Any]) -> tuple[Any, str]:
     try:
-        return plain(value), ""
+        return plain(make()), ""
     except NotPlain as fault:
         return None, str(fault)
+    except BaseException as error:  # a class of its own that cannot be looked at
+        return None, f"it cannot be shown ({type(error).__name__})"
 
 
 def _call(channel: Channel, loaded: Any, order: dict[str, Any], file: Path) -> None:
