@@ -74,7 +74,7 @@ def test_decorators_defaults_conditions_and_loops() -> None:
         "unused = 1 / 0",
         "@twice\ndef control(x, g=gain):\n    return g * x + sum(table)",
     )
-    assert names["control"](1) == 10  # type: ignore[operator]
+    assert names["control"](1) == 2 * (5 + 0 + 5 + 10)  # type: ignore[operator]
     assert "unused" not in names
 
 
@@ -89,6 +89,55 @@ def test_a_percent_sign_that_is_none_of_ipython_s() -> None:
 
 def test_a_cell_of_another_language_is_left_out() -> None:
     assert "rm" not in made("%%bash\nrm = 1", "control = 1")
+
+
+def test_what_a_function_of_the_notebook_changes_is_changed() -> None:
+    names = made(
+        "gains, laws, k = {}, {}, 1.0",
+        "def tune():\n    global k\n    k = 30.0\n    fill(gains)",
+        "def fill(table, more=None):\n    table['Kv'] = 0.5",
+        "def register(f):\n    laws['mine'] = f\n    return f",
+        "tune()",
+        "_ = fill(gains)",
+        "fill(other := {}); unused = 1 / 0",
+        "@register\ndef law(e):\n    return k * e + gains['Kv']",
+        "control = laws['mine']",
+    )
+    assert names["control"](2.0) == 60.5  # type: ignore[operator]
+    assert "unused" not in names
+
+
+def test_what_changes_a_parameter_but_needs_more_than_is_there_is_left_out_and_said() -> None:
+    found = converted(
+        notebook(
+            "import rds\nparams = {'Kp': 1.0}",
+            "def tried(k):\n    params['Kp'] = k\n    return rds.Experiment(controller=control).run()",
+            "for k in (2.0, 4.0):\n    tried(k).plot()",
+            "params['Kp'] = 3.0\ndef control(e):\n    return params['Kp'] * e",
+        ).encode()
+    )
+    names: dict[str, object] = {}
+    exec(found.code.decode(), names)
+    assert names["control"](1.0) == 3.0  # type: ignore[operator]
+    assert "calls of tried() are left out" in found.notes[-1]
+
+
+@pytest.mark.parametrize(
+    ("cell", "lines"),
+    [
+        ("files = !ls\nx, = %timeit -o 1\ncontrol = 1", 2),
+        ("!pip install \\\n  numpy\ncontrol = 1", 2),
+        ("%%time\n%matplotlib inline\ncontrol = 1", 2),
+        ("\n%%capture out\ncontrol = 1", 1),
+        ("    x = 0\n    %time x\n    control = x + 1", 1),
+        ("text = '''\n%d\n'''\n%matplotlib inline\ncontrol = len(text) - 3", 1),
+        ("def f():\n    !ls\n    return 1\ncontrol = f()", 1),
+    ],
+)
+def test_ipython_s_commands(cell: str, lines: int) -> None:
+    found = converted(notebook(cell).encode())
+    assert f"cell 1: {lines} of IPython's own commands left out" in found.notes[0]
+    assert made(cell)["control"] == 1
 
 
 def test_code_that_python_cannot_read_is_kept_for_its_message() -> None:

@@ -9,17 +9,21 @@ from __future__ import annotations
 import ast
 import json
 import re
-import symtable
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rds.grading.intake.items import Refusal
+from rds.grading.intake.needed import needed
 
 LARGEST = 16 << 20  # bytes; pictures are in notebooks too
 LARGEST_CODE = 512 << 10  # bytes, of all cells: the parser takes a thousand times as much memory
 INTERFACE = ("control", "derivatives", "advance", "output", "interpolate", "params", "initial_state")
-_MAGIC = re.compile(r"\s*(?:[%!?]|[\w.]+\?{1,2}\s*$)")
+_MAGIC = re.compile(r"\s*(?:[%!?]|[\w.]+\?{1,2}\s*$|[A-Za-z_][\w, ]*=\s*[%!])")  # also `files = !ls`
+_RUNS_THE_CELL = ("%%time", "%%capture", "%%prun")  # as if the line were not there
+_LINES = re.compile(r"\r\n|\r|\n")
+_MOST_MAGICS = 50  # that are looked for one by one
 
 
 @dataclass(frozen=True)
@@ -49,11 +53,16 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
     text = "\n".join(lines) + "\n"
     try:
         body = ast.parse(text).body
-        keep = _needed(body, set(wanted))
+        keep, elsewhere = needed(body, set(wanted))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return Converted(_encoded(text), tuple(notes))
     if len(keep) < len(body):
         notes.append(f"of its {len(body)} statements {len(keep)} define what was asked for, and only these are graded")
+    if elsewhere:
+        names = ", ".join(f"{name}()" for name in elsewhere)
+        notes.append(
+            f"calls of {names} are left out: what they change is needed, and so are modules that are not there"
+        )
     return Converted(_encoded(_only(text, body, keep)), tuple(notes))
 
 
@@ -83,74 +92,50 @@ def _code_cells(data: bytes) -> list[str]:
 
 def _without_magics(source: str) -> tuple[list[str], int]:
     """A cell's lines with IPython's commands as comments, and how many there were. `%%` takes the whole cell."""
-    lines = re.split(r"\r\n|\r|\n", source)
-    first = next((line for line in lines if line.strip()), "")
-    if first.lstrip().startswith("%%"):
-        return [f"# {line}" for line in lines], len(lines)
-    if _parses(source):  # a line that begins with % may go on with the one before
-        return lines, 0
-    kept = [re.sub(r"^(\s*).*", r"\1pass", line) if _MAGIC.match(line) else line for line in lines]
-    return kept, sum(1 for line in lines if _MAGIC.match(line))
+    lines = _LINES.split(source)
+    first = next((n for n, line in enumerate(lines) if line.strip()), 0)
+    words = lines[first].split()[:1]
+    skipped = 0
+    if words and words[0].startswith("%%"):
+        if words[0] not in _RUNS_THE_CELL:
+            return [f"# {line}" for line in lines], len(lines)
+        lines[first], skipped = f"# {lines[first]}", 1
+    if _fault("\n".join(lines)) is not None:
+        lines = textwrap.dedent("\n".join(lines)).split("\n")  # as IPython does
+    for _ in range(_MOST_MAGICS):  # only where Python fails: a line that begins with % may be within a text, or go on
+        at = _fault("\n".join(lines))
+        if at is None:
+            return lines, skipped
+        if not 1 <= at <= len(lines) or not _MAGIC.match(lines[at - 1]):
+            break
+        skipped += _leave_out(lines, at - 1)
+    at = 0
+    while at < len(lines):
+        at += 1
+        if _MAGIC.match(lines[at - 1]):
+            skipped += _leave_out(lines, at - 1)
+    return lines, skipped
 
 
-def _parses(source: str) -> bool:
+def _leave_out(lines: list[str], at: int) -> int:
+    """Put `pass` in place of the command at `lines[at]`, which a backslash continues; how many lines it had."""
+    count = 1
+    while lines[at + count - 1].rstrip().endswith("\\") and at + count < len(lines):
+        count += 1
+    indent = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+    lines[at : at + count] = [f"{indent}pass", *[""] * (count - 1)]
+    return count
+
+
+def _fault(source: str) -> int | None:
+    """None if Python can read it; else the number of the line at which it cannot, 0 if it does not say."""
     try:
         ast.parse(source)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return False
-    return True
-
-
-def _needed(body: Sequence[ast.stmt], wanted: set[str]) -> set[int]:
-    """The numbers of the statements that make the wanted names, and of those that make what these use."""
-    facts = [_made_and_used(statement) for statement in body]
-    makers: dict[str, list[int]] = {}
-    for number, (made, _) in enumerate(facts):
-        for name in made:
-            makers.setdefault(name, []).append(number)
-    keep = {number for number, statement in enumerate(body) if _is_for_all(statement)}
-    known, todo = set(wanted), list(wanted)
-    while todo:
-        for number in makers.get(todo.pop(), ()):
-            if number not in keep:
-                keep.add(number)
-                new = facts[number][1] - known
-                known |= new
-                todo += new
-    return keep
-
-
-def _is_for_all(statement: ast.stmt) -> bool:
-    """Whether it concerns all code: `from __future__ import`, and `from x import *`, of which nobody knows."""
-    return isinstance(statement, ast.ImportFrom) and (
-        statement.module == "__future__" or any(alias.name == "*" for alias in statement.names)
-    )
-
-
-def _made_and_used(statement: ast.stmt) -> tuple[set[str], set[str]]:
-    """The names that a statement binds or changes, and those of the notebook that it needs, in functions too."""
-    top = symtable.symtable(ast.unparse(statement), "notebook", "exec")
-    made = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_assigned() or symbol.is_imported()}
-    used = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_referenced()}
-    tables = top.get_children()
-    while tables:
-        table = tables.pop()
-        used |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
-        tables += table.get_children()
-    if not isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-        changed = [n for n in ast.walk(statement) if isinstance(n, ast.Attribute | ast.Subscript)]
-        made |= {_root(node) for node in changed if not isinstance(node.ctx, ast.Load)}
-    if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
-        made.add(_root(statement.value.func))  # params.update(...)
-    return made, used
-
-
-def _root(node: ast.AST) -> str:
-    """The name that an expression such as a.b[c].d begins with; "" if it begins otherwise, or is a name alone."""
-    inner = node
-    while isinstance(inner, ast.Attribute | ast.Subscript):
-        inner = inner.value
-    return inner.id if isinstance(inner, ast.Name) and inner is not node else ""
+    except SyntaxError as error:
+        return error.lineno or 0
+    except (ValueError, RecursionError, MemoryError):
+        return 0
+    return None
 
 
 def _only(text: str, body: Sequence[ast.stmt], keep: set[int]) -> str:
