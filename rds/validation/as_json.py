@@ -93,6 +93,7 @@ def _log(a: Assessment) -> dict[str, Any]:
             "blocks": len(voltage.extra),
             "left_out": voltage.left_out,
         },
+        "noise": {"value": a.noise, "unit": a.unit},
         "attainable": None if a.attainable is None else asdict(a.attainable) | {"ratio": a.attainable.ratio},
         "ranges": {name: asdict(found) for name, found in a.ranges.items()},
     }

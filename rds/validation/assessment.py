@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from rds.identification.initial_state import estimate_start
 from rds.identification.kstep import STEPS, ahead, errors_of
 from rds.identification.needed_voltage import NeededVoltage, needed_voltage, smoothed_velocity
 from rds.identification.residuals import ResidualTest, bandwidth, block_length, block_means, residual_tests
+from rds.identification.smoothing import motion_of
 from rds.logs.log import Log
 from rds.validation.attainable import Attainable, attainable
 from rds.validation.candidate import Candidate, check_units
@@ -68,6 +69,7 @@ class Assessment:
     tests: ResidualTest | None
     voltage: NeededVoltage | None
     attainable: Attainable | None  # None where no fit to this log is a measure of the model
+    noise: float  # of the measurement, rounding included, in the unit of the position
     overlap: Overlap
     ranges: Mapping[str, Range]
 
@@ -137,6 +139,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
         "block_time": block_means(t[first:], block),
         "block_velocity": rates[0],
         "block_modelled": rates[1],
+        "noise": float(max(motion_of(log).noise, (log.resolution or 0.0) / sqrt(12.0))),
         "overlap": overlap(candidate, log),
         "ranges": _ranges(candidate, log, rates[0]),
     }
@@ -164,7 +167,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
         gain=_gain(rates[0], rates[1]),
         tests=_tests(candidate, log, first, start, modelled, frequency),
         voltage=_voltage(candidate, log, block),
-        attainable=attainable(candidate, log, start),
+        attainable=attainable(candidate, log, start, common["noise"]),
         **common,
     )
 

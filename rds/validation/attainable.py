@@ -11,13 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import hypot, isfinite, sqrt
+from math import hypot, isfinite
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.identification.estimate import Parameter
-from rds.identification.smoothing import motion_of
 from rds.logs.log import Log
 from rds.validation.candidate import Candidate
 
@@ -56,8 +55,9 @@ class Attainable:
         return self.rmse / least if least > 0.0 else float("inf")
 
 
-def attainable(candidate: Candidate, log: Log, start: tuple[float, ...]) -> Attainable | None:
-    """The least RMSE that the structure reaches on the first 200,000 samples of `log`, from the initial state `start`.
+def attainable(candidate: Candidate, log: Log, start: tuple[float, ...], noise: float) -> Attainable | None:
+    """The least RMSE that the structure reaches on the first 200,000 samples of `log`, from the initial state `start`;
+    `noise` is the measurement's.
 
     None where that says nothing: a closed loop (a free run lacks the controller), a model without estimated parameters,
     or one whose derivatives are not known (a student's file, for which a search would take minutes).
@@ -78,7 +78,6 @@ def attainable(candidate: Candidate, log: Log, start: tuple[float, ...]) -> Atta
         found = least_squares(free, np.concatenate([free.point(candidate.values, []), state.point]), _RUNS)
     except InputError:  # the free run is not finite
         return None
-    noise = float(max(motion_of(part).noise, (log.resolution or 0.0) / sqrt(12.0)))
     values, covariance = free.values(found.point), uncertainty_of(free, found).covariance
     errors = dict(zip(free.names, np.sqrt(np.diag(covariance)).tolist(), strict=False))
     return Attainable(

@@ -44,9 +44,14 @@ class Candidate:
         """The parameters that have a standard error: those that a fit adjusted."""
         return tuple(n for n, p in self.parameters.items() if isfinite(p.std_error) and p.std_error > 0.0)
 
-    def fit_errors(self) -> list[Errors]:
-        """Free-run errors on the fit's own logs, so far as recorded."""
-        return [log["free_run"] for log in self.fitted_on if isinstance(log.get("free_run"), Errors)]
+    def fit_predictions(self) -> list[Mapping[int, Errors]]:
+        """Errors on each of the fit's own logs by the number of samples predicted ahead, so far as recorded."""
+        unit = self.structure.output_unit
+        return [
+            {k: errors for k, errors in log["ahead"].items() if errors.unit == unit}
+            for log in self.fitted_on
+            if isinstance(log.get("ahead"), Mapping)
+        ]
 
     def range_of(self, quantity: str) -> tuple[float, float] | None:
         """The lowest and highest `command` (V) or `velocity` (mm/s) of the fit's logs; None where not recorded."""
@@ -88,10 +93,7 @@ def of_model(model: Model, name: str = "", unit: str = "mm") -> Candidate:
 def _of_estimate(estimate: Estimate, name: str) -> Candidate:
     from rds.identification.structures import structure
 
-    logs = tuple(
-        {**log, "free_run": estimate.free_run.get(str(log.get("name", "")))} if "free_run" not in log else log
-        for log in estimate.logs
-    )
+    logs = tuple({**log, "ahead": estimate.ahead.get(str(log.get("name", "")), {})} for log in estimate.logs)
     return Candidate(
         name=name or estimate.structure,
         structure=structure(estimate.structure, estimate.options),

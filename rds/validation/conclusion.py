@@ -42,13 +42,7 @@ def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Wo
     else:
         purposes.append("simulating position and velocity")
     limits = list(_limits(a, bands))
-    short = not (position and velocity)
-    if (
-        short
-        or limits
-        or against & {"whiteness", "command", "voltage", "overfitted", "ahead", "attainable", "parameters", "guess"}
-        or a.log.closed_loop
-    ):
+    if against or limits or a.log.closed_loop:
         return Word.PARTLY, " ".join([*purposes, *limits])
     return Word.VALID, ""
 
@@ -81,8 +75,11 @@ def sentence_of(candidate: Candidate, a: Assessment, word: Word, purpose: str, r
     if word is Word.VALID:
         return f"{name} is valid for {log}."
     sentence = f"{name} is valid for {purpose} only, by {log}."
-    if any(reason.kind == "parameters" for reason in reasons):
+    kinds = {reason.kind for reason in reasons if reason.side is Side.AGAINST}
+    if "parameters" in kinds:
         sentence += " Do not take its parameters for the axis's own: this log contradicts them."
+    elif "structure" in kinds:
+        sentence += " Do not take its parameters for the axis's own: they make up for something that it lacks."
     if guessed := guesses(candidate.parameters):
         sentence += f" Do not take its {_and(guessed)} for the axis's own: the fit's data did not tell."
     return sentence

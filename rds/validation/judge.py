@@ -39,6 +39,7 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
         *_voltage(a, bands),
         *_residuals(a, bands),
         *_attainable(a, bands),
+        *_structure(a, bands),
         *_guesses(candidate),
         *_overfit(candidate, a, bands),
         *_extent(a, bands),
@@ -275,19 +276,48 @@ def _guesses(candidate: Candidate) -> Iterator[Reason]:
         yield Reason(Side.AGAINST, "guess", f"{sentence}, whatever this log says of the model as a whole")
 
 
-def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reason]:
-    known = [e.rmse for e in candidate.fit_errors() if e.rmse > 0.0 and e.unit == a.unit]
-    if a.free_run is None or not known or a.overlap.share > bands.seen:
+def _structure(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    """What no parameters of this structure explain. The residual tests cannot see it: a fit with such residuals states
+    wide intervals, which allow for as much.
+    """
+    if a.free_run is None or a.noise == 0.0 or a.motion == 0.0 or a.log.closed_loop:
         return
-    own = max(known)
-    own = max(own, (a.log.resolution or 0.0) / sqrt(12.0))
-    ratio = a.free_run.rmse / own
-    if ratio > bands.worse:
+    if a.attainable is not None:
+        left, what = a.attainable.reached, "fitted to this very log, the same structure still leaves"
+    else:
+        left, what = a.free_run.rmse, "the free run leaves"
+    if left > bands.unexplained * a.noise:
+        yield Reason(
+            Side.AGAINST,
+            "structure",
+            f"{what} {left:.3g} {a.unit} (RMS), {left / a.noise:.3g} times the measurement's noise "
+            f"({a.noise:.2g} {a.unit}): the axis does something that the model lacks; its parameters make up for that",
+        )
+
+
+def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reason]:
+    """Errors on the fit's data beside those here, where no fit to this log is the measure.
+
+    Errors of a free run grow with the length of a log; those of predictions over the same time can be compared.
+    """
+    if a.attainable is not None or a.overlap.share > bands.seen:
+        return
+    known = [ahead for ahead in candidate.fit_predictions() if ahead]
+    shared = [k for k in a.ahead if all(k in ahead for ahead in known)]
+    if not known or not shared:
+        return
+    k = max(shared)
+    own = max(max(ahead[k].rmse for ahead in known), (a.log.resolution or 0.0) / sqrt(12.0))
+    speed = a.ranges["velocity"]
+    if speed.fitted is not None and largest(speed.fitted) > 0.0:
+        own *= max(1.0, largest(speed.here) / largest(speed.fitted))
+    if own > 0.0 and (ratio := a.ahead[k].rmse / own) > bands.worse:
         yield Reason(
             Side.AGAINST,
             "overfitted",
-            f"the RMSE is {ratio:.1f} times that on the fit's own data ({own:.3g} {a.unit}): the fit followed what was "
-            "particular to them, the structure lacks what shows here, or the axis has changed",
+            f"{k} samples ahead, the RMSE is {ratio:.1f} times what it was on the fit's own data at such speeds "
+            f"({own:.3g} {a.unit}): the fit followed what was particular to them, the model lacks what shows here, or "
+            "the axis has changed",
         )
 
 

@@ -92,8 +92,9 @@ class Bands:
     least_changes: float = 3.0  # of the velocity, from above its mean to below it or back
     least_steps: float = 20.0  # of the encoder, that the axis must at least move
     skill: float = 0.5  # a prediction's RMSE must be less than so much of that without a model
-    worse: float = 2.0  # RMSE here over RMSE on the fit's data, beyond which the fit has followed its own noise
+    worse: float = 2.0  # RMSE of predictions here over those on the fit's data: beyond it, these were particular
     attainable: float = 2.0  # RMSE over that of the same structure fitted to this very log
+    unexplained: float = 3.0  # RMS that no parameters explain, over the noise: beyond it, the structure lacks something
     apart: float = 3.5  # standard errors by which a parameter may differ from what this log says of it
     beyond: float = 1.1  # speeds and voltages here over the fit's, beyond which the model extrapolates
     covered: float = 0.5  # share of the fit's speeds that a log must cover to speak for all of them

@@ -10,11 +10,14 @@ import pytest
 from rds.core.errors import InputError
 from rds.core.types import Model, Source
 from rds.identification.estimate import Errors
+from rds.identification.fit import fit
 from rds.identification.fitted_stretch import fitted_stretch
+from rds.identification.structures import structure
 from rds.logs.log import Finding, Gravity
+from rds.validation.assessment import assess
 from rds.validation.validate import Validation, validate
-from rds.validation.verdict import Bands, Word
-from tests.validation.validation_logs import T, X, candidate, log, moved, square
+from rds.validation.verdict import Bands, Side, Word
+from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
 
 FRESH = square(8.0, 3.0, 0.7)
 
@@ -149,12 +152,42 @@ def test_an_error_below_the_encoder_s_rounding_is_too_good() -> None:
 
 
 def test_an_error_that_grows_on_new_data_is_overfitting() -> None:
-    record = fitted_stretch(log(square(6.0), name="fit")) | {"free_run": Errors(99.9, 0.002, 0.01, "mm")}
+    record = fitted_stretch(log(square(6.0), name="fit")) | {"ahead": {100: Errors(99.9, 0.002, 0.01, "mm")}}
     found = validate(candidate(X | {"K": 1.80}, fitted_on=(record,)), log(FRESH))
     (reason,) = [r for r in found.verdict.reasons if r.kind == "overfitted"]
-    own = found.assessments["log"].free_run
-    assert own is not None and f"{own.rmse / 0.002:.1f} times" in reason.what
+    ahead = found.assessments["log"].ahead[100]
+    speed = found.assessments["log"].ranges["velocity"]
+    assert speed.fitted is not None and speed.fitted[1] >= speed.here[1]
+    assert f"100 samples ahead, the RMSE is {ahead.rmse / 0.002:.1f} times" in reason.what
     assert found.verdict.word is not Word.VALID
+
+
+def test_a_longer_log_is_not_overfitting() -> None:
+    """Errors of a free run add up: of 2 s and of 10 s they cannot be compared, predictions over 0.1 s can."""
+    values = X | {"friction_plus": 0.545}
+    short, long = (assess(candidate(values), log(square(seconds)), None) for seconds in (2.0, 10.0))
+    assert short.free_run is not None and long.free_run is not None and long.free_run.rmse > 3.0 * short.free_run.rmse
+    record = fitted_stretch(log(square(2.0), name="fit")) | {"free_run": short.free_run, "ahead": short.ahead}
+    found = validate(candidate(values, fitted_on=(record,)), log(square(10.0)))
+    assert all(reason.kind != "overfitted" for reason in found.verdict.reasons)
+
+
+def test_what_the_structure_lacks_is_no_matter_of_wide_intervals() -> None:
+    """Low speed, play and Stribeck friction, fitted without them: intervals allow for any residual, and K is off."""
+    t = np.arange(6000) * T
+    axis = structure("axis", ("stribeck", "backlash"))
+    truth = X | {"stribeck": 0.5, "stribeck_velocity": 0.2, "backlash": 0.02}
+    logs = []
+    for number, frequency in enumerate((0.5, 0.6)):
+        u = 0.9 * np.sin(2 * np.pi * frequency * t)
+        y = np.rint(axis.respond(t, u, [0.0, 0.0, 0.0], truth) / STEP) * STEP
+        logs.append(log(u, y, name=f"slow-{number}"))
+    estimate = fit(logs[:1], structure("axis"))
+    assert abs(estimate.parameters["K"].value / X["K"] - 1.0) > 0.1
+    found = validate(estimate, logs[1])
+    assert found.verdict.word is Word.PARTLY and "its parameters" in found.verdict.sentence
+    (reason,) = [r for r in found.verdict.reasons if r.kind == "structure"]
+    assert reason.side is Side.AGAINST and "times the measurement's noise" in reason.what
 
 
 def test_speeds_and_voltages_beyond_the_fit_s_are_said() -> None:
