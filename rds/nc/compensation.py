@@ -240,7 +240,7 @@ class Compensation:
         angle = self._turns_away((-outward[1], outward[0]) if turn > 0 else (outward[1], -outward[0]))
         offset = -self.radius if inside else self.radius
         if angle < -STRAIGHT_ON or angle > math.pi + (STRAIGHT_ON if inside else -STRAIGHT_ON):
-            self._queue.trim(self._crossing_arc(self._before_corner(), centre, radius + offset, turn), angle)
+            self._queue.trim(self._crossing_arc(self._before_corner(), centre, radius + offset, outward, turn), angle)
         elif angle <= STRAIGHT_ON:
             self._queue.finish(wide=True)
         else:
@@ -282,14 +282,19 @@ class Compensation:
             raise no_room(self.radius, before)
         return crossing
 
-    def _crossing_arc(self, before: Move, centre: Point, radius: float, turn: int) -> Point:
+    def _crossing_arc(self, before: Move, centre: Point, radius: float, outward: Point, turn: int) -> Point:
+        """`radius` is that of the offset arc at its end, `outward` the direction from the centre to the corner."""
         if before.kind == ARC:
             old = math.dist(before.centre, before.end)
             if old == 0 or before.centre == centre:
                 raise ProgramError("two arcs around one centre meet at an inside corner; make them one arc")
             crossing = arc_arc(before.centre, old, centre, radius, self._inside(before.turn) == (turn > 0))
         else:
-            crossing = line_arc(self._queue.tool, self._coming(), centre, radius, self._inside(turn))
+            # As in LinuxCNC, an arc whose end is off its circle draws the line with it onto the circle of its end.
+            programmed = radius + (self.radius if self._inside(turn) else -self.radius)
+            aside = programmed - math.dist(centre, self.programmed)
+            coming_from = along(self._queue.tool, outward, aside)
+            crossing = line_arc(coming_from, self._coming(), centre, radius, self._inside(turn))
         if crossing is None:
             raise no_room(self.radius, before)
         return crossing
