@@ -20,6 +20,7 @@ from rds.checks.timing import judge_time
 from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
+from rds.core.load import wants_state
 from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
 from rds.core.values import shown
@@ -170,7 +171,7 @@ class _Run:
         if not self.axes and not self.calls and _is_about_form(error) and self._works_with_arrays():
             return self.found.fault(clauses.RUNS, f"control() fails with one axis's numbers: {said}; {_SEVERAL}")
         if not self.calls:
-            if self.subject.student.initial_state is None and _is_about_form(error):
+            if self._is_for_want_of_state(error, before):
                 said = f"control() fails with the empty state, and there is no initial_state: {said}"
                 remedy = "define it, as in `initial_state = [0.0]`"
                 return self.found.fault(clauses.INITIAL_STATE, f"{said}; {remedy}")
@@ -182,6 +183,12 @@ class _Run:
         return self.found.fault(
             clauses.RUNS, f"control() failed at t = {t:.3f} s with state {shown(before[3])}: {said}"
         )
+
+    def _is_for_want_of_state(self, error: BaseException, before: tuple[Any, ...]) -> bool:
+        if self.subject.student.initial_state is not None or not _is_about_form(error):
+            return False
+        params = copy.deepcopy(self.params)
+        return wants_state(error, lambda state: self.function(*before[:3], state, params), self.source)
 
     def _works_with_arrays(self) -> bool:
         state = copy.deepcopy(self.initial_state)

@@ -73,6 +73,8 @@ def _text(exc: BaseException) -> str:
     except STUDENT_ERRORS:  # an exception class of the student's own may fail to print itself
         text = "(its message cannot be printed)"
     text = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
+    if type(exc) is TypeError and "'Reference'" in text:
+        return f"{text} (r.position, r.velocity and r.acceleration are its numbers)"
     return f"{text} (the dict has no such key)" if type(exc) is KeyError else text  # its own text is the key alone
 
 

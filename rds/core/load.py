@@ -169,6 +169,8 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
                 f"define it there, as in `params = {{{error.args[0]!r}: 1.0}}`",
                 source.path or source.name,
             ) from error
+        if not wants_state(error, lambda state: control(0.0, Reference(0.0, 0.0, 0.0), 0.0, state, params), source):
+            return  # whoever runs it reports it
         raise ContractError(
             f"control() fails with the empty state, and there is no initial_state: {student_error(error, source)}; "
             "define initial_state, as in `initial_state = [0.0]`",
@@ -176,6 +178,15 @@ def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source:
         ) from error
     except STUDENT_ERRORS:
         return  # not for want of a state: whoever runs it reports it
+
+
+def wants_state(error: BaseException, call: Callable[[Any], Any], source: Source | None) -> bool:
+    """Whether `error`, of `call` with the empty state, is about the state: with a number it is another one, or none."""
+    try:
+        call(0.0)
+    except STUDENT_ERRORS as other:
+        return student_error(other, source) != student_error(error, source)
+    return True
 
 
 def _role_of(function: Callable[..., Any], name: str) -> str:
@@ -291,9 +302,14 @@ def _load_error(error: BaseException, file: Path) -> InputError:
     said = student_error(error, file)
     if isinstance(error, SystemExit):
         return InputError(f"it ends the program while it loads: {said}; remove the exit", where)
-    if isinstance(error, ModuleNotFoundError):
+    if isinstance(error, ModuleNotFoundError) and str(error.name).startswith("rds."):
+        remedy = "where files are graded, rds holds the interfaces only: move what runs experiments under "
+        remedy += '`if __name__ == "__main__":`'
+    elif isinstance(error, ModuleNotFoundError):
         remedy = f"install {error.name}, or put {error.name}.py next to the file (where files are graded, "
         remedy += "only numpy, scipy and control are there)"
+    elif type(error) is ImportError and "relative import" in str(error):
+        remedy = "import a file next to it by its name alone, without the dot; what is graded must be in one file"
     else:
         remedy = 'correct it, or move what is not a definition under `if __name__ == "__main__":`'
     return InputError(f"it fails while it loads: {said}; {remedy}", where)

@@ -290,6 +290,15 @@ def test_missing_initial_state_is_named():
     assert "there is no initial_state" in str(report)
 
 
+def test_an_error_that_any_state_meets_is_not_for_want_of_one():
+    def control(t, r, y, state, params):
+        return r - y, state
+
+    report = check_controller(control)
+    assert [fault.clause for fault in report.faults] == [clauses.RUNS]
+    assert "r.position" in str(report) and "initial_state" not in str(report)
+
+
 def test_params_must_be_a_dict():
     namespace = {"control": lambda t, r, y, state, params: (0.0, state), "params": [1.0]}
     assert [fault.clause for fault in check_controller(namespace).faults] == [clauses.PARAMS]

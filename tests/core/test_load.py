@@ -11,6 +11,7 @@ import pytest
 
 from rds.core.errors import ContractError, InputError
 from rds.core.load import from_function, from_namespace, load_student, student_error
+from rds.core.types import Reference
 
 CONTROL = "def control(t, r, y, state, params):\n    return 0.0, state\n"
 
@@ -77,6 +78,8 @@ def test_a_helper_with_the_name_of_an_interface_is_left_alone(write):
         ("def f():\n    return 1 / 0\n\nf()\n", ["mine.py:2", "in f: ZeroDivisionError", "`return 1 / 0`"]),
         ("import sys\nsys.exit(3)\n", ["mine.py:2", "remove the exit"]),
         ("import no_such_module_here\n", ["mine.py:1", "install no_such_module_here"]),
+        ("from .other import gain\n", ["mine.py:1", "without the dot", "in one file"]),
+        ("import rds.no_such_module\n", ["mine.py:1", "move what runs experiments under"]),
         ("", ["mine.py", "control(t, r, y, state, params)", "interpolate(segment, T, params)"]),
         (CONTROL.replace("control", "controll"), ["controll(); did you mean control()?"]),
         (CONTROL.replace("control", "Control"), ["Control(); did you mean control()?"]),
@@ -163,6 +166,26 @@ def test_a_missing_initial_state_is_noticed_before_the_run(write):
     with pytest.raises(ContractError, match=r"no initial_state.*line 2, in control.*define initial_state"):
         load_student(write(text)).controller()
     assert load_student(write("initial_state = [0.0]\n" + text)).controller().initial_state == [0.0]
+
+
+@pytest.mark.parametrize("fails", ["r - y", "control.no_such", "len(params['gain'])", "float('x')"])
+def test_a_controller_that_fails_whatever_its_state_is_not_told_to_have_another(write, fails):
+    text = f"params = {{'gain': 1.0}}\ndef control(t, r, y, state, params): return {fails}, state\n"
+    law = load_student(write(text)).controller()
+    with pytest.raises((TypeError, AttributeError, ValueError)):
+        law.control(0.0, Reference(0.0, 0.0, 0.0), 0.0, law.initial_state, law.params)
+
+
+@pytest.mark.parametrize("needs", ["state[0]", "state['i']", "[1.0][int(state)]"])
+def test_a_controller_that_lacks_its_state_is_told_so(write, needs):
+    with pytest.raises(ContractError, match="no initial_state"):
+        load_student(write(f"def control(t, r, y, state, params): return {needs}, state\n")).controller()
+
+
+def test_a_reference_that_is_taken_for_a_number_says_what_its_numbers_are():
+    with pytest.raises(TypeError) as caught:
+        Reference(0.0, 0.0, 0.0) - 1.0  # type: ignore[operator]
+    assert "r.position" in student_error(caught.value)
 
 
 def test_there_is_no_controller_in_a_model(write):

@@ -101,7 +101,7 @@ def _not_there(statement: ast.stmt) -> Iterator[str]:
 def _effect(function: ast.FunctionDef) -> _Effect:
     effect = _Effect()
     arguments = {node.arg for node in ast.walk(function.args) if isinstance(node, ast.arg)}
-    bound = set()
+    bound: set[str] = set()
     for node in ast.walk(function):
         if isinstance(node, ast.Global):
             effect.names |= set(node.names)
