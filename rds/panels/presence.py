@@ -44,11 +44,11 @@ class Presence(anywidget.AnyWidget):
         self._age = 0.0  # s, of the order that comes next
         self.on_msg(self._said)
 
-    def in_time(self, what: str) -> None:
-        """InputError if the order that is carried out now was pressed too long ago."""
+    def in_time(self, what: str, moved: bool = False) -> None:
+        """InputError if the order that is carried out now was pressed, or `moved`, too long ago."""
         age, self._age = self._age, 0.0
         if age > LATE:
-            raise InputError(refusal(what, age))
+            raise InputError(refusal(what, age, moved))
 
     def _said(self, _: Any, content: Any, __: Any) -> None:
         """Anything else than the four words does nothing."""
@@ -70,4 +70,4 @@ class Presence(anywidget.AnyWidget):
         if kind == "go" and type(number) is int:
             self._age = 1e-3 * age + time.monotonic() - self._answered.pop(number, -math.inf)
         elif kind == "late" and isinstance(what, str):
-            self._late(refusal(what[:60], 1e-3 * age))
+            self._late(refusal(what[:60], 1e-3 * age, content.get("moved") is True))

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import ipywidgets as widgets
-
+from rds.core.errors import InputError
 from rds.panels.kit.button import attempt, halt, order, run_order
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
+from rds.panels.override import OverrideSlider
 from rds.session.choices import Choices
+from rds.session.late import refusal
 from rds.session.program_run import ProgramWork
 
-_STEP = 5  # % of the override's slider
+_OVERRIDE = "The override"
 
 
 class Operator:
@@ -37,17 +39,10 @@ class Operator:
                 ("Home", "End the program where it is, go up and move home", ProgramWork.home),
             )
         )
-        field = choices.fields["override"]
-        self.override = widgets.IntSlider(
-            int(choices["override"]),
-            0,
-            200,
-            _STEP,
-            description="Override [%]",
-            tooltip=f"{field.tooltip} (0 to 200 %); arrow keys change it",
-            style={"description_width": "90px"},
-        )
-        self.override.observe(self._overridden, "value")
+        tip = f"{choices.fields['override'].tooltip} (0 to 200 %); arrow keys change it"
+        self._in_time = shell.presence.in_time
+        self.override = OverrideSlider(self._ask, value=choices["override"], tip=tip)
+        choices.watch(self._chosen)
         buttons = [self.run_button, self.hold_button, self.resume_button, self.home_button]
         self.mode = FieldView(choices, "mode")
         self.mode.add_class("rds-program-mode")
@@ -65,13 +60,30 @@ class Operator:
         self.hold_button.disabled = not operable or held
         self.resume_button.disabled = not (held or waits)
         self.home_button.disabled = not operable
+        self.override.moves = operable
+        self.override.disabled = work is not None and not operable  # it begins with what was chosen
 
     def _do(self, what: str, act: Callable[[ProgramWork], None]) -> None:
         if (work := self.work) is not None:
             attempt(what, lambda: act(work), self._notice)
             self.enable()
 
-    def _overridden(self, change: Any) -> None:
-        self._choices.set("override", change["new"])
-        if self.work is not None and self.work.operable:
-            self._do("Override", lambda work: work.override(change["new"] / 100.0))
+    def _chosen(self, name: str) -> None:
+        if name == "override":
+            self.override.value = self._choices["override"]
+
+    def _ask(self, percent: float, ordered: bool) -> None:
+        """So much feed: less at once, more only in time, as it would come unexpected later."""
+        attempt(_OVERRIDE, lambda: self._set_override(percent, ordered), self._notice)
+
+    def _set_override(self, percent: float, ordered: bool) -> None:
+        work = self.work
+        if work is not None:
+            if not work.operable:
+                raise InputError("the override of this run cannot be changed now: set it before the next one")
+            if percent > self._choices["override"]:
+                if not ordered:
+                    raise InputError(refusal(_OVERRIDE, math.inf, moved=True))
+                self._in_time(_OVERRIDE, moved=True)
+            work.override(percent / 100.0)
+        self._choices.set("override", percent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from rds.panels.jog import JogView
 from rds.panels.kit.button import run_order
 from rds.panels.kit.notice import Notice
 from rds.panels.presence import Presence
+from rds.panels.program_operator import Operator
 from rds.panels.shell import Shell
 from rds.session import Session
 from rds.session.choices import Choices
@@ -20,6 +22,7 @@ from rds.session.equipment_fields import MODES
 from rds.session.fields import Choice
 from rds.session.jog import Jog
 from rds.session.late import LATE
+from rds.session.program import program_choices
 
 KEEPS = """
 window.sent = []; // what the page said of its buttons
@@ -110,6 +113,53 @@ def test_a_late_run_is_refused_only_where_something_moves(tmp_path: Path) -> Non
         shell.presence._age = 0.0
     assert begun == ["simulation", "emulation"]
     assert "Run was pressed 7 s ago" in said.value
+
+
+class Running:
+    """A program that runs, for whoever changes its override."""
+
+    operable = held = True
+
+    def __init__(self) -> None:
+        self.shares: list[float] = []
+
+    def status(self) -> None:
+        """Not known."""
+
+    def override(self, share: float) -> None:
+        """Note it."""
+        self.shares.append(share)
+
+
+def test_a_late_override_is_refused_where_it_is_more_and_taken_where_it_is_less(tmp_path: Path) -> None:
+    shell, said = Shell(Session(tmp_path)), Notice()
+    choices = program_choices(shell.session)
+    operator = Operator(shell, choices, said, lambda: None)
+    slider, work = operator.override, Running()
+
+    def ask(percent: float, age: float, ordered: bool = True) -> None:
+        said.clear()
+        shell.presence._age = age
+        slider._told(None, {"kind": "set", "percent": percent, "ordered": ordered, "number": 1}, None)
+
+    ask(120.0, math.inf, ordered=False)  # nothing runs
+    assert choices["override"] == slider.value == 120.0 and not slider.disabled
+    operator.work = work  # type: ignore[assignment]
+    operator.enable()
+    assert slider.moves
+    ask(150.0, 7.0)
+    assert "The override was moved 7 s ago" in said.value and "move it again" in said.value
+    ask(150.0, 0.0, ordered=False)
+    assert "The override was moved too long ago" in said.value
+    ask(50.0, 7.0, ordered=False)
+    ask(80.0, 1.0)
+    for wrong in (math.nan, "90", True, None):
+        ask(wrong, 0.0)  # type: ignore[arg-type]
+    assert work.shares == [0.5, 0.8] and choices["override"] == slider.value == 80.0 and not said.value
+    work.operable = False
+    operator.enable()
+    ask(10.0, 0.0)
+    assert slider.disabled and "cannot be changed now" in said.value and choices["override"] == 80.0
 
 
 @pytest.mark.parametrize("kind", ["step", "turn"])

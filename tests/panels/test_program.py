@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -116,9 +117,17 @@ def test_a_run_is_held_resumed_changed_and_stopped_in_the_middle(open_page: Call
     stands(page)
     page.click('button:text-is("Resume")')
     page.wait_for_selector('.rds-state:has-text("Line 2 runs")')
-    slider = page.locator('.rds-program [role="slider"]').first
+    slider = page.locator(".rds-override input")
     slider.press("ArrowRight")
     page.wait_for_selector('.rds-state:has-text("override 105 %")')
+    slider.focus()
+    key = {"key": "End", "code": "End", "windowsVirtualKeyCode": 35, "timestamp": time.time() - 7.0}
+    page.context.new_cdp_session(page).send("Input.dispatchKeyEvent", {"type": "rawKeyDown"} | key)
+    page.wait_for_selector('.rds-notice-warning:has-text("The override was moved 7 s ago, while this page was busy")')
+    page.wait_for_function("document.querySelector('.rds-override input').value === '105'")  # nor does it stay in sight
+    for each in ("ArrowRight", "ArrowLeft", "ArrowLeft"):  # more is taken back by less, which waits for nothing
+        slider.press(each)
+    page.wait_for_selector('.rds-state:has-text("override 100 %")')
     slider.press("End")
     page.wait_for_selector('.rds-state:has-text("override 200 %")')
     page.wait_for_function("Number(/Feed (\\d+)/.exec(document.querySelectorAll('.rds-state')[1].innerText)[1]) > 200")

@@ -12,6 +12,8 @@ const ORDER = ".rds-order"; // what moves the machine
 // the later of two clocks: one may be set back, the other one stands still while the computer sleeps
 const clocks = () => [performance.now(), Date.now()];
 const since = (then) => Math.max(...clocks().map((now, each) => now - then[each]));
+// a page that stood still comes to a press later; of one that a widget makes of something else, the widget says how long
+const lag = (event, button) => Math.max(event.isTrusted ? performance.now() - event.timeStamp : Number(button.dataset.lag ?? 0), 0);
 
 function render({ model, el }) {
   el.style.display = "none";
@@ -32,7 +34,9 @@ function render({ model, el }) {
     const button = pressed(event);
     if (!button || button === through) return;
     if (button.matches(AT_ONCE)) {
-      forget((each) => each.matches(ORDER)); // nothing that was pressed before may move the machine after it
+      const orders = [...waiting.values()].map((each) => each.button).filter((each) => each.matches(ORDER));
+      forget((each) => orders.includes(each)); // nothing that was pressed before may move the machine after it
+      for (const each of orders) each.dispatchEvent(new Event("rds-given-up"));
       return;
     }
     if (touched === settled && waiting.size === 0 && !button.matches(ORDER)) return;
@@ -40,7 +44,7 @@ function render({ model, el }) {
     event.preventDefault();
     forget((each) => each === button); // pressed again: once, and not never where the first word was lost
     number += 1;
-    waiting.set(number, { button, touched, at: clocks() });
+    waiting.set(number, { button, touched, at: clocks().map((now) => now - lag(event, button)) });
     model.send({ kind: "settle", number });
   };
   const answered = (message) => {
@@ -53,7 +57,8 @@ function render({ model, el }) {
     if (button.matches(ORDER) && age > model.get("patience")) {
       // a sign such as ▶ names nothing
       const what = button.closest(".rds-hold") ? button.getAttribute("aria-label") : button.textContent.trim();
-      model.send({ kind: "late", what, age });
+      model.send({ kind: "late", what, age, moved: button.matches(".rds-moved") });
+      button.dispatchEvent(new Event("rds-given-up"));
       return;
     }
     // for any button: whether it is an order may hang on a change of which only the kernel has heard
