@@ -84,7 +84,8 @@ def program(data: bytes) -> None:
         check_fault(found["fault"], NAME, data[1:].split(b"\n"))
     elif len(found["items"]) < 1000:
         calls = [item for item in found["items"] if isinstance(item, canon.Call)]
-        assert all(line.encode("utf-8", "surrogateescape") for line in canon.text(calls))
+        for line in canon.text(calls):  # a line of (PRINT, ) is empty
+            line.encode("utf-8", "surrogateescape")
 
 
 def _file(data: bytes, read: Callable[[Path], Any]) -> Any:
