@@ -82,13 +82,26 @@ def _names_apart(logs: Sequence[Log]) -> list[Log]:
     ]
 
 
+def check_command(log: Log, model: str) -> None:
+    """InputError where the command is no voltage, which `model` takes."""
+    if (has := log.units.get("command") or "V") != "V":
+        raise InputError(
+            f"command is in {'per cent or a pure number' if has == '1' else has}, and {model} takes V. Where a drive's "
+            'current, torque or per cent stands for the voltage, say so in the map: unit = "V" for the command takes '
+            f"each of its numbers as 1 V (with scale = ... as so many), and K is then per that number. Say the same of "
+            "every log of this axis",
+            log.source or log.name,
+        )
+
+
 def _check_units(logs: Sequence[Log], structure: Structure) -> None:
     for log in logs:
-        for quantity, unit in (("position", structure.output_unit), ("command", "V")):
-            has = log.units.get(quantity, unit)
-            if unit and has and has != unit:
-                raise InputError(
-                    f"{quantity} is in {has}, and structure {structure.name} takes {unit}; state the unit in a map "
-                    "beside the data, or choose the structure for it (spindle for a speed)",
-                    log.source or log.name,
-                )
+        check_command(log, f"structure {structure.name}")
+        unit = structure.output_unit
+        has = log.units.get("position", unit)
+        if unit and has and has != unit:
+            raise InputError(
+                f"position is in {has}, and structure {structure.name} takes {unit}; state the unit in a map beside "
+                "the data, or choose the structure for it (spindle for a speed)",
+                log.source or log.name,
+            )

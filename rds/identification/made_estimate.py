@@ -45,6 +45,7 @@ def made_estimate(
     Parameters that the structure says are given have no error. InputError for values outside the structure's bounds.
     """
     values = {name: float(values[name]) for name in structure.parameters}
+    covariance = 0.5 * (covariance + covariance.T)  # rounding leaves that of near twins uneven, which no reader takes
     given = set(structure.given(logs)) if structure.given else set()
     width = t_quantile(freedom)
     errors = np.sqrt(np.diag(covariance))

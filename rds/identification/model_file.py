@@ -239,7 +239,9 @@ def _read_covariance(words: Words, names: tuple[str, ...]) -> np.ndarray:
         raise table.fault("rows", f"must be {len(names)} rows of {len(names)} numbers, one for each parameter")
     known = matrix[np.ix_(np.isfinite(np.diag(matrix)), np.isfinite(np.diag(matrix)))]
     if not np.allclose(known, known.T, rtol=1e-6, atol=0.0, equal_nan=True) or (np.diag(known) < 0.0).any():
-        raise table.fault("rows", "must be symmetric, with no negative number on its diagonal")
+        raise InputError(
+            "rows must be those of a symmetric matrix, with no negative number on its diagonal", table.place("rows")
+        )
     table.done()
     return matrix
 

@@ -58,8 +58,8 @@ def _implausible(problem: Problem, values: Mapping[str, float]) -> list[str]:
         )
     if tau is not None and not _TIMES[0] <= tau <= _TIMES[1]:
         said.append(
-            f"tau = {tau:.3g} s is no time constant of an axis ({_TIMES[0]:g} to {_TIMES[1]:g} s): is the time in "
-            "seconds, and are the columns the right ones?"
+            f"tau = {tau:.3g} s is no time constant of an axis ({_TIMES[0]:g} to {_TIMES[1]:g} s): {UNUSABLE}. Is the "
+            "time in seconds, are the columns the right ones, and does the structure have what the axis does?"
         )
     if problem.structure.output_unit == "mm":
         for log in problem.logs:

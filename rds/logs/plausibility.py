@@ -21,6 +21,8 @@ _FINEST, _COARSEST = 1e-7, 0.5  # mm: steps of an encoder
 _SPINDLE = 500e3  # rev/min
 _SLOWEST = 0.2  # s, sample period
 _VOLTS = 1e3
+_TRACKED = 0.1  # standard deviation of the error over that of the reference: no voltage finds the way so well by itself
+_LOOP_UNKNOWN = "whether a controller was closing the loop is not known; state closed_loop in the map"
 
 
 def direction(log: Log, axis: Axis | None) -> list[Finding]:
@@ -84,8 +86,7 @@ def loop(log: Log, axis: Axis | None) -> list[Finding]:
     reference = log.extra.get("reference")
     if reference is None or np.ptp(log.command) == 0.0 or len(log) < 50:
         if log.closed_loop is None:
-            what = "whether a controller was closing the loop is not known; state closed_loop in the map"
-            return [Finding("loop", what)]
+            return [Finding("loop", _LOOP_UNKNOWN)]
         return []
     stride = max(1, len(log) // 200_000)
     error, command = (reference - log.position)[::stride], log.command[::stride]
@@ -98,6 +99,15 @@ def loop(log: Log, axis: Axis | None) -> list[Finding]:
         if log.closed_loop is False:
             what += "; the log is stated to be open loop"
         return [Finding("closed-loop", what, Gravity.WARNING)]
+    if log.closed_loop is None:
+        off, way = float(np.std(reference - log.position)), float(np.std(reference))
+        if off < _TRACKED * way:
+            what = (
+                f"{told} (the position follows its reference to {100 * off / way:.2g} % of the way, which only a "
+                "controller does); if none did, state closed_loop = false in the map"
+            )
+            return [Finding("closed-loop", what, Gravity.WARNING)]
+        return [Finding("loop", _LOOP_UNKNOWN)]
     return []
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.types import Model
 from rds.identification.estimate import Errors, Estimate, Parameter
+from rds.identification.fit import check_command
 from rds.identification.model_structure import structure_of_model
 from rds.identification.structure import Structure
 from rds.logs.log import Log
@@ -33,6 +34,7 @@ class Candidate:
     covariance: np.ndarray | None = None
     fitted_on: tuple[Mapping[str, Any], ...] = ()
     source: str = ""
+    unusable: tuple[str, ...] = ()  # what the fit warned of that leaves nothing to believe in
 
     @property
     def is_rate(self) -> bool:
@@ -101,6 +103,7 @@ def _of_estimate(estimate: Estimate, name: str) -> Candidate:
         parameters=dict(estimate.parameters),
         covariance=estimate.covariance,
         fitted_on=logs,
+        unusable=tuple(estimate.unusable()),
     )
 
 
@@ -142,11 +145,13 @@ def _of_file(file: Any, name: str) -> Candidate:
         covariance=file.covariance,
         fitted_on=tuple(file.logs),
         source=file.path,
+        unusable=tuple(file.unusable()),
     )
 
 
 def check_units(candidate: Candidate, log: Log) -> None:
-    """InputError where the model's output and the log's position are not in the same unit."""
+    """InputError where the log's command is no voltage, or its position not in the unit of the model's output."""
+    check_command(log, f"the model {candidate.name}")
     unit, has = candidate.structure.output_unit, log.units.get("position", "")
     if has and unit and has != unit:
         raise InputError(

@@ -10,14 +10,16 @@ from rds.validation.candidate import Candidate
 from rds.validation.verdict import Bands, Reason, Side, Verdict, Word
 from rds.validation.within import foreseen_at, passes
 
+DATA = "data-"  # how the kind of a reason begins that is a finding about the log
+
 
 def conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
     """The word of the verdict, and what the model is valid for where that is only something."""
     untold = {reason.kind for reason in reasons if reason.side is Side.UNTOLD}
-    if untold - {"same-data"}:
+    if any(kind != "same-data" and not kind.startswith(DATA) for kind in untold):
         return Word.UNTOLD, ""
     word, purpose = _from_errors(a, reasons, bands)
-    # what fails even on its own data has failed; what passes there has shown nothing
+    # what fails even on its own data, or on faulty ones, has failed; what passes there has shown nothing
     return (Word.UNTOLD, "") if untold and word is not Word.NOT else (word, purpose)
 
 

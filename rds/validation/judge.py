@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from math import sqrt
 
 from rds.identification.estimate import said_of_guesses
-from rds.logs.log import Gravity
+from rds.logs.log import Finding, Gravity
 from rds.validation.assessment import Assessment, largest
 from rds.validation.candidate import Candidate
-from rds.validation.conclusion import conclude, sentence_of
+from rds.validation.conclusion import DATA, conclude, sentence_of
 from rds.validation.verdict import Bands, Reason, Side, Verdict, Word
 from rds.validation.within import passes, skilled_at
 
@@ -22,6 +22,7 @@ _FACTORS = {  # of measured over modelled, and what makes it
     60.0: "the speed is per minute where it is stated per second",
     1.0 / 60.0: "the speed is per second where it is stated per minute",
 }
+_MISLEADING = ("sign", "units", "columns", "wrap")  # findings of a log after which a good fit proves nothing
 _BLOCKS = 50  # with fewer, the residual tests find nothing
 _NEAR = 0.15  # how near to such a factor is suspicious
 _FEW = 0.1  # share of lags beyond the plain band that is still called white
@@ -91,8 +92,18 @@ def _data(a: Assessment, bands: Bands) -> Iterator[Reason]:
         )
     for finding in log.findings:
         if finding.gravity is not Gravity.NOTE:
-            yield Reason(Side.NOTE, f"data-{finding.kind}", finding.what)
+            yield Reason(_side_of(finding), f"{DATA}{finding.kind}", finding.what)
     yield from _too_good(a, bands)
+
+
+def _side_of(finding: Finding) -> Side:
+    """What speaks against a log speaks against what a model shows there: both may share a sign or a unit that is wrong.
+
+    That samples are missing at its end, and what only the excitation lacks, takes nothing from the rest.
+    """
+    if finding.kind not in _MISLEADING:
+        return Side.NOTE
+    return Side.UNTOLD if finding.gravity is Gravity.FAULT else Side.AGAINST
 
 
 def _too_good(a: Assessment, bands: Bands) -> Iterator[Reason]:
@@ -272,6 +283,8 @@ def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
 
 
 def _guesses(candidate: Candidate) -> Iterator[Reason]:
+    for sentence in candidate.unusable:
+        yield Reason(Side.AGAINST, "fit", f"the fit warned: {sentence}")
     for sentence in said_of_guesses(candidate.parameters):
         yield Reason(Side.AGAINST, "guess", f"{sentence}, whatever this log says of the model as a whole")
 

@@ -15,9 +15,11 @@ from rds.identification.estimate import Estimate, guesses
 from rds.identification.estimate_json import parameter_rows
 from rds.identification.fit import fit
 from rds.identification.fit_report import fragment
+from rds.identification.made_estimate import made_estimate
 from rds.identification.model_file import read_model, write_model
 from rds.identification.run_model import check_model_file
 from rds.logs.log import Log
+from rds.validation.report import _parameters
 from rds.validation.validate import validate
 from tests.identification.fit_logs import mini_cnc
 
@@ -71,10 +73,19 @@ def test_the_model_file_and_who_reads_it_say_it(estimate: Estimate, tmp_path: Pa
         assert done.exit_code == 0 and SAID in done.stderr
 
 
-def test_validation_says_it_of_a_model_that_holds_otherwise(estimate: Estimate, tmp_path: Path) -> None:
+def test_a_covariance_that_rounding_left_uneven_can_be_read_back(estimate: Estimate, tmp_path: Path) -> None:
+    covariance = np.diag([1e-5, 1.7, 1.1, 0.9])
+    covariance[0, 1], covariance[1, 0] = 0.0061701118, 0.0061701060
+    log = forward(1, 0.5)
+    made = made_estimate(make(), "simulation", [log], mini_cnc("X"), covariance, 100.0, states=[(0.0, 0.0)])
+    read = read_model(write_model(tmp_path / "x.toml", made)).covariance
+    assert (read == read.T).all() and read[0, 1] == pytest.approx(0.0061701089)
+
+
+def test_validation_says_it_of_a_model_that_holds_otherwise(estimate: Estimate) -> None:
     found = validate(estimate, forward(2, 0.4))
     assert str(found.verdict.word) == "valid for"
     assert "Do not take its friction_minus for the axis's own" in found.verdict.sentence
     assert any(reason.kind == "guess" and SAID in reason.what for reason in found.verdict.reasons)
-    page = found.write(tmp_path)[0].read_text(encoding="utf-8")
+    page = _parameters(found)
     assert "friction_minus (a guess: not told by the fit" in page and "K (a guess" not in page

@@ -122,6 +122,24 @@ def test_a_closed_loop_shows_itself(tmp_path: Path) -> None:
     assert log.closed_loop is None and "closed-loop" not in grave(log)
 
 
+def test_a_position_that_follows_its_reference_shows_a_controller_that_errors_do_not(tmp_path: Path) -> None:
+    """A drive's integrator holds friction, so the error explains little of the command; an open loop never follows."""
+    t = np.arange(4000) * 1e-3
+    r = 5.0 * np.sin(2 * np.pi * 0.5 * t)
+    random = np.random.default_rng(0)
+    columns = {
+        "time": t,
+        "voltage": 0.5 * np.sign(np.cos(2 * np.pi * 0.5 * t)) + 0.1 * random.standard_normal(len(t)),
+        "position": np.round(r + 0.01 * np.cos(2 * np.pi * 3.0 * t), 3),
+        "ref": r,
+    }
+    reference = 'reference = { column = "ref", unit = "mm" }\n'
+    log = read(tmp_path, columns, axis_lines=reference)
+    assert log.closed_loop is True and "which only a controller does" in grave(log)["closed-loop"].what
+    log = read(tmp_path, columns | {"ref": 2.0 * r}, axis_lines=reference)
+    assert log.closed_loop is None and any(f.kind == "loop" and "not known" in f.what for f in log.findings)
+
+
 # --- time
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from rds.core.types import Model, Source
 from rds.identification.estimate import Errors
 from rds.identification.fit import fit
 from rds.identification.fitted_stretch import fitted_stretch
+from rds.identification.model_file import write_model
 from rds.identification.structures import structure
+from rds.logs.findings import with_findings
 from rds.logs.log import Finding, Gravity
 from rds.validation.assessment import assess
 from rds.validation.validate import Validation, validate
@@ -160,6 +163,27 @@ def test_an_error_that_grows_on_new_data_is_overfitting() -> None:
     assert speed.fitted is not None and speed.fitted[1] >= speed.here[1]
     assert f"100 samples ahead, the RMSE is {ahead.rmse / 0.002:.1f} times" in reason.what
     assert found.verdict.word is not Word.VALID
+
+
+def test_a_sign_or_unit_that_model_and_log_share_is_not_valid(tmp_path: Path) -> None:
+    """The fit's log had the same fault, so the model repeats this one: nothing is shown by that."""
+    fitted, fresh = (with_findings(log(-u, moved(u))) for u in (square(6.0, 2.5, 1.0), FRESH))
+    estimate = fit([fitted], structure("axis"))
+    found = validate(estimate, fresh)
+    assert found.verdict.word is Word.UNTOLD and "data-sign" in kinds(found, "cannot tell")
+    assert "fit" in kinds(found, "against")
+    assert "fit" in kinds(validate(write_model(tmp_path / "reversed.toml", estimate), fresh), "against")
+    slow = [replace(log(u, moved(u)), time=np.arange(len(u)) * 1.0) for u in (square(6.0, 2.5, 1.0), FRESH)]
+    found = validate(fit([with_findings(slow[0])], structure("axis")), with_findings(slow[1]))
+    assert found.verdict.word is not Word.VALID and "data-units" in kinds(found, "against")
+
+
+def test_a_command_that_is_no_voltage_is_refused_with_a_remedy() -> None:
+    drive = log(FRESH, units={"position": "mm", "command": "A"})
+    with pytest.raises(InputError, match=r'command is in A, and the model model takes V.*unit = "V"'):
+        validate(candidate(), drive)
+    with pytest.raises(InputError, match=r"command is in A, and structure axis takes V"):
+        fit([drive], structure("axis"))
 
 
 def test_a_longer_log_is_not_overfitting() -> None:
