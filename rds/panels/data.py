@@ -109,9 +109,7 @@ class DataView:
 
     def use_model(self) -> None:
         """Go to equipment control with the model file chosen there."""
-        path = self.desk.path(self.desk.choices["model"], "the model file")
-        if not path.exists():
-            self.desk.write_model()
+        self.desk.model_to_use()
         self.shell.open("equipment-control")
         choices = self.shell.session.choices("equipment control", ())
         choices.set("model", "user")

@@ -57,11 +57,12 @@ class DataDesk:
         self.estimate: Estimate | None = None
         self.validation: Validation | None = None
         self.fitted: tuple[Log, ...] = ()
+        self._unwritten: str | None = None  # the model file that was named when the last fit ended, until it is written
 
     def files(self) -> list[str]:
         """Files of the folder that may hold logged data, and its latest runs, by their way from the folder."""
         folder = self.session.folder
-        found = [path for path in _entries(folder) if path.is_file() and path.suffix.lower() in SUFFIXES]
+        found = [path for path in _entries(folder) if path.suffix.lower() in SUFFIXES and _may_be_log(path)]
         runs = [run.folder for run in self.session.runs(LISTED)]
         return [str(path.relative_to(folder)) for path in [*found, *runs]]
 
@@ -124,6 +125,7 @@ class DataDesk:
             task.note = "fitting"
             self.estimate = fit(logs, made, method, given)
             self.fitted = tuple(logs)
+            self._unwritten = str(self.choices["model"])
             return self.estimate
 
         return self.session.work(f"fit {path.name}", work, own_code=True)
@@ -137,12 +139,29 @@ class DataDesk:
         path = self.path(self.choices["model"], "the model file to write")
         if path.suffix != ".toml":
             raise InputError("a model file is TOML; give it a name that ends in .toml", str(path))
-        return write_model(path, self.estimate)
+        written = write_model(path, self.estimate)
+        self._unwritten = None
+        return written
+
+    def model_to_use(self) -> Path:
+        """The model file that is named; written first if it is not there. InputError if it is not of the last fit."""
+        path = self.path(self.choices["model"], "the model file")
+        self._refuse_another(path)
+        return path if path.exists() else self.write_model()
+
+    def _refuse_another(self, path: Path) -> None:
+        if self._unwritten == self.choices["model"] and path.exists():
+            raise InputError(
+                f"{path.name} is from before the last fit; Save model writes the new one over it, "
+                "or name another file to keep both"
+            )
 
     def validate(self) -> Task[Validation]:
         """Validate the model file (or the last estimate, where none is named) on the chosen validation log."""
         path = self.path(self.choices["validation_file"], "a file with other data than those of the fit")
         model: Any = self.session.folder / self.choices["model"] if self.choices["model"] else self.estimate
+        if isinstance(model, Path):
+            self._refuse_another(model)
         if model is None or (isinstance(model, Path) and not model.exists()):
             if self.estimate is None:
                 raise InputError("there is no model: fit one, or name a model file that exists")
@@ -179,6 +198,21 @@ def _fields() -> Iterable[Field]:
         "model", "Model file", "the fitted model is written here; every mode takes it", "fitted.toml", "fitted.toml"
     )
     yield Text("validation_file", "Validate on", "a file with other data than those of the fit", "", "e.g. other.csv")
+
+
+def _may_be_log(path: Path) -> bool:
+    """Whether it is a file, and not what a run has made of a part program."""
+    from rds.nc.compiled_file import MAGIC
+
+    if not path.is_file():
+        return False
+    if path.suffix.lower() != ".dat":
+        return True
+    try:
+        with path.open("rb") as file:
+            return file.read(len(MAGIC)) != MAGIC
+    except OSError:
+        return False
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -62,10 +62,14 @@ class Number(Field):
             return f"{'at least' if low == self.low else 'more than'} {low:g}{self._unit}"
         if isfinite(self.high):
             return f"at most {self.high:g}{self._unit}"
-        return f"a number{' in' + self._unit if self.unit else ''}"
+        return self._a_number
 
     def _more_than_to(self) -> str:
         return f"more than {self.above:g} and at most {self.high:g}{self._unit}"
+
+    @property
+    def _a_number(self) -> str:
+        return f"a number{' in' + self._unit if self.unit else ''}"
 
     @property
     def _unit(self) -> str:
@@ -73,14 +77,14 @@ class Number(Field):
 
     def _number(self, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise InputError(f"{self.label} must be a number{self._unit}, not {value!r:.60}")
+            raise InputError(f"{self.label} must be {self._a_number}, not {value!r:.60}")
         text = value.strip().removesuffix(self.unit).strip() if isinstance(value, str) else value
         if isinstance(text, str) and text.count(",") == 1 and "." not in text:
             text = text.replace(",", ".")
         try:
             return float(text)
         except (ValueError, OverflowError):
-            raise InputError(f"{self.label} must be a number{self._unit}, not {value!r:.60}") from None
+            raise InputError(f"{self.label} must be {self._a_number}, not {value!r:.60}") from None
 
 
 @dataclass(frozen=True)

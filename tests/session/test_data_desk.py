@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
+from rds.nc.compiled_file import MAGIC
 from rds.session import Session
 from rds.session.data_desk import DataDesk
 
@@ -46,6 +47,22 @@ def test_from_a_log_to_a_validated_model_file(desk: DataDesk) -> None:
     validated = desk.validate()
     assert validated.wait(PATIENCE) and validated.error is None
     assert desk.validation is not None and "fit 99" in str(desk.validation)
+    again = desk.fit()
+    assert again.wait(PATIENCE) and again.error is None
+    for use in (desk.validate, desk.model_to_use):  # which would take the model of the first fit
+        with pytest.raises(InputError, match=r"fitted\.toml is from before the last fit; Save model"):
+            use()
+    desk.choices.set("model", "second.toml")
+    assert desk.model_to_use() == path.with_name("second.toml") and path.with_name("second.toml").is_file()
+    desk.choices.set("model", "fitted.toml")  # named by hand now
+    assert desk.model_to_use() == path
+
+
+def test_what_a_run_has_made_of_a_part_program_is_no_log(desk: DataDesk) -> None:
+    (desk.session.folder / "part.dat").write_bytes(MAGIC + b"{}")
+    (desk.session.folder / "log.dat").write_text("0 1 2\n")
+    (desk.session.folder / "folder.csv").mkdir()
+    assert desk.files() == ["a.csv", "b.csv", "log.dat"]
 
 
 def test_what_is_missing_is_said_at_once(desk: DataDesk) -> None:

@@ -48,7 +48,11 @@ function render({ model, el }) {
       if (!way) return;
       event.preventDefault();
       if (event.repeat) return;
-      if (model.get("by_step")) buttons[way < 0 ? 0 : 1].click();
+      if (model.get("by_step")) {
+        const [minus, plus] = buttons, each = way < 0 ? minus : plus;
+        each.dataset.lag = performance.now() - event.timeStamp; // for presence.js
+        each.click();
+      }
       else press(button, way);
     });
     button.addEventListener("keyup", release);
