@@ -16,6 +16,7 @@ from rds.core.errors import InputError
 AXES = ("X", "Y", "Z", "A", "B", "C")
 LINE, XY, ZX, YZ = -1, 0, 1, 2  # planes
 EXACT_PATH, EXACT_STOP, BLEND = 0, 1, 2  # modes: G61, G61.1, G64
+FULL_CIRCLE = 1e-6  # rad; an arc shorter than this is a whole turn (LinuxCNC's CIRCLE_FUZZ)
 
 SEGMENT = np.dtype(
     [
@@ -76,8 +77,9 @@ def arc(
 ) -> np.ndarray:
     """An arc or helix (array of one SEGMENT) about `centre` (X, Y, Z, or the first of them).
 
-    `clockwise` is seen from the positive end of the plane's normal; `turns` are whole turns more; an end equal to the
-    start in the plane is a full circle. Raises InputError when start or end is on the centre.
+    `clockwise` is seen from the positive end of the plane's normal; `turns` are whole turns more; an end that is seen
+    from the centre where the start is, to FULL_CIRCLE, is a full circle. Raises InputError when start or end is on the
+    centre.
     """
     row = _row(start, end, rate, mode, tolerance, 0.0, program_line)
     row["plane"] = plane
@@ -89,15 +91,11 @@ def arc(
     radius = hypot(*from_centre)
     if radius == 0.0 or hypot(*to_centre) == 0.0:
         raise InputError(f"an arc from {tuple(a)} to {tuple(b)} has its centre {tuple(c)} on an end; move the centre")
-    sweep = atan2(to_centre[1], to_centre[0]) - atan2(from_centre[1], from_centre[0])
-    closed = a[first] == b[first] and a[second] == b[second]
-    if clockwise:
-        sweep = -2 * pi if closed else sweep - 2 * pi * (sweep >= 0)
-        sweep -= 2 * pi * turns
-    else:
-        sweep = 2 * pi if closed else sweep + 2 * pi * (sweep <= 0)
-        sweep += 2 * pi * turns
-    row["sweep"] = sweep
+    sign = -1.0 if clockwise else 1.0
+    angle = atan2(to_centre[1], to_centre[0]) - atan2(from_centre[1], from_centre[0])
+    sweep = (sign * angle) % (2 * pi)
+    sweep += 2 * pi * ((sweep < FULL_CIRCLE) + turns)
+    row["sweep"] = sign * sweep
     row["length"] = hypot(radius * sweep, b[normal] - a[normal])
     return row
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.motion.segments import LINE, SEGMENT, XY, YZ, ZX, in_plane
+from rds.motion.segments import FULL_CIRCLE, LINE, SEGMENT, XY, YZ, ZX, in_plane
 from rds.nc.canon import ARC, TRAVERSE
 
 INCH = 25.4  # mm
@@ -16,7 +16,6 @@ PLANE_WORDS = {"XY": "G17", "XZ": "G18", "YZ": "G19"}
 SYSTEMS = ("", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 DECIMALS = 9  # of machine positions: an axis that stands still does so in whatever units it was sent there
 _NO_WAY = 2e-9  # mm or degrees; less is what that rounding may leave
-_FULL_CIRCLE = 1e-6  # rad; an arc shorter than this is a whole turn (LinuxCNC's CIRCLE_FUZZ)
 
 
 class Frame:
@@ -118,7 +117,7 @@ def bend(segments: np.ndarray, arcs: np.ndarray, plane: int, centres: np.ndarray
     angle = arrival - np.arctan2(arm_2, arm_1)
     sign = np.where(turns < 0, -1.0, 1.0)
     part = np.mod(sign * angle, 2 * np.pi)
-    part += 2 * np.pi * (part < _FULL_CIRCLE)
+    part += 2 * np.pi * (part < FULL_CIRCLE)
     sweep = part + 2 * np.pi * (np.abs(turns) - 1)
     segments["plane"][arcs] = plane
     segments["centre"][arcs] = centres

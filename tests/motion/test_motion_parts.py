@@ -89,6 +89,16 @@ def test_the_senses_of_arcs() -> None:
         arc((0, 0), (1, 0), (0, 0), 1.0)
 
 
+@pytest.mark.parametrize("clockwise", [False, True])
+def test_an_arc_that_ends_beside_its_start_is_a_full_circle_however_it_is_rounded(clockwise: bool) -> None:
+    """Off the circle by what programs may be; an angle of 1e-16 rad would be a jump of that in no time."""
+    for degrees in range(0, 360, 7):
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        row = arc((3 + 7 * c, 2 + 7 * s), (3 + 7.001 * c, 2 + 7.001 * s), (3, 2), 5.0, clockwise=clockwise)[0]
+        assert row["sweep"] == pytest.approx(-2 * pi if clockwise else 2 * pi)
+        assert row["length"] == pytest.approx(14 * pi)
+
+
 @settings(max_examples=200, deadline=None)
 @given(
     table=st.lists(
