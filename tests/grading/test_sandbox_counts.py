@@ -38,6 +38,29 @@ def test_more_work_is_more_events_in_proportion(pool: Pool, written: Written) ->
     assert more - few == most - more > 10 * 50 * 2  # rounds, samples, at least two lines each
 
 
+CRAMMED = {
+    "statements": "        " + "total = t * 2; " * 1000,
+    "an expression": "        total = " + " + ".join(["t * 2"] * 1000),
+    "instructions of no line": "        unplaced()",
+}
+UNPLACED = """
+def unplaced():
+    n = 1000
+    while n: n -= 1
+count = len(unplaced.__code__.co_code) // 2
+table = bytes(0x80 | 15 << 3 | min(8, count - at) - 1 for at in range(0, count, 8))  # "no location" for up to 8 each
+unplaced.__code__ = unplaced.__code__.replace(co_linetable=table)
+"""
+
+
+@pytest.mark.parametrize("name", CRAMMED)
+def test_work_is_not_hidden_between_lines(name: str, pool: Pool, written: Written) -> None:
+    """A thousand small sums a sample, which on lines of their own would be a thousand events."""
+    head = f"{UNPLACED}initial_state = ()\ndef control(t, r, y, state, params):\n    if t >= 0.0:\n"
+    found = counts(pool, written(f"{head}{CRAMMED[name]}\n    return 1.0, state\n", ""), samples=3)
+    assert (found.events or 0) > 3 * 150, found
+
+
 def test_the_count_is_the_same_on_a_busy_computer(pool: Pool, written: Written) -> None:
     path = written(WORK.replace("ROUNDS", "20"), "")
     quiet = counts(pool, path)

@@ -1,6 +1,7 @@
 """Counting the work of a run in events of the interpreter: lines, calls, returns, calls of compiled functions.
 
-The same input gives the same count, on a busy computer too. What one compiled function does inside counts as one.
+The same input gives the same count, on a busy computer too. What one compiled function does inside counts as one. A
+line of a hundred instructions, as of many statements, counts as several, and so do instructions that have no line.
 
 The count is begun before the submission is loaded, and kept in closures that nothing a submission can import, patch or
 be handed leads to: what it does to `sys`, `os`, `json` or to this package comes too late. It can come by what calls
@@ -32,6 +33,8 @@ _NEVER = _TRACES | _LOOKS | _NOT_TRACED | {"os.fork"}
 _NEVER_BEGINS = ("gc.", "ctypes.", "_thread.")
 _FRAMES = frozenset({"tb_frame", "gi_frame", "cr_frame", "ag_frame"})
 _NO_MODULES = ("_test", "_xx")  # of Python's own tests: they reach into the interpreter
+_AS_A_LINE = 25  # instructions: of a line with very many, so many count as one more
+_FULL_LINE, _NO_LINE = 200, 8  # bytes of instructions; on one line, and on none (where a function begins, say)
 
 
 class Counted(NamedTuple):
@@ -61,15 +64,36 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     # with the codes themselves: that of a function which is exchanged would make room for another with its number
     uncounted = {identity(code): code for module in (*own, sys.modules[__name__]) for code in _codes(module)}
     there = frozenset(sys.builtin_module_names) & sys.modules.keys()
-    events, before, runs, is_open, may_look = 0, 0, False, False, False
+    events, since, before, runs, is_open, may_look = 0, 0, 0, False, False, False
+    known: dict[int, tuple[CodeType, bool]] = {}
     secret: int | None = seal
 
     def line(frame: FrameType, event: str, arg: Any) -> Any:
-        nonlocal events
-        if identity(frame.f_code) in uncounted:
+        nonlocal events, since
+        code = frame.f_code
+        if identity(code) in uncounted:
             return None
+        if event == "opcode":
+            since += 1
+            if since < _AS_A_LINE:
+                return tracing
+        elif event == "call" and hides_work(code):
+            frame.f_trace_opcodes = True
         events += 1
+        since = 0
         return tracing
+
+    def hides_work(code: CodeType) -> bool:
+        """Whether lines alone say too little of it: they hold very much, or instructions have none."""
+        number = identity(code)
+        if number not in known:
+            sizes: dict[int | None, int] = {None: 0}
+            hides = False
+            for first, end, at in code.co_lines():
+                size = sizes[at] = sizes.get(at, 0) + end - first
+                hides |= size > (_NO_LINE if at is None else _FULL_LINE)
+            known[number] = code, hides  # with the code itself, as above
+        return known[number][1]
 
     def call(frame: FrameType, event: str, arg: Any) -> None:
         nonlocal events
@@ -164,6 +188,7 @@ def counted(questions: int, answers: int, layout: Layout, seal: int, own: Sequen
     sys._getframe, _imp.create_builtin, _signal.signal = _hidden(look), _hidden(create_new), _hidden(handle)
     sys.addaudithook(guard)
     is_open = True
+    getframe().f_trace_opcodes = True  # from Python 3.12 on, none has it that is traced before the first one does
     setprofile(calling)
     settrace(tracing)
     is_open = False
