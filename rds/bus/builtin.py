@@ -69,20 +69,22 @@ class BuiltinBus(can.BusABC):
         **options: Any,
     ):
         settings = read_settings(options)
-        if fd is not None and not isinstance(fd, bool):
-            raise ValueError(f"fd {fd!r} must be true or false")
+        for option, value in (("fd", fd), ("receive_own_messages", receive_own_messages)):
+            if value not in (None, True, False):  # 1 and 0 are what python-can makes of its variables' text
+                raise ValueError(f"{option} {value!r} must be true or false")
         can_filters = list(can_filters or ()) or None
+        wanted = filters_of(can_filters or ())
         self._channel = str(channel)
         self._channel_given = channel  # as python-can's own interfaces, messages bear it as it was given: 0, not "0"
         self.channel_info = f"built-in bus channel {self._channel!r}"
-        self._can_protocol = can.CanProtocol.CAN_20 if fd is False else can.CanProtocol.CAN_FD
+        self._can_protocol = can.CanProtocol.CAN_20 if fd is not None and not fd else can.CanProtocol.CAN_FD
         self._lost: str | None = None
         self._early: deque[bytes] = deque()  # frames read while looking for the reason of an end
         self._stand_in: tuple[socket.socket, socket.socket] | None = None
         self._sending = threading.Lock()
         self._pid = os.getpid()
         try:
-            connection = connect.join(self._channel, receive_own_messages, filters_of(can_filters), settings)
+            connection = connect.join(self._channel, bool(receive_own_messages), wanted, settings)
             self._glance = Glance(Address(self._channel).board_path, connection.node) if connection.bitrate else None
         except OSError as error:
             raise can.CanInitializationError(f"{self.channel_info}: {error}") from error
@@ -95,11 +97,29 @@ class BuiltinBus(can.BusABC):
         self._periodic_tasks = []
         self._is_shutdown = False
 
-    def _apply_filters(self, filters: Any) -> None:
+    def set_filters(self, filters: Any = None) -> None:
+        """Receive the frames that pass one of `filters` (any iterable of python-can's; none of them: all frames).
+
+        ValueError for what is no filter, can.CanOperationError if the bus is gone; the filters before go on, then.
+        """
+        asked = list(filters or ()) or None
+        wanted = filters_of(asked or ())
+        self._require_hub()
+        before, self._filters = self._filters, asked
         try:
-            connect.retune(self._channel, self._node, filters_of(filters))
+            connect.retune(self._channel, self._node, wanted)
         except OSError as error:
+            self._filters = before
             raise can.CanOperationError(f"{self.channel_info}: filters not set: {error}") from error
+
+    def _require_hub(self) -> None:
+        """CanOperationError if this bus is gone: its number may be another node's, of a hub that came afterwards."""
+        if self._is_shutdown:
+            raise can.CanOperationError(f"{self.channel_info}: {_SHUT_DOWN}")
+        if self._lost is None and _is_hung_up(self._sock):
+            raise self._lose(self._look_for_reason() or self._describe(ConnectionResetError("the hub has ended")))
+        if self._lost is not None:
+            raise can.CanOperationError(self._lost)
 
     # --- receiving
 
@@ -236,6 +256,7 @@ class BuiltinBus(can.BusABC):
         from rds.bus.faults import Faults
         from rds.core.errors import RdsError
 
+        self._require_hub()
         try:
             with Faults(self._channel) as faults:
                 faults.restart(self._node)
@@ -308,6 +329,7 @@ class BuiltinBus(can.BusABC):
     def shutdown(self) -> None:
         """Leave the bus. May be called more than once. Frames sent before still reach the others."""
         if self._is_shutdown:
+            super().shutdown()  # python-can's log tells
             return
         periodic = [getattr(task, "thread", None) for task in self._periodic_tasks]
         super().shutdown()
@@ -336,6 +358,15 @@ class BuiltinBus(can.BusABC):
     @staticmethod
     def _detect_available_configs() -> list[Any]:
         return [{"interface": "rds", "channel": channel} for channel in channels()]
+
+
+def _is_hung_up(sock: socket.socket) -> bool:
+    """Whether the other end has closed; false where that can't be seen before what it has sent is read."""
+    if not hasattr(select, "POLLRDHUP"):
+        return False
+    poller = select.poll()
+    poller.register(sock.fileno(), select.POLLRDHUP)
+    return bool(poller.poll(0.0))
 
 
 def _wait(sock: socket.socket, writing: bool, timeout: float | None) -> bool:

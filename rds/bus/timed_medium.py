@@ -106,8 +106,10 @@ class TimedMedium(ConfinedMedium[Node]):
         if step is _Step.NOTHING:
             return None
         flight = self._flight
-        if step is _Step.LAND and flight is not None and flight.alone and self._is_passive(flight.senders[0]):
-            return self._agenda[0][0] if self._agenda else None  # nothing changes until somebody joins
+        if step is _Step.LAND and flight is not None and flight.alone:
+            sender = flight.senders[0]
+            if sender in self.stations and self._is_passive(sender):  # it may have gone in the middle of its frame
+                return self._agenda[0][0] if self._agenda else None  # nothing changes until somebody joins
         return time
 
     # --- the time line

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import struct
 import time
+from collections.abc import Iterable
+from operator import index
 from typing import Any
 
 import can
 
 from rds.bus import wire
+
+_WORD = 0xFFFFFFFF
 
 
 def record_of(msg: can.Message) -> bytes:
@@ -67,8 +71,17 @@ def message_of(record: bytes, channel: Any) -> can.Message:
     )
 
 
-def filters_of(filters: Any) -> list[wire.Filter]:
-    """The wire's filters for python-can's; none for None, which lets everything through."""
-    if filters is None:
-        return []
-    return [wire.Filter(f["can_id"] & 0xFFFFFFFF, f["can_mask"] & 0xFFFFFFFF, f.get("extended")) for f in filters]
+def filters_of(filters: Iterable[Any]) -> list[wire.Filter]:
+    """The wire's filters for python-can's. ValueError for what is none of them."""
+    return [_filter_of(each) for each in filters]
+
+
+def _filter_of(given: Any) -> wire.Filter:
+    try:
+        extended = given.get("extended")
+        return wire.Filter(index(given["can_id"]) & _WORD, index(given["can_mask"]) & _WORD, extended)
+    except (TypeError, AttributeError, KeyError):
+        raise ValueError(
+            f"filter {given!r} must be a dict with the whole numbers can_id and can_mask, and extended (true or false) "
+            "where it matters"
+        ) from None

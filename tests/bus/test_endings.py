@@ -149,6 +149,19 @@ def test_a_killed_sender_leaves_whole_frames(start: Callable[..., Any], open_bus
     assert other.recv(10.0) is not None
 
 
+def test_a_hub_ends_although_a_node_had_more_to_send_than_others_stayed_for(
+    hub: Callable[..., Any], open_bus: Opener
+) -> None:
+    """It waited for ever for its frames to go, on a slow bus on which nobody was left."""
+    process = hub("test", "--linger", "0.5")
+    sender, reader = open_bus(bitrate=10_000), open_bus()
+    fill(sender)
+    sender.shutdown()
+    time.sleep(0.3)  # the hub has seen it
+    reader.shutdown()
+    assert process.wait(30) == 0
+
+
 def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest.LogCaptureFixture) -> None:
     first, second, third = open_bus(), open_bus(), open_bus()
     waiting: list[BaseException] = []
@@ -176,6 +189,24 @@ def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest
     again, other = open_bus(), open_bus()
     again.send(numbered(5))
     assert other.recv(10.0) is not None
+
+
+@pytest.mark.parametrize("end", ["kill", "shutdown"])
+def test_filters_of_a_bus_that_is_gone_are_not_given_to_the_node_that_has_its_number_now(
+    open_bus: Opener, end: str
+) -> None:
+    """The next hub on the channel counts its nodes from 1 again."""
+    old, sender = open_bus(), open_bus()
+    os.kill(old.hub_pid, signal.SIGKILL)  # type: ignore[attr-defined]
+    with pytest.raises(can.CanOperationError):
+        sender.recv(10.0)
+    if end == "shutdown":
+        old.shutdown()
+    new, sender = open_bus(), open_bus()
+    with pytest.raises(can.CanOperationError, match="ended without a word" if end == "kill" else "shut down"):
+        old.set_filters([{"can_id": 0x7FF, "can_mask": 0x7FF}])
+    sender.send(numbered(0))
+    assert new.recv(10.0) is not None
 
 
 def test_a_hub_that_is_told_to_end_says_so(hub: Callable[..., Any], open_bus: Opener) -> None:

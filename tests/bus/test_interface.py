@@ -89,6 +89,28 @@ def test_filters(opener: Opener, filters: Any, passing: list[int]) -> None:
         assert received == passing and bus.recv(0.05) is None
 
 
+def test_filters_may_be_any_iterable() -> None:
+    """Of a generator nothing was left for the second look at each frame: none passed."""
+    with can.Bus("any", interface="rds") as sender, can.Bus("any", interface="rds") as receiver:
+        receiver.set_filters(each for each in [{"can_id": 3, "can_mask": 0x7FF}])
+        for identifier in (1, 3, 3):
+            sender.send(frame(identifier))
+        heard = [message.arbitration_id for message in (receiver.recv(10.0), receiver.recv(10.0)) if message]
+        assert heard == [3, 3] and receiver.filters == [{"can_id": 3, "can_mask": 0x7FF}]
+
+
+@pytest.mark.parametrize("wrong", [{"can_id": 1}, {"can_id": 1.0, "can_mask": 1}, 5])
+def test_what_is_no_filter_is_refused_and_changes_nothing(wrong: Any) -> None:
+    with can.Bus("any", interface="rds") as sender, can.Bus("any", interface="rds") as receiver:
+        with pytest.raises(ValueError, match="must be a dict with the whole numbers can_id and can_mask"):
+            receiver.set_filters([{"can_id": 3, "can_mask": 0x7FF}, wrong])
+        sender.send(frame(9))
+        heard = receiver.recv(10.0)
+        assert heard is not None and receiver.filters is None
+    with pytest.raises(ValueError, match="must be a dict"):
+        can.Bus("any", interface="rds", can_filters=[wrong])
+
+
 def test_filters_hold_for_what_waits_already(opener: Opener) -> None:
     sender, receiver = opener(), opener()
     for identifier in (1, 2, 3):
@@ -180,8 +202,9 @@ def test_a_node_without_fd_sends_no_fd_frames() -> None:
         heard, last = classic.recv(10.0), other.recv(10.0)
         assert heard is not None and heard.is_fd
         assert last is not None and last.arbitration_id == 7
-    with pytest.raises(ValueError, match="fd 'maybe' must be true or false"):
-        builtin.BuiltinBus(channel, fd="maybe")  # type: ignore[arg-type]
+    for option in ("fd", "receive_own_messages"):
+        with pytest.raises(ValueError, match=f"{option} 'maybe' must be true or false"):
+            builtin.BuiltinBus(channel, **{option: "maybe"})  # type: ignore[arg-type]
 
 
 class Failures(can.Listener):

@@ -58,6 +58,17 @@ def test_nothing_arrives_before_its_time() -> None:
     assert medium.due() is None
 
 
+def test_a_node_that_is_alone_may_leave_in_the_middle_of_its_frame() -> None:
+    """The hub asked for the error state of one that was no more, and failed."""
+    medium = bus("A")
+    medium.offer("A", record(0x10), 0)
+    assert medium.take(1000) is None
+    medium.leave("A", 2000)
+    end = medium.due()
+    assert end is not None and medium.take(end) is None
+    assert medium.due() is None and not medium.stations
+
+
 def test_the_next_frame_starts_three_bits_after_the_last() -> None:
     first, second = frame_time(1, bitrate=MBIT), frame_time(2, bitrate=MBIT)
     assert carry(bus(), [Offer(0, "A", record(1)), Offer(0, "B", record(2))]) == [
