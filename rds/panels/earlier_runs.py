@@ -34,7 +34,7 @@ class EarlierRuns:
         self._session, self._opened = shell.session, opened
         self._runs: list[KeptRun] = []
         self.list = widgets.SelectMultiple(
-            options=[], rows=12, tooltip="Hold Ctrl or Shift to choose several", layout={"width": "100%"}
+            options=[], rows=12, tooltip="Hold Ctrl or Shift to choose several", layout={"width": "auto"}
         )
         self.bar, self.notice = WorkBar(shell.ticker), Notice()
         tip = "Open the run that is chosen; several are laid over"

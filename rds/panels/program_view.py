@@ -34,6 +34,7 @@ class ProgramView:
         self.notice = Notice()
         self.work: ProgramWork | None = None
         self._traced = self._shown = False
+        self._ran: str | None = None  # the text whose run, or result, is shown
         self.editor = Editor(lambda: self.files.save())
         self.editor.text = self.program.text.text
         self.editor.observe(self._typed, "text")
@@ -83,6 +84,11 @@ class ProgramView:
 
     def _chosen(self, name: str) -> None:
         if name == "file":
+            if self.work is None and self._ran not in (None, self.program.text.text):
+                self._ran = None  # what came of it names lines of another text
+                self.notice.clear()
+                self.result.clear()
+                self.tabs.selected_index = PREVIEW
             if self.editor.text != self.program.text.text:
                 self._opened()
             self.files.refresh()
@@ -123,6 +129,7 @@ class ProgramView:
         finally:
             self.files.refresh()
         self.work = self.operator.work = work
+        self._ran = self.program.text.text
         self._traced = self._shown = False
         self.editor.locked = True
         self.result.clear()

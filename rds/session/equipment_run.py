@@ -105,7 +105,12 @@ class EquipmentRun:
 
     @property
     def seconds_left(self) -> float | None:
-        """s."""
+        """s; of a loop against the clock what is planned, without the time that its start took. None while it saves."""
+        if self.result is not None:
+            return None
+        if self.real_time and self._run is not None and not self._run.done:
+            taken, of = self._run.progress
+            return (of - taken) * self._run.plan.T if taken else None
         return self._task.seconds_left if self._task else None
 
     @property

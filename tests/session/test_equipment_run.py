@@ -120,6 +120,7 @@ def test_a_gain_is_changed_while_it_runs_and_recorded_with_its_time(alone: Path)
     while not len(run.new_rows()) and time.monotonic() < end:
         time.sleep(0.02)
     values = LiveValues(run)
+    assert run.seconds_left is not None and run.seconds_left < 60.0  # however long it took to start
     before = values["X.Pgain"]
     with pytest.raises(InputError, match=r"Pgain.* must be at least 0"):
         values.set("X.Pgain", "-1")
@@ -132,7 +133,7 @@ def test_a_gain_is_changed_while_it_runs_and_recorded_with_its_time(alone: Path)
     (when, *change), (stopped, *stop) = run.result.meta["changes"]
     assert change == ["X.Pgain", before, 7.5] and 0.0 < when <= stopped < 60.0 and stop == ["stop", 0.0, 1.0]
     assert len(run.result) < 60_000 and run.result.meta["ending"] == "stopped"
-    assert not run.live_values and session.machine_user is None
+    assert not run.live_values and session.machine_user is None and run.seconds_left is None
     with pytest.raises(InputError, match="is over"):
         values.set("X.Pgain", 8.0)
     text = (run.folder / "changes.csv").read_text()

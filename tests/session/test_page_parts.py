@@ -19,7 +19,7 @@ from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.machine_modules import ModulesView
-from rds.panels.program_view import ProgramView
+from rds.panels.program_view import RESULT, ProgramView
 from rds.panels.result_actions import ResultActions
 from rds.panels.shell import Shell
 from rds.session import Session
@@ -106,6 +106,19 @@ def test_after_a_result_that_cannot_be_shown_the_next_program_can_be_run(
     with pytest.raises(OSError, match="No space"):
         view._ended()
     assert view.work is None and not view.editor.locked and not view.operator.run_button.disabled
+
+
+def test_what_came_of_a_program_does_not_stand_beside_another_one(tmp_path: Path) -> None:
+    for name, line in (("first.ngc", "X1"), ("same.ngc", "X1"), ("other.ngc", "X2")):
+        (tmp_path / name).write_text(f"G21 G90\nG0 {line}\nM2\n")
+    view = ProgramView(Shell(Session(tmp_path)))
+    view.program.open("first.ngc")
+    view._ran = view.program.text.text
+    for name, stays in (("same.ngc", True), ("other.ngc", False)):
+        view.notice.say("ended early: stopped in line 2")
+        view.tabs.selected_index = RESULT
+        view.program.open(name)
+        assert (view.tabs.selected_index == RESULT, bool(view.notice.value)) == (stays, stays)
 
 
 def test_a_run_whose_files_are_gone_is_not_sent_without_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

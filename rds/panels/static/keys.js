@@ -1,4 +1,5 @@
 // What folds away can be opened without a mouse: its header takes the focus, and Enter or space does what a click does.
+// And a panel begins at its top, however far the one before was scrolled.
 
 const HEADER = ".jupyter-widget-Collapse-header";
 
@@ -20,16 +21,19 @@ function render({ el }) {
     event.target.click();
   };
   const seen = new MutationObserver(label);
+  const turned = new MutationObserver(() => { app.scrollTop = 0; });
   const begun = requestAnimationFrame(() => {
     app = el.closest(".rds-app");
     if (!app) return;
     label();
     seen.observe(app, { childList: true, subtree: true, attributes: true, attributeFilter: ["class"] });
+    turned.observe(app.querySelector(".rds-panel"), { childList: true });
     app.addEventListener("keydown", pressed);
   });
   return () => {
     cancelAnimationFrame(begun);
     seen.disconnect();
+    turned.disconnect();
     if (app) app.removeEventListener("keydown", pressed);
   };
 }
