@@ -61,6 +61,7 @@ def fit(
     with refusals(), stdout_kept(json):
         from rds.core.errors import InputError
         from rds.identification.fit import fit as fit_model
+        from rds.identification.missing import with_hint
         from rds.identification.structures import structure as structure_of
 
         if out is not None and out.suffix != ".toml":
@@ -73,7 +74,7 @@ def fit(
             if (method or made.default_method) == "simulation":
                 options["progress"] = bar("fitting")
                 _say_if_slow(made)
-            estimate = fit_model(fitted, made, method, options)
+            estimate = with_hint(fit_model(fitted, made, method, options), fitted)
         validation = _validated(estimate, rest) if split else None
         files = _write(out, report, estimate, fitted, made, validation)
     for sentence in estimate.unusable():

@@ -13,7 +13,7 @@ from rds.logs.log import Log
 from rds.logs.motion import travel
 
 _POOR = 90.0  # per cent: a model that fits worse does not explain the motion
-_MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
+MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
 _LITTLE = 100.0  # times the measurement's noise: with less motion than that, a fit is not told by much
 _NONE = 12.0  # times the noise: it alone spans 8 in 10^4 samples, 10.4 in 10^7
 _WHITE = 2.576  # 99 % band, in units of 1/√N
@@ -31,7 +31,7 @@ def fitted_doubts(structure: Structure, log: Log, error: np.ndarray) -> list[str
     motion, size, unit = motion_of(log), _rms(error), structure.output_unit
     so = _NARROW if structure.sensitivities is None else _WIDENED  # see profile.py
     said = [*_little(log, motion, unit, so), *_poor(log, motion, error)]
-    if motion.noise > 0.0 and size > _MISSED * motion.noise:
+    if motion.noise > 0.0 and size > MISSED * motion.noise:
         said.append(
             f"{log.name}: the residuals ({size:.3g} {unit} RMS) are {size / motion.noise:.3g} times the measurement's "
             f"noise ({motion.noise:.2g} {unit}): the machine does something that structure {_named(structure)} lacks. "
@@ -48,7 +48,7 @@ def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str)
     # forces are right in a closed loop as well, whose free run drifts; the other methods are for open loops
     is_open = log.closed_loop is False or method != "inverse-dynamics"
     said = [*_little(log, motion, unit, _NARROW), *_poor(log, motion, error, is_open)]
-    if motion.noise > 0.0 and size > _MISSED * motion.noise:
+    if motion.noise > 0.0 and size > MISSED * motion.noise:
         said.append(
             f"{log.name}: the free run of these parameters is {size:.3g} {unit} off (RMS), {size / motion.noise:.3g} "
             f"times the measurement's noise ({motion.noise:.2g} {unit}). Either structure {_named(structure)} lacks "
@@ -85,7 +85,7 @@ def _too_small(log: Log, way: str, reach: float, how: str, noise: float, unit: s
 def _poor(log: Log, motion: Motion, error: np.ndarray, is_open: bool = True) -> list[str]:
     spread = float(log.position.std())
     fit = 100.0 * (1.0 - float(error.std()) / spread) if spread > 0.0 else 0.0
-    if not (fit < _POOR and _rms(error) > _MISSED * motion.noise):
+    if not (fit < _POOR and _rms(error) > MISSED * motion.noise):
         return []
     verdict = (
         UNUSABLE if is_open else "unless a controller held it (closed_loop in the map), they are not the axis's own"
@@ -102,7 +102,7 @@ def _coloured(log: Log, motion: Motion, error: np.ndarray) -> list[str]:
     correlation = {lag: float(e[lag:] @ e[:-lag]) / power for lag in _LAGS if lag < len(e) // 4 and power > 0.0}
     band = _WHITE / np.sqrt(len(error))
     beyond = {lag: value for lag, value in correlation.items() if abs(value) > 2.0 * band}
-    if not beyond or (motion.noise > 0.0 and _rms(error) <= _MISSED * motion.noise):
+    if not beyond or (motion.noise > 0.0 and _rms(error) <= MISSED * motion.noise):
         return []
     values = ", ".join(f"{value:.2f} at {lag}" for lag, value in beyond.items())
     return [

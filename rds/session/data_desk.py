@@ -113,6 +113,7 @@ class DataDesk:
 
         def work(task: Task[Estimate]) -> Estimate:
             from rds.identification.fit import fit
+            from rds.identification.missing import with_hint
             from rds.identification.structures import structure
             from rds.logs.read_log import read_log
 
@@ -123,7 +124,7 @@ class DataDesk:
             if (method or made.default_method) == "simulation":
                 given["progress"] = lambda done, of: task.advance(done, of, "fitting")
             task.note = "fitting"
-            self.estimate = fit(logs, made, method, given)
+            self.estimate = with_hint(fit(logs, made, method, given), logs)
             self.fitted = tuple(logs)
             self._unwritten = str(self.choices["model"])
             return self.estimate
