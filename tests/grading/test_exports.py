@@ -232,6 +232,15 @@ def test_moodle_worksheet_is_filled_in_and_otherwise_the_same(tmp_path: Path) ->
     assert set(done.left_out) == {"Else_777"}
 
 
+def test_names_are_the_same_however_their_accents_are_written(tmp_path: Path) -> None:
+    book = tmp_path / "grades.csv"
+    book.write_text(
+        "Full name,ID number,Assignment: Tracking (Real)\nJos\u00e9 Pe\u00f1a,,-\nJose Pena,,-\n", encoding="utf-8"
+    )
+    done = exported(tmp_path, "moodle", [grade("Jose\u0301 Pen\u0303a")], Wanted(gradebook=book))
+    assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["26", "-"]
+
+
 def test_moodle_maximum_grade_is_kept_to(tmp_path: Path) -> None:
     sheet = tmp_path / "worksheet.csv"
     sheet.write_text(WORKSHEET.replace("30.00", "100.00"), encoding="utf-8")

@@ -180,8 +180,10 @@ def test_gradescope_metadata_that_is_none(tmp_path: Path, text: str) -> None:
 
 
 def test_times_of_the_instructor(tmp_path: Path) -> None:
-    times = "student,timestamp\nada,2026-01-10T13:00:00\nben,2026-01-10T13:00:00Z\n"
-    found = of(put(tmp_path, {"ada.py": "", "ben.py": "", "timestamps.csv": times}), zone=CET)
+    times = "student,timestamp\nada,2026-01-10T13:00:00\nben,2026-01-10T13:00:00Z\nJos\u00e9,2026-01-10T12:00:00\n"
+    files = {"ada.py": "", "ben.py": "", "Jose\u0301.py": "", "timestamps.csv": times}  # as a Mac writes an accent
+    found = of(put(tmp_path, files), zone=CET)
+    assert found["Jose\u0301"].time == datetime(2026, 1, 10, 12, tzinfo=CET)
     assert found["ada"].time == datetime(2026, 1, 10, 13, tzinfo=CET)
     assert found["ben"].time == datetime(2026, 1, 10, 13, tzinfo=UTC)
 
@@ -192,6 +194,7 @@ def test_times_of_the_instructor(tmp_path: Path) -> None:
         ("who,when\n", "columns student and timestamp"),
         ("student,timestamp\nzoe,2026-01-10\n", "line 2: student 'zoe' handed nothing in"),
         ("student,timestamp\nada,soon\n", "line 2: timestamp = 'soon' is no time"),
+        ("student,timestamp\nada,2026-01-10\nada,2026-01-12\n", "line 3: student 'ada' has a line above already"),
     ],
 )
 def test_times_that_will_not_do(tmp_path: Path, text: str, said: str) -> None:

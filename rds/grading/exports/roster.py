@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -97,7 +98,7 @@ def _by_cell(sheet: Sheet, key: Key) -> Mapping[str, list[int]]:
     at, table = sheet.at(key.column), {}  # type: tuple[int | None, dict[str, list[int]]]
     assert at is not None  # by `find`
     for number, row in enumerate(sheet.rows):
-        if value := key.of_row(row[at]).strip().casefold():
+        if value := _compared(key.of_row(row[at])):
             table.setdefault(value, []).append(number)
     return table
 
@@ -105,7 +106,7 @@ def _by_cell(sheet: Sheet, key: Key) -> Mapping[str, list[int]]:
 def _rows_of(grade: Grade, tables: Sequence[tuple[Key, Mapping[str, list[int]]]]) -> tuple[list[int], str]:
     for key, table in tables:
         for value in key.of_grade(grade):
-            if rows := table.get(key.of_row(value).strip().casefold()):
+            if rows := table.get(_compared(key.of_row(value))):
                 return rows, key.column
     return [], ""
 
@@ -125,4 +126,9 @@ def platform(grade: Grade, name: str, *names: str) -> list[str]:
 
 def letters(name: str) -> str:
     """A name without what is written differently here and there: spaces, commas, capitals."""
-    return "".join(each for each in name.casefold() if each.isalnum())
+    return "".join(each for each in _compared(name) if each.isalnum())
+
+
+def _compared(text: str) -> str:
+    """Without capitals, and with accents in the letters: a Mac keeps them apart in the names of files."""
+    return unicodedata.normalize("NFC", text).strip().casefold()

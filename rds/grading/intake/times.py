@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import unicodedata
 from datetime import UTC, datetime, tzinfo
 from zoneinfo import ZoneInfo
 
@@ -29,15 +30,20 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
     if not {"student", "timestamp"} <= set(reader.fieldnames or ()):
         raise InputError("must have the columns student and timestamp", f"{TIMES}: line 1")
     known, found = {heap.student for heap in layout.heaps}, {}
+    composed = {unicodedata.normalize("NFC", student): student for student in known}
     for row in reader:
-        place, student = f"{TIMES}: line {reader.line_num}", (row["student"] or "").strip()
+        place, told = f"{TIMES}: line {reader.line_num}", (row["student"] or "").strip()
+        # a Mac keeps accents apart from their letters in the names of files
+        student = told if told in known else composed.get(unicodedata.normalize("NFC", told), told)
         if student not in known:
             raise InputError(f"student {student!r} handed nothing in; correct the name, or remove the line", place)
+        if student in found:
+            raise InputError(f"student {student!r} has a line above already; keep one of them", place)
         try:
             when = datetime.fromisoformat((row["timestamp"] or "").strip())
         except ValueError:
-            told = row["timestamp"]
-            raise InputError(f"timestamp = {told!r} is no time; as in 2026-11-30T23:59:00+01:00", place) from None
+            said = row["timestamp"]
+            raise InputError(f"timestamp = {said!r} is no time; as in 2026-11-30T23:59:00+01:00", place) from None
         found[student] = when if when.tzinfo else when.replace(tzinfo=zone or UTC)
     return found
 
