@@ -34,7 +34,15 @@ from rds.commands import (
 )
 from rds.commands.app import app as app_page
 from rds.commands.buses import Channel, Experiment, Interface, bus_table_of
-from rds.commands.common import Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
+from rds.commands.common import (
+    Json,
+    ends_as_ctrl_c,
+    print_json,
+    progress_bars,
+    refusals,
+    say_what_is_replaced,
+    stdout_kept,
+)
 from rds.commands.guard import guarded
 
 app = typer.Typer(
@@ -76,7 +84,7 @@ Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the re
 @app.command()
 def demo(out: Out = None, json: Json = False) -> None:
     """Track a sine on X, Y and Z in all three modes, and show the published numbers beside ours."""
-    with refusals(), stdout_kept(json):
+    with refusals(), stdout_kept(json), ends_as_ctrl_c():
         from rds.demo import run_demo
 
         with progress_bars() as bar:
@@ -102,7 +110,7 @@ def run(
     json: Json = False,
 ) -> None:
     """Run an experiment and save its results: tables, plots and a report."""
-    with refusals(), stdout_kept(json):
+    with refusals(), stdout_kept(json), ends_as_ctrl_c():
         from rds.experiment.report import exit_code, run_and_save, run_json
 
         say_what_is_replaced(out)

@@ -109,8 +109,9 @@ def _wait(child: int, reading: int) -> NoReturn:
         sys.stderr.write("rds: stopped\n")
         os._exit(_INTERRUPTED)
     sys.stderr.write(
-        f"rds: the process that ran the student's code {how}; nothing was saved. control() and the model must only "
-        "compute and return: remove what ends, kills or closes things\n"
+        f"rds: the process that ran the student's code {how}; nothing was saved (a run against the clock goes "
+        "on to its end, and keeps its record). control() and the model must only compute and return: remove what ends, "
+        "kills or closes things\n"
     )
     sys.stderr.flush()
     os._exit(2)

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.commands.common import Json, print_json, progress_bars, refusals, say_what_is_replaced, stdout_kept
+from rds.commands.common import (
+    Json,
+    ends_as_ctrl_c,
+    print_json,
+    progress_bars,
+    refusals,
+    say_what_is_replaced,
+    stdout_kept,
+)
 from rds.commands.nc_options import MaxJumps, Parameters, Program, Tools, With, setup
 
 if TYPE_CHECKING:
@@ -54,7 +62,7 @@ def run(
     In a terminal, while it runs in real time: space holds and goes on, + and - change the feed, h moves home, q stops.
     Elsewhere `rds nc operate` does the same.
     """
-    with refusals(), stdout_kept(json):
+    with refusals(), stdout_kept(json), ends_as_ctrl_c():
         from rds.core.errors import InputError
         from rds.experiment.folder import new_folder, require_writable
         from rds.experiment.report import exit_code, run_json

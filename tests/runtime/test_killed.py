@@ -238,10 +238,12 @@ def test_a_machine_that_is_not_there(alone: Path) -> None:
     assert not (alone / "run").exists()
 
 
-def test_an_interrupted_run_stops_safely_and_is_saved(alone: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "polite kill"])
+def test_an_interrupted_run_stops_safely_and_is_saved(alone: Path, number: signal.Signals) -> None:
+    """After a polite kill it said "stopped", and the axes moved on to the end of the run."""
     with served("own"):
         host = started(alone, "implementation", 20.0, "own", start_new_session=True)
-        os.killpg(host.pid, signal.SIGINT)
+        os.killpg(host.pid, number)
         said, errors = host.communicate(timeout=120)
         assert host.returncode == 1, errors
         wait_until(lambda: statuses("own") == {Status.WATCHDOG})  # after a last command of zero volts
