@@ -12,6 +12,7 @@ from rds.machines.machine import Axis
 
 _LAGS = 10  # windows by which a motion may follow its command
 _CLEAR, _FAINT = 0.5, 0.15  # correlations
+_NEAR = 0.7  # of the largest correlation: a peak as good as it
 _JUMP, _SMOOTH = 0.3, 0.1  # of the range, in one sample: what a command may do, and a position does not
 _LEAP = 0.8  # of the range of a position, in one sample: no axis does that
 _FACTOR = 30.0  # of the expected size: beyond it a unit is wrong, not an axis
@@ -135,18 +136,19 @@ def _both(log: Log) -> dict[str, np.ndarray]:
 
 
 def _follows(seen: Motion) -> float:
-    """The correlation of speed with command over the lags that an axis may have: at its first clear peak, or furthest
-    from 0.
+    """The largest correlation of speed with command over the lags that an axis may have, with the sign of the first peak
+    that comes near it.
 
     An axis follows a sine by less than a quarter of its period and its delay, so the peak of its own sign comes first;
-    half a period later stands one of the other.
+    half a period later stands one of the other, and noise makes it the higher one as often as not.
     """
     most = min(_LAGS, len(seen.speed) // 4)
     values = [correlation(seen.command[: len(seen.command) - lag], seen.speed[lag:]) for lag in range(most + 1)]
+    largest = max(map(abs, values))
     for value, following in zip(values, [*values[1:], 0.0], strict=True):
-        if abs(value) > _CLEAR and (abs(following) < abs(value) or following * value < 0.0):
-            return value
-    return max(values, key=abs)
+        if abs(value) > _NEAR * largest and (abs(following) < abs(value) or following * value < 0.0):
+            return float(np.copysign(largest, value))
+    return largest  # all are 0
 
 
 def _against_machine(log: Log, axis: Axis) -> list[Finding]:

@@ -2,9 +2,11 @@
 
 Between two samples the path is the quintic through their positions, velocities and accelerations; at a rate of r it is
 passed with the velocity r v, the acceleration r² a + ṙ v and the jerk r³ j + 3 r ṙ a + r̈ v. So no rate leaves the path,
-and a constant r up to 1 keeps every limit that the plan keeps. A change of the rate is a `Ramp`; before it begins, each
-of its samples is worked out and held against velocity, acceleration and jerk of every axis. A rate above 1 is taken
-only with a way back to 1 that is known to keep the limits as well, and left where that way would no longer do so.
+and a constant r of at most FREE keeps every limit that the plan keeps: where the plan changes its jerk between two
+samples, the quintics have up to 0.88 % more of it. A ramp to 1 ends at a sample of the plan, and from there on the
+planned samples are sent. A change of the rate is a `Ramp`; before it begins, each of its samples is worked out and held
+against velocity, acceleration and jerk of every axis. Another rate above FREE is taken only with a way back to 1 that
+is known to keep the limits as well, and left where that way would no longer do so.
 """
 
 from __future__ import annotations
@@ -15,12 +17,14 @@ from typing import Any
 import numpy as np
 
 from rds.runtime.program import Program
-from rds.runtime.ramp import SHARPEST, STEEPEST, Ramp
+from rds.runtime.ramp import EXTRA_SHARPEST, EXTRA_STEEPEST, FURTHEST, SHARPEST, STEEPEST, Ramp
 
+FREE = 0.997  # up to this rate no limit that the plan keeps can be exceeded
 EXCESS = 0.001  # by which differences of the samples sent may exceed a limit, relative: quintics are no plan
 PATIENCE = 0.5  # s after which somebody who wants it slower gets the gentlest step, wherever the path is
 _SHORTEST, _LONGEST = 0.02, 600  # s and samples, of a ramp: a change that takes longer is made in steps
-_STAY = 8  # samples at a rate above 1 that are checked at once
+_STAY = 8  # samples at a rate above FREE that are checked at once
+_LANDS_WITH = 0.25  # of what acceleration and jerk allow, for ending at a sample of the plan
 _AHEAD = 0.2  # s of the plan whose speed says how long a ramp will have to be
 # Ramps that are tried, one at each sample: share of the change that is wanted, times as long as the least.
 _TRIES = ((1.0, 1.05), (1.0, 1.5), (1.0, 2.2), (1.0, 3.5), (0.3, 1.5), (0.3, 3.5), (0.05, 2.0), (0.05, 5.0))
@@ -47,13 +51,13 @@ class Retimed:
         self._past = [self.position] * 3  # the last samples, for differences
         self._ramp: Ramp | None = None
         self._k, self._from = 0, 0.0  # how far the ramp is, and where it began
-        self._back = Ramp(1.0, 1.0, 1)  # from a rate above 1, known to keep the limits
+        self._back = Ramp(1.0, 1.0, 1)  # from a rate above FREE, known to keep the limits
         self._tries = self._sure = 0
         self._rests = True
 
     def advance(self, wanted: float, until: int) -> None:
         """One sample period towards the rate `wanted`, and along the path at most to the sample `until`."""
-        if self._ramp is None and (wanted != self.rate or self.rate > 1.0):
+        if self._ramp is None and (wanted != self.rate or _is_watched(self.rate)):
             self._choose(wanted, until)
         ramp, slope = self._ramp, 0.0
         if ramp is None:
@@ -64,6 +68,8 @@ class Retimed:
             self.rate, slope = ramp.rate(self._k), ramp.slope(self._k) / self._T
             if self._k == ramp.samples:
                 self.rate, slope, self._ramp = ramp.end, 0.0, None
+                if ramp.end == 1.0:
+                    place = float(round(place))
         self._rests = self._rests and self.rate == 0.0
         self.place = min(place, until)
         self._evaluate(self.rate, slope)
@@ -72,8 +78,8 @@ class Retimed:
             self.settle(wanted)
 
     def settle(self, wanted: float) -> None:
-        """Take the rate `wanted`, at most 1, at once: for a place where the path rests."""
-        self.rate, self._ramp, self._rests = min(wanted, 1.0), None, True
+        """Take the rate `wanted`, or 1 where it would have to be watched, at once: for a place where the path rests."""
+        self.rate, self._ramp, self._rests = wanted if wanted <= FREE else 1.0, None, True
         self._past = [self.position] * 3
         self._tries = self._sure = 0
 
@@ -84,7 +90,7 @@ class Retimed:
             self.settle(wanted)
             return
         self._sure -= 1
-        if rate > 1.0 and self._sure < 0:
+        if _is_watched(rate) and self._sure < 0:
             if self._share([Ramp(rate, rate, _STAY), self._back], until) > 1.0 + EXCESS:
                 self._begin(self._back)
                 return
@@ -97,14 +103,14 @@ class Retimed:
         ramp = self._towards(wanted, *_TRIES[self._tries % len(_TRIES)])
         self._tries += 1
         back = Ramp(ramp.end, 1.0, ramp.samples)
-        if self._share([ramp, back] if ramp.end > 1.0 else [ramp], until) <= 1.0 + EXCESS:
+        if self._share([ramp, back] if _is_watched(ramp.end) else [ramp], until) <= 1.0 + EXCESS:
             self._begin(ramp)
             self._back = back
         elif wanted < self.rate <= 1.0 and self._tries * self._T > PATIENCE:
             self._begin(self._towards(wanted, *_TRIES[-1]))
 
     def _begin(self, ramp: Ramp) -> None:
-        self._ramp, self._k, self._from = ramp, 0, self.place
+        self._ramp, self._k, self._from = _on(ramp, self.place), 0, self.place
         self._tries = self._sure = 0
 
     def _towards(self, wanted: float, share: float, longer: float) -> Ramp:
@@ -112,18 +118,23 @@ class Retimed:
         i, T, rate = int(self.place), self._T, self.rate
         v = np.abs(self._tables[1][i : i + 1 + ceil(_AHEAD / T)]).max(axis=0)
         _, acceleration, jerk = self._limits
+        landing = max(
+            float(np.sqrt(EXTRA_STEEPEST * FURTHEST / _LANDS_WITH * T * v / acceleration).max()),
+            float(np.cbrt(EXTRA_SHARPEST * FURTHEST / _LANDS_WITH * T * v / jerk).max()),
+        )
         change, samples = share * (wanted - rate), 0
         while samples == 0 or samples > _LONGEST:
             change *= 1.0 if samples == 0 else (_LONGEST / samples) ** 2
             speed = v * abs(change)
             seconds = max(_SHORTEST, (STEEPEST * speed / acceleration).max(), np.sqrt(SHARPEST * speed / jerk).max())
             samples = max(ceil(longer * float(seconds) / T), 4)
-        return Ramp(rate, wanted if change == wanted - rate else rate + change, samples)
+        return Ramp(rate, wanted if change == wanted - rate else rate + change, max(samples, ceil(landing / T)))
 
     def _share(self, ramps: list[Ramp], until: int) -> float:
         """The largest share of a limit that the samples of these ramps, one after the other, take of any axis."""
         parts, place = [], self.place
-        for ramp in ramps:
+        for planned in ramps:
+            ramp = _on(planned, place)
             parts.append(place + ramp.passed(np.arange(1.0, ramp.samples + 1.0)))
             place = float(parts[-1][-1])
         parts.append(place + ramps[-1].end * np.array((1.0, 2.0, 3.0)))  # and on at that rate
@@ -170,6 +181,16 @@ class Retimed:
                 a.append(ddp / (T * T))
         self.velocity = [rate * value for value in v]
         self.acceleration = [square * push + slope * value for push, value in zip(a, v, strict=True)]
+
+
+def _is_watched(rate: float) -> bool:
+    """Whether the limits could be exceeded at this rate: not where the planned samples are sent."""
+    return rate > FREE and rate != 1.0
+
+
+def _on(ramp: Ramp, place: float) -> Ramp:
+    """What `ramp` is when it begins at `place`: to a rate of 1, it ends at a sample of the plan."""
+    return ramp.landing(place) if ramp.end == 1.0 else ramp
 
 
 def _quintic(p0: Any, v0: Any, a0: Any, p1: Any, v1: Any, a1: Any, q: Any) -> tuple[Any, Any, Any]:

@@ -54,6 +54,7 @@ shares = st.floats(0.02, 0.6)
     phase=st.floats(0.0, 6.28),
 )
 @example("forward", 0.01, 1.764, (0.06, 0.03), 20.0 / (2.0 * np.pi), 0.001, 0.0)
+@example("forward", 0.1875, 1.0, (0.125, 0.5), 5.0, 0.0002, 0.0)  # the first peak 0.49, the one against it 0.60
 def test_a_good_log_has_no_fault_and_one_with_a_sign_reversed_has(
     kind: str, tau: float, K: float, friction: tuple[float, float], frequency: float, period: float, phase: float
 ) -> None:

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from rds.motion.deviation import allowed, deviation
-from rds.motion.segments import BLEND
+from rds.motion.segments import BLEND, chain
 from rds.runtime.program import Program
 from rds.runtime.retimed import EXCESS, Retimed
 
@@ -74,6 +74,23 @@ def test_at_100_percent_the_samples_are_the_planned_ones() -> None:
     motion, _, _ = planned(segments, LIMITS, T)
     position, _, _ = followed(segments, [1.0], 10)
     assert (position == motion.position).all()
+
+
+def test_a_corner_passed_after_a_change_of_rate_keeps_the_limits() -> None:
+    """Between the planned samples, where it came back to 100 % at any place, it had 0.14 % too much jerk."""
+    first = polygon([(0, 0), (1, 0), (0.8, -1)], 1.0, mode=BLEND, tolerance=0.001)
+    segments = chain(first, polygon([(0.8, -1), (1.8, -1), (2.8, -1)], 1.0))
+    position, _, _ = followed(segments, [1.0, 1.0, 0.5], 17)
+    assert max(shares(position)) <= 1.0 + EXCESS
+
+
+def test_back_at_100_percent_the_samples_are_the_planned_ones_again() -> None:
+    segments = polygon([(0, 0), (20, 0), (20, 20), (0, 20)], 10.0, mode=BLEND)
+    motion, _, _ = planned(segments, LIMITS, T)
+    position, _, rates = followed(segments, [0.37, 1.0, 1.7, 1.0, 0.0, 0.998, 1.0], 150)
+    last = int(np.flatnonzero(rates != 1.0)[-1])
+    rest = position[last + 1 :]
+    assert len(rest) > 500 and (rest == motion.position[-len(rest) :]).all()
 
 
 def test_200_percent_is_reached_where_the_axes_have_it_to_spare() -> None:
