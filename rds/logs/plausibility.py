@@ -136,8 +136,8 @@ def _both(log: Log) -> dict[str, np.ndarray]:
 
 
 def _follows(seen: Motion) -> float:
-    """The largest correlation of speed with command over the lags that an axis may have, with the sign of the first peak
-    that comes near it.
+    """The largest correlation of speed with command over the lags that an axis may have, with the sign of the first
+    peak that comes near it.
 
     An axis follows a sine by less than a quarter of its period and its delay, so the peak of its own sign comes first;
     half a period later stands one of the other, and noise makes it the higher one as often as not.
