@@ -12,24 +12,29 @@ import numpy as np
 from rds.core.toml_text import toml_text
 from rds.logs.map import DIMENSIONS, SUFFIX, UNKNOWN, AxisMap, ColumnMap, LogMap, TimeMap
 from rds.logs.table import Column, Table, remedy
-from rds.logs.units import dimension
+from rds.logs.units import dimension, known_units
 from rds.results.units import default_unit
 
 # words of names, lower case, that tell a quantity; the first that fits
 _WORDS: Mapping[str, frozenset[str]] = {
-    "time": frozenset(("time", "t", "zeit", "timestamp", "timestamps", "elapsed", "seconds")),
-    "reference": frozenset(("reference", "ref", "setpoint", "desired", "target", "soll", "demand", "qg")),
-    "velocity": frozenset(("velocity", "vel", "speed", "v", "rate", "geschwindigkeit")),
-    "current": frozenset(("current", "amps", "strom", "i", "amperage")),
+    "time": frozenset(("time", "t", "zeit", "timestamp", "timestamps", "elapsed", "seconds", "zeitstempel")),
+    "reference": frozenset(
+        ("reference", "ref", "setpoint", "desired", "target", "soll", "demand", "qg", "sollposition", "lagesollwert")
+    ),
+    "velocity": frozenset(
+        ("velocity", "vel", "speed", "v", "rate", "geschwindigkeit", "drehzahl", "istdrehzahl", "drehzahlistwert")
+    ),
+    "current": frozenset(("current", "amps", "strom", "iststrom", "i", "amperage")),
     "command": frozenset(("voltage", "command", "cmd", "volt", "volts", "u", "input", "control", "vir", "spannung")),
     "position": frozenset(
         ("measured", "position", "pos", "encoder", "enc", "y", "x", "q", "qm", "ist", "output", "angle", "counts")
-    ),
+    ).union(("istposition", "lageistwert", "lage")),
 }
 _OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration"))  # never what was measured
 _LIKELY = {"time": "s", "command": "V", "position": "mm", "velocity": "mm/s", "current": "A", "reference": "mm"}
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
+_TOLD = 5  # columns that a sentence names
 _ORDINALS = ("reading", "iteration", "move", "index", "n", "count", "sample")
 
 
@@ -61,6 +66,8 @@ def guess(table: Table) -> Guess:
             continue
         axes[name] = AxisMap(name, {q: ColumnMap(c.name, place="the guessed map") for q, c in found.items()})
         said += [f"{q} of {name} is {c.name!r} [{c.unit}]" for q, c in found.items()]
+    strange = [c for c in table.columns.values() if _is_strange(c)]
+    said += [f"{c.name!r} is not used, as its unit {c.unit!r} is unknown" for c in strange]
     if doubts or not axes:
         for quantity in ("command", "position"):
             spoiled = _spoiled(table, quantity)
@@ -105,6 +112,9 @@ def draft(table: Table) -> str:
     missing = [c.name for c in table.columns.values() if c.unit is None and c.text is None]
     if missing:
         notes.append(f"The file gives no unit for {', '.join(missing[:8])}{' ...' if len(missing) > 8 else ''}.")
+    strange = [f"{c.unit!r} of {c.name!r}" for c in table.columns.values() if _is_strange(c)]
+    if strange:
+        notes.append(f"Unknown units, for which others stand here: {', '.join(strange[:8])}.")
     content["axis"] = axes
     return toml_text(content, "\n".join(notes))
 
@@ -134,9 +144,11 @@ def _time(table: Table) -> tuple[str | None, str]:
             return found[0].name, ""
     if rising:
         return None, f"{', '.join(c.name for c in rising)} could each be the time; say which in a map"
-    unitless = [c.name for c in columns if _role(c.name) == "time"]
-    if unitless and not in_time:
-        return None, f"{unitless[0]!r} may be the time, but nothing gives its unit; give it in a map"
+    named = [c for c in columns if _role(c.name) == "time"]
+    if named and not in_time:
+        if named[0].unit is not None:
+            return None, f"{named[0].name!r} may be the time, but {_unknown(named[0], 'time')}"
+        return None, f"{named[0].name!r} may be the time, but nothing gives its unit; give it in a map"
     if columns and not any(c.unit or _role(c.name) for c in columns):
         names = ", ".join(c.name for c in columns[:5]) + (" ..." if len(columns) > 5 else "")
         return None, f"nothing tells what {names} are, and in which units; say it in a map"
@@ -215,7 +227,10 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
                     f"; {speeds[0].name} is a velocity, which alone does not do: log the position, or add the "
                     "velocity's integral over time as a column"
                 )
-            return {}, doubt + (f" (no unit: {', '.join(bare[:5])})" if bare else "")
+            strange = [c for c in measured if _is_strange(c) and _role(c.name) in (quantity, None)]
+            doubt += "".join(f"; {c.name!r}: {_unknown(c, quantity)}" for c in strange[:_TOLD])
+            doubt += _may_stand_for(measured) if quantity == "command" else ""
+            return {}, doubt + (f" (no unit: {', '.join(bare[:_TOLD])})" if bare else "")
         if len(fits) > 1:
             names = ", ".join(f"{c.name} [{c.unit}]" for c in fits)
             return {}, f"{names} could each be the {quantity}"
@@ -227,6 +242,27 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
         if len(fits) == 1:
             found[quantity] = fits[0]
     return found, ""
+
+
+def _is_strange(column: Column) -> bool:
+    """Whether the file gives a unit that is none of those known."""
+    return bool(column.unit) and dimension(str(column.unit)) is None
+
+
+def _unknown(column: Column, quantity: str) -> str:
+    return (
+        f"its unit {column.unit!r} is unknown ({known_units(str(column.unit), DIMENSIONS[quantity])}); give the right "
+        "one in a map, with scale = ... where a number of the column is not one of it"
+    )
+
+
+def _may_stand_for(columns: Sequence[Column]) -> str:
+    """That a current, torque or percentage may be the command, which nobody but the user knows."""
+    of = [d for d in DIMENSIONS["command"] if d != "voltage"]
+    drives = [f"{c.name} [{c.unit}]" for c in columns if dimension(c.unit or "") in of]
+    if not drives:
+        return ""
+    return f"; where a drive's {' or '.join(drives[:_TOLD])} stands for the voltage, say so in a map"
 
 
 def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
@@ -251,5 +287,6 @@ def _likely(columns: Sequence[Column], quantity: str) -> Column | None:
     """The first column that may be the quantity, by unit or else by name."""
     measured = [c for c in columns if not _OTHERS & {word.lower() for word in _tokens(c.name)}]
     fits = _fitting(measured, quantity)
-    named = [c for c in measured if _role(c.name) == quantity and c.unit is None]
-    return next(iter([*fits, *named]), None)
+    named = [c for c in measured if _role(c.name) == quantity and (c.unit is None or _is_strange(c))]
+    chosen = [*fits, *named] if any(_role(c.name) == quantity for c in fits) else [*named, *fits]
+    return next(iter(chosen), None)

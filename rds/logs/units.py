@@ -39,14 +39,17 @@ _DIMENSIONS: Mapping[str, tuple[str, Mapping[str, float]]] = MappingProxyType(
 _SPELLINGS: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(("sec", "secs", "second", "seconds", "Sekunden"), "s"),
-        **dict.fromkeys(("msec", "milliseconds"), "ms"),
-        **dict.fromkeys(("usec", "microseconds"), "us"),
+        **dict.fromkeys(("sek", "Sek", "Sec"), "s"),
+        **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
+        **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
         **dict.fromkeys(("meter", "metre", "meters", "metres"), "m"),
-        **dict.fromkeys(("micron", "microns"), "um"),
+        **dict.fromkeys(("millimeter", "millimetre", "millimeters", "millimetres", "Millimeter"), "mm"),
+        **dict.fromkeys(("micron", "microns", "micrometer", "micrometre", "micrometers", "Mikrometer"), "um"),
         **dict.fromkeys(("inch", "inches"), "in"),
-        **dict.fromkeys(("°", "degree", "degrees"), "deg"),
+        **dict.fromkeys(("°", "degree", "degrees", "Grad"), "deg"),
         **dict.fromkeys(("radian", "radians"), "rad"),
-        **dict.fromkeys(("°/s",), "deg/s"),
+        **dict.fromkeys(("°/s", "deg/sec"), "deg/s"),
+        **{f"{length}/sec": f"{length}/s" for length in ("m", "mm", "um", "in", "rad")},
         **dict.fromkeys(("rpm", "RPM", "r/min", "U/min", "1/min", "min-1"), "rev/min"),
         **dict.fromkeys(("U/s", "r/s", "rps"), "rev/s"),
         **dict.fromkeys(("count", "cts", "inc", "incs", "increments", "ticks", "pulses"), "counts"),
@@ -60,6 +63,7 @@ _SPELLINGS: Mapping[str, str] = MappingProxyType(
 _BY_UNIT = MappingProxyType(
     {unit: (dimension, factor) for dimension, (_, units) in _DIMENSIONS.items() for unit, factor in units.items()}
 )
+_ALIKE = 0.75  # of the letters: what is less alike is another unit, not a slip
 # endings of names that say a unit, as in `pos_mm`; not those that are as likely something else (x_in, a_1, p_m)
 _ENDINGS = ("s", "ms", "us", "ns", "mm", "um", "deg", "rad", "counts", "V", "mV", "A", "mA", "N", "Nm", "rpm")
 
@@ -98,15 +102,23 @@ def factor(unit: str, to: str) -> float:
     return from_factor / to_factor
 
 
+def known_units(unit: str, dimensions: Iterable[str]) -> str:
+    """Which units there are for `dimensions`, and which of them an unknown `unit` may be meant for, as words."""
+    known = [name for d in dimensions for name in _DIMENSIONS[d][1]]
+    spelled = {word.casefold(): known_as for word, known_as in _SPELLINGS.items() if known_as in known}
+    spelled |= {name.casefold(): name for name in known}
+    close = get_close_matches(plain(unit).casefold(), spelled, n=1, cutoff=_ALIKE)
+    hint = f"; did you mean {spelled[close[0]]!r}?" if close else ""
+    return f"known units: {', '.join(known)}{hint}"
+
+
 def check_unit(unit: str, dimensions: Iterable[str], what: str) -> str:
     """The dimension of `unit`, which must be one of `dimensions`; InputError lists the units that would do."""
     allowed = list(dimensions)
     found = dimension(unit)
     if found is None:
         known = [name for d in allowed for name in _DIMENSIONS[d][1]]
-        close = get_close_matches(plain(unit), known, n=1, cutoff=0.5)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise InputError(f"unit {unit!r} of {what} is unknown; known units: {', '.join(known)}{hint}")
+        raise InputError(f"unit {unit!r} of {what} is unknown; {known_units(unit, allowed)}")
     if found not in allowed:
         known = [name for d in allowed for name in _DIMENSIONS[d][1]]
         raise InputError(f"{what} is in {unit!r}, which measures {found}; it must be in one of {', '.join(known)}")
