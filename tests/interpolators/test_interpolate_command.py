@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -238,7 +239,8 @@ def test_the_commands_of_the_document(tmp_path: Path, monkeypatch: pytest.Monkey
     assert len(commands) == 6
     for command in commands:
         assert run(command).exit_code == 0, command
-    code = re.search(r"```python\n(.*?)```", text, re.DOTALL)
-    assert code is not None
-    exec(compile(code[1], "docs/interpolation.md", "exec"), {})
+    names: dict[str, Any] = {}
+    for code in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(compile(code, "docs/interpolation.md", "exec"), names)
     assert Path("path.csv").is_file()
+    assert names["result"].metrics["X"]["max_abs_error"] < 0.05  # mm
