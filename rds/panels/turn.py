@@ -10,6 +10,10 @@ from typing import Any
 import anywidget
 import traitlets
 
+from rds.panels.answers import Answers
+
+_FRESH = 1.0  # s: as long as static/turn.js waits for an answer
+
 
 @cache
 def _module() -> str:
@@ -17,7 +21,11 @@ def _module() -> str:
 
 
 class TurnButtons(anywidget.AnyWidget):
-    """`on_word(kind, direction)` hears "turn" every 200 ms while the spindle shall turn, and "stop" once."""
+    """`on_word(kind, direction)` hears "turn" every 200 ms while the spindle shall turn, and "stop" once.
+
+    The first "turn" is an order, which static/presence.js lets go in time; those behind it name an answer that they
+    have had: what was under way while nothing went through moves nothing.
+    """
 
     _esm = traitlets.Unicode().tag(sync=True)
     spindle = traitlets.Unicode("").tag(sync=True)
@@ -26,6 +34,7 @@ class TurnButtons(anywidget.AnyWidget):
     def __init__(self, on_word: Callable[[str, int], None], **options: Any):
         super().__init__(_esm=_module(), **options)
         self._on_word = on_word
+        self._answers = Answers(_FRESH)
         self.on_msg(self._told)
 
     def forget(self) -> None:
@@ -37,7 +46,9 @@ class TurnButtons(anywidget.AnyWidget):
         if not isinstance(content, dict):
             return
         kind, direction = content.get("kind"), content.get("direction", 0)
-        if kind == "stop" or (kind == "turn" and direction in (-1, 1)):
+        number = content.get("answer")
+        moves = kind == "turn" and (number is None or self._answers.fresh(number))
+        if kind == "stop" or (moves and direction in (-1, 1)):
             self._on_word(str(kind), int(direction))
         if kind == "turn":
-            self.send({"kind": "heard"})
+            self.send(self._answers.give())

@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from rds.core.errors import InputError
+from rds.panels.hold import HoldButtons
 from rds.panels.jog import JogView
 from rds.panels.kit.button import run_order
 from rds.panels.kit.notice import Notice
 from rds.panels.presence import Presence
 from rds.panels.program_operator import Operator
 from rds.panels.shell import Shell
+from rds.panels.turn import TurnButtons
 from rds.session import Session
 from rds.session.choices import Choices
 from rds.session.equipment_fields import MODES
@@ -174,3 +177,29 @@ def test_a_late_step_and_a_late_turn_are_said_and_not_done(
     buttons = view._holds["X"] if kind == "step" else view._turns["spindle"]
     buttons._told(None, {"kind": kind, "direction": 1}, None)
     assert "pressed 7 s ago" in view.notice.value
+
+
+def test_words_of_a_held_button_that_come_all_at_once_move_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard: list[str] = []
+    now = [100.0]
+    monkeypatch.setattr("rds.panels.answers.time", SimpleNamespace(monotonic=lambda: now[0]))
+    for made, kind, lasts in ((HoldButtons, "hold", 0.5), (TurnButtons, "turn", 1.0)):
+        buttons = made(lambda kind, direction: heard.append(kind))
+        answers: list[Any] = []
+        monkeypatch.setattr(buttons, "send", answers.append)
+
+        def say(answer: Any, buttons: Any = buttons, kind: str = kind) -> int:
+            buttons._told(None, {"kind": kind, "direction": 1, "answer": answer}, None)
+            return len(heard)
+
+        first = say(None)
+        assert first == (kind == "turn")  # an order, of which presence.js knows how old it is
+        assert say(answers[-1]["number"]) == first + 1
+        last = answers[-1]["number"]
+        now[0] += lasts - 0.1
+        assert say(last) == first + 2
+        now[0] += 7.0  # nothing goes through
+        for answer in (last, 0, True, "1", answers[0]["number"]):
+            assert say(answer) == first + 2
+        assert say(answers[-1]["number"]) == first + 3
+        heard.clear()

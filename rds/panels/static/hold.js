@@ -3,12 +3,13 @@
 // is an order that presence.js lets go if it is not late.
 const BEAT = 50; // ms
 const UNHEARD = 10; // words without an answer, after which it counts as let go: a kernel that was held up, or a
-// connection that broke, would hand on all of them later, when nobody holds the button any more
+// connection that broke, hands on all of them later, when nobody holds the button any more. Each names the last answer
+// that was heard, and moves nothing if that is old; the first word of a press only asks for one
 
 function render({ model, el }) {
   const box = document.createElement("div");
   box.className = "rds-hold";
-  let held = null; // the direction, and the timer that beats
+  let held = null; // the button, and the timer that beats
   let unheard = 0; // words since the last answer
 
   const release = () => {
@@ -22,9 +23,10 @@ function render({ model, el }) {
     if (button.disabled || held !== null || model.get("by_step")) return;
     const say = () => {
       unheard += 1;
-      model.send({ kind: "hold", direction });
+      model.send({ kind: "hold", direction, answer: held.answer });
     };
-    held = { button, timer: setInterval(() => (button.disabled || unheard >= UNHEARD ? release() : say()), BEAT) };
+    const timer = setInterval(() => (button.disabled || unheard >= UNHEARD ? release() : say()), BEAT);
+    held = { button, timer, say, answer: null }; // the last answer that was heard
     button.classList.add("rds-hold-on");
     say();
   };
@@ -71,7 +73,14 @@ function render({ model, el }) {
     for (const button of buttons) button.classList.toggle("rds-order", model.get("by_step"));
     release();
   };
-  const told = (word) => { if (word.kind === "heard") unheard = 0; };
+  const told = (word) => {
+    if (word.kind !== "heard") return;
+    unheard = 0;
+    if (held === null) return;
+    const first = held.answer === null;
+    held.answer = word.number;
+    if (first) held.say(); // the word that moves: the one before has only asked for this answer
+  };
   model.on("change:disabled", enable);
   model.on("change:by_step", set_way);
   model.on("msg:custom", told);

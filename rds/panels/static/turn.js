@@ -23,9 +23,10 @@ function render({ model, el }) {
     forget();
     const say = () => {
       unheard += 1;
-      model.send({ kind: "turn", direction });
+      model.send({ kind: "turn", direction, answer: turning.answer });
+      turning.answer ??= 0; // the order has gone; what comes behind it names an answer
     };
-    turning = { button, direction, timer: setInterval(() => (unheard >= UNHEARD ? stop() : say()), BEAT) };
+    turning = { button, direction, answer: null, timer: setInterval(() => (unheard >= UNHEARD ? stop() : say()), BEAT) };
     button.classList.add("rds-hold-on");
     button.setAttribute("aria-pressed", "true");
     say();
@@ -58,8 +59,10 @@ function render({ model, el }) {
     if (model.get("disabled")) forget();
   };
   const told = (word) => {
-    if (word.kind === "heard") unheard = 0;
     if (word.kind === "forget") forget();
+    if (word.kind !== "heard") return;
+    unheard = 0;
+    if (turning !== null) turning.answer = word.number;
   };
   model.on("change:disabled", enable);
   model.on("msg:custom", told);
