@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.logs.csv_headings import Headings, alternates, labview_units, name_and_unit, paired_headings
 from rds.logs.units import dimension
 from rds.results.units import split_heading
 
@@ -37,6 +38,7 @@ class Layout:
     words: frozenset[int]  # columns whose cells are no numbers
     dates: Mapping[int, bool]  # columns of dates and times of day: whether their first one says its zone
     announced: int | None = None  # samples, where a comment says how many there should be
+    paired: bool = False  # every other column holds the times of the column after it
 
 
 def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
@@ -60,8 +62,11 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
             remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
         raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
     _, width, mark, point, first = best
-    first = _with_faulty_rows(lines, first, mark, point, width)
-    names, units = _headings(lines, first, mark, point, width)
+    found_heads = paired_headings(lines[:first], lambda line: split(line, mark), width)
+    if found_heads is None:
+        first = _with_faulty_rows(lines, first, mark, point, width)
+        found_heads = _headings(lines, first, mark, point, width)
+    names, units, paired = found_heads
     body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
     stamps = {i: found for i in range(width) for row in body[:1] if (found := _DATE.fullmatch(row[i]))}
     dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()}
@@ -73,7 +78,9 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
         and not any(is_number(row[i], point) for row in body)
         and any(row[i].lower() not in BLANKS for row in body)
     )
-    return Layout(encoding, mark, point, first, names, units, words, dates, _announced(lines[:first]))
+    return Layout(
+        encoding, mark, point, first, names, units, words, dates, _announced(lines[:first]), paired or alternates(units)
+    )
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -164,9 +171,7 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
     return at if heading is not None else first
 
 
-def _headings(
-    lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int
-) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
+def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
     """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
     above = [line for line in lines[:first] if line.strip()][-2:]
     rows = [_heading_cells(line, delimiter, width) for line in above]
@@ -176,13 +181,14 @@ def _headings(
         units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
         heads = rows[-2]
     if heads is None or any(is_number(cell, decimal) for cell in heads):
-        return tuple(f"column {i + 1}" for i in range(width)), tuple(units)
+        return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
     names = []
     for i, cell in enumerate(heads):
-        name, unit = split_heading(cell.strip('"'))
+        name, unit = name_and_unit(cell.strip('"'))
         names.append(name or f"column {i + 1}")
         units[i] = unit if unit is not None else units[i]
-    return tuple(names), tuple(units)
+    of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)
+    return Headings(tuple(names), of_labview or tuple(units))
 
 
 def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:

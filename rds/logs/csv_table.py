@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from rds.core.errors import InputError
 from rds.logs.csv_layout import BLANKS, Layout, is_number, sniff, split
 from rds.logs.log import Finding, Gravity
 from rds.logs.table import Column, Table, since_first
-from rds.logs.units import unit_of_name
+from rds.logs.units import factor, unit_of_name
 
 Progress = Callable[[int, int], None]
 _BLOCK = 1 << 22  # bytes
@@ -58,7 +59,27 @@ def read_csv(
         elif not (at and at == len(names) - 1 and name == f"column {at + 1}" and np.isnan(values[at]).all()):
             # but for what a delimiter at the end of each line makes
             columns[name] = Column(name, "s" if at in layout.dates else unit, values[at])
+    if layout.paired:
+        columns = _with_own_times(columns)
     return Table(path, "csv", columns, findings=tuple(findings))
+
+
+def _with_own_times(columns: Mapping[str, Column]) -> dict[str, Column]:
+    """Channels with the times before them; one column of time where all have the same, as they are where no unit is."""
+    times, channels = [*columns.values()][::2], [*columns.values()][1::2]
+    if any(
+        c.unit is None or c.text is not None or not (np.diff(c.values[np.isfinite(c.values)]) >= 0.0).all()
+        for c in times
+    ):
+        return dict(columns)  # not known, or no times
+    if all(np.array_equal(column.values, times[0].values, equal_nan=True) for column in times):
+        return {"time": Column("time", times[0].unit, times[0].values)} | {c.name: c for c in channels}
+    found = {}
+    for time, channel in zip(times, channels, strict=True):
+        there = np.isfinite(time.values)  # a slower channel has fewer rows
+        second = factor(str(time.unit), "s")
+        found[channel.name] = replace(channel, values=channel.values[there], time=time.values[there] * second)
+    return found
 
 
 def missing_samples(announced: int, found: int, who: str) -> Finding:

@@ -140,8 +140,8 @@ def _time(table: Table) -> tuple[str | None, str]:
     rising = [c for c in in_time if _rises(c.values)]
     named = [c for c in rising if _role(c.name) == "time"]
     for found in (rising, named):
-        if len(found) == 1:
-            return found[0].name, ""
+        if found and all(_are_alike(c, found[0]) for c in found):
+            return found[0].name, ""  # one alone, or the same in several columns
     if rising:
         return None, f"{', '.join(c.name for c in rising)} could each be the time; say which in a map"
     named = [c for c in columns if _role(c.name) == "time"]
@@ -187,6 +187,10 @@ def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
     return sentence + "; if its rows are equally spaced in time, say so in a map: rate = 1000.0 (Hz) under [time]"
 
 
+def _are_alike(a: Column, b: Column) -> bool:
+    return a is b or (a.unit == b.unit and np.array_equal(a.values, b.values, equal_nan=True))
+
+
 def _rises(values: np.ndarray) -> bool:
     steps = np.diff(values[:100_000])
     return len(steps) > 0 and bool(np.mean(steps > 0.0) >= _RISING)
@@ -197,7 +201,7 @@ def _tokens(name: str) -> list[str]:
 
 
 def _role(name: str) -> str | None:
-    words = [word.lower() for word in _tokens(name)]
+    words = [word.lower().rstrip("0123456789") or word for word in _tokens(name)]  # time1, u2
     return next((role for role, known in _WORDS.items() if any(word in known for word in words)), None)
 
 

@@ -11,7 +11,7 @@ from rds.core.errors import InputError
 from rds.logs.table import Table
 
 Progress = Callable[[int, int], None]
-TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn")
+TEXTS = (".csv", ".txt", ".dat", ".tsv", ".prn", ".lvm")
 BUSES = (".asc", ".blf", ".log", ".trc", ".mf4", ".db")
 MEASUREMENTS = (".mf4", ".mdf", ".dat")  # of which some are text, and some bus logs
 

@@ -1,0 +1,91 @@
+"""Tables as recorders and drives export them: where names, units and times stand in their heads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.logs.csv_headings import name_and_unit
+from rds.logs.read_log import read_log
+
+T = np.arange(400)  # ms
+U, X = np.sin(0.03 * T), 3.0 * np.cos(0.03 * T)
+LABVIEW = """LabVIEW Measurement\t
+Separator\tTab
+Decimal_Separator\t.
+***End_of_Header***\t
+\t
+Channels\t2\t\t
+Samples\t400\t400\t
+Y_Unit_Label\tVolts\tmm\t
+X_Dimension\tTime\tTime\t
+Delta_X\t1.000000E-3\t1.000000E-3\t
+***End_of_Header***\t\t\t
+X_Value\tVoltage\tPosition\tComment
+"""
+TWINCAT = """Name;Scope Project
+File;C:\\a.svdx
+Start time of export;133547077451230000;Tuesday, March 12, 2024;14:22:25.123
+
+Name;ActPos;Name;CmdVolt
+SymbolComment;;SymbolComment;
+SymbolName;Axes.Axis 1.ActPos;SymbolName;MAIN.fU
+Port;501;Port;851
+Unit;mm;Unit;V
+Data-Type;REAL64;Data-Type;REAL64
+SampleTime[ms];1;SampleTime[ms];1
+"""
+
+
+def written(folder: Path, name: str, head: str, columns: Sequence[np.ndarray], mark: str, end: str = "") -> Path:
+    path = folder / name
+    rows = (mark.join("" if np.isnan(x) else f"{x:.6f}" for x in row) + end for row in zip(*columns, strict=True))
+    path.write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("cell", "name", "unit"),
+    [
+        ("pos [mm]", "pos", "mm"),
+        ("pos {furlong}", "pos", "furlong"),
+        ("pos/mm", "pos", "mm"),
+        ("speed / mm/s", "speed", "mm/s"),
+        ("pos in mm", "pos", "mm"),
+        ("pos, µm", "pos", "µm"),
+        ("mm/s", "mm/s", None),  # a unit alone is no name with one
+        ("rev/min", "rev/min", None),
+        ("counts/s", "counts/s", None),
+        ("in/out", "in/out", None),
+        ("pos/furlong", "pos/furlong", None),
+        ("u, filtered", "u, filtered", None),
+    ],
+)
+def test_name_and_unit_of_a_heading(cell: str, name: str, unit: str | None) -> None:
+    assert name_and_unit(cell) == (name, unit)
+
+
+def test_a_labview_measurement(tmp_path: Path) -> None:
+    (log,) = read_log(written(tmp_path, "a.lvm", LABVIEW, [T / 1e3, U, X], "\t", "\t"))
+    assert log.sample_period == pytest.approx(1e-3) and log.units["position"] == "mm" and log.units["command"] == "V"
+    assert np.allclose(log.position, X, atol=1e-6) and np.allclose(log.command, U, atol=1e-6)
+
+
+def test_a_scope_with_a_time_for_each_channel(tmp_path: Path) -> None:
+    (log,) = read_log(written(tmp_path, "same.csv", TWINCAT, [T, X, T, U], ";"))
+    assert np.allclose(log.time, T / 1e3) and np.allclose(log.position, X, atol=1e-6)
+    assert np.allclose(log.command, U, atol=1e-6)
+    slow = np.where(np.arange(400) < 200, 2.0 * T, np.nan)  # ms: the command every second sample, in fewer rows
+    held = np.where(np.isnan(slow), np.nan, np.sin(0.03 * slow))
+    (log,) = read_log(written(tmp_path, "slow.csv", TWINCAT, [T, X, slow, held], ";"))
+    assert len(log) == 400 and np.allclose(log.command, np.sin(0.03 * (T // 2 * 2)), atol=1e-6)
+
+
+def test_times_and_channels_in_turn(tmp_path: Path) -> None:
+    head = "t1 [ms],ActPos [mm],t2 [ms],CmdVolt [V]\n"
+    (log,) = read_log(written(tmp_path, "own.csv", head, [T, X, T - 0.25, U], ","))
+    assert np.allclose(log.time, T / 1e3) and np.allclose(log.command, U, atol=1e-6)
+    assert any("last received value is held: it is 0.00025 s old" in finding.what for finding in log.findings)
