@@ -11,8 +11,8 @@ _KEPT = 50  # answers of which it is remembered when they were given
 class Answers:
     """Each word of a held button names the last answer that its page has heard; the first ones name none.
 
-    When a connection, or a kernel, stands still and comes back, all words that were under way come at once. None of them
-    may move anything: nobody knows whether the button is held still.
+    When a connection, or a kernel, stands still and comes back, all words that were under way come at once. None of
+    them may move anything: nobody knows whether the button is held still.
     """
 
     def __init__(self, lasts: float):
