@@ -34,7 +34,7 @@ from rds.runtime.processes import is_alive, wait_for_end
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
 from rds.runtime.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
 from rds.runtime.ring import Ring
-from rds.runtime.shared import remove_left, ring_path
+from rds.runtime.shared import folders, remove_left
 from rds.runtime.stopwatch import TIMING_COLUMNS
 
 Progress = Callable[[int, int], None]  # samples taken, samples in all
@@ -145,10 +145,7 @@ def _recorded(
     if plan.bus.get("interface") == BUILTIN:
         about["channel"] = plan.bus["channel"]
     capacity = min(plan.most_samples, max(_RING_BYTES // (8 * len(columns)), 1000))
-    path = ring_path(about["run"])
-    remove_left(path.parent)
-    ring = Ring.create(path, columns, capacity, **about)
-    desk = Desk.create(ring.desk_path, plan.channels())
+    ring, desk = _shared(plan, columns, capacity, about)
     try:
         with tempfile.TemporaryFile() as said:  # by the recorder, which says something only if it fails
             command = [sys.executable, "-P", "-m", "rds.runtime.recorder", str(directory), str(ring.path)]
@@ -176,6 +173,29 @@ def _recorded(
         for left in (ring.path, ring.desk_path):
             with contextlib.suppress(OSError):
                 left.unlink()
+
+
+def _shared(plan: Plan, columns: list[str], capacity: int, about: dict[str, Any]) -> tuple[Ring, Desk]:
+    """The memory that the run's processes share, in the first folder that has room; InputError if none has."""
+    full = []
+    for folder in folders():
+        remove_left(folder)
+        path = folder / f"rds-{about['run']}.ring"
+        try:
+            ring = Ring.create(path, columns, capacity, **about)
+            try:
+                return ring, Desk.create(ring.desk_path, plan.channels())
+            except OSError:
+                ring.close()
+                path.unlink()
+                raise
+        except OSError as error:
+            full.append(f"{folder}: {error.strerror or error}")
+    size = 8 * capacity * len(columns) / 1e6
+    raise InputError(
+        f"the memory that the run's processes share ({size:.1f} MB) finds no room ({'; '.join(full)}); make some "
+        "there, or set TMPDIR to a folder that has it"
+    )
 
 
 def _dumped(plan: Plan) -> bytes:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
+from rds.runtime.shared import make
 from rds.runtime.words import read_word, write_float, write_word
 
 _MAGIC = b"RDSDESK1"
@@ -91,7 +92,7 @@ class Desk:
 
     @classmethod
     def create(cls, path: str | Path | None, channels: Sequence[Channel]) -> Desk:
-        """A new desk in the file `path`, or (None) in the memory of this process alone."""
+        """A new desk in the file `path`, or (None) in the memory of this process alone. OSError if there is no room."""
         text = json.dumps([asdict(channel) for channel in channels]).encode()
         values = struct.Struct(f"<{len(channels)}d")
         first = _TEXT + _text_size(len(text))
@@ -99,8 +100,7 @@ class Desk:
         if path is None:
             memory = mmap.mmap(-1, size)
         else:
-            with open(path, "wb") as file:
-                file.truncate(size)
+            make(path, size)
             memory = _map(path)
         write_word(memory, _SIZE, len(text))
         memory[_TEXT : _TEXT + len(text)] = text

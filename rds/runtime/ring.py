@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rds.core.errors import InputError
-from rds.runtime.shared import hold
+from rds.runtime.shared import hold, make
 from rds.runtime.words import read_word, write_word
 
 _MAGIC = b"RDSRING1"
@@ -36,14 +36,13 @@ class Ring:
 
     @classmethod
     def create(cls, path: str | Path, columns: list[str], capacity: int, **about: Any) -> Ring:
-        """A new ring in the file `path`; `about` (JSON) travels in its header."""
+        """A new ring in the file `path`; `about` (JSON) travels in its header. OSError if there is no room for it."""
         description = {"columns": columns, "capacity": capacity, **about}
         text = json.dumps(description).encode()
         if len(text) > _HEADER - _TEXT:
             raise InputError(f"the run's description takes {len(text)} bytes; at most {_HEADER - _TEXT} fit")
         size = _HEADER + capacity * 8 * len(columns)
-        with open(path, "wb") as new:
-            new.truncate(size)
+        make(path, size)
         memory, file = _map(path)
         memory[_TEXT : _TEXT + len(text)] = text
         write_word(memory, _TEXT_SIZE, len(text))

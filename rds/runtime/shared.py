@@ -17,11 +17,27 @@ from typing import IO
 _YOUNG = 60.0  # s: a ring may just have been made, and its lock not yet taken
 
 
-def ring_path(run: str) -> Path:
-    """Of the ring of the run with this name, in a folder that has room; its desk is beside it."""
-    memory = Path("/dev/shm")
-    folder = memory if os.access(memory, os.W_OK) else Path(tempfile.gettempdir())
-    return folder / f"rds-{run}.ring"
+def folders() -> list[Path]:
+    """Where the ring of a run may lie, with its desk beside it; the best first."""
+    memory, disk = Path("/dev/shm"), Path(tempfile.gettempdir())
+    return [memory, disk] if os.access(memory, os.W_OK) else [disk]
+
+
+def make(path: str | Path, size: int) -> None:
+    """A new file of `size` bytes that are really there, of zeros. OSError where there is no room; then it is no file.
+
+    Of one that is only said to be so long, the kernel would look for the room when a process writes, and kill the
+    process if there is none.
+    """
+    try:
+        with open(path, "wb") as new:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(new.fileno(), 0, size)
+            else:
+                new.truncate(size)
+    except OSError:
+        Path(path).unlink(missing_ok=True)
+        raise
 
 
 def hold(ring: IO[bytes]) -> None:

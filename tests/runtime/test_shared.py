@@ -7,7 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from lost_machines import unless_lost
 
+import rds
+from rds.core.errors import InputError
+from rds.modes import host
 from rds.runtime import shared
 from rds.runtime.desk import Desk
 from rds.runtime.ring import Ring
@@ -41,6 +45,29 @@ def test_a_ring_is_removed_when_the_last_of_its_processes_is_killed(
         other.kill()
     shared.remove_left(tmp_path)
     assert set(tmp_path.iterdir()) == set()
+
+
+def test_shared_memory_is_there_to_its_last_byte(tmp_path: Path) -> None:
+    """In a full /dev/shm, as that of a container soon is, its pages were missing when the loop came to write them."""
+    ring = Ring.create(tmp_path / "rds-0.ring", ["a", "b"], 10_000)
+    Desk.create(ring.desk_path, []).close()
+    ring.close()
+    for path in (ring.path, ring.desk_path):
+        about = path.stat()
+        assert about.st_blocks * 512 >= about.st_size > 100_000
+
+
+def test_a_run_whose_memory_finds_no_room_goes_to_the_next_folder_or_says_so(
+    alone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiment = rds.Experiment(duration=0.1, reference=rds.sinusoid(2.0, 1.0), controller={"name": "p"})
+    monkeypatch.setattr(host, "folders", lambda: [alone / "missing", alone])
+    unless_lost(lambda: experiment.run("emulation", out=alone / "run"))
+    assert not list(alone.glob("rds-*"))
+    monkeypatch.setattr(host, "folders", lambda: [alone / "missing"])
+    with pytest.raises(InputError, match=r"\(0\.0 MB\) finds no room \(.*missing: No such file.*make some"):
+        experiment.run("emulation", out=alone / "none")
+    assert not (alone / "none").exists()
 
 
 def test_a_ring_that_was_just_made_and_what_is_none_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
