@@ -10,6 +10,7 @@ import pytest
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.grading.cases import CaseRun
 from rds.grading.criteria import KINDS
+from rds.grading.criteria.measuring import NotMeasured
 from rds.results import Result
 
 T = 0.01
@@ -48,6 +49,11 @@ def test_a_line_that_is_too_fast_and_ends_too_early() -> None:
     run = rows_of(LINE, straight(25, 0.9))
     assert measured("end-point-error", run) == pytest.approx(0.5, rel=1e-12)
     assert measured("feed-error", run) == pytest.approx(80.0, rel=1e-9)
+
+
+def test_a_feed_rate_is_not_kept_by_rows_that_do_not_move() -> None:
+    with pytest.raises(NotMeasured, match="nothing moves"):
+        measured("feed-error", rows_of(LINE, np.zeros((5, 2))))
 
 
 def test_beside_the_line_is_off_the_path() -> None:

@@ -66,6 +66,17 @@ def test_the_class_is_spread_from_all_points_to_none(graded: tuple[str, BatchOut
     assert any(made.late_days > 0.0 and made.score < made.before_penalty for made in outcome.grades.values())
 
 
+@pytest.mark.parametrize(
+    "body", ["for _ in range(3): yield segment.end, o, o", "yield segment.start, o, o", "yield o, o, o"]
+)
+def test_rows_that_interpolate_nothing_earn_little(body: str, tmp_path: Path, pool: Pool) -> None:
+    path = tmp_path / "my_interpolator.py"
+    head = "params = {'acceleration': 1.0}\ndef interpolate(segment, T, params):\n    o = [0.0] * len(segment.start)\n"
+    path.write_text(f"{head}    {body}\n")
+    made = grade(read_assignment(ASSIGNMENTS / "interpolator"), path, "ada", pool)
+    assert made.status is Status.OK and made.score <= 16.0  # for ends that are where they should be
+
+
 def test_only_the_copy_is_pointed_out_and_costs_nothing(graded: tuple[str, BatchOutcome]) -> None:
     name, outcome = graded
     pairs = json.loads((outcome.folder / "similarity.json").read_text())["pairs"]
