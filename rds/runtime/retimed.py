@@ -22,6 +22,7 @@ from rds.runtime.ramp import EXTRA_SHARPEST, EXTRA_STEEPEST, FURTHEST, SHARPEST,
 FREE = 0.997  # up to this rate no limit that the plan keeps can be exceeded
 EXCESS = 0.001  # by which differences of the samples sent may exceed a limit, relative: quintics are no plan
 PATIENCE = 0.5  # s after which somebody who wants it slower gets the gentlest step, wherever the path is
+_FEWEST = 9  # samples of a ramp; from rest, a shorter one would go back a little to land on a sample of the plan
 _SHORTEST, _LONGEST = 0.02, 600  # s and samples, of a ramp: a change that takes longer is made in steps
 _STAY = 8  # samples at a rate above FREE that are checked at once
 _LANDS_WITH = 0.25  # of what acceleration and jerk allow, for ending at a sample of the plan
@@ -127,7 +128,7 @@ class Retimed:
             change *= 1.0 if samples == 0 else (_LONGEST / samples) ** 2
             speed = v * abs(change)
             seconds = max(_SHORTEST, (STEEPEST * speed / acceleration).max(), np.sqrt(SHARPEST * speed / jerk).max())
-            samples = max(ceil(longer * float(seconds) / T), 4)
+            samples = max(ceil(longer * float(seconds) / T), _FEWEST)
         return Ramp(rate, wanted if change == wanted - rate else rate + change, max(samples, ceil(landing / T)))
 
     def _share(self, ramps: list[Ramp], until: int) -> float:

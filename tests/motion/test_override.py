@@ -93,6 +93,22 @@ def test_back_at_100_percent_the_samples_are_the_planned_ones_again() -> None:
     assert len(rest) > 500 and (rest == motion.position[-len(rest) :]).all()
 
 
+def test_it_never_goes_back_at_a_long_sample_period() -> None:
+    """From 0 to 100 % in 4 samples of 10 ms, it went back by up to 0.7 % of a sample to land on one of the plan."""
+    T = 0.01
+    motion, _, _ = planned(polygon([(0, 0), (3, 0)], 1.0), LIMITS, T)
+    table = np.stack((LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk))[:, :4]
+    rows = {name: getattr(motion, name)[:, :4].copy() for name in ("position", "velocity", "acceleration")}
+    program = Program(("X", "Y", "Z", "A"), None, **rows, line=motion.line, happenings=(), home=(), limits=table)
+    for every in range(1, 30):
+        follower = Retimed(program, T)
+        k = place = 0
+        while follower.place < len(motion) - 1:
+            follower.advance(float(k // every % 2 if k < 800 else 1.0), len(motion) - 1)
+            assert follower.place >= place and follower.rate >= 0.0
+            place, k = follower.place, k + 1
+
+
 def test_200_percent_is_reached_where_the_axes_have_it_to_spare() -> None:
     segments = polygon([(0, 0), (40, 0), (40, 30)], 5.0, mode=BLEND)
     _, _, rates = followed(segments, [2.0], 10)
