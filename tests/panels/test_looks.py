@@ -55,13 +55,19 @@ def test_long_lines_of_a_command_scroll_within_the_panel(open_page: Callable[...
 def test_what_is_said_of_a_button_is_in_sight_beside_it_and_each_panel_begins_at_its_top(
     open_page: Callable[..., Any],
 ) -> None:
-    page = open_page("Data")
+    page = open_page("Data", height=600)
     page.click('button:text-is("Validate")')  # below what fits on the page
     said = page.locator('.rds-main .rds-notice:visible:has-text("other data")')
     said.wait_for()
     assert page.evaluate("document.querySelector('.rds-app').scrollTop") > 0
     head = page.locator(".rds-head").bounding_box()
     assert said.bounding_box()["y"] >= head["y"] + head["height"]
+    file = page.locator('.rds-field:has-text("File with logged data") input')
+    page.mouse.move(640, 400)
+    page.mouse.wheel(0, 3000)
+    page.wait_for_function("document.querySelector('.rds-nav').getBoundingClientRect().y < 0")
+    file.focus()
+    assert file.bounding_box()["y"] >= head["y"] + head["height"]
     page.click('.rds-nav button:text-is("Help")')
     page.wait_for_selector('.rds-title h1:text-is("Help")')
     page.wait_for_function("document.querySelector('.rds-app').scrollTop === 0")
