@@ -7,6 +7,7 @@ modulo `SEATS`. The hub writes, nodes read.
 from __future__ import annotations
 
 import contextlib
+import errno
 import mmap
 import os
 from pathlib import Path
@@ -15,7 +16,7 @@ SEATS = 1 << 16
 
 
 class Board:
-    """The hub's end: makes the file at `path`, and removes it."""
+    """The hub's end: makes the file at `path`, and removes it. OSError if there is no room for it."""
 
     def __init__(self, path: Path):
         self._path = path
@@ -24,7 +25,10 @@ class Board:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
         try:
             os.truncate(descriptor, 0)
-            os.truncate(descriptor, SEATS)
+            # written, not only said to be so long: where the disk has no room, a later write would kill the hub
+            if os.write(descriptor, bytes(SEATS)) < SEATS:
+                path.unlink()
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
             self._states = mmap.mmap(descriptor, SEATS)
         finally:
             os.close(descriptor)

@@ -111,7 +111,10 @@ class HubNodes:
         if settings.bitrate:
             from rds.bus.timed_medium import TimedMedium  # the untimed bus starts without its tables
 
-            self._board = Board(self._address.board_path)
+            try:
+                self._board = Board(self._address.board_path)
+            except OSError as error:
+                raise wire.WireError(f"the board of the bus cannot be made: {error.strerror}") from error
             self._medium = TimedMedium(settings.bitrate, settings.data_bitrate or None, self._show)
         else:
             self._medium = UntimedMedium()

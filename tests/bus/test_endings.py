@@ -17,6 +17,7 @@ import can
 import pytest
 
 from rds.bus import wire
+from rds.bus.board import SEATS, Board
 from rds.bus.hub_loop import STALL
 
 from .conftest import FORK, wait_for
@@ -160,6 +161,24 @@ def test_a_hub_ends_although_a_node_had_more_to_send_than_others_stayed_for(
     time.sleep(0.3)  # the hub has seen it
     reader.shutdown()
     assert process.wait(30) == 0
+
+
+def test_a_board_for_which_there_is_no_room_is_refused(
+    open_bus: Opener, runtime_directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hub that wrote where a full disk had no page was killed."""
+    path = runtime_directory / "board"
+    board = Board(path)
+    assert path.stat().st_blocks * 512 >= SEATS
+    board.remove()
+    with monkeypatch.context() as patched, pytest.raises(OSError, match="No space left"):
+        patched.setattr(os, "write", lambda descriptor, data: 512)
+        Board(path)
+    assert not path.exists()
+    (runtime_directory / "rds").mkdir(mode=0o700, exist_ok=True)
+    (runtime_directory / "rds" / "test.states").mkdir()
+    with pytest.raises(can.CanInitializationError, match="refused: the board of the bus cannot be made"):
+        open_bus(bitrate=500_000)
 
 
 def test_a_killed_hub_is_an_error_at_every_node(open_bus: Opener, caplog: pytest.LogCaptureFixture) -> None:
