@@ -18,7 +18,7 @@ LAGS = 25
 BAND = 2.58  # standard deviations: 99 %
 _SURROGATES = 299
 _LEAST_BLOCKS = 100
-_LONGEST = 200_000  # samples that are tested
+LONGEST = 200_000  # samples that are tested
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def residual_tests(
     `frequency` is the motion's bandwidth in Hz, `resolution` the encoder's step in the residual's unit (None: fine);
     `sensitivities` (samples, parameters) with `covariance` say how uncertain the modelled output is.
     """
-    use = slice(0, min(len(residual), _LONGEST))
+    use = slice(0, min(len(residual), LONGEST))
     residual, command, modelled = residual[use], command[use], modelled[use]
     block = block_length(frequency, T, len(residual))
     spread = _parameter_spread(sensitivities, covariance, use)

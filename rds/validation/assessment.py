@@ -14,9 +14,9 @@ from rds.identification.estimate import Errors
 from rds.identification.initial_state import estimate_start
 from rds.identification.kstep import STEPS, ahead, errors_of
 from rds.identification.needed_voltage import NeededVoltage, needed_voltage, smoothed_velocity
-from rds.identification.residuals import ResidualTest, bandwidth, block_length, block_means, residual_tests
-from rds.identification.smoothing import motion_of
+from rds.identification.residuals import LONGEST, ResidualTest, bandwidth, block_length, block_means, residual_tests
 from rds.logs.log import Log
+from rds.logs.motion import noise
 from rds.validation.attainable import Attainable, attainable
 from rds.validation.candidate import Candidate, check_units
 from rds.validation.same_data import Overlap, overlap
@@ -139,7 +139,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
         "block_time": block_means(t[first:], block),
         "block_velocity": rates[0],
         "block_modelled": rates[1],
-        "noise": float(max(motion_of(log).noise, (log.resolution or 0.0) / sqrt(12.0))),
+        "noise": max(noise(y[:LONGEST]), (log.resolution or 0.0) / sqrt(12.0)),
         "overlap": overlap(candidate, log),
         "ranges": _ranges(candidate, log, rates[0]),
     }
@@ -231,6 +231,7 @@ def _gain(measured: np.ndarray, modelled: np.ndarray) -> float | None:
 def _tests(
     candidate: Candidate, log: Log, first: int, start: tuple[float, ...], modelled: np.ndarray, frequency: float
 ) -> ResidualTest:
+    log, modelled = log.part(0, first + LONGEST), modelled[:LONGEST]  # of the rest, no derivatives are needed
     names, covariance = candidate.estimated, None
     slopes = None
     if names and candidate.covariance is not None:
