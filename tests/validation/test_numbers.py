@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rds.core.errors import InputError
 from rds.identification.initial_state import estimate_start
 from rds.identification.needed_voltage import needed_voltage, static_curve
-from rds.identification.residuals import BAND, bandwidth, block_length, effective_samples, residual_tests
+from rds.identification.residuals import BAND, LONGEST, bandwidth, block_length, effective_samples, residual_tests
 from rds.identification.structures import structure
 from rds.logs.fingerprint import fingerprint, shared
 from rds.validation.assessment import assess, smoothed_velocity
@@ -225,3 +225,11 @@ def test_an_exact_model_with_backlash_needs_hardly_another_voltage() -> None:
     y = np.rint(made.respond(t, u, (0.0, 0.0, 0.0), values) / STEP) * STEP
     found = assess(Candidate("play", made, values), made_log(u, y)).voltage
     assert found is not None and found.relative_percent is not None and found.relative_percent < 10.0
+
+
+def test_the_bandwidth_of_a_long_log_is_summed_over_its_parts() -> None:
+    t = np.arange(2 * LONGEST + 1234) * T
+    rate = np.sin(2 * np.pi * 3.0 * t) + 0.5 * np.sin(2 * np.pi * 11.0 * t) + 7.0
+    assert bandwidth(rate, T) == pytest.approx(11.0, abs=0.02)
+    assert bandwidth(rate[:LONGEST], T) == pytest.approx(11.0, abs=0.02)
+    assert bandwidth(np.full(2 * LONGEST, 3.0), T) == 0.0
