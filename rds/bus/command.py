@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import time
 
 from rds.bus.address import lock_file, runtime_directory
 from rds.core.errors import MachineError
 
 _LONGEST = 400  # bytes of a holder's name
+_YOUNG = 60.0  # s: a file may just have been made, and its lock not yet taken
 
 
 class Command:
@@ -69,3 +71,11 @@ def commanded(channel: str) -> bool:
     free = command.acquire()
     command.release()
     return not free
+
+
+def remove_left() -> None:
+    """Remove the files of runs that were killed while they commanded a channel; that of a living one is locked."""
+    for path in runtime_directory().glob("*.command"):
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > _YOUNG:
+                commanded(path.stem)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from rds.bus import wire
 from rds.bus.address import Address
+from rds.runtime.processes import how_it_ended
 
 PATIENCE = 10.0  # s for a hub to start and to answer
 _RETRY = 0.002  # s between looks at a hub that somebody else is starting or that is just ending
@@ -160,7 +161,8 @@ def _start_hub(address: Address, lock: int, deadline: float) -> None:
         process.communicate()
         raise TimeoutError(f"the hub of channel {address.channel!r} did not start in time") from None
     if process.returncode != 0:
-        raise OSError(f"the hub of channel {address.channel!r} did not start: {text.decode(errors='replace').strip()}")
+        why = text.decode(errors="replace").strip() or f"it {how_it_ended(process.returncode)}"
+        raise OSError(f"the hub of channel {address.channel!r} did not start: {why}")
 
 
 def _start_hub_on_windows(address: Address, deadline: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import tempfile
@@ -11,6 +12,9 @@ from typing import Any
 
 from rds.bus.dialects import server_module
 from rds.core.errors import MachineError
+from rds.runtime.processes import how_it_ended
+
+_ENDING = 1.0  # s for one that has closed its stdout
 
 
 def start_server(
@@ -44,11 +48,14 @@ def start_server(
         )
         assert server.stdout is not None
         if not server.stdout.readline().startswith(b"ready"):
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                server.wait(_ENDING)  # to know how it ended by itself
             server.kill()
             server.communicate()
             said.seek(0)
             last = said.read().decode(errors="replace").strip().splitlines()[-1:]
-            raise MachineError(f"the machine on the built-in bus did not start: {''.join(last) or 'it said nothing'}")
+            why = "".join(last) or f"its process {how_it_ended(server.returncode)}"
+            raise MachineError(f"the machine on the built-in bus did not start: {why}")
     return server
 
 

@@ -165,7 +165,7 @@ def _recorded(
                     ring.ask_to_stop()
                     recorder.wait()
                 if recorder.returncode != 0:
-                    _take_over(directory, ring, plan.T, _why_it_ended(recorder.returncode, said))
+                    _take_over(directory, ring, plan.T, _how_it_ended(recorder.returncode, said))
         return bool(ring.head)
     finally:
         ring.close()
@@ -245,7 +245,7 @@ def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress:
         progress(ring.head, plan.samples)
 
 
-def _why_it_ended(code: int, said: IO[bytes]) -> str:
+def _how_it_ended(code: int, said: IO[bytes]) -> str:
     """What became of a recorder that did not end well, by its exit code and what it said on stderr."""
     if code < 0:
         how = f"was ended from outside, by signal {-code}"
@@ -253,7 +253,7 @@ def _why_it_ended(code: int, said: IO[bytes]) -> str:
         said.seek(0)
         lines = said.read().decode(errors="replace").strip().splitlines()
         how = f"failed with code {code}" + (f"; the last that it said: {lines[-1][:300]}" if lines else "")
-    return f"the recorder process {how}; the samples up to then are kept"
+    return f"the recorder process {how}"
 
 
 def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
@@ -272,4 +272,5 @@ def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
             break
         time.sleep(_POLL)
     recorder.close()
-    finish(directory, ring, {"ending": Ending.KILLED, "reason": reason, "rows": ring.head})
+    kept = "; the samples up to then are kept" if ring.head else ", before the first sample"
+    finish(directory, ring, {"ending": Ending.KILLED, "reason": f"{reason}{kept}", "rows": ring.head})

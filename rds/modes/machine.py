@@ -27,7 +27,7 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
         yield replace(plan, bus=bus)
         return
     from rds.bus.address import channels
-    from rds.bus.command import commanded
+    from rds.bus.command import commanded, remove_left
     from rds.bus.dialects import DEFAULT, is_served
     from rds.bus.link import default_channel
     from rds.bus.server_process import end_server, start_server
@@ -43,6 +43,7 @@ def machine_behind(plan: Plan) -> Iterator[Plan]:
         return
     if given is None:
         channel = f"{plan.machine.name[:20]}-{secrets.token_hex(4)}"
+    remove_left()
     timing = {key: bus[key] for key in TIMING if key in bus}
     server = start_server(dialect, plan.machine.path, channel, timing)
     try:

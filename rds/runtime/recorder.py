@@ -116,7 +116,7 @@ def conclude(directory: Path, rows: int, code: int | None, hung: str | None) -> 
     try:
         report: dict[str, Any] = json.loads((directory / REPORT).read_text())
     except (OSError, ValueError):
-        report = {"ending": Ending.KILLED, "reason": _death(directory, code)}
+        report = {"ending": Ending.KILLED, "reason": _death(directory, rows, code)}
     if hung:
         report |= {"ending": Ending.FAULT, "reason": hung}
     return report | {"rows": rows}
@@ -134,9 +134,10 @@ def finish(directory: Path, ring: Ring, ending: dict[str, Any]) -> None:
             (directory / name).unlink()
 
 
-def _death(directory: Path, code: int | None) -> str:
+def _death(directory: Path, rows: int, code: int | None) -> str:
     if code is not None and code < 0:
-        return f"the target process was ended by signal {-code}; its samples up to then are kept"
+        kept = "; its samples up to then are kept" if rows else ", before its first sample"
+        return f"the target process was ended by signal {-code}{kept}"
     said = ""
     with contextlib.suppress(OSError):
         lines = (directory / LOG).read_text(errors="replace").strip().splitlines()

@@ -20,10 +20,14 @@ from lost_machines import TRIES, unless_lost
 from misbehaviour import every, process, send
 
 import rds
+from rds.bus.address import runtime_directory
 from rds.bus.calling import find_machine
+from rds.bus.command import Command, remove_left
 from rds.bus.dialects import server_module
 from rds.bus.frames import CALL, Kind, Status, answer_identifier, decode_answer
+from rds.bus.server_process import start_server
 from rds.results import Result
+from rds.runtime.recorder import conclude
 from rds.runtime.ring import Ring
 
 pytestmark = pytest.mark.realtime
@@ -142,6 +146,30 @@ def test_a_killed_target(experiment: Maker, during: During, alone: Path) -> None
         (alone / "run" / name).unlink()
     raw = check_readable(alone / "run", "killed", 300)
     assert (raw["X_measured"] == result["X_measured"]).all()
+
+
+def test_what_is_kept_of_a_killed_run_is_said_only_if_there_is_something(tmp_path: Path) -> None:
+    assert conclude(tmp_path, 10, -9, None)["reason"].endswith("by signal 9; its samples up to then are kept")
+    assert conclude(tmp_path, 0, -9, None)["reason"].endswith("by signal 9, before its first sample")
+
+
+def test_the_command_of_a_killed_run_is_cleared_away(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each had a channel of its own, and its file stayed."""
+    monkeypatch.setattr("rds.bus.command._YOUNG", -1.0)
+    folder = runtime_directory()
+    (folder / "killed.command").write_text("process 1")
+    with Command("living"):
+        remove_left()
+        assert [path.name for path in folder.glob("*.command")] == ["living.command"]
+
+
+def test_a_machine_that_is_killed_before_it_is_there(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was said to have said nothing."""
+    (alone / "python").write_text("#!/bin/sh\nkill -9 $$\n")
+    (alone / "python").chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(alone / "python"))
+    with pytest.raises(rds.MachineError, match="did not start: its process was ended by signal 9"):
+        start_server("rds", "mini-cnc", "own")
 
 
 def test_every_sample_before_the_kill_is_on_the_disk(experiment: Maker, during: During, alone: Path) -> None:
@@ -367,8 +395,6 @@ def test_a_new_run_replaces_an_earlier_one_in_its_folder(experiment: Maker, duri
 def test_a_run_that_never_began_leaves_the_earlier_one(experiment: Maker, alone: Path) -> None:
     first = unless_lost(lambda: experiment(duration=0.2).run("emulation", out=alone / "run"))
     with served("own"):
-        from rds.bus.command import Command
-
         with Command("own"), pytest.raises(rds.MachineError, match="another run commands the machine"):
             experiment(duration=0.2, bus={"channel": "own"}).run("emulation", out=alone / "run")
     assert (rds.open_result(alone / "run")["time"] == first["time"]).all()
