@@ -141,10 +141,19 @@ def _validate(student: StudentFile) -> None:
             f"params is {shown(student.params)} ({kind}); it must be a dict of defaults, as in {{'gain': 20.0}}", where
         )
     for name, function in student.functions.items():
-        if fault := argument_fault(name, function):
+        if fault := argument_fault(name, function) or _form_fault(name, function):
             code = getattr(inspect.unwrap(function), "__code__", None)
             line = f":{code.co_firstlineno}" if code and student.source.path == code.co_filename else ""
             raise ContractError(fault, f"{student.source.path or student.source.name}{line}")
+
+
+def _form_fault(name: str, function: Callable[..., Any]) -> str | None:
+    """Whether calling `function` would not run it, with the remedy; only rows are yielded."""
+    if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
+        return f"{name}() is asynchronous, and nobody awaits it; write `def`, not `async def`"
+    if name != "interpolate" and inspect.isgeneratorfunction(function):
+        return f"{name}() is a generator; use `return`, not `yield`"
+    return None
 
 
 def _is_written_here(value: Any, variables: Mapping[str, Any]) -> bool:
