@@ -118,6 +118,7 @@ class Text(Field):
     placeholder: str = ""
     longest: int = 4096
     refuse: Callable[[str], None] | None = None
+    needed: bool = False  # whether no text at all is refused, too
 
     def check(self, value: Any) -> str:
         """The text."""
@@ -126,7 +127,7 @@ class Text(Field):
         if bad := [c for c in value if unicodedata.category(c) in ("Cc", "Cs") and c not in "\t\n"]:
             raise InputError(f"{self.label} holds a character that cannot be written, {bad[0]!r}; type it again")
         if self.refuse is not None:
-            if value:
+            if value or self.needed:
                 self.refuse(value)
         elif any(len(part.encode()) > _LONGEST_NAME for part in value.split("/")):
             raise InputError(f"{self.label} is longer than the name of a file can be, {_LONGEST_NAME} bytes")

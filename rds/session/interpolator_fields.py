@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 from rds.core.errors import InputError
@@ -95,7 +96,7 @@ def read_point(text: str) -> list[float]:
         values = [float(cell) for cell in text.replace(",", " ").split()]
     except ValueError:
         values = []
-    if not 2 <= len(values) <= 3:
+    if not 2 <= len(values) <= 3 or not all(map(isfinite, values)):
         raise InputError(
             f"write two or three positions in mm with a comma between them, such as 10, 0; not {text!r:.60}"
         )
@@ -106,7 +107,7 @@ def _point(name: str, label: str, tip: str, default: str) -> Text:
     def refuse(text: str) -> None:
         read_point(text)
 
-    return Text(name, label, tip, default, default, refuse=refuse, longest=200)
+    return Text(name, label, tip, default, default, refuse=refuse, longest=200, needed=True)
 
 
 def _method(role: str) -> Choice:

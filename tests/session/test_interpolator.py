@@ -122,6 +122,9 @@ def test_user_s_file_is_checked_first_and_its_fault_is_at_its_line(tmp_path: Pat
     ("name", "value", "why"),
     [
         ("start", "ten", "two or three positions in mm"),
+        ("end", "nan, 0", "two or three positions in mm"),
+        ("centre", "0, 1e400", "two or three positions in mm"),
+        ("end", "", "two or three positions in mm"),
         ("feed", 0.0, "more than 0"),
         ("period", "0 s", "from 1e-05 to 1 s"),
         ("arc_method", "linear", "one of"),
