@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from rds.bus import wire
 from rds.bus.address import Address
-from rds.runtime.processes import how_it_ended
+from rds.core.exit_code import how_it_ended
 
 PATIENCE = 10.0  # s for a hub to start and to answer
 _RETRY = 0.002  # s between looks at a hub that somebody else is starting or that is just ending

@@ -12,7 +12,7 @@ from typing import Any
 
 from rds.bus.dialects import server_module
 from rds.core.errors import MachineError
-from rds.runtime.processes import how_it_ended
+from rds.core.exit_code import how_it_ended
 
 _ENDING = 1.0  # s for one that has closed its stdout
 

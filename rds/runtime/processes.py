@@ -42,8 +42,3 @@ def is_alive(process: int, argument: str) -> bool:
     except OSError:
         return False
     return True
-
-
-def how_it_ended(code: int) -> str:
-    """Of a process without a last word, by its exit code, in a sentence's middle."""
-    return f"was ended by signal {-code}" if code < 0 else f"ended with code {code}, and said nothing"

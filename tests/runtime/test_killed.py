@@ -394,9 +394,8 @@ def test_a_new_run_replaces_an_earlier_one_in_its_folder(experiment: Maker, duri
 
 def test_a_run_that_never_began_leaves_the_earlier_one(experiment: Maker, alone: Path) -> None:
     first = unless_lost(lambda: experiment(duration=0.2).run("emulation", out=alone / "run"))
-    with served("own"):
-        with Command("own"), pytest.raises(rds.MachineError, match="another run commands the machine"):
-            experiment(duration=0.2, bus={"channel": "own"}).run("emulation", out=alone / "run")
+    with served("own"), Command("own"), pytest.raises(rds.MachineError, match="another run commands the machine"):
+        experiment(duration=0.2, bus={"channel": "own"}).run("emulation", out=alone / "run")
     assert (rds.open_result(alone / "run")["time"] == first["time"]).all()
     assert not {"unstarted.json", "plan.pickle"} & {path.name for path in (alone / "run").iterdir()}
 
