@@ -13,6 +13,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations
 
 GRAM = 12  # nodes
@@ -72,20 +73,28 @@ def similar_pairs(found: Mapping[str, Fingerprints], template: Iterable[Fingerpr
     for student in sorted(own):
         for value in own[student]:
             holders.setdefault(value, []).append(student)
-    shared: dict[tuple[str, str], list[int]] = {}
+    groups: dict[tuple[str, ...], list[int]] = {}  # what the same students have: many have all of a file in common
     for value, students in holders.items():
-        for pair in combinations(students, 2):
-            shared.setdefault(pair, []).append(value)
-    pairs = [_pair(*both, values, own) for both, values in shared.items() if len(values) >= LEAST_COMMON]
-    return sorted(
-        (pair for pair in pairs if pair.score >= LEAST_SCORE), key=lambda pair: (-pair.score, pair.first, pair.second)
-    )
+        if len(students) > 1:
+            groups.setdefault(tuple(students), []).append(value)
+    parts = list(groups.values())
+    shared: dict[tuple[str, str], list[int]] = {}  # by pair: numbers of groups
+    for number, together in enumerate(groups):
+        for pair in combinations(together, 2):
+            shared.setdefault(pair, []).append(number)
 
+    @cache
+    def lines(student: str, numbers: tuple[int, ...]) -> tuple[Lines, ...]:
+        return _joined(own[student][value] for number in numbers for value in parts[number])
 
-def _pair(first: str, second: str, values: list[int], own: Mapping[str, Fingerprints]) -> Pair:
-    smaller = min(len(own[first]), len(own[second]))
-    where = [_joined(own[student][value] for value in values) for student in (first, second)]
-    return Pair(first, second, len(values) / smaller, len(values), where[0], where[1])
+    pairs = []
+    for (first, second), numbers in shared.items():
+        common = sum(len(parts[number]) for number in numbers)
+        score = common / min(len(own[first]), len(own[second]))
+        if common >= LEAST_COMMON and score >= LEAST_SCORE:
+            which = tuple(numbers)
+            pairs.append(Pair(first, second, score, common, lines(first, which), lines(second, which)))
+    return sorted(pairs, key=lambda pair: (-pair.score, pair.first, pair.second))
 
 
 def _joined(spans: Iterable[Lines]) -> tuple[Lines, ...]:

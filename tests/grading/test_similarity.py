@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ast
 import re
+from itertools import combinations
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.grading.similarity import GRAM, WINDOW, fingerprints, similar_pairs
+from rds.grading.similarity import GRAM, LEAST_COMMON, LEAST_SCORE, WINDOW, fingerprints, similar_pairs
 from rds.grading.similarity_table import pairs_html
 
 LAW = '''"""PD control with a filtered derivative."""
@@ -115,6 +116,20 @@ def test_a_common_passage_of_enough_nodes_is_always_found(before: list[str], aft
 
 
 FORMS = ("x = 1", "f(x)", "x += y", "del x", "x = [y]", "assert x", "x = -y", "x = y if x else 1")
+
+
+@given(st.lists(st.sets(st.integers(0, 40)), min_size=2, max_size=11))
+def test_pairs_are_those_of_a_comparison_one_by_one(values: list[set[int]]) -> None:
+    found = {f"s{n:02}": {value: (value, value) for value in own} for n, own in enumerate(values)}
+    expected = {
+        (a, b, len(both) / min(len(found[a]), len(found[b])), len(both))
+        for a, b in combinations(found, 2)
+        if len(both := found[a].keys() & found[b].keys()) >= LEAST_COMMON
+        and len(both) >= LEAST_SCORE * min(len(found[a]), len(found[b]))
+    }
+    pairs = similar_pairs(found)
+    assert {(pair.first, pair.second, pair.score, pair.common) for pair in pairs} == expected
+    assert all(sum(last - first + 1 for first, last in pair.first_lines) == pair.common for pair in pairs)
 
 
 def test_the_table_escapes_names() -> None:
