@@ -105,7 +105,7 @@ class BusView:
                 each.transmission * 1e6,
                 each.response * 1e6,
                 each.deadline * 1e6,
-                ("✔ " if each.verdict == "met" else "✖ ") + each.verdict,
+                ("✔\u00a0" if each.verdict == "met" else "✖\u00a0") + each.verdict,
             ]
             for each in analysis.rows
         ]

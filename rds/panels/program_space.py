@@ -28,14 +28,14 @@ class SpaceView:
             height=340,
             camera_auto_fit=False,
             menu_visibility=False,
-            axes=["X [mm]", "Y [mm]", "Z [mm]"],
+            axes=["X", "Y", "Z"],  # with units they do not fit in the corner
             grid_visible=True,
         )
         self._plot += box_lines(low, high)
         self._tool = k3d.points(np.zeros((1, 3), np.float32), point_size=0.02 * self._size, color=_TOOL, shader="mesh")
         self._plot += self._tool
         self._lines: list[object] = []
-        words = "<p>Orange: rapid; blue: straight feed; green: arc feed; violet: the tool. Turn it with the mouse.</p>"
+        words = "<p>In mm. Orange: rapid; blue: straight feed; green: arc feed; violet: the tool. Turn it with the mouse.</p>"
         self.widget = widgets.VBox([self._plot, widgets.HTML(words)])
 
     def show(self, trace: Trace) -> None:
