@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from rds.identification.estimate import UNUSABLE
+from rds.identification.estimate import UNUSABLE, Errors
+from rds.identification.kstep import over_noise
 from rds.identification.smoothing import Motion, motion_of
 from rds.identification.structure import SPEED, Structure
 from rds.logs.log import Log
@@ -14,6 +16,7 @@ from rds.logs.motion import travel
 
 _POOR = 90.0  # per cent: a model that fits worse does not explain the motion
 MISSED = 1.5  # times the measurement's noise: residuals that are larger hold something else
+_FAR = 10.0  # times what noise makes of a prediction: it is off by more than noise and intervals explain
 _LITTLE = 100.0  # times the measurement's noise: with less motion than that, a fit is not told by much
 _NONE = 12.0  # times the noise: it alone spans 8 in 10^4 samples, 10.4 in 10^7
 _WHITE = 2.576  # 99 % band, in units of 1/√N
@@ -56,6 +59,19 @@ def other_doubts(structure: Structure, log: Log, error: np.ndarray, method: str)
             f"with --method simulation{'' if log.closed_loop is False else _OR_HELD}"
         )
     return said
+
+
+def held_doubts(structure: Structure, log: Log, predicted: Mapping[int, Errors]) -> list[str]:
+    """Doubts where a controller held the axis, whose absence a short prediction does not show."""
+    found = over_noise(predicted, motion_of(log).noise)
+    if found is None or found[1] <= _FAR:
+        return []
+    k, ratio = found
+    return [
+        f"{log.name}: predictions {k} samples ahead are {predicted[k].rmse:.3g} {structure.output_unit} off (RMS), "
+        f"{ratio:.3g} times what the measurement's noise makes: the machine does something that structure "
+        f"{_named(structure)} lacks (a delay, play, ...), or the parameters are off; no interval counts that"
+    ]
 
 
 def is_little(structure: Structure, log: Log) -> bool:

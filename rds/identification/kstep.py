@@ -12,7 +12,7 @@ free run; measurement noise is in them twice.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import nan
 
 import numpy as np
@@ -39,3 +39,15 @@ def ahead(measured: np.ndarray, modelled: np.ndarray, unit: str, steps: Sequence
             predicted = measured[:-k] + modelled[k:] - modelled[:-k]
             found[k] = errors_of(measured[k:], predicted, unit)
     return found
+
+
+def over_noise(predicted: Mapping[int, Errors], noise: float) -> tuple[int, float] | None:
+    """The farthest prediction, in samples ahead, and its RMSE over what `noise` alone makes of it; None for no noise.
+
+    It begins at a measured position and ends at one, so noise alone makes √2 of it. Over so short a time the error of
+    a free run without its controller hardly adds up: what is left, the model lacks, or its parameters are off.
+    """
+    if not predicted or noise <= 0.0:
+        return None
+    k = max(predicted)
+    return k, predicted[k].rmse / (np.sqrt(2.0) * noise)

@@ -13,7 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.identification.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
 from rds.identification.fitted_stretch import fitted_stretch
-from rds.identification.free_run_doubts import other_doubts
+from rds.identification.free_run_doubts import held_doubts, other_doubts
 from rds.identification.initial_state import estimate_start
 from rds.identification.kstep import ahead, errors_of
 from rds.identification.structure import Structure
@@ -83,6 +83,7 @@ def made_estimate(
                 f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
                 "fit a little, and the free run lacks the controller that held the axis, so its error grows with time"
             )
+            said += held_doubts(structure, log, predictions[log.name])
     return Estimate(
         structure=structure.name,
         options=structure.options,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import sqrt
 
 from rds.identification.estimate import said_of_guesses
+from rds.identification.kstep import over_noise
 from rds.logs.log import Finding, Gravity
 from rds.validation.assessment import Assessment, largest
 from rds.validation.candidate import Candidate
@@ -293,7 +294,18 @@ def _structure(a: Assessment, bands: Bands) -> Iterator[Reason]:
     """What no parameters of this structure explain. The residual tests cannot see it: a fit with such residuals states
     wide intervals, which allow for as much.
     """
-    if a.free_run is None or a.noise == 0.0 or a.motion == 0.0 or a.log.closed_loop:
+    if a.free_run is None or a.noise == 0.0 or a.motion == 0.0:
+        return
+    if a.log.closed_loop:
+        found = over_noise(a.ahead, a.noise)
+        if found is not None and found[1] > bands.unexplained:
+            yield Reason(
+                Side.AGAINST,
+                "structure-held",
+                f"{found[0]} samples ahead, where the missing controller hardly shows, the model is {found[1]:.3g} "
+                f"times as far off as noise makes it ({a.ahead[found[0]].rmse:.3g} {a.unit} RMSE): the axis does "
+                "something that the model lacks (a delay, play, ...), or the parameters are off",
+            )
         return
     if a.attainable is not None:
         left, what = a.attainable.reached, "fitted to this very log, the same structure still leaves"

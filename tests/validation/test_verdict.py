@@ -165,6 +165,24 @@ def test_an_error_that_grows_on_new_data_is_overfitting() -> None:
     assert found.verdict.word is not Word.VALID
 
 
+def test_a_closed_loop_hides_no_delay() -> None:
+    """A delay of 3 samples under a controller: inverse dynamics make a time constant far too long of it."""
+    axis, values = structure("axis", ("delay",)), X | {"delay": 0.003}
+    t = np.arange(6000) * T
+    logs = []
+    for number, frequency in enumerate((0.7, 0.9)):
+        u = 9.0 * np.sin(2 * np.pi * frequency * t) + 6.0 * np.sin(2 * np.pi * 8.0 * t)
+        y = np.rint(axis.respond(t, u, [0.0, 0.0], values) / STEP) * STEP
+        logs.append(log(u, y, name=f"held-{number}", closed_loop=True))
+    estimate = fit(logs[:1], structure("axis"), "inverse-dynamics")
+    assert estimate.parameters["tau"].low > 1.1 * X["tau"]
+    assert any("predictions 100 samples ahead are" in warning for warning in estimate.warnings)
+    found = validate(estimate, logs[1])
+    assert "structure-held" in kinds(found, "against") and "is not shown" in found.verdict.sentence
+    right = validate(fit(logs[:1], axis), logs[1])
+    assert "structure-held" not in kinds(right, "against")
+
+
 def test_a_sign_or_unit_that_model_and_log_share_is_not_valid(tmp_path: Path) -> None:
     """The fit's log had the same fault, so the model repeats this one: nothing is shown by that."""
     fitted, fresh = (with_findings(log(-u, moved(u))) for u in (square(6.0, 2.5, 1.0), FRESH))
