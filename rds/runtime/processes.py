@@ -42,3 +42,11 @@ def is_alive(process: int, argument: str) -> bool:
     except OSError:
         return False
     return True
+
+
+def is_stopped(process: int) -> bool:
+    """Whether it was stopped by a signal or a debugger, and does not run; false where that cannot be seen."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] in "Tt"
+    except (OSError, IndexError):
+        return False

@@ -21,13 +21,14 @@ from rds.core.types import Ending
 from rds.runtime.changes import FILE as CHANGES
 from rds.runtime.changes import STOP, as_text, read_changes, timed
 from rds.runtime.desk import Desk
-from rds.runtime.processes import wait_for_end
+from rds.runtime.processes import is_stopped, wait_for_end
 from rds.runtime.program import HOLD
 from rds.runtime.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
 from rds.runtime.ring import Ring
 
 DRAIN_EVERY = 0.05  # s
 HANG_AFTER = 5.0  # s without a new sample, or 20 periods if that is longer
+HELD_UP = 1.0  # s for one look: this process did not run
 READY_WITHIN = 60.0  # s from the start of the target to its first sample
 READY = 2  # heartbeats of the target when its loop begins
 PLAN, REPORT, LOG = "plan.pickle", "target.json", "target.log"
@@ -84,12 +85,16 @@ class Recorder:
             self._file.close()
 
 
-def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) -> str | None:
-    """Record until the target ends; if it hangs, kill it and return what happened."""
+def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) -> tuple[Ending, str] | None:
+    """Record until the target ends; if it hangs, kill it and return what ending that is, and why.
+
+    Time in which this process was held up itself does not count: the target may have been, too.
+    """
     hang_after = max(HANG_AFTER, 20 * period)
     host = os.getppid()
     seen, since = (-1, -1), time.monotonic()
     while target.poll() is None:
+        looked = time.monotonic()
         wait_for_end(target, DRAIN_EVERY)
         if host and os.getppid() != host:
             recorder.host_is_gone()
@@ -97,28 +102,37 @@ def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) ->
         now = (recorder.drain(), recorder.ring.heartbeat)
         if now != seen:
             seen, since = now, time.monotonic()
+        elif (took := time.monotonic() - looked) > HELD_UP:
+            since += took
         quiet, rows = time.monotonic() - since, now[0]
         is_running = recorder.ring.heartbeat >= recorder.ring.about["ready"]
         if quiet > (hang_after if is_running else READY_WITHIN):
+            stopped = is_stopped(target.pid)
             target.kill()
             target.wait()
-            if is_running:
-                return (
-                    f"control() or the model did not return for {quiet:.0f} s at t = {rows * period:.3f} s; "
-                    f"look for a loop without an end in it. The target was killed; the watchdogs cut the voltage"
+            at = f"at t = {rows * period:.3f} s"
+            if stopped:
+                return Ending.KILLED, (
+                    f"the target process was stopped from outside (SIGSTOP, or a debugger) {at}, and did not go on for "
+                    f"{quiet:.0f} s. It was killed; the watchdogs cut the voltage"
                 )
-            return f"the target was not ready within {READY_WITHIN:.0f} s"
+            if is_running:
+                return Ending.FAULT, (
+                    f"control() or the model did not return for {quiet:.0f} s {at}; "
+                    "look for a loop without an end in it. The target was killed; the watchdogs cut the voltage"
+                )
+            return Ending.FAULT, f"the target was not ready within {READY_WITHIN:.0f} s"
     return None
 
 
-def conclude(directory: Path, rows: int, code: int | None, hung: str | None) -> dict[str, Any]:
+def conclude(directory: Path, rows: int, code: int | None, hung: tuple[Ending, str] | None) -> dict[str, Any]:
     """How the run ended, from the target's own report or from the way it died."""
     try:
         report: dict[str, Any] = json.loads((directory / REPORT).read_text())
     except (OSError, ValueError):
         report = {"ending": Ending.KILLED, "reason": _death(directory, rows, code)}
     if hung:
-        report |= {"ending": Ending.FAULT, "reason": hung}
+        report |= {"ending": hung[0], "reason": hung[1]}
     return report | {"rows": rows}
 
 

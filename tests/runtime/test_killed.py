@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,9 @@ from rds.bus.dialects import server_module
 from rds.bus.frames import CALL, Kind, Status, answer_identifier, decode_answer
 from rds.bus.server_process import start_server
 from rds.results import Result
-from rds.runtime.recorder import conclude
+from rds.runtime import recorder
+from rds.runtime.desk import Desk
+from rds.runtime.recorder import READY, Recorder, conclude, watch
 from rds.runtime.ring import Ring
 
 pytestmark = pytest.mark.realtime
@@ -146,6 +149,48 @@ def test_a_killed_target(experiment: Maker, during: During, alone: Path) -> None
         (alone / "run" / name).unlink()
     raw = check_readable(alone / "run", "killed", 300)
     assert (raw["X_measured"] == result["X_measured"]).all()
+
+
+@pytest.fixture
+def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[subprocess.Popen[bytes], Recorder]]:
+    """A target that takes no samples, and its recorder, who is impatient."""
+    monkeypatch.setattr(recorder, "HANG_AFTER", 0.3)
+    ring = Ring.create(tmp_path / "a.ring", ["sample"], 10, ready=READY)
+    Desk.create(ring.desk_path, []).close()
+    ring.beat(READY)
+    with subprocess.Popen([sys.executable, "-S", "-c", "input()"], stdin=-1, stderr=subprocess.DEVNULL) as target:
+        yield target, Recorder(tmp_path, ring)
+        target.kill()
+    ring.close()
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").is_file(), reason="no /proc here")
+def test_a_target_that_was_stopped_is_not_the_codes_fault(recorded: tuple[subprocess.Popen[bytes], Recorder]) -> None:
+    """The student was to look for a loop without an end."""
+    target, its = recorded
+    target.send_signal(signal.SIGSTOP)
+    hung = watch(target, its, 0.001)
+    assert hung is not None and hung[0] == "killed"
+    assert "stopped from outside" in hung[1] and target.returncode == -signal.SIGKILL
+
+
+def test_a_recorder_that_was_held_up_kills_nobody(
+    recorded: tuple[subprocess.Popen[bytes], Recorder], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All processes of a container are paused together, and the clock goes on."""
+    target, its = recorded
+    now = [time.monotonic()]
+    waits = [0.05, 0.05, 60.0, 0.05]
+
+    def wait(process: subprocess.Popen[bytes], seconds: float) -> None:
+        now[0] += waits.pop()
+        if not waits:
+            process.kill()
+            process.wait()
+
+    monkeypatch.setattr(recorder, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(recorder, "wait_for_end", wait)
+    assert watch(target, its, 0.001) is None
 
 
 def test_what_is_kept_of_a_killed_run_is_said_only_if_there_is_something(tmp_path: Path) -> None:
