@@ -12,9 +12,10 @@ import tempfile
 from functools import lru_cache
 
 # Nothing that other submissions could notice: no locks, which are on a file wherever it is mounted, no times, which
-# devices keep when the sandbox is gone, and not how much room there is on the computer's disks.
+# devices keep when the sandbox is gone, not how much room there is on the computer's disks, and not whether a page of a
+# file is in memory (preadv2).
 _FILES = """
-    read readv pread64 preadv preadv2 write writev pwrite64 pwritev pwritev2 open openat close close_range lseek
+    read readv pread64 preadv write writev pwrite64 pwritev open openat close close_range lseek
     stat fstat lstat newfstatat statx access faccessat faccessat2 readlink readlinkat getcwd chdir fchdir
     mkdir mkdirat rmdir unlink unlinkat rename renameat renameat2 getdents getdents64 ftruncate truncate fallocate fsync
     fdatasync umask dup dup2 dup3 pipe pipe2 select pselect6 poll ppoll

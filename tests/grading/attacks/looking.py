@@ -101,7 +101,7 @@ for name, number in dict(
     tee=276, vmsplice=278, name_to_handle_at=303, open_by_handle_at=304, seccomp=317, landlock_create_ruleset=444,
     syslog=103, sethostname=170, clock_settime=227, swapon=167, init_module=175, kexec_load=246, modify_ldt=154,
     quotactl=179, acct=163, reboot=169, setxattr=188, sendfile=40, socketpair=53, rt_sigqueueinfo=129, tgsigqueueinfo=297,
-    pidfd_send_signal=424, flock=73, utimensat=280, statfs=137, fstatfs=138, process_madvise=440, process_mrelease=448, cachestat=451, map_shadow_stack=453, futex_wake=454,
+    pidfd_send_signal=424, flock=73, utimensat=280, statfs=137, fstatfs=138, preadv2=327, mincore=27, process_madvise=440, process_mrelease=448, cachestat=451, map_shadow_stack=453, futex_wake=454,
 ).items():
     ctypes.set_errno(0)
     if libc.syscall(number, 0, 0, 0, 0, 0, 0) != -1 or ctypes.get_errno() != errno.EPERM:
