@@ -34,11 +34,12 @@ def column_time(table: Table, about: TimeMap) -> np.ndarray:
     column = table.column(about.column, about.place)
     unit = _unit(column, about.unit, "time", about.place)
     second = factor(unit, "s")
-    values = (about.scale * column.values + about.offset) * second
+    numbers = column.values if about.wrap is None else _unwrapped(column.values, about.wrap)[0]
+    values = (about.scale * numbers + about.offset) * second
     _check_size(values, f"time ({column.name!r}, in s)", about.place)
     finite = np.flatnonzero(np.isfinite(values))
     if len(finite) and abs(values[finite[0]]) > _LATE:  # from the first row on, before digits are lost to its size
-        values = about.scale * (column.values - column.values[finite[0]]) * second
+        values = about.scale * (numbers - numbers[finite[0]]) * second
     return values
 
 

@@ -57,6 +57,7 @@ class TimeMap:
     scale: float = 1.0
     offset: float = 0.0
     rate: float | None = None
+    wrap: float | None = None  # numbers of the column, at which its counter begins again
     source: str = ""
     uncertainty: float | None = None  # s, one standard deviation of a time stamp
     place: str = ""
@@ -203,12 +204,13 @@ def _time(words: Words | None, path: str) -> TimeMap:
         scale=_scale(words),
         offset=words.number("offset", 0.0, "the time's unit", -1e15, 1e15),
         rate=rate,
+        wrap=words.number("wrap", None, "numbers of the column", 1e-9, 1e15) if "wrap" in words else None,
         source=words.text("source", "") or "",
         uncertainty=uncertainty,
         place=words.place(),
     )
     words.done()
-    for key in ("unit", "scale", "offset"):
+    for key in ("unit", "scale", "offset", "wrap"):
         if column is None and key in words:
             raise words.fault(key, 'is of a column of numbers, and none is named; add column = "...", or remove it')
     return made

@@ -38,7 +38,8 @@ def time_base(time: np.ndarray, jitter_limit: float, duplicates: str, gaps: str,
         k = int(back[0]) + 1
         raise InputError(
             f"time goes back at sample {k}, from {time[k - 1]:.9g} to {time[k]:.9g} s ({len(back)} such steps); is the "
-            "column the time, and is it one recording?",
+            "column the time, and is it one recording? Of a counter that begins again, say in the map at which number, "
+            "as in wrap = 65536 under [time]",
             where,
         )
     findings: list[Finding] = []

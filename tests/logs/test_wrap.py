@@ -61,3 +61,17 @@ def test_wrap_is_for_what_a_counter_counts(tmp_path: Path) -> None:
     (tmp_path / "log.csv.map.toml").write_text(text)
     with pytest.raises(InputError, match="wrap = 10 is for position and reference"):
         read_log(path)
+
+
+def test_a_time_that_begins_again_goes_on(tmp_path: Path) -> None:
+    made = axis()
+    ticks = np.arange(len(made["time"])) + 65_000
+    path = write(tmp_path / "log.csv", made | {"time": ticks % 65_536})
+    text = MAP.format(which="position", wrap="").replace('"s"', '"ms"{time}')
+    text = text.replace('"counts", unit = "counts"', '"position", unit = "mm"').replace("resolution = 1e-4\n", "")
+    (tmp_path / "log.csv.map.toml").write_text(text.replace("{time}", ""))
+    with pytest.raises(InputError, match=r"time goes back at sample 536.*wrap = 65536 under \[time\]"):
+        read_log(path)
+    (tmp_path / "log.csv.map.toml").write_text(text.replace("{time}", "\nwrap = 65536"))
+    (log,) = read_log(path)
+    assert np.allclose(log.time, ticks * 1e-3) and log.sample_period == pytest.approx(1e-3)
