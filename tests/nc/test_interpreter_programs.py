@@ -48,6 +48,7 @@ STRICTER = {
     "L with a cutter's number": "G41 L3\nM2",
     "G92.1 while the cutter is compensated": "G41.1 D1 G92.1\nM2",
     "a program number": "O1000\nM2",
+    "a name that is not closed": "o<p1 call [4]\nM2",
     "a character 0": "G0 X1 \x00Y2\nM2",
     "another subroutine's end": "o1 sub\no2 endsub\no1 endsub\no1 call\nM2",
     "RETURN under another subroutine's name": "o1 sub\no1 endsub\no2 sub\no1 return\no2 endsub\no2 call\nM2",
