@@ -68,13 +68,14 @@ def test_what_stays_behind_neither_holds_nor_speaks(alone: Path, act: str) -> No
     assert json.loads(out)["mode"] == "simulation"
 
 
-def test_ctrl_c_ends_an_endless_simulation(alone: Path) -> None:
+@pytest.mark.parametrize(("number", "said"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+def test_ctrl_c_ends_an_endless_simulation(alone: Path, number: signal.Signals, said: str) -> None:
     process = run(alone, "open('there', 'w').close(); spin()")
     while not (alone / "there").exists():
         assert process.poll() is None
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert "stopped" in err
+    assert f"stopped by {said}" in err
     assert not (alone / "out").exists()

@@ -69,11 +69,11 @@ def _work(command: Callable[[], int], writing: int) -> NoReturn:
 
 def _wait(child: int, reading: int) -> NoReturn:
     """The parent: pass signals on, wait for the word, give the exit code."""
-    interrupted = False
+    interrupted = 0  # by this signal
 
     def pass_on(number: int, _: object) -> None:
         nonlocal interrupted
-        interrupted = True
+        interrupted = number
         os.kill(child, number)
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -97,7 +97,10 @@ def _wait(child: int, reading: int) -> NoReturn:
                 break
             time.sleep(0.01)
         if code == _INTERRUPTED:
-            sys.stderr.write("rds: stopped by Ctrl-C\n" if interrupted else "rds: stopped by a KeyboardInterrupt\n")
+            by = {signal.SIGINT: "Ctrl-C", 0: "a KeyboardInterrupt"}.get(interrupted) or signal.Signals(
+                interrupted
+            ).name
+            sys.stderr.write(f"rds: stopped by {by}\n")
         os._exit(code)
     _, status = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(status)
