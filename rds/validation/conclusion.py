@@ -81,7 +81,7 @@ def sentence_of(candidate: Candidate, a: Assessment, word: Word, purpose: str, r
     if "parameters" in kinds:
         sentence += " Do not take its parameters for the axis's own: this log contradicts them."
     elif "structure" in kinds:
-        sentence += " Do not take its parameters for the axis's own: they make up for something that it lacks."
+        sentence += " Its parameters may not be the axis's own: they may make up for something that it lacks."
     elif "structure-held" in kinds:
         sentence += " That its parameters are the axis's own is not shown: see the predictions."
     if guessed := guesses(candidate.parameters):

@@ -316,7 +316,8 @@ def _structure(a: Assessment, bands: Bands) -> Iterator[Reason]:
             Side.AGAINST,
             "structure",
             f"{what} {left:.3g} {a.unit} (RMS), {left / a.noise:.3g} times the measurement's noise "
-            f"({a.noise:.2g} {a.unit}): the axis does something that the model lacks; its parameters make up for that",
+            f"({a.noise:.2g} {a.unit}, if it is white): the axis does something that the model lacks, and its "
+            "parameters may make up for that",
         )
 
 

@@ -227,7 +227,7 @@ def test_what_the_structure_lacks_is_no_matter_of_wide_intervals() -> None:
     estimate = fit(logs[:1], structure("axis"))
     assert abs(estimate.parameters["K"].value / X["K"] - 1.0) > 0.1
     found = validate(estimate, logs[1])
-    assert found.verdict.word is Word.PARTLY and "its parameters" in found.verdict.sentence
+    assert found.verdict.word is Word.PARTLY and "Its parameters may not be" in found.verdict.sentence
     (reason,) = [r for r in found.verdict.reasons if r.kind == "structure"]
     assert reason.side is Side.AGAINST and "times the measurement's noise" in reason.what
 
