@@ -35,7 +35,7 @@ class SpaceView:
         self._tool = k3d.points(np.zeros((1, 3), np.float32), point_size=0.02 * self._size, color=_TOOL, shader="mesh")
         self._plot += self._tool
         self._lines: list[object] = []
-        words = "<p>In mm. Orange: rapid; blue: straight feed; green: arc feed; violet: the tool. Turn it with the mouse.</p>"
+        words = "<p>In mm. Orange: rapid; blue: straight; green: arc feed; violet: the tool. Turn it by mouse.</p>"
         self.widget = widgets.VBox([self._plot, widgets.HTML(words)])
 
     def show(self, trace: Trace) -> None:
