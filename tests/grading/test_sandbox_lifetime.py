@@ -59,6 +59,14 @@ def wait_for_end(numbers: list[int]) -> list[int]:
     return left
 
 
+def test_a_closed_pool_holds_nothing_open(pool: Pool) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    with Pool() as own:
+        kept = [*own._interpreters.values()]  # whoever still refers to it
+    assert len(os.listdir("/proc/self/fd")) == before
+    assert not any(each.is_alive for each in kept)
+
+
 @pytest.mark.usefixtures("pool")
 def test_a_grader_that_is_killed_leaves_no_process(written: Written) -> None:
     path = written(DAEMONS, "params = {'waits': True}\n")

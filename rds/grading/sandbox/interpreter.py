@@ -52,8 +52,10 @@ class Interpreter:
         except OSError:
             data = b""
         if not data:
-            self.close()
-            raise SandboxError(f"the sandbox did not start: {self._last_words()}")
+            self._end()
+            said = self._last_words()
+            self._said.close()
+            raise SandboxError(f"the sandbox did not start: {said}")
         self.resident_bytes = int(json.loads(data)["resident_bytes"])
         self._is_ready = True
 
@@ -69,6 +71,10 @@ class Interpreter:
 
     def close(self) -> None:
         """End it, and with it every process below it."""
+        self._end()
+        self._said.close()
+
+    def _end(self) -> None:
         self._socket.close()
         self._process.kill()  # of bubblewrap, with which the kernel ends all that is in its namespace
         self._process.wait()
@@ -80,6 +86,8 @@ class Interpreter:
             raise SandboxError(f"the warm interpreter is gone: {self._last_words()}") from None
 
     def _last_words(self) -> str:
+        if self._said.closed:
+            return "it was closed"
         self._said.seek(0)
         lines = self._said.read().decode(errors="replace").strip().splitlines()
         return lines[-1][:300] if lines else "it said nothing"
