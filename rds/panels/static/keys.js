@@ -20,20 +20,20 @@ function render({ el }) {
     event.preventDefault();
     event.target.click();
   };
-  const seen = new MutationObserver(label);
-  const turned = new MutationObserver(() => { app.scrollTop = 0; });
+  const seen = new MutationObserver((changes) => {
+    label();
+    if (changes.some((each) => each.type === "childList" && each.target.matches(".rds-panel"))) app.scrollTop = 0;
+  });
   const begun = requestAnimationFrame(() => {
     app = el.closest(".rds-app");
     if (!app) return;
     label();
     seen.observe(app, { childList: true, subtree: true, attributes: true, attributeFilter: ["class"] });
-    turned.observe(app.querySelector(".rds-panel"), { childList: true });
     app.addEventListener("keydown", pressed);
   });
   return () => {
     cancelAnimationFrame(begun);
     seen.disconnect();
-    turned.disconnect();
     if (app) app.removeEventListener("keydown", pressed);
   };
 }
