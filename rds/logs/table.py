@@ -11,6 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.options import check_known
+from rds.logs.csv_headings import name_and_unit
 from rds.logs.log import Finding
 
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}([ T,]|$)")
@@ -55,7 +56,12 @@ class Table:
         return any(column.time is not None for column in self.columns.values())
 
     def column(self, name: str, place: str) -> Column:
-        """The column called `name`; InputError at `place`, with the names there are, for another or one of words."""
+        """The column called `name`, which may be its heading with the unit; InputError at `place`, with the names there
+        are, for another or one of words.
+        """
+        bare, unit = name_and_unit(name)
+        if name not in self.columns and unit is not None and bare in self.columns and self.columns[bare].unit == unit:
+            name = bare
         if name not in self.columns:
             try:
                 check_known([name], self.columns, self.path.name)

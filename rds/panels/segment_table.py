@@ -22,7 +22,8 @@ class SegmentTable(widgets.VBox):
         super().__init__()
         self.add_class("rds-group")
         self._choices, self._name = choices, name
-        self._rows = [_Row(self, row) for row in choices[name]]
+        self._taken = choices[name]
+        self._rows = [_Row(self, row) for row in self._taken]
         self._add = widgets.Button(description="Add a line", tooltip="A straight move from where the path ends")
         self._add.on_click(lambda _: self.add("line"))
         self._add_arc = widgets.Button(description="Add an arc", tooltip="An arc from where the path ends")
@@ -30,6 +31,7 @@ class SegmentTable(widgets.VBox):
         self._refusal = widgets.HTML("")
         self._refusal.add_class("rds-refusal")
         self._show()
+        choices.watch(self._follow)
 
     @property
     def refused(self) -> list[str]:
@@ -57,10 +59,19 @@ class SegmentTable(widgets.VBox):
         try:
             for number, row in enumerate(self._rows, start=1):
                 made.append(row.read(number))
+            self._taken = made
             self._choices.set(self._name, made)
             self._refusal.value = ""
         except InputError as error:
             self._refusal.value = f'<span role="alert">✖ {escape(str(error))}</span>'
+
+    def _follow(self, name: str) -> None:
+        """Show rows that were set elsewhere."""
+        if name == self._name and self._choices[name] != self._taken:
+            self._taken = self._choices[name]
+            self._rows = [_Row(self, row) for row in self._taken]
+            self._refusal.value = ""
+            self._show()
 
     def _show(self) -> None:
         for number, row in enumerate(self._rows, start=1):

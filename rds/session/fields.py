@@ -82,7 +82,7 @@ class Number(Field):
         if isinstance(text, str) and text.count(",") == 1 and "." not in text:
             text = text.replace(",", ".")
         try:
-            return float(text)
+            return float("" if "_" in str(text) else text)  # 1_0 is 10 to Python alone
         except (ValueError, OverflowError):
             raise InputError(f"{self.label} must be {self._a_number}, not {value!r:.60}") from None
 

@@ -21,6 +21,7 @@ from rds.session.interpolator_fields import (
     LINE,
     NONE,
     PROGRAM,
+    ROWS,
     SINGLE,
     USER,
     feed,
@@ -201,6 +202,8 @@ class Interpolating:
             self.choices.replace([feed(unit, float(f"{value:.10g}"))])  # the same speed in another unit
         if name in ("line_method", "arc_method"):
             self._fit_options()
+        if name == "kind" and self.choices["rows"] in ROWS.values():
+            self.choices.set("rows", [dict(row) for row in ROWS[self.choices["kind"]]])
 
     def _fit_options(self) -> None:
         """The options of the chosen methods."""

@@ -18,7 +18,13 @@ LINE, ARC = "line", "arc"
 SINGLE, SEVERAL, PROGRAM = "single", "several", "program"
 NONE = "none"
 ONLY = {LINE: "circular", ARC: "linear"}  # what a line's or an arc's method cannot be
-_ROWS = ({"kind": LINE, "end": [30.0, 0.0]}, {"kind": ARC, "end": [30.0, 20.0], "centre": [30.0, 10.0]})
+_STRAIGHT = {"kind": LINE, "end": [30.0, 0.0]}
+_HALF_CIRCLE = {"kind": ARC, "end": [30.0, 20.0], "centre": [30.0, 10.0]}
+ROWS = {  # to begin with, by what is interpolated
+    "linear": [_STRAIGHT, {"kind": LINE, "end": [30.0, 20.0]}],
+    "circular": [{"kind": ARC, "end": [30.0, 0.0], "centre": [20.0, 0.0]}, _HALF_CIRCLE],
+    "both": [_STRAIGHT, _HALF_CIRCLE],
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,7 @@ def fields() -> Iterable[Field]:
     ways = {"ccw": "Counter-clockwise", "cw": "Clockwise"}
     yield Choice("direction", "Direction", "of the arc, seen from the positive end of the third axis", "ccw", ways)
     yield Choice("plane", "Plane", "in which the arc lies", "XY", {name: name for name in PLANES})
-    yield Rows("rows", "Segments", "each begins where the one before ends", [dict(row) for row in _ROWS])
+    yield Rows("rows", "Segments", "each begins where the one before ends", [dict(row) for row in ROWS["circular"]])
     yield Text("program", "Part program", "a file in your folder", "", "e.g. part.ngc")
     yield Choice("feed_unit", "Unit of the feed rate", "", "mm/min", {unit: unit for unit in FEED_UNITS})
     yield feed("mm/min", 600.0)
@@ -96,7 +102,7 @@ def read_point(text: str) -> list[float]:
         values = [float(cell) for cell in text.replace(",", " ").split()]
     except ValueError:
         values = []
-    if not 2 <= len(values) <= 3 or not all(map(isfinite, values)):
+    if not 2 <= len(values) <= 3 or not all(map(isfinite, values)) or "_" in text:
         raise InputError(
             f"write two or three positions in mm with a comma between them, such as 10, 0; not {text!r:.60}"
         )

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rds.core.errors import InputError
 from rds.logs.csv_headings import name_and_unit
 from rds.logs.read_log import read_log
+from rds.logs.tables import read_table
 
 T = np.arange(400)  # ms
 U, X = np.sin(0.03 * T), 3.0 * np.cos(0.03 * T)
@@ -89,3 +91,13 @@ def test_times_and_channels_in_turn(tmp_path: Path) -> None:
     (log,) = read_log(written(tmp_path, "own.csv", head, [T, X, T - 0.25, U], ","))
     assert np.allclose(log.time, T / 1e3) and np.allclose(log.command, U, atol=1e-6)
     assert any("last received value is held: it is 0.00025 s old" in finding.what for finding in log.findings)
+
+
+def test_a_column_is_named_with_its_unit_or_without(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t [s],u (V),x/mm\n0,1,2\n1,3,4\n")
+    table = read_table(path)
+    for name, bare in (("t [s]", "t"), ("u (V)", "u"), ("x/mm", "x"), ("x [mm]", "x"), ("x", "x")):
+        assert table.column(name, "a map").name == bare
+    with pytest.raises(InputError, match=r"no column 'x \[um\]'; it has t, u, x"):
+        table.column("x [um]", "a map")

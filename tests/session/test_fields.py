@@ -25,7 +25,9 @@ def test_numbers_are_read_as_people_write_them(written: str, meant: float) -> No
     assert AMPLITUDE.check(written) == meant
 
 
-@pytest.mark.parametrize("wrong", ["", "five", "1,000.5", "nan", "inf", "-1", "151", "1e999", True, None, [1], "2.5 V"])
+@pytest.mark.parametrize(
+    "wrong", ["", "five", "1,000.5", "nan", "inf", "-1", "151", "1e999", "1_0", True, None, [1], "2.5 V"]
+)
 def test_other_numbers_are_refused_with_range_and_unit(wrong: object) -> None:
     with pytest.raises(InputError, match="Amplitude must be") as refusal:
         AMPLITUDE.check(wrong)

@@ -182,3 +182,15 @@ def test_magnified_errors_are_as_many_times_as_large(tmp_path: Path) -> None:
     assert np.allclose(np.linalg.norm(off, axis=1), done.path_error) and np.allclose(nearest + off, done.position)
     drawn = magnified(done, 100.0).axes[0].lines[1].get_xydata()[::2]
     assert np.allclose(drawn, nearest + 100.0 * off)
+
+
+@pytest.mark.parametrize("kind", ["circular", "linear", "both"])
+def test_several_segments_begin_with_a_table_that_can_be_interpolated(tmp_path: Path, kind: str) -> None:
+    assert len(run(make(tmp_path, kind=kind, given="several")).segments) == 2
+
+
+def test_a_table_of_ones_own_is_kept_when_the_kind_changes(tmp_path: Path) -> None:
+    own = [{"kind": "line", "end": [12.0, 0.0]}]
+    panel = make(tmp_path, kind="linear", given="several", rows=own)
+    panel.choices.set("kind", "both")
+    assert panel.choices["rows"] == own
