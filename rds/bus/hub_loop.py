@@ -213,9 +213,7 @@ class Hub(HubNodes):
             if node.state is State.GREETING and now - node.moved_at > GREETING * SECOND:
                 self._expel(node, "no hello came")
         if self._members and all(member.hung_up for member in self._members):
-            for member in list(
-                self._members
-            ):  # they have ended, and nobody is left to take what they still had to send
+            for member in list(self._members):  # nobody is left to take what these had still to send
                 self._part(member)
         if not self._address.path.exists():
             log(f"{self._address.path} is gone: nobody new could come in, and a second hub might start")

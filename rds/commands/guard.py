@@ -97,10 +97,9 @@ def _wait(child: int, reading: int) -> NoReturn:
                 break
             time.sleep(0.01)
         if code == _INTERRUPTED:
-            by = {signal.SIGINT: "Ctrl-C", 0: "a KeyboardInterrupt"}.get(interrupted) or signal.Signals(
-                interrupted
-            ).name
-            sys.stderr.write(f"rds: stopped by {by}\n")
+            by = {0: "a KeyboardInterrupt", signal.SIGINT: "Ctrl-C"}
+            by |= {number: number.name for number in (signal.SIGTERM, signal.SIGHUP)}
+            sys.stderr.write(f"rds: stopped by {by[interrupted]}\n")
         os._exit(code)
     _, status = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(status)

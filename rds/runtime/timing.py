@@ -135,7 +135,8 @@ def judge(
     if silent >= LASTING and 2 * silent >= count + discarded:
         reason = (
             f"{lost}, but by the machine's doing: in {silent} periods the loop waited for a module that was silent; "
-            "the run says nothing about the code that it tried: see to the machine, and repeat it"
+            "the run says nothing about the code that it tried: see to the machine, or to what held its program up, "
+            "and repeat it"
         )
         return Judgement(Verdict.VOID, reason, count, alone, discarded)
     owner = "the system's own" if not missing else "the system's or the bus's"
