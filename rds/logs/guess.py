@@ -114,7 +114,7 @@ def draft(table: Table) -> str:
         notes.append(f"The file gives no unit for {', '.join(missing[:8])}{' ...' if len(missing) > 8 else ''}.")
     strange = [f"{c.unit!r} of {c.name!r}" for c in table.columns.values() if _is_strange(c)]
     if strange:
-        notes.append(f"Unknown units, for which others stand here: {', '.join(strange[:8])}.")
+        notes.append(f"Unknown units, for which {UNKNOWN!r} stands here: {', '.join(strange[:8])}.")
     content["axis"] = axes
     return toml_text(content, "\n".join(notes))
 
@@ -128,6 +128,8 @@ def _unit(table: Table, name: str | None, quantity: str) -> str:
     unit = table.columns[name].unit if name is not None and name in table.columns else None
     if unit is not None and dimension(unit) in DIMENSIONS[quantity]:
         return unit
+    if name is not None and name in table.columns and _is_strange(table.columns[name]):
+        return UNKNOWN
     return (name and default_unit(name)) or _LIKELY[quantity]
 
 

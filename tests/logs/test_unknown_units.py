@@ -37,6 +37,7 @@ def test_an_unknown_unit_is_named(tmp_path: Path, heading: str, column: str, uni
     assert repr(column) in fault and f"its unit {unit!r} is unknown (known units: " in fault
     assert hint in fault if hint else "did you mean" not in fault
     assert f"{unit!r} of {column!r}" in found.draft
+    assert 'unit = "?"' in found.draft  # a draft that nobody corrects must not be taken for the truth
 
 
 def test_a_column_that_is_not_used_for_its_unit_is_said(tmp_path: Path) -> None:
