@@ -30,7 +30,7 @@ from benchmarks import (
     timed_bus,
 )
 from benchmarks.figures import TITLES, Figure
-from rds.console import show_table
+from rds.cli.console import show_table
 
 SUBJECTS = {
     "simulation": "Ten seconds of the demo's X axis: 10,000 samples",

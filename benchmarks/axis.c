@@ -1,4 +1,4 @@
-/* The X axis of the demo for comparison: the arithmetic of rds.controllers.tracking, rds.interface and
+/* The X axis of the demo for comparison: the arithmetic of rds.controllers.tracking, rds.machines and
    rds.models.linear_axis, line for line, in C.
 
        gcc -O2 -ffp-contract=off axis.c -o axis -lm

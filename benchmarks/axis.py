@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import rds
+from rds.cli.demo import OBSERVER_POLE
 from rds.controllers.tracking import law
-from rds.demo import OBSERVER_POLE
-from rds.interface import encoder
+from rds.machines.encoder import encoder
 from rds.models.linear_axis import coefficients, respond
-from rds.runtime.plan import Plan
+from rds.modes.loop.plan import Plan
 
 Drive = Callable[[float, float, float, float, float, float], tuple[float, float, float]]
 Move = Callable[[float, float, float], tuple[float, float]]

@@ -26,9 +26,9 @@ import can
 from rich.console import Console
 from rich.table import Table
 
-from rds.bus.drivers import AxisDrivers
+from rds.bus.modules.rds.drivers import AxisDrivers
+from rds.core.scheduling import raise_priority
 from rds.machines import load_machine
-from rds.runtime.scheduling import raise_priority
 
 PERIOD = 0.001  # s
 LATENCY_ID, BURST_ID = 1, 2
@@ -108,7 +108,7 @@ class Threads:
 def control_cycle(cycles: int) -> dict[str, float]:
     """exchange() with four modules served by another process at 1 kHz, µs."""
     machine, channel = load_machine("mini-cnc"), uuid4().hex[:16]
-    command = [sys.executable, "-m", "rds.bus.server", "mini-cnc", "--channel", channel]
+    command = [sys.executable, "-m", "rds.bus.modules.rds.server", "mini-cnc", "--channel", channel]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
         assert server.stdout is not None
         server.stdout.readline()

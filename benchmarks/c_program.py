@@ -9,7 +9,7 @@ from statistics import median
 import numpy as np
 
 from benchmarks.axis import constants
-from rds.runtime.plan import Plan
+from rds.modes.loop.plan import Plan
 
 # Without -ffp-contract=off some processors fuse a·b + c into one rounding: no longer the same arithmetic.
 FLAGS = ("-O2", "-ffp-contract=off")

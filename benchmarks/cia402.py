@@ -26,13 +26,13 @@ import canopen
 
 from benchmarks.cyclictest import Cyclictest
 from benchmarks.figures import TITLES, Figure
-from rds.bus.cia402.configure import prepare
-from rds.bus.cia402.host import Cia402Drivers
-from rds.bus.cia402.settings import read_settings
-from rds.console import show_table
+from rds.bus.modules.cia402.configure import prepare
+from rds.bus.modules.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.settings import read_settings
+from rds.cli.console import show_table
 from rds.core.errors import MachineError
+from rds.core.scheduling import raise_priority
 from rds.machines import load_machine
-from rds.runtime.scheduling import raise_priority
 
 MACHINE = "mini-cnc"
 Kept = tuple[list[int], list[int], Counter[str]]  # cycle times and latenesses in ns, missed cycles by reason
@@ -174,7 +174,7 @@ def _once(axes: tuple[str, ...], period: float, loop: str, seconds: float, bitra
     if bitrate:
         where += ["--option", f"bitrate={bitrate}"]
     server = subprocess.Popen(
-        [sys.executable, "-m", "rds.bus.cia402.server", MACHINE, *where, "--exit-with-stdin"],
+        [sys.executable, "-m", "rds.bus.modules.cia402.server", MACHINE, *where, "--exit-with-stdin"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -6,15 +6,15 @@ from pathlib import Path
 from time import perf_counter_ns
 
 from benchmarks.figures import Figure
+from rds.interpolators.motion.segments import arc, chain, line
 from rds.machines import load_machine
-from rds.motion.segments import arc, chain, line
+from rds.modes.loop.changes import Heed, stop_channel
+from rds.modes.loop.execution import Execution
+from rds.modes.loop.laws import LiveReference
+from rds.modes.loop.live_values import Channel, Desk
+from rds.modes.loop.retimed import Retimed
+from rds.nc.run.prepare import planned
 from rds.nc.toolpath import Event, PathBlock
-from rds.programs.prepare import planned
-from rds.runtime.changes import Heed, stop_channel
-from rds.runtime.desk import Channel, Desk
-from rds.runtime.execution import Execution
-from rds.runtime.laws import LiveReference
-from rds.runtime.retimed import Retimed
 
 CHANNELS = 40
 ROUNDS = 7

@@ -10,9 +10,9 @@ from time import perf_counter
 import rds
 from benchmarks.figures import Figure, interleaved
 from benchmarks.grading_peers import autograde_seconds, nbclient_seconds
-from rds.grading.assignment import read_assignment
+from rds.grading.assignment.assignment import read_assignment
 from rds.grading.batch import run_batch
-from rds.grading.grade_one import grade
+from rds.grading.batch.grade_one import grade
 from rds.grading.sandbox import Pool, available
 
 STUDENTS = 1000

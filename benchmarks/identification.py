@@ -13,10 +13,10 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.figures import Figure, interleaved, ratios
-from rds.identification.axis_structure import make
-from rds.identification.estimate import Estimate
-from rds.identification.fit import fit
-from rds.logs.log import Log
+from rds.identification.fit.estimate import Estimate
+from rds.identification.fit.fit import fit
+from rds.identification.logs.log import Log
+from rds.identification.structures.axis_structure import make
 from rds.machines import load_machine
 from rds.models.linear_axis import coefficients, respond
 

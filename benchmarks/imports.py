@@ -29,7 +29,7 @@ def _inside(statement: str) -> float:
 
 
 def _help() -> float:
-    command = [sys.executable, "-c", "import sys; from rds.cli import main; sys.argv = ['rds', '--help']; main()"]
+    command = [sys.executable, "-c", "import sys; from rds.cli.main import main; sys.argv = ['rds', '--help']; main()"]
     started = time.perf_counter()
     subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
     return time.perf_counter() - started

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import c_program, cyclictest, nc_peers
-from rds.runtime.environment import surroundings
+from rds.modes.process.environment import surroundings
 
 PACKAGES = ("rds", "numpy", "numba", "llvmlite", "scipy", "control", "bdsim", "python-can", "canopen")
 

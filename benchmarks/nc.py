@@ -18,8 +18,9 @@ from unittest.mock import patch
 from benchmarks.figures import Figure, interleaved, ratios
 from benchmarks.nc_peers import PEERS, call, rs274
 from benchmarks.nc_program import write_program
-from rds.nc import fast_lane, interpret
-from rds.nc.canon import text
+from rds.nc import interpret
+from rds.nc.language import fast_lane
+from rds.nc.language.canon_text import text
 
 LINES = 200_000
 SHORT = 20_000  # for what is slow
@@ -110,8 +111,8 @@ def planning(place: Path, rounds: int) -> list[Figure]:
 
 def _plan(file: Path) -> tuple[float, float]:
     """Seconds that it takes, and seconds of motion."""
+    from rds.interpolators.motion import Limits, plan
     from rds.machines import load_machine
-    from rds.motion import Limits, plan
     from rds.nc.toolpath import toolpath
 
     limits = Limits.of(load_machine("mini-cnc"))

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.axis import experiment, parts
-from rds.runtime.plan import Plan
+from rds.modes.loop.plan import Plan
 
 
 def run_control(plan: Plan) -> tuple[float, list[float]]:

@@ -10,11 +10,11 @@ import numpy as np
 
 import rds
 from benchmarks.figures import Figure
-from rds.identification.estimate import Estimate, Parameter
-from rds.identification.model_file import write_model
+from rds.identification.fit.estimate import Estimate, Parameter
+from rds.identification.fit.model_file import write_model
+from rds.identification.robustness import study
 from rds.machines import load_machine
 from rds.models.linear_axis import PARAMETERS
-from rds.robustness import study
 
 RUNS = 10_000
 ROUNDS = 3

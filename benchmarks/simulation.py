@@ -17,8 +17,8 @@ from benchmarks.axis import experiment
 from benchmarks.c_program import CProgram
 from benchmarks.figures import Figure, interleaved, ratios
 from benchmarks.peers import PEERS, call
-from rds.experiment.compiled import obstacle, run_compiled
-from rds.modes.host import run_plan
+from rds.modes.experiment.compiled import obstacle, run_compiled
+from rds.modes.process.host import run_plan
 
 SAME = 1e-12  # mm
 REPEATS = 50  # of the quick ones, in each round

@@ -29,15 +29,15 @@ import can
 
 from benchmarks.cyclictest import Cyclictest
 from benchmarks.figures import TITLES, Figure
-from rds.bus.bits import frame_time
-from rds.bus.builtin import BuiltinBus
-from rds.bus.drivers import AxisDrivers
-from rds.bus.faults import Faults
-from rds.console import show_table
+from rds.bus.hub.builtin import BuiltinBus
+from rds.bus.hub.faults import Faults
+from rds.bus.medium.bits import frame_time
+from rds.bus.modules.rds.drivers import AxisDrivers
+from rds.cli.console import show_table
 from rds.core.clock import LatePolicy, RealTimeClock
 from rds.core.errors import MachineError
+from rds.core.scheduling import lock_memory, raise_priority
 from rds.machines import load_machine
-from rds.runtime.scheduling import lock_memory, raise_priority
 
 BITRATE = 1_000_000  # bit/s
 PERIOD = 1_000_000  # ns
@@ -92,7 +92,7 @@ class Cycles:
 def measure(seconds: float) -> Cycles:
     """Drive the four axes of the mini CNC for so long."""
     machine, channel = load_machine("mini-cnc"), uuid4().hex[:16]
-    command = [sys.executable, "-m", "rds.bus.server", "mini-cnc", "--channel", channel]
+    command = [sys.executable, "-m", "rds.bus.modules.rds.server", "mini-cnc", "--channel", channel]
     command += ["--option", f"bitrate={BITRATE}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
         assert server.stdout is not None

@@ -17,6 +17,10 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from rds.bus.tools.mf4 import put_off_asammdf
+
+put_off_asammdf()  # as our programs do: seconds of each worker
+
 # Random input is the same every time; `make test ARGS=--hypothesis-profile=search` goes on looking for trouble.
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
@@ -87,7 +91,7 @@ def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     yield tmp_path
     for process, command in _processes(runtime).items():
         # they would stay some seconds, for the next run or a host that comes back: no need to wait for that
-        if "rds.bus.hub" in command or "--exit-with-stdin" in command:
+        if "rds.bus.hub.hub" in command or "--exit-with-stdin" in command:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, signal.SIGTERM)
     deadline = time.monotonic() + LINGER
@@ -111,8 +115,6 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
     """With what each bus of this process was opened; python-can's virtual one knows no bit rate."""
     import can
 
-    import rds.bus.link
-
     calls: list[dict[str, Any]] = []
     real = can.Bus
 
@@ -120,7 +122,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
         calls.append(options)
         return real(**{key: value for key, value in options.items() if key != "bitrate"})
 
-    monkeypatch.setattr(rds.bus.link.can, "Bus", bus)
+    monkeypatch.setattr(can, "Bus", bus)
     yield calls
 
 

@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 import rds
-from rds.cli import app, progress_bars
+from rds.cli.main import app, progress_bars
 
 SIMULATION = """
 axis = "X"
@@ -54,7 +54,9 @@ def folder(alone: Path) -> Path:
 
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     """`rds` with these arguments, in pipes."""
-    return subprocess.run([sys.executable, "-m", "rds.cli", *arguments], capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        [sys.executable, "-m", "rds.cli.main", *arguments], capture_output=True, text=True, timeout=120
+    )
 
 
 def call(*arguments: str) -> Any:
@@ -242,7 +244,7 @@ def test_a_served_machine_ends_by_ctrl_c(folder: Path) -> None:
     import signal
 
     served = subprocess.Popen(
-        [sys.executable, "-m", "rds.cli", "machine", "serve", "mini-cnc"],
+        [sys.executable, "-m", "rds.cli.main", "machine", "serve", "mini-cnc"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -264,7 +266,7 @@ def test_a_served_machine_ends_by_ctrl_c(folder: Path) -> None:
 def test_help_is_quick() -> None:
     """Nothing heavy is imported for it."""
     done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "rds.cli", "--help"], capture_output=True, text=True
+        [sys.executable, "-X", "importtime", "-m", "rds.cli.main", "--help"], capture_output=True, text=True
     )
     assert done.returncode == 0
     assert all(word in done.stdout for word in ("demo", "run", "check", "machine", "compare"))
@@ -277,7 +279,7 @@ def test_progress_is_for_terminals(folder: Path) -> None:
     with progress_bars() as bar:
         bar("run")(1, 2)
     main, pipe = os.openpty()
-    arguments = [sys.executable, "-m", "rds.cli", "run", "e.toml", "--out", "out", "--json"]
+    arguments = [sys.executable, "-m", "rds.cli.main", "run", "e.toml", "--out", "out", "--json"]
     on_terminal = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=pipe, text=True, timeout=60)
     os.close(pipe)
     shown = os.read(main, 65536).decode(errors="replace")

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.commands.buses import ChosenBus, bus_table_of, chosen_bus, machine_of
+from rds.cli.buses import ChosenBus, bus_table_of, chosen_bus, machine_of
+from rds.cli.main import app
 from rds.core.errors import InputError
 
 ADAPTER = '[bus]\ninterface = "virtual"\nchannel = 0\nbitrate = 250000\n'
@@ -41,7 +41,7 @@ def test_the_bit_rate_of_an_adapter_reaches_the_command(
     words: list[str], code: int, opened: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("rds.bus.estop.drives.cut", lambda bus: {})  # it asks 127 nodes
+    monkeypatch.setattr("rds.bus.tools.estop.drives.cut", lambda bus: {})  # it asks 127 nodes
     done = CliRunner().invoke(app, [*words, "--experiment", str(experiment(tmp_path, ADAPTER))])
     assert done.exit_code == code, done.output
     assert told(opened) == {("virtual", 0, 250_000)}
@@ -103,7 +103,9 @@ def test_a_machine_is_served_on_the_bus_and_in_the_dialect_of_the_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     served: list[Any] = []
-    monkeypatch.setattr("rds.bus.serving.serve_machine", lambda *words, **options: served.append((words, options)))
+    monkeypatch.setattr(
+        "rds.bus.modules.serving.serve_machine", lambda *words, **options: served.append((words, options))
+    )
     file = str(experiment(tmp_path, ADAPTER + 'dialect = "oacs"\n'))
     done = CliRunner().invoke(app, ["machine", "serve", "mrmt-oacs", "--experiment", file])
     assert done.exit_code == 0, done.output

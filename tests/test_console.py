@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-import rds.console
-from rds.console import cell, show_table
+import rds.cli.console
+from rds.cli.console import cell, show_table
 
 COLUMNS = ["axis", "direction", "average [counts]", "largest − expected [counts]", "largest deviation [mm]", "remark"]
 ROWS = [["X", "cw", "13532.0", "71.0", "0.349", "meets what was asked for"], ["X", "ccw", "13536.0", "–", "0.178", ""]]
@@ -20,7 +20,7 @@ ROWS = [["X", "cw", "13532.0", "71.0", "0.349", "meets what was asked for"], ["X
 def shown(columns: list[str], rows: list[list[str]], width: int, terminal: bool) -> list[str]:
     screen = Console(width=width, force_terminal=terminal, color_system=None, record=True, file=io.StringIO())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rds.console, "console", lambda: screen)
+        patch.setattr(rds.cli.console, "console", lambda: screen)
         show_table("Title", columns, rows)
     return screen.export_text(styles=False).splitlines()
 

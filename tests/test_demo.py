@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 import rds
-from rds import demo
-from rds.cli import app
+from rds.cli import demo
+from rds.cli.main import app
 
 
 def test_the_gains_are_those_of_table_2() -> None:

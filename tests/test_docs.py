@@ -12,19 +12,19 @@ import pytest
 from documents import ROOT, Block, blocks, save
 
 import rds
-from rds.bus import frames
+from rds.bus.modules.rds import frames
 from rds.checks import check_file
 from rds.controllers import controller_module, controller_names
+from rds.core.toml_table import Words
 from rds.core.types import Ending, Verdict
-from rds.core.words import Words
-from rds.experiment.resolve import resolve
 from rds.machines import load_machine
 from rds.models import model_module, model_names
 from rds.models.machine_axis import MachineParameters
 from rds.modes import mode_names
+from rds.modes.experiment.resolve import resolve
+from rds.references import make_signal, signal_kinds
+from rds.references import user as user_signal
 from rds.results.metrics import ERROR_METRICS
-from rds.signals import make_signal, signal_kinds
-from rds.signals import user as user_signal
 
 DOCUMENT = "docs/experiments.md"
 TEXT = (ROOT / DOCUMENT).read_text(encoding="utf-8")

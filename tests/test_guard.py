@@ -38,7 +38,7 @@ def control(t, r, y, state, params):
 def run(folder: Path, act: str) -> subprocess.Popen[str]:
     (folder / "law.py").write_text(LAW.format(act=act))
     (folder / "experiment.toml").write_text(EXPERIMENT)
-    command = [sys.executable, "-m", "rds.cli", "run", "experiment.toml", "--out", "out", "--json"]
+    command = [sys.executable, "-m", "rds.cli.main", "run", "experiment.toml", "--out", "out", "--json"]
     return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

@@ -9,11 +9,11 @@ import pytest
 from documents import ROOT
 from typer.testing import CliRunner
 
-import rds.commands.fit as fit_command
-import rds.help.build as build
-import rds.motion.compiling as compiling
-from rds.cli import app
-from rds.identification.structures import structure
+import rds.cli.fit as fit_command
+import rds.core.compiling as compiling
+import rds.panels.help.build as build
+from rds.cli.main import app
+from rds.identification.structures.structures import structure
 from rds.panels.app import serve
 
 

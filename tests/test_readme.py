@@ -108,7 +108,7 @@ def _run_command(words: list[str], output: list[str]) -> None:
     real_time = words[0] == "run" and is_real_time(words)
     if real_time:
         shorten(Path(words[1]), SHORT)
-    done = run(["-m", "rds.cli", *words])
+    done = run(["-m", "rds.cli.main", *words])
     assert "ended early" not in done.stderr
     # a machine that is busy with other tests may be late; everything else must be as the README says
     assert done.returncode in ((0, 1) if real_time else (0,)), done.stderr
@@ -130,7 +130,7 @@ def _serve(words: list[str]) -> subprocess.Popen[bytes]:
     log = Path("server.log")
     with open(log, "wb") as output:
         server = subprocess.Popen(
-            [sys.executable, "-m", "rds.cli", *words], env=environment(), stdout=output, stderr=output
+            [sys.executable, "-m", "rds.cli.main", *words], env=environment(), stdout=output, stderr=output
         )
     until = time.monotonic() + 30
     while b"Ctrl-C" not in log.read_bytes():

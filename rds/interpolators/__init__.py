@@ -9,12 +9,8 @@ in no row: `rds.interpolators.acceleration` puts a filter on top of any method.
 from __future__ import annotations
 
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
 
 from rds.core.registry import Registry
-
-if TYPE_CHECKING:
-    from rds.interpolators.interpolator import Interpolator
 
 DEFAULT = "constant-velocity"
 LIBRARY = Registry(
@@ -41,10 +37,3 @@ def interpolator_names() -> list[str]:
 def interpolator_module(name: str) -> ModuleType:
     """The module of the interpolator called `name`, with its `OPTIONS` and `interpolate`."""
     return LIBRARY.module(name)
-
-
-def library_interpolator(name: str = DEFAULT, **options: Any) -> Interpolator:
-    """The library's interpolator called `name`; InputError for an unknown name or option, or a value that won't do."""
-    from rds.interpolators.interpolator import from_library
-
-    return from_library(name, options)

@@ -17,7 +17,7 @@ from rds.core.load import StudentFile, load_student
 from rds.core.options import read_options
 from rds.core.signature import form
 from rds.core.types import ArcSegment, Segment, Source
-from rds.interpolators import LIBRARY
+from rds.interpolators import DEFAULT, LIBRARY
 from rds.interpolators.division import Method, check_steps
 from rds.interpolators.reference_word import Steps, steps
 
@@ -105,6 +105,11 @@ def find_interpolator(name: str, options: Mapping[str, Any] | None = None) -> In
     if name not in LIBRARY.modules and (name.endswith(".py") or Path(name).is_file()):
         return from_student(load_student(name), options)
     return from_library(name, options or {})
+
+
+def library_interpolator(name: str = DEFAULT, **options: Any) -> Interpolator:
+    """The library's interpolator called `name`; InputError for an unknown name or option, or a value that won't do."""
+    return from_library(name, options)
 
 
 def from_library(name: str, options: Mapping[str, Any]) -> Interpolator:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rds.interpolators.reference_word import Steps
-from rds.interpolators.result import Interpolation
-from rds.results.figure import BLUE, CYCLE, GREY, VERMILLION, Picture, dress, legend
+from rds.core.figure import BLUE, CYCLE, GREY, VERMILLION, Picture, dress, legend
+
+if TYPE_CHECKING:
+    from rds.interpolators.reference_word import Steps
+    from rds.interpolators.result import Interpolation
 
 _ROUNDING = 1e-6  # mm: a smaller error is rounding, and is drawn as the zero that it is
 _STYLES = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))

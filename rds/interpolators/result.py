@@ -15,8 +15,8 @@ from rds.interpolators.acceleration import Acceleration
 from rds.interpolators.reference_word import Steps
 
 if TYPE_CHECKING:
+    from rds.core.figure import Picture
     from rds.results import Result
-    from rds.results.figure import Picture
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.core.geometry import PLANES
 from rds.core.options import check_known
+from rds.core.toml_table import Words
 from rds.core.types import ArcSegment, LineSegment, Segment
-from rds.core.words import Words
 
 FEED_UNITS = {"mm/min": 1 / 60, "mm/s": 1.0, "m/min": 1000 / 60, "in/min": 25.4 / 60, "in/s": 25.4}  # mm/s
 _KEYS = {"line": ("kind", "end", "feed"), "arc": ("kind", "end", "centre", "clockwise", "plane", "feed")}

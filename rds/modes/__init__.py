@@ -1,9 +1,14 @@
 """Modes by name, imported on use."""
 
+from __future__ import annotations
+
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 from rds.core.errors import InputError
-from rds.runtime.mode import Mode
+
+if TYPE_CHECKING:
+    from rds.modes.loop.mode import Mode
 
 _MODULES = {
     "simulation": "simulation",

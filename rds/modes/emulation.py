@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from rds.core.contracts import Drivers
+from rds.modes.loop.loop import Loop
+from rds.modes.loop.mode import Mode
+from rds.modes.loop.plan import Plan
 from rds.modes.parts import SimulatedAxes, loop
-from rds.runtime.loop import Loop
-from rds.runtime.mode import Mode
-from rds.runtime.plan import Plan
 
 
 def build(plan: Plan, drivers: Drivers | None) -> Loop:

@@ -2,7 +2,7 @@
 
 from rds.core.clock import LatePolicy
 from rds.modes.implementation import build
-from rds.runtime.mode import Mode
+from rds.modes.loop.mode import Mode
 
 MODE = Mode(
     "model-validation",

@@ -7,9 +7,9 @@ from math import isfinite
 
 from rds.core.contracts import Motion
 from rds.core.types import Ending, Model
-from rds.interface import diverged, encoder
-from rds.runtime.loop import Loop
-from rds.runtime.plan import Plan
+from rds.machines.encoder import diverged, encoder
+from rds.modes.loop.loop import Loop
+from rds.modes.loop.plan import Plan
 
 
 class SimulatedAxes:

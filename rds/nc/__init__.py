@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rds.nc.dialect import Dialect as Dialect
-    from rds.nc.errors import ProgramError as ProgramError
-    from rds.nc.interpreter import interpret as interpret
+    from rds.nc.language.dialect import Dialect as Dialect
+    from rds.nc.language.errors import ProgramError as ProgramError
+    from rds.nc.language.interpreter import interpret as interpret
 
-_HOMES = {"Dialect": "dialect", "ProgramError": "errors", "interpret": "interpreter"}
+_HOMES = {"Dialect": "language.dialect", "ProgramError": "language.errors", "interpret": "language.interpreter"}
 
 __all__ = ["Dialect", "ProgramError", "interpret"]
 

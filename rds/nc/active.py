@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 from typing import Any
 
-from rds.nc.canon import Call
-from rds.nc.context import INCH
-from rds.nc.frame import SYSTEMS
-from rds.nc.interpreter import Interpreter
-from rds.nc.state import INVERSE_TIME, NO_MOTION, PER_REVOLUTION, State
+from rds.nc.language.canon import Call
+from rds.nc.language.context import INCH
+from rds.nc.language.frame import SYSTEMS
+from rds.nc.language.interpreter import Interpreter
+from rds.nc.language.state import INVERSE_TIME, NO_MOTION, PER_REVOLUTION, State
 
 _PLANES = ("G17", "G18", "G19")
 _PATH = {"EXACT_PATH": "G61", "EXACT_STOP": "G61.1", "CONTINUOUS": "G64"}

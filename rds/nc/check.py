@@ -10,18 +10,18 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
+from rds.core.atomic import write_files
 from rds.core.errors import InputError
 from rds.machines import Machine
-from rds.nc.canon import Call, MotionBlock
 from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_compiled, write_compiled
-from rds.nc.dialect import Dialect
-from rds.nc.interpreter import interpret
-from rds.nc.parameters import read_parameters
-from rds.nc.reading_on import Later
+from rds.nc.language.canon import Call, MotionBlock
+from rds.nc.language.dialect import Dialect
+from rds.nc.language.interpreter import interpret
+from rds.nc.language.parameters import read_parameters
+from rds.nc.language.reading_on import Later
+from rds.nc.language.tools import Tool, read_tools
 from rds.nc.toolpath import PathBlock, Report, toolpath
-from rds.nc.tools import Tool, read_tools
 from rds.nc.validate import Validation, Validator
-from rds.results.atomic import write_files
 
 Item = MotionBlock | Call
 Progress = Callable[[int, int], None]

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.motion.segments import SEGMENT
+from rds.interpolators.motion.segments import SEGMENT
 from rds.nc.toolpath import Event, PathBlock
 
 MAGIC = b"RDS compiled part program 1\n"
@@ -55,7 +55,7 @@ def file_sha256(path: Path) -> str:
 def write_compiled(
     header: Mapping[str, Any], blocks: Iterable[PathBlock], after: Callable[[], Mapping[str, Any]] = dict
 ) -> Callable[[BinaryIO], None]:
-    """A writer for `rds.results.atomic.write_files`: the blocks, as they come, into a stream.
+    """A writer for `rds.core.atomic.write_files`: the blocks, as they come, into a stream.
 
     `after`, asked when all blocks have passed, gives more words for the last line.
     """

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from rds.interpolators.motion.certificate import Certificate
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.profiles import motion_of
+from rds.interpolators.motion.samples import SampleBlock
 from rds.machines import Machine
-from rds.motion.certificate import Certificate
-from rds.motion.limits import Limits
-from rds.motion.profiles import motion_of
-from rds.motion.samples import SampleBlock
 from rds.nc.toolpath import PathBlock
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from rds.motion.segments import LINE, in_plane
+from rds.interpolators.motion.segments import LINE, in_plane
 
 
 def extents(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The least and the greatest position of each segment (dtype SEGMENT) along X Y Z A B C: two arrays n × 6.
 
-    The path is that of `rds.motion.segments.point_at`: what an arc's end is off its circle is spread along the arc.
+    The path is that of `rds.interpolators.motion.segments.point_at`: what an arc's end is off its circle is spread
+    along the arc.
     """
     low = np.minimum(segments["start"], segments["end"])
     high = np.maximum(segments["start"], segments["end"])

@@ -34,7 +34,7 @@ def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) 
 
     Raises InputError for a program that moves rotary axes, moves nothing, or takes more than `most` samples of `T` s.
     """
-    from rds.motion.limits import Limits
+    from rds.interpolators.motion.limits import Limits
 
     fastest = Limits.of(machine).velocity
     segments: list[Segment] = []

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rds.core.figure import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, Picture
+from rds.interpolators.motion.segments import AXES
 from rds.machines import Machine
-from rds.motion.segments import AXES
 from rds.nc.trace import CURVED, RAPID, STRAIGHT, Trace
 from rds.nc.validate import TOLERANCE, plain
-from rds.results.figure import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

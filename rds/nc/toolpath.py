@@ -14,10 +14,10 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from rds.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT
-from rds.nc.canon import RATE, Call, MotionBlock
-from rds.nc.errors import ProgramError
-from rds.nc.frame import Frame, only_rotary, segments_of
+from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT
+from rds.nc.language.canon import RATE, Call, MotionBlock
+from rds.nc.language.errors import ProgramError
+from rds.nc.language.frame import Frame, only_rotary, segments_of
 
 BLOCK_SEGMENTS = 65536  # a PathBlock is handed on when it has at least so many
 MODES = {"EXACT_PATH": EXACT_PATH, "EXACT_STOP": EXACT_STOP, "CONTINUOUS": BLEND}

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rds.motion.segments import in_plane
+from rds.interpolators.motion.segments import in_plane
 from rds.nc.extent import extents
 from rds.nc.toolpath import PathBlock
 
@@ -90,7 +90,7 @@ def _thinned(points: np.ndarray, resolution: float) -> np.ndarray:
 def sample(segments: np.ndarray, step: float = STEP) -> tuple[np.ndarray, np.ndarray]:
     """Points along segments after their starts (n × 3, X Y Z), and to which segment each belongs.
 
-    On an arc the path is that of `rds.motion.segments.point_at`.
+    On an arc the path is that of `rds.interpolators.motion.segments.point_at`.
     """
     curved = segments["plane"] >= 0
     counts = np.where(curved, np.ceil(np.abs(segments["sweep"]) / step), 1).astype(int).clip(1)

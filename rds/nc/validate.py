@@ -13,18 +13,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.segments import AXES
 from rds.machines import Machine
-from rds.motion.limits import Limits
-from rds.motion.segments import AXES
-from rds.nc.errors import ProgramError
 from rds.nc.extent import extents
-from rds.nc.frame import only_rotary
-from rds.nc.places import at_their_words
-from rds.nc.tool_limits import ToolLimits, limits_of
+from rds.nc.fault_columns import at_their_words
+from rds.nc.language.errors import ProgramError
+from rds.nc.language.frame import only_rotary
 
 if TYPE_CHECKING:
+    from rds.nc.language.tools import Tool
     from rds.nc.toolpath import Event, PathBlock
-    from rds.nc.tools import Tool
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from rds.nc.language.tools import Tool
 
 TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
 LONGEST_DWELL = 3600.0  # s; chosen: more is a P in milliseconds
@@ -333,3 +337,26 @@ def plain(value: float) -> str:
     """A number as people write it: up to four decimals, and as many as it takes to be anything."""
     text = f"{value:.4f}".rstrip("0").rstrip(".")
     return text if float(text) or not value else f"{value:.2g}"
+
+
+_MAX = re.compile(r"\bmax((?:\s+[SF]\s*\d+(?:\.\d*)?)+)", re.IGNORECASE)
+_WORD = re.compile(r"([SF])\s*(\d+(?:\.\d*)?)", re.IGNORECASE)
+
+
+class ToolLimits(NamedTuple):
+    """The most that a tool bears; inf where nothing is said."""
+
+    speed: float = inf  # rev/min
+    feed: float = inf  # mm/min
+
+
+def tool_limits(comment: str) -> ToolLimits:
+    """The limits in the comment of a tool's line: after the word `max`, S in rev/min and F in mm/min."""
+    found = _MAX.search(comment)
+    words = {letter.upper(): float(value) for letter, value in _WORD.findall(found[1])} if found else {}
+    return ToolLimits(words.get("S", inf), words.get("F", inf))
+
+
+def limits_of(tools: Iterable[Tool]) -> dict[int, ToolLimits]:
+    """The limits of each tool by its number."""
+    return {tool.number: tool_limits(tool.comment) for tool in tools}

@@ -4,10 +4,10 @@ Light to import: pandas, pyarrow, scipy and matplotlib are imported by the funct
 """
 
 from rds.results.compare import AxisComparison, Comparison, compare
-from rds.results.files import open_result, save_all, save_result
+from rds.results.files import save_all, save_result
 from rds.results.metrics import axis_metrics, metric_notes, metric_units
 from rds.results.report import write_report
-from rds.results.result import Result
+from rds.results.result import Result, open_result
 
 __all__ = [
     "AxisComparison",

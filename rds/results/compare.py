@@ -10,10 +10,11 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.metrics import axis_metrics, fit_percent, metric_notes
-from rds.results.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rds.results.result import Result
 
 # what a run is made of, sample by sample: two runs are identical where all of these are that both have
 _ENDINGS = ("_reference", "_measured", "_command", "_voltage")

@@ -9,15 +9,17 @@ import io
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.arrow import to_arrow, to_numpy
 from rds.results.header import FORMAT, describe, parse
-from rds.results.result import Result
 from rds.results.units import heading
+
+if TYPE_CHECKING:
+    from rds.results.result import Result
 
 
 def sidecar(path: Path) -> Path:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from rds.core.atomic import write_files
 from rds.core.errors import InputError
-from rds.results.atomic import write_files
 from rds.results.foreign import from_table
-from rds.results.header import assemble
-from rds.results.killed import from_record
-from rds.results.result import Result
+from rds.results.header import Contents, assemble
+
+if TYPE_CHECKING:
+    from rds.results.result import Result
+
+Made = TypeVar("Made")
 
 # in the order in which a directory's files are preferred
 _FORMATS = {
@@ -56,23 +59,21 @@ def saved_files(directory: str | Path) -> dict[str, Path]:
     return {suffix.removeprefix("."): directory / f"{_STEM}{suffix}" for suffix in (*_FORMATS, ".json")}
 
 
-def open_result(path: str | Path) -> Result:
-    """The result saved at `path`: a file of any format, or a directory that holds one result.
+def read_saved(path: str | Path, make: Callable[..., Made]) -> Made:
+    """`make(columns, units, meta)` of what is saved at `path`; see `rds.results.result.open_result`.
 
-    A directory with only the raw record of a run (one that was killed before it could save) is opened from that.
-    A table from elsewhere with `time` and measured columns opens with what it has. Raises InputError, naming the
-    file, the fault and the remedy, for anything else.
+    InputError names the file that it was read from, also for what `make` refuses.
     """
     path = Path(path)
     try:
         if path.is_dir():
             path = _choose(path)
         if path.name == _RECORD:
-            return from_record(path.parent)
+            return make(*from_record(path.parent))
         if not path.exists():
             raise InputError("there is no such file; give a saved result (.parquet, .csv, .mat) or its directory")
         columns, header = _format(path).read(path)
-        return from_table(columns) if header is None else assemble(columns, header)
+        return make(*(from_table(columns) if header is None else assemble(columns, header)))
     except InputError as error:
         if error.where is not None:
             raise
@@ -119,3 +120,19 @@ def _some(names: Sequence[str]) -> str:
 
 def _holds_result(directory: Path) -> bool:
     return any(f.name == _RECORD or (f.stem == _STEM and f.suffix in _FORMATS) for f in directory.iterdir())
+
+
+def from_record(directory: str | Path) -> Contents:
+    """The result in the record of `directory`, up to its last whole row.
+
+    It has the columns that the loop recorded and no verdict: that needs the plan of the run. Raises InputError for a
+    record that cannot be read.
+    """
+    # imported here: a saved result opens without the runtime
+    from rds.modes.process.record import read_record
+
+    columns, units, meta = read_record(directory)
+    meta["notes"] = [f"{note}, no verdict and no simulation" for note in meta["notes"]]
+    if "program_line" in columns and len(columns["program_line"]):
+        meta["notes"].append(f"the part program was in line {columns['program_line'][-1]:.0f}")
+    return Contents(columns, units, meta)

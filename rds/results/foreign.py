@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.results.result import Result
+from rds.results.header import Contents
 from rds.results.units import split_heading
 
 _TIME = ("time", "t")
 _MEASURED = "_measured"
 
 
-def from_table(table: Mapping[str, np.ndarray]) -> Result:
+def from_table(table: Mapping[str, np.ndarray]) -> Contents:
     """A result from columns headed like `time [s]`, `X_measured [mm]`, with nothing else known about the run.
 
     Needs `time` (or `t`) in s and at least one column `<axis>_measured`; the axes are those that have one. The
@@ -44,4 +44,4 @@ def from_table(table: Mapping[str, np.ndarray]) -> Result:
     period = float(np.median(steps))
     # 0.2 - 0.1 is not 0.1: a step that is a decimal to within rounding is meant to be that decimal
     period = float(f"{period:.9g}")
-    return Result(columns, units, {"axes": axes, "sample_period": period})
+    return Contents(columns, units, {"axes": axes, "sample_period": period})

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.results.result import Result
+
+if TYPE_CHECKING:
+    from rds.results.result import Result
 
 FORMAT = "rds result"
 VERSION = 1
 _TYPES = {"float64": np.float64, "int64": np.int64}
+
+
+class Contents(NamedTuple):
+    """What a result is made of, as `rds.results.result.Result` takes it."""
+
+    columns: Mapping[str, np.ndarray]
+    units: Mapping[str, str]
+    meta: Mapping[str, Any]
 
 
 def describe(result: Result) -> dict[str, Any]:
@@ -57,7 +67,7 @@ def _is_column(entry: Any) -> bool:
     )
 
 
-def assemble(columns: Mapping[str, np.ndarray], header: dict[str, Any]) -> Result:
+def assemble(columns: Mapping[str, np.ndarray], header: dict[str, Any]) -> Contents:
     """The result that `header` describes, from the `columns` found; InputError where they do not agree."""
     names = [entry["name"] for entry in header["columns"]]
     missing = [name for name in names if name not in columns]
@@ -73,4 +83,4 @@ def assemble(columns: Mapping[str, np.ndarray], header: dict[str, Any]) -> Resul
                 "the file is truncated or was changed; take another copy"
             )
     typed = {e["name"]: np.asarray(columns[e["name"]]).astype(_TYPES[e["type"]], copy=False) for e in header["columns"]}
-    return Result(typed, {entry["name"]: entry["unit"] for entry in header["columns"]}, header["meta"])
+    return Contents(typed, {entry["name"]: entry["unit"] for entry in header["columns"]}, header["meta"])

@@ -9,13 +9,15 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.header import describe, parse
-from rds.results.result import Result
+
+if TYPE_CHECKING:
+    from rds.results.result import Result
 
 _DESCRIPTION = "rds_result"
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")  # MATLAB's namelengthmax is 63

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.arrow import to_arrow, to_numpy
 from rds.results.header import describe, parse
-from rds.results.result import Result
+
+if TYPE_CHECKING:
+    from rds.results.result import Result
 
 _DESCRIPTION = b"rds_result"
 

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.results.figure import BLUE, GREY, RESPONSES, VERMILLION, WIDTH, Picture, dress, legend, quantity
-from rds.results.late import late_samples
+from rds.core.figure import BLUE, GREY, RESPONSES, VERMILLION, WIDTH, Picture, dress, legend, quantity
+from rds.results.late_samples import late_samples
 from rds.results.metrics import settled, tracking_error
-from rds.results.result import Result
 from rds.results.units import heading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from rds.results.result import Result
 
 _PANEL_HEIGHT = 2.45  # inches
 _COLUMN_WIDTH = 4.3  # inches, at least, of each axis where there are several

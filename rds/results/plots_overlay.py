@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
-from rds.results.figure import BLUE, CYCLE, GREEN, GREY, ORANGE, RESPONSES, VERMILLION, Picture, dress, legend, quantity
+from rds.core.figure import BLUE, CYCLE, GREEN, GREY, ORANGE, RESPONSES, VERMILLION, Picture, dress, legend, quantity
 from rds.results.metrics import error_metrics, settled, tracking_error
-from rds.results.result import Result
 
 if TYPE_CHECKING:
     from rds.results.compare import Comparison
+    from rds.results.result import Result
 
 # a later one is drawn over an earlier one: narrower and dashed, so that equal lines show as two colours
 _MODES: dict[str, dict[str, Any]] = {

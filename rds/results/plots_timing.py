@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.results.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Picture, dress, legend
-from rds.results.late import STAGES, late_samples, total_time
+from rds.core.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Picture, dress, legend
+from rds.results.late_samples import STAGES, late_samples, total_time
 from rds.results.result import Result
 
 if TYPE_CHECKING:

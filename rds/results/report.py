@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import quote
 
+from rds.core.atomic import write_files
 from rds.core.errors import InputError
 from rds.results import html
-from rds.results.atomic import write_files
-from rds.results.late import total_time
+from rds.results.late_samples import total_time
 from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_units
 from rds.results.result import Result
 from rds.results.units import heading

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.results.files import read_saved, save_all, save_result
 from rds.results.plain import plain
 from rds.results.units import default_unit
 
@@ -38,7 +39,7 @@ class Result:
     converter) are used where they are there.
 
     `validation` is what a run in the mode model-validation proved of its models, per axis (an
-    `rds.validation.validate.Validation`); it is not saved, but its numbers are, in `meta["validation"]`.
+    `rds.identification.validate.validate.Validation`); it is not saved, but its numbers are, in `meta["validation"]`.
 
     Raises InputError for columns of different lengths, other than real numbers, or not finite, for a time that
     does not increase, and for a meta that lacks its needed keys. Only a `..._command` column may hold NaN or
@@ -141,8 +142,6 @@ class Result:
 
     def save(self, path: str | Path) -> Path:
         """Save to a .csv, .mat or .parquet file, or in all three kinds in a directory; InputError if it cannot."""
-        from rds.results.files import save_all, save_result
-
         path = Path(path)
         if path.suffix:
             return save_result(self, path)
@@ -152,14 +151,22 @@ class Result:
     @staticmethod
     def open(path: str | Path) -> Result:
         """Open a saved result without running again; see `open_result`."""
-        from rds.results.files import open_result
-
         return open_result(path)
 
     def _repr_html_(self) -> str:
         from rds.results.html import result_fragment
 
         return result_fragment(self)
+
+
+def open_result(path: str | Path) -> Result:
+    """The result saved at `path`: a file of any format, or a directory that holds one result.
+
+    A directory with only the raw record of a run (one that was killed before it could save) is opened from that.
+    A table from elsewhere with `time` and measured columns opens with what it has. Raises InputError, naming the
+    file, the fault and the remedy, for anything else.
+    """
+    return read_saved(path, Result)
 
 
 def _column(name: str, values: Any) -> np.ndarray:

@@ -22,7 +22,7 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus import connect
+from rds.bus.hub import connect
 
 FORK = multiprocessing.get_context("fork")  # quick, and these tests hold no threads when they fork
 
@@ -110,7 +110,7 @@ def hub(program: Callable[..., subprocess.Popen[str]], runtime_directory: Path) 
     """Starts a hub by hand in the foreground, with other limits than usual."""
 
     def starter(channel: str = "test", *arguments: str) -> subprocess.Popen[str]:
-        process = program("rds.bus.hub", channel, *arguments)
+        process = program("rds.bus.hub.hub", channel, *arguments)
         wait_for(lambda: greets(channel) or process.poll() is not None)  # its address is there before it listens
         return process
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rds.bus.analysis import Errors, Task, responses, worst_response
-from rds.bus.messages import Message, in_order, messages_of, priority
-from rds.bus.schedule import Slot, occupied, one_cycle, schedule
+from rds.bus.analysis.messages import Message, in_order, messages_of, priority
+from rds.bus.analysis.response_times import Errors, Task, responses, worst_response
+from rds.bus.analysis.schedule import Slot, occupied, one_cycle, schedule
 from rds.core.errors import InputError
 from rds.machines import load_machine
 
@@ -181,7 +181,7 @@ def test_arbitration_standard_before_extended_and_data_before_remote() -> None:
 @given(st.integers(0, 0x1FFFFFFF), st.integers(0, 0x1FFFFFFF), st.booleans(), st.booleans())
 def test_priority_is_what_the_wire_decides(first: int, second: int, standard: bool, remote: bool) -> None:
     """The first bit in which the frames differ: dominant wins."""
-    from rds.bus.bit_string import bit_string
+    from rds.bus.medium.bit_string import bit_string
 
     first = first & 0x7FF if standard else first
     one, two = message(first, not standard, remote), message(second, True)

@@ -9,11 +9,11 @@ from math import inf
 
 import pytest
 
-from rds.bus.analysis import Errors
-from rds.bus.analysis_plot import plot
-from rds.bus.analysis_report import analyse, analyse_messages
-from rds.bus.bits import frame_bits
-from rds.bus.messages import Message
+from rds.bus.analysis.analysis_plot import plot
+from rds.bus.analysis.analysis_report import analyse, analyse_messages
+from rds.bus.analysis.messages import Message
+from rds.bus.analysis.response_times import Errors
+from rds.bus.medium.bits import frame_bits
 from rds.core.errors import InputError
 from rds.machines import load_machine
 
@@ -145,5 +145,6 @@ def test_the_picture_shows_each_message_twice(bitrate: int) -> None:
 
 
 def test_no_need_of_python_can_or_matplotlib() -> None:
-    code = "import sys, rds.bus.analysis_report; sys.exit(bool({'can', 'matplotlib', 'numpy'} & set(sys.modules)))"
+    code = "import sys, rds.bus.analysis.analysis_report\n"
+    code += "sys.exit(bool({'can', 'matplotlib', 'numpy'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

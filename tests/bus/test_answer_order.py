@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.bus import frames
-from rds.bus.drivers import AxisDrivers
-from rds.bus.frames import Answer, Kind, Status
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.drivers import AxisDrivers
+from rds.bus.modules.rds.frames import Answer, Kind, Status
 from rds.core.errors import MachineError
 from rds.machines import load_machine
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.bit_string import bit_string, crc
-from rds.bus.bits import (
+from rds.bus.medium.bit_string import bit_string, crc
+from rds.bus.medium.bits import (
     CRC15,
     CRC17,
     CRC21,

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from rds.bus import wire
-from rds.bus.bit_string import bit_string
-from rds.bus.bits import frame_time
-from rds.bus.confinement import ErrorCounters, ErrorState
-from rds.bus.error_flags import broken_frame, flipped, noticed_after, vulnerable
-from rds.bus.error_reports import describe
-from rds.bus.fault_kinds import Fault
-from rds.bus.medium import FaultRefused
-from rds.bus.station import Station
-from rds.bus.timed_medium import TimedMedium
+from rds.bus.hub import wire
+from rds.bus.medium.bit_string import bit_string
+from rds.bus.medium.bits import frame_time
+from rds.bus.medium.confinement import ErrorCounters, ErrorState
+from rds.bus.medium.error_flags import broken_frame, flipped, noticed_after, vulnerable
+from rds.bus.medium.error_reports import describe
+from rds.bus.medium.fault_kinds import Fault
+from rds.bus.medium.medium import FaultRefused
+from rds.bus.medium.station import Station
+from rds.bus.medium.timed_medium import TimedMedium
 
 from .wires import MBIT, bus, drain, identifier_of, record
 

@@ -10,7 +10,7 @@ from uuid import uuid4
 
 import pytest
 
-from rds.bus.dialects import dialect_names, is_served, server_module
+from rds.bus.modules.dialects import dialect_names, is_served, server_module
 from rds.core.errors import InputError
 from rds.machines import Machine, load_machine
 

@@ -15,11 +15,11 @@ from uuid import uuid4
 import can
 import pytest
 
-from rds.bus import frames
-from rds.bus.calling import find_machine
-from rds.bus.drivers import AxisDrivers
-from rds.bus.frames import Answer, Kind, Status
-from rds.bus.server import serve
+from rds.bus.modules.calling import find_machine
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.drivers import AxisDrivers
+from rds.bus.modules.rds.frames import Answer, Kind, Status
+from rds.bus.modules.rds.server import serve
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 
@@ -30,7 +30,9 @@ SLOW = replace(MACHINE, sample_period=0.01)
 
 @pytest.fixture(params=["rds", "virtual"])
 def served(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
-    monkeypatch.setattr("rds.bus.drivers.LOST_AFTER", 5.0)  # s: its modules share this process, which may be held up
+    monkeypatch.setattr(
+        "rds.bus.modules.rds.drivers.LOST_AFTER", 5.0
+    )  # s: its modules share this process, which may be held up
     where = {"interface": request.param, "channel": uuid4().hex}
     stop, ready = threading.Event(), threading.Event()
     thread = threading.Thread(target=lambda: serve(SLOW, **where, ready=ready.set, stop=stop))
@@ -45,7 +47,7 @@ def served(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> I
 @pytest.fixture
 def machine_process(program: Callable[..., Any]) -> Callable[..., Any]:
     def starter(*arguments: str) -> Any:
-        process = program("rds.bus.server", "mini-cnc", "--channel", "m", *arguments)
+        process = program("rds.bus.modules.rds.server", "mini-cnc", "--channel", "m", *arguments)
         line = process.stdout.readline()
         assert line.startswith("ready mini-cnc on rds:m"), line + process.stderr.read()
         return process
@@ -296,7 +298,7 @@ def test_the_server_says_what_is_wrong(program: Callable[..., Any]) -> None:
         (["mini-cnc", "--option", "baud=5"], 1, "no option baud"),
         (["mini-cnc", "--interface", "nonsense"], 1, "can't be opened"),
     ):
-        process = program("rds.bus.server", *arguments)
+        process = program("rds.bus.modules.rds.server", *arguments)
         out, err = process.communicate(timeout=30)
         assert process.returncode == code and words in err and out == "" and "Traceback" not in err
 

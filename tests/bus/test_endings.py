@@ -16,9 +16,9 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus import wire
-from rds.bus.board import SEATS, Board
-from rds.bus.hub_loop import STALL
+from rds.bus.hub import wire
+from rds.bus.hub.error_states import SEATS, Board
+from rds.bus.hub.hub_loop import STALL
 
 from .conftest import FORK, wait_for
 
@@ -266,7 +266,7 @@ def test_an_event_loop_hears_of_the_end_once(open_bus: Opener) -> None:
 def test_a_stopped_hub_is_named(hub: Callable[..., Any], open_bus: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
     process = hub()
     os.kill(process.pid, signal.SIGSTOP)
-    monkeypatch.setattr("rds.bus.connect.join.__defaults__", (0.3,))
+    monkeypatch.setattr("rds.bus.hub.connect.join.__defaults__", (0.3,))
     with pytest.raises(can.CanInitializationError, match="does not answer"):
         open_bus()
 

@@ -9,8 +9,8 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus.faults import Faults
-from rds.cli import app
+from rds.bus.hub.faults import Faults
+from rds.cli.main import app
 from rds.core.errors import InputError
 
 SCHEDULE = '[[fault]]\nkind = "unplug"\nnode = "X"\nat = 100.0\n'

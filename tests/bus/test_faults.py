@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.bits import frame_time
-from rds.bus.fault_file import read_faults
-from rds.bus.fault_kinds import KINDS, Fault
-from rds.bus.faults import Faults
-from rds.bus.injector import Injector
-from rds.bus.medium import FaultRefused, Medium, UntimedMedium
-from rds.bus.station import Station
+from rds.bus.hub.faults import Faults
+from rds.bus.medium.bits import frame_time
+from rds.bus.medium.fault_file import read_faults
+from rds.bus.medium.fault_kinds import KINDS, Fault
+from rds.bus.medium.injector import Injector
+from rds.bus.medium.medium import FaultRefused, Medium, UntimedMedium
+from rds.bus.medium.station import Station
 from rds.core.errors import InputError
 
 from .wires import MBIT, bus, drain, identifier_of, record

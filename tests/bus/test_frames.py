@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus import frames, wire
-from rds.bus.frames import Answer, Kind, Status
+from rds.bus.hub import wire
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Answer, Kind, Status
 from rds.core.errors import InputError, MachineError
 
 voltage = st.floats(-10.0, 10.0)

@@ -14,7 +14,7 @@ import can
 import pytest
 from can.interfaces.virtual import VirtualBus
 
-from rds.bus import builtin
+from rds.bus.hub import builtin
 
 Opener = Callable[..., can.BusABC]
 

@@ -9,8 +9,9 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus import estop, frames, listening, traffic
-from rds.bus.frames import Status
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Status
+from rds.bus.tools import estop, listening, traffic
 from rds.core.errors import MachineError
 
 

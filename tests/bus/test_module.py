@@ -6,9 +6,9 @@ from math import exp
 
 import pytest
 
-from rds.bus import frames
-from rds.bus.frames import Answer, Kind, Status
-from rds.bus.module import AxisModule, machine_parameters
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Answer, Kind, Status
+from rds.bus.modules.rds.module import AxisModule, machine_parameters
 from rds.core.errors import InputError
 from rds.machines import Axis, load_machine
 

@@ -13,9 +13,9 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus.dialects import dialect_names, server_module
-from rds.bus.faults import Faults
-from rds.bus.serving import serve_machine
+from rds.bus.hub.faults import Faults
+from rds.bus.modules.dialects import dialect_names, server_module
+from rds.bus.modules.serving import serve_machine
 from rds.core.errors import InputError
 from rds.machines import load_machine
 
@@ -48,7 +48,7 @@ def test_every_dialect_plays_a_schedule_of_faults(dialect: str, program: Callabl
 
 
 def test_faults_need_the_built_in_bus(dialect: str, tmp_path: Path) -> None:
-    from rds.bus.fault_file import read_faults
+    from rds.bus.medium.fault_file import read_faults
 
     schedule = tmp_path / "faults.toml"
     schedule.write_text('[[fault]]\nkind = "unplug"\nnode = "X"\n')

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import rds
-from rds.bus import connect
-from rds.bus.bits import frame_time
-from rds.bus.drivers import AxisDrivers
-from rds.bus.error_reports import describe
-from rds.bus.fault_kinds import Fault
-from rds.bus.faults import Faults
+from rds.bus.hub import connect
+from rds.bus.hub.faults import Faults
+from rds.bus.medium.bits import frame_time
+from rds.bus.medium.error_reports import describe
+from rds.bus.medium.fault_kinds import Fault
+from rds.bus.modules.rds.drivers import AxisDrivers
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.results import Result
@@ -396,7 +396,7 @@ def test_a_run_with_a_fault_for_nobody_says_so(tmp_path: Path) -> None:
 
 def test_a_module_that_is_plugged_in_again_is_at_zero_volts(program: Callable[..., Any]) -> None:
     """Its watchdog has cut the voltage; the old answers that waited in its controller confuse nobody."""
-    server = program("rds.bus.server", "mini-cnc", "--channel", "m", "--option", "bitrate=500000")
+    server = program("rds.bus.modules.rds.server", "mini-cnc", "--channel", "m", "--option", "bitrate=500000")
     assert server.stdout.readline().startswith("ready")
     drivers = AxisDrivers(MACHINE, ["X", "Y"], channel="m", sample_period=0.01)
     drivers.start()
@@ -430,14 +430,21 @@ def test_the_machine_brings_its_own_faults(program: Callable[..., Any], tmp_path
     schedule = tmp_path / "faults.toml"
     schedule.write_text('[[fault]]\nkind = "unplug"\nnode = "X"\n')
     server = program(
-        "rds.bus.server", "mini-cnc", "--channel", "m", "--option", "bitrate=500000", "--faults", str(schedule)
+        "rds.bus.modules.rds.server",
+        "mini-cnc",
+        "--channel",
+        "m",
+        "--option",
+        "bitrate=500000",
+        "--faults",
+        str(schedule),
     )
     assert server.stdout.readline().startswith("ready")
     with Faults("m") as line:
         assert [node["name"] for node in line.nodes()] == list(MACHINE.axes)
         assert not state_of(line, "X")["plugged"] and state_of(line, "Y")["plugged"]
     schedule.write_text('[[fault]]\nkind = "unplugg"\nnode = "X"\n')
-    other = program("rds.bus.server", "mini-cnc", "--channel", "n", "--faults", str(schedule))
+    other = program("rds.bus.modules.rds.server", "mini-cnc", "--channel", "n", "--faults", str(schedule))
     assert other.wait(30) == 2 and f"{schedule}, line 2" in other.stderr.read()
 
 

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.bus import wire
-from rds.bus.analysis import Errors, responses
-from rds.bus.bits import frame_time
-from rds.bus.fault_kinds import Fault
-from rds.bus.messages import Message, in_order
-from rds.bus.messages import priority as message_priority
-from rds.bus.schedule import schedule
-from rds.bus.station import flags_of, priority, record_bits
-from rds.bus.timed_medium import TimedMedium
+from rds.bus.analysis.messages import Message, in_order
+from rds.bus.analysis.messages import priority as message_priority
+from rds.bus.analysis.response_times import Errors, responses
+from rds.bus.analysis.schedule import schedule
+from rds.bus.hub import wire
+from rds.bus.medium.bits import frame_time
+from rds.bus.medium.fault_kinds import Fault
+from rds.bus.medium.station import flags_of, priority, record_bits
+from rds.bus.medium.timed_medium import TimedMedium
 
 from .wires import MBIT, bus, drain, identifier_of, record
 

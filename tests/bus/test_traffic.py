@@ -9,9 +9,9 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus.faults import Faults
-from rds.bus.traffic import refuse_taken
-from rds.cli import app
+from rds.bus.hub.faults import Faults
+from rds.bus.tools.traffic import refuse_taken
+from rds.cli.main import app
 from rds.core.errors import MachineError
 
 Opener = Callable[..., can.BusABC]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rds.bus import wire
-from rds.bus.medium import Delivery, Medium
-from rds.bus.station import Station
-from rds.bus.timed_medium import TimedMedium
+from rds.bus.hub import wire
+from rds.bus.medium.medium import Delivery, Medium
+from rds.bus.medium.station import Station
+from rds.bus.medium.timed_medium import TimedMedium
 
 MBIT = 1_000_000
 

@@ -15,8 +15,8 @@ import pytest
 from bus.conftest import wait_for
 
 from bus_tools.made_frames import frame
-from rds.bus.faults import Faults
-from rds.bus.logs import LogFile, LogWriter
+from rds.bus.hub.faults import Faults
+from rds.bus.tools.logs import LogFile, LogWriter
 
 Opener = Callable[..., can.BusABC]
 
@@ -27,7 +27,7 @@ def rds() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     processes = []
 
     def run(*arguments: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "rds.commands.bus", *arguments, "--channel", "test"]
+        command = [sys.executable, "-m", "rds.cli.bus", *arguments, "--channel", "test"]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         processes.append(process)
         return process
@@ -164,7 +164,7 @@ def test_a_socketcand_server_until_ctrl_c(rds: Callable[..., subprocess.Popen[st
 def test_commands_are_replayed_only_by_one_host(
     rds: Callable[..., subprocess.Popen[str]], open_bus: Opener, tmp_path: Path
 ) -> None:
-    from rds.bus.command import Command
+    from rds.bus.hub.command import Command
 
     log = LogWriter(tmp_path / "a.log")
     log.write(frame(0x010, bytes(8)))

@@ -12,8 +12,8 @@ from documents import ROOT, blocks
 from typer.main import get_command
 
 from bus_tools.made_frames import frame
-from rds.bus.logs import ENDINGS, LogWriter
-from rds.commands.bus import app
+from rds.bus.tools.logs import ENDINGS, LogWriter
+from rds.cli.bus import app
 
 DOCUMENT = "docs/bus.md"
 TEXT = (ROOT / DOCUMENT).read_text(encoding="utf-8")

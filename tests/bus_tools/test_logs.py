@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bus_tools.made_frames import START, frame, kept, of_every_kind
-from rds.bus.logs import LogFile, LogWriter
+from rds.bus.tools.logs import LogFile, LogWriter
 from rds.core.errors import InputError
 
 WITHOUT_FD = ("trc", "csv", "db", "trc.gz", "csv.gz")
@@ -58,7 +58,7 @@ def test_a_log_that_was_never_closed_is_read_to_the_last_flush(ending: str, tmp_
     path = tmp_path / f"log.{ending}"
     program = (
         "import os, sys; from pathlib import Path; sys.path.insert(0, sys.argv[2])\n"
-        "from bus_tools.made_frames import frame; from rds.bus.logs import LogWriter\n"
+        "from bus_tools.made_frames import frame; from rds.bus.tools.logs import LogWriter\n"
         "log = LogWriter(Path(sys.argv[1]))\n"
         "for k in range(100):\n"
         "    log.write(frame(0x100, bytes([k]), k / 1000))\n"
@@ -160,12 +160,11 @@ def test_a_damaged_mf4_is_refused_in_a_sentence(tmp_path: Path) -> None:
     assert refused > 5
 
 
-def test_nobody_waits_for_the_package_of_mf4_who_needs_it_not(tmp_path: Path) -> None:
-    """In a process of its own: what is imported stays."""
-    pytest.importorskip("asammdf", reason="MF4 needs the package asammdf: pip install asammdf")
-    script = """
+OWN_PROGRAM = """
 import sys
-from rds.bus.logs import LogFile, LogWriter
+from rds.bus.tools.mf4 import put_off_asammdf
+put_off_asammdf()
+from rds.bus.tools.logs import LogFile, LogWriter
 import can
 assert not {"asammdf", "pandas"} & set(sys.modules)
 log = LogWriter(sys.argv[1])
@@ -174,7 +173,35 @@ log.close()
 assert "asammdf" in sys.modules
 assert [bytes(message.data) for message in LogFile(sys.argv[1])] == [b"abc"]
 """
-    subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.mf4")], check=True)
+USERS_INTERPRETER = """
+import sys
+finders = list(sys.meta_path)
+from rds.bus.tools.logs import LogFile, LogWriter
+import rds.bus.modules.rds.server, rds.bus.hub.builtin, rds.modes.process.target, rds.panels.jog.loop
+import can
+assert sys.meta_path == finders
+assert "asammdf" in sys.modules and can.io.mf4.asammdf is not None
+from asammdf.blocks.mdf_v3 import MDF3
+from asammdf.blocks.mdf_v4 import MDF4
+ends = [kind.__del__ for kind in (MDF3, MDF4)]
+open(sys.argv[1], "wb").write(b"MDF     4.10    " + bytes(200))
+try:
+    list(LogFile(sys.argv[1]))
+except rds.core.errors.InputError as error:
+    assert "can't be read" in str(error)
+else:
+    raise AssertionError("a damaged file was read")
+assert ends == [kind.__del__ for kind in (MDF3, MDF4)]
+"""
+
+
+@pytest.mark.parametrize("script", [OWN_PROGRAM, USERS_INTERPRETER])
+def test_only_our_own_programs_put_off_the_package_of_mf4(tmp_path: Path, script: str) -> None:
+    """Our programs do without it until such a log is opened; a user's interpreter is left as it is."""
+    pytest.importorskip("asammdf", reason="MF4 needs the package asammdf: pip install asammdf")
+    words = [sys.executable, "-c", script, str(tmp_path / "a.mf4")]
+    done = subprocess.run(words, check=True, capture_output=True, text=True)
+    assert not done.stderr, done.stderr
 
 
 def test_there_is_no_such_log(tmp_path: Path) -> None:

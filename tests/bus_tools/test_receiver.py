@@ -17,8 +17,8 @@ from bus.conftest import wait_for
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rds.bus import receiver as module
-from rds.bus.receiver import Fault, Receiver, Trouble
+from rds.bus.tools import receiver as module
+from rds.bus.tools.receiver import Fault, Receiver, Trouble
 
 RAISES: list[Callable[[], BaseException]] = [
     lambda: can.CanOperationError("bus error"),

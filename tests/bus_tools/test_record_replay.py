@@ -18,11 +18,11 @@ import pytest
 from bus.conftest import wait_for
 
 from bus_tools.made_frames import frame, kept, of_every_kind
-from rds.bus.link import open_bus as open_any
-from rds.bus.logs import LogFile
-from rds.bus.record import record
-from rds.bus.replay import replay
-from rds.bus.selection import Selection
+from rds.bus.tools.link import open_bus as open_any
+from rds.bus.tools.logs import LogFile
+from rds.bus.tools.record import record
+from rds.bus.tools.replay import replay
+from rds.bus.tools.selection import Selection
 from rds.core.errors import InputError, MachineError
 
 Opener = Callable[..., can.BusABC]
@@ -100,7 +100,7 @@ class TimedBus:
 def timed_bus(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A bus whose time is that of replaying."""
     bus = TimedBus()
-    monkeypatch.setattr("rds.bus.replay.time", bus)
+    monkeypatch.setattr("rds.bus.tools.replay.time", bus)
     return bus
 
 
@@ -196,7 +196,7 @@ def test_no_bus_no_file(tmp_path: Path) -> None:
 
 def test_a_killed_recorder_leaves_what_it_took(tmp_path: Path, open_bus: Opener) -> None:
     path = tmp_path / "a.blf"
-    command = [sys.executable, "-m", "rds.commands.bus", "record", str(path), "--channel", "test"]
+    command = [sys.executable, "-m", "rds.cli.bus", "record", str(path), "--channel", "test"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     assert "recording" in process.stderr.readline()
@@ -329,7 +329,7 @@ def test_identifiers_of_eight_digits_are_extended() -> None:
 @pytest.fixture
 def machine(program: Callable[..., Any]) -> None:
     """The demo machine on the test channel, in a process of its own."""
-    server = program("rds.bus.server", "mini-cnc", "--channel", "test")
+    server = program("rds.bus.modules.rds.server", "mini-cnc", "--channel", "test")
     assert server.stdout.readline().startswith("ready")
 
 

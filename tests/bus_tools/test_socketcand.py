@@ -19,12 +19,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bus_tools.made_frames import frame, kept, of_every_kind
-from rds.bus import socketcand as module
-from rds.bus import socketcand_words as words
-from rds.bus.hub_loop import STALL
-from rds.bus.link import open_bus as open_any
-from rds.bus.receiver import Fault
-from rds.bus.socketcand import Server
+from rds.bus.hub.hub_loop import STALL
+from rds.bus.tools import socketcand as module
+from rds.bus.tools import socketcand_words as words
+from rds.bus.tools.link import open_bus as open_any
+from rds.bus.tools.receiver import Fault
+from rds.bus.tools.socketcand import Server
 from rds.core.errors import InputError
 
 Opener = Callable[..., can.BusABC]

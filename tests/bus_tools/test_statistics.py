@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bus_tools.made_frames import frame, of_every_kind
-from rds.bus import frames
-from rds.bus.bits import frame_time
-from rds.bus.decode import cyclic, decoder
-from rds.bus.frames import Answer, Kind, Status
-from rds.bus.monitor import View, to_json
-from rds.bus.monitor_view import picture
-from rds.bus.statistics import Key, Statistics, since
+from rds.bus.medium.bits import frame_time
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Answer, Kind, Status
+from rds.bus.tools.decode import cyclic, decoder
+from rds.bus.tools.monitor import View, to_json
+from rds.bus.tools.monitor_view import picture
+from rds.bus.tools.statistics import Key, Statistics, since
 from rds.core.errors import InputError
 
 
@@ -185,7 +185,7 @@ def test_without_cantools_it_says_how_to_get_it(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setitem(sys.modules, "cantools", None)
     with pytest.raises(InputError, match="pip install cantools"):
         decoder([tmp_path / "oven.dbc"])
-    monkeypatch.setattr("rds.bus.decode.find_spec", lambda name: None)
+    monkeypatch.setattr("rds.bus.tools.decode.find_spec", lambda name: None)
     assert decoder()(frame(0x013)) is not None, "the cyclic messages need none"
 
 

@@ -20,11 +20,11 @@ from uuid import uuid4
 import can
 import pytest
 
-from rds.bus.cia402 import codes
-from rds.bus.cia402.codes import Mode, State, state_of
-from rds.bus.cia402.drive import Drive, Frame
-from rds.bus.cia402.node import DriveNode
-from rds.bus.cia402.server import serve
+from rds.bus.modules.cia402 import codes
+from rds.bus.modules.cia402.codes import Mode, State, state_of
+from rds.bus.modules.cia402.drive import Drive, Frame
+from rds.bus.modules.cia402.node import DriveNode
+from rds.bus.modules.cia402.server import serve
 from rds.machines import Machine, load_machine
 
 NODE = 2
@@ -154,7 +154,7 @@ def rig(machine: Machine) -> Rig:
 @pytest.fixture
 def served(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., tuple[str, list[DriveNode]]]]:
     """Serves drives on python-can's `virtual` bus, in a thread; gives the channel and the nodes."""
-    monkeypatch.setattr("rds.bus.cia402.host.LOST_AFTER", PATIENCE)
+    monkeypatch.setattr("rds.bus.modules.cia402.host.LOST_AFTER", PATIENCE)
     with contextlib.ExitStack() as stack:
 
         def starter(*axes: str) -> tuple[str, list[DriveNode]]:
@@ -190,7 +190,7 @@ def builtin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture
 def program(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., subprocess.Popen[str]]]:
     """Runs `python ...`; kills what is left at the end. A host here waits for drives as long as patient ones for it."""
-    monkeypatch.setattr("rds.bus.cia402.host.LOST_AFTER", 250)
+    monkeypatch.setattr("rds.bus.modules.cia402.host.LOST_AFTER", 250)
     with contextlib.ExitStack() as stack:
 
         def runner(*arguments: str) -> subprocess.Popen[str]:

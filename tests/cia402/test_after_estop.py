@@ -9,12 +9,12 @@ import can
 import canopen
 import pytest
 
-from rds.bus.cia402.codes import State, state_of
-from rds.bus.cia402.configure import library
-from rds.bus.cia402.host import Cia402Drivers
-from rds.bus.cia402.scan import scan
-from rds.bus.estop import stop_everything
-from rds.bus.link import open_bus
+from rds.bus.modules.cia402.codes import State, state_of
+from rds.bus.modules.cia402.configure import library
+from rds.bus.modules.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.scan import scan
+from rds.bus.tools.estop import stop_everything
+from rds.bus.tools.link import open_bus
 from rds.core.errors import MachineError
 from rds.machines import Machine
 

@@ -11,10 +11,10 @@ import can
 import pytest
 from canopen.sdo import SdoCommunicationError
 
-from rds.bus.cia402 import codes, configure
-from rds.bus.cia402.codes import State
-from rds.bus.cia402.host import Cia402Drivers
-from rds.bus.cia402.scan import scan
+from rds.bus.modules.cia402 import codes, configure
+from rds.bus.modules.cia402.codes import State
+from rds.bus.modules.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.scan import scan
 from rds.core.errors import MachineError
 from rds.machines import Machine
 
@@ -46,7 +46,7 @@ def test_each_drive_has_a_mode_of_its_own(machine: Machine, served: Served) -> N
 def test_a_drive_that_stays_under_power_after_its_quick_stop_is_told_to_give_it_up(
     machine: Machine, served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rds.bus.cia402.host._STOPPING", 0.5)
+    monkeypatch.setattr("rds.bus.modules.cia402.host._STOPPING", 0.5)
     channel, nodes = served("X")
     table = {"mode": "csp", "axis": {"X": {"write": [[0x605A, 0, 6]]}}}
     with drivers(machine, channel, ["X"], cia402=table) as host:
@@ -139,7 +139,7 @@ def test_an_emergency_stop_while_a_drive_is_homed_is_told_as_such(machine: Machi
 
 
 HOMES = """
-from rds.bus.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.host import Cia402Drivers
 from rds.machines import load_machine
 host = Cia402Drivers(load_machine("mini-cnc"), ["X"], channel="drives", cia402={"axis": {"X": {"homing": 17}}})
 host.start(lambda axis, position: position < -0.5 and print("homing", flush=True))

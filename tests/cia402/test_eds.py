@@ -16,7 +16,7 @@ from canopen.objectdictionary.datatypes import INTEGER_TYPES
 
 from .conftest import Abort, Rig
 
-PATH = str(files("rds.bus.cia402").joinpath("axis.eds"))
+PATH = str(files("rds.bus.modules.cia402").joinpath("axis.eds"))
 U8, U16, U32, I8, I16, I32 = (
     datatypes.UNSIGNED8,
     datatypes.UNSIGNED16,

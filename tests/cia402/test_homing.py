@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rds.bus.cia402.codes import ENABLE_OPERATION, HALT, MODE_12, MODE_13, TARGET_REACHED, Mode, State
-from rds.bus.cia402.homing import METHODS
+from rds.bus.modules.cia402.codes import ENABLE_OPERATION, HALT, MODE_12, MODE_13, TARGET_REACHED, Mode, State
+from rds.bus.modules.cia402.homing import METHODS
 from rds.machines import Machine
 
 from .conftest import Rig

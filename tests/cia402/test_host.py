@@ -14,11 +14,11 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus.cia402.codes import Nmt, State
-from rds.bus.cia402.follow import follow
-from rds.bus.cia402.host import Cia402Drivers
-from rds.bus.cia402.node import DriveNode
-from rds.bus.cia402.scan import scan
+from rds.bus.modules.cia402.codes import Nmt, State
+from rds.bus.modules.cia402.follow import follow
+from rds.bus.modules.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.node import DriveNode
+from rds.bus.modules.cia402.scan import scan
 from rds.core.errors import InputError, MachineError
 from rds.machines import Machine
 
@@ -172,7 +172,7 @@ def test_a_drive_needs_nothing_but_what_the_profile_makes_mandatory(
     """The EDS of a bought drive: no objects of ours, none of the optional ones, one PDO each way."""
     eds = configparser.RawConfigParser()
     eds.optionxform = str  # type: ignore[assignment,method-assign]
-    eds.read_string(files("rds.bus.cia402").joinpath("axis.eds").read_text())
+    eds.read_string(files("rds.bus.modules.cia402").joinpath("axis.eds").read_text())
     optional = ("2000", "2001", "1006", "1016", "1017", "1019", "1029", "60C2", "6502", "60E3")
     for section in eds.sections():
         if section.startswith(optional) or section[:4] in {f"{base + n:04X}" for base in PDOS for n in (1, 2, 3)}:

@@ -6,7 +6,7 @@ from math import cos, pi, sin
 
 import pytest
 
-from rds.bus.cia402.codes import (
+from rds.bus.modules.cia402.codes import (
     DISABLE_VOLTAGE,
     ENABLE_OPERATION,
     INTERNAL_LIMIT,
@@ -19,7 +19,7 @@ from rds.bus.cia402.codes import (
     Mode,
     State,
 )
-from rds.bus.module import machine_parameters
+from rds.bus.modules.rds.module import machine_parameters
 from rds.machines import Machine
 from rds.models.machine_axis import MachineAxis
 

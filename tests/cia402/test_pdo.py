@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from rds.bus.cia402.codes import ENABLE_OPERATION, SHUTDOWN, Mode, State
+from rds.bus.modules.cia402.codes import ENABLE_OPERATION, SHUTDOWN, Mode, State
 
 from .conftest import NODE, Abort, Rig
 

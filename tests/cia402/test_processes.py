@@ -12,9 +12,9 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus.cia402.codes import State
-from rds.bus.cia402.host import Cia402Drivers
-from rds.bus.cia402.scan import scan
+from rds.bus.modules.cia402.codes import State
+from rds.bus.modules.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.scan import scan
 from rds.core.errors import MachineError
 from rds.machines import Machine
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.realtime
 Program = Callable[..., "subprocess.Popen[str]"]
 HOST = """
 import sys, time
-from rds.bus.cia402.host import Cia402Drivers
+from rds.bus.modules.cia402.host import Cia402Drivers
 from rds.machines import load_machine
 patient = {"axis": {"X": {"write": [[0x2000, 1, 200], [0x2000, 2, 250]]}}}
 host = Cia402Drivers(load_machine("mini-cnc"), ["X"], channel="drives", cia402=patient)
@@ -41,7 +41,7 @@ for k in range(1_000_000):
 
 
 def serve(program: Program, *axes: str) -> subprocess.Popen[str]:
-    server = program("-m", "rds.bus.cia402.server", "mini-cnc", "--channel", "drives", "--axes", ",".join(axes))
+    server = program("-m", "rds.bus.modules.cia402.server", "mini-cnc", "--channel", "drives", "--axes", ",".join(axes))
     assert server.stdout is not None
     assert server.stdout.readline().startswith("ready mini-cnc on rds:drives")
     return server
@@ -125,7 +125,14 @@ def test_a_server_ends_when_it_is_told(builtin: Path, program: Program) -> None:
 
 def test_a_server_ends_when_its_starter_has_gone(builtin: Path, program: Program) -> None:
     server = program(
-        "-m", "rds.bus.cia402.server", "mini-cnc", "--channel", "drives", "--exit-with-stdin", "--afterlife", "0.3"
+        "-m",
+        "rds.bus.modules.cia402.server",
+        "mini-cnc",
+        "--channel",
+        "drives",
+        "--exit-with-stdin",
+        "--afterlife",
+        "0.3",
     )
     assert server.stdout is not None and server.stdin is not None
     assert server.stdout.readline().startswith("ready")

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from rds.bus.cia402.codes import Mode
-from rds.bus.cia402.settings import read_settings
+from rds.bus.modules.cia402.codes import Mode
+from rds.bus.modules.cia402.settings import read_settings
 from rds.core.errors import InputError
 from rds.machines import Machine
 

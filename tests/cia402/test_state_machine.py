@@ -7,8 +7,8 @@ from canopen.profiles.p402 import State402
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.cia402.codes import STATUS_PATTERNS, State, state_of, status_text
-from rds.bus.cia402.state_machine import TRANSITIONS, StateMachine
+from rds.bus.modules.cia402.codes import STATUS_PATTERNS, State, state_of, status_text
+from rds.bus.modules.cia402.state_machine import TRANSITIONS, StateMachine
 
 WAYS = {tuple(way) for way in State402.TRANSITIONTABLE}
 # not in the library's table: quick stop without power (7, 10), and 3 with 4 in one command

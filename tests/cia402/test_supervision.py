@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rds.bus.cia402.codes import Mode, Nmt, State, error_register_bits, error_text
+from rds.bus.modules.cia402.codes import Mode, Nmt, State, error_register_bits, error_text
 from rds.machines import Machine
 
 from .conftest import Rig, T

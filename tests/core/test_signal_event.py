@@ -6,7 +6,7 @@ import signal
 import threading
 import time
 
-from rds.commands.common import until_ctrl_c
+from rds.cli.common import until_ctrl_c
 from rds.core.interrupt import SignalEvent
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from rds.bus.drivers import Counters
-from rds.experiment.bus_note import bus_note
+from rds.bus.modules.rds.drivers import Counters
+from rds.modes.experiment.outcome import bus_note
 
 SOUND = {"frames": 30000, "error_frames": 0, "struck": 0}
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis.strategies import booleans, floats, sampled_from
 
 import rds
-from rds.experiment.bus_note import bus_note
+from rds.modes.experiment.outcome import bus_note
 
 numba = pytest.importorskip("numba")
 

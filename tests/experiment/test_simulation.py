@@ -153,7 +153,7 @@ def test_parameters_that_no_file_can_hold_are_kept_as_texts(tmp_path):
         "axis = 'X'\nduration = 0.1\n[reference]\nkind = 'sinusoid'\namplitude = 1.0\nfrequency = 5.0\n"
         "[controller]\nfile = 'law.py'\n"
     )
-    from rds.experiment.report import run_and_save
+    from rds.modes.experiment.report import run_and_save
 
     _, files = run_and_save(tmp_path / "e.toml", None, tmp_path / "out", None)
     for kind in ("csv", "mat", "parquet"):
@@ -172,7 +172,7 @@ def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> No
         "axis = 'X'\nduration = 0.1\n[reference]\nkind = 'sinusoid'\namplitude = 1.0\nfrequency = 5.0\n"
         "[controller]\nfile = 'law.py'\n"
     )
-    from rds.experiment.report import run_and_save
+    from rds.modes.experiment.report import run_and_save
 
     for out in (Path("out"), None):
         _, files = run_and_save(Path("e.toml"), None, out, None)
@@ -181,7 +181,7 @@ def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> No
 
 
 def test_a_run_s_tables_are_written_once(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rds.experiment.report import run_and_save
+    from rds.modes.experiment.report import run_and_save
     from rds.results import files as results
 
     written, save = [], results.save_all

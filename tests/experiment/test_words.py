@@ -26,9 +26,9 @@ from hypothesis.strategies import (
 
 import rds
 from rds.core.errors import InputError, RdsError
-from rds.core.words import Words
-from rds.experiment.resolve import resolve
-from rds.runtime.plan import Plan
+from rds.core.toml_table import Words
+from rds.modes.experiment.resolve import resolve
+from rds.modes.loop.plan import Plan
 
 GOOD = """\
 machine = "mini-cnc"
@@ -363,7 +363,7 @@ PLAUSIBLE = fixed_dictionaries(
 @settings(max_examples=400, deadline=None)
 @given(table=one_of(dictionaries(KEYS, JUNK), PLAUSIBLE))
 def test_junk_is_refused_or_planned_and_nothing_else(table: dict[str, Any]) -> None:
-    from rds.experiment.resolve import resolve
+    from rds.modes.experiment.resolve import resolve
 
     table = _without_none(table)
     if isinstance(table.get("duration"), int | float) and table["duration"] == table["duration"]:

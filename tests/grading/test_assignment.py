@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
-from rds.grading.assignment import read_assignment
-from rds.grading.hand_out import hand_out
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.hand_out import hand_out
 from rds.grading.sandbox.limits import Limits
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
 

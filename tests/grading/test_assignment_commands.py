@@ -10,16 +10,16 @@ import pytest
 from click.testing import Result as Ran
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.grading.assignment import read_assignment
+from rds.cli.main import app
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.check_assignment import IDLE, WORK_SEEDS, check_assignment
+from rds.grading.assignment.self_check import self_check
+from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.cases.case import CaseRun
 from rds.grading.cases.control import ControlCase
-from rds.grading.check_assignment import IDLE, WORK_SEEDS, check_assignment
 from rds.grading.sandbox import Pool
 from rds.grading.sandbox.counts import Counts
 from rds.grading.sandbox.subject import Subject
-from rds.grading.self_check import self_check
-from rds.grading.trusted import TrustedFiles
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 
 BLIND = HEAD.replace("title", 'self_check = "blind"\ntitle')

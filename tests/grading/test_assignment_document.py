@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.grading.assignment import SELF_CHECKS, read_assignment
+from rds.grading.assignment.assignment import SELF_CHECKS, read_assignment
+from rds.grading.assignment.late_rules import Late
 from rds.grading.criteria import KINDS
-from rds.grading.late import Late
 from rds.grading.sandbox import Pool
 from rds.grading.sandbox.limits import Limits
 from tests.documents import ROOT, blocks, save

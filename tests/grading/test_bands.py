@@ -9,11 +9,11 @@ from hypothesis import assume, given
 from hypothesis.strategies import floats, text
 
 from rds.core.errors import InputError
-from rds.core.words import Words
-from rds.grading.bands import Bands
+from rds.core.toml_table import Words
+from rds.grading.assignment.late_rules import Late, days_late, read_late
+from rds.grading.assignment.seeds import part_seed, student_seed
+from rds.grading.criteria.bands import Bands
 from rds.grading.grade import Band
-from rds.grading.late import Late, days_late, read_late
-from rds.grading.seeds import part_seed, student_seed
 
 NUMBERS = floats(-1e6, 1e6)
 

@@ -16,12 +16,12 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
+from rds.core.parallel import Outcome
 from rds.grading.batch import BatchOutcome, run_batch
 from rds.grading.batch import run as run_module
+from rds.grading.batch.journal import Journal, read_journal
 from rds.grading.grade import Grade, Status
-from rds.grading.journal import Journal, read_journal
 from rds.grading.sandbox import SandboxError, available
-from rds.spread import Outcome
 from tests.grading.batches import ASSIGNMENT, law, notebook, put
 from tests.grading.made import assignment_in
 
@@ -232,7 +232,7 @@ def test_our_own_errors_are_tried_again_then_listed_and_never_a_zero(
                     raise SandboxError("the warm interpreter is gone")
                 yield Outcome(index, work(task))
             except SandboxError as error:
-                from rds.spread.outcome import Failure
+                from rds.core.parallel.outcome import Failure
 
                 yield Outcome(index, failure=Failure.RAISED, reason=str(error))
 
@@ -258,7 +258,7 @@ def test_a_worker_that_dies_is_replaced(place: Path, tmp_path: Path) -> None:
                 process = int(path.parent.name)
                 words = path.read_bytes() if path.exists() else b""
                 status = (path.parent / "stat").read_text() if path.exists() else ""
-                if b"rds.spread.worker" in words and int(status.rpartition(")")[2].split()[1]) == os.getpid():
+                if b"rds.core.parallel.worker" in words and int(status.rpartition(")")[2].split()[1]) == os.getpid():
                     os.kill(process, signal.SIGKILL)
                     killed.append(process)
                     return
@@ -288,7 +288,7 @@ def test_a_disk_that_is_full_loses_nothing(place: Path, tmp_path: Path, monkeypa
         return write(descriptor, data)
 
     with monkeypatch.context() as patch, pytest.raises(InputError, match=r"No space left.*--resume"):
-        patch.setattr("rds.grading.journal.os.write", full)
+        patch.setattr("rds.grading.batch.journal.os.write", full)
         run_batch(place / "task", handed_in, out, jobs=1)
     assert [row["student"] for row in read_journal(out / "journal.jsonl")] == ["ada"]
     found = run_batch(place / "task", handed_in, out, jobs=1, resume=True)

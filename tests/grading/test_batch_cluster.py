@@ -78,7 +78,7 @@ def test_a_worker_without_the_sandbox_is_told(place: Path) -> None:
 
 
 def test_no_scheduler_is_refused(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rds.spread.cluster.CONNECT", 0.3)
+    monkeypatch.setattr("rds.core.parallel.cluster.CONNECT", 0.3)
     with pytest.raises(InputError, match="no dask scheduler answers"):
         run_batch(place / "task", place / "in", place / "nobody", scheduler="tcp://127.0.0.1:1")
     with pytest.raises(InputError, match="give one of them"):

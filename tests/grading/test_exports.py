@@ -16,14 +16,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.grading.export import Written, export
+from rds.grading.batch.grades_table import csv_text, grades_csv
 from rds.grading.exports import GRADEBOOKS
+from rds.grading.exports.export import Written, export
 from rds.grading.exports.exported import Wanted
 from rds.grading.exports.one_json import LARGEST
 from rds.grading.grade import Grade, Status
-from rds.grading.grades_table import csv_text, grades_csv
 from tests.grading.grades import HOSTILE, batch_in, grade, score
 
 NOTHING = Wanted()

@@ -15,18 +15,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.grading.assignment import Assignment, read_assignment
-from rds.grading.band_bar import band_bar
-from rds.grading.bands import Bands
+from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.cases.case import CaseRun
-from rds.grading.chart import Curve, Panel, chart, ticks
-from rds.grading.class_report import class_page
+from rds.grading.criteria.bands import Bands
 from rds.grading.exports.pictures import pictures_of
-from rds.grading.feedback import feedback_page
-from rds.grading.feedback_plots import case_picture
+from rds.grading.feedback.band_bar import band_bar
+from rds.grading.feedback.chart import Curve, Panel, chart, ticks
+from rds.grading.feedback.class_report import class_page
+from rds.grading.feedback.feedback import feedback_page
+from rds.grading.feedback.feedback_plots import case_picture
+from rds.grading.feedback.histogram import histogram
+from rds.grading.feedback.plain_text import cell, one_line, plain
 from rds.grading.grade import Status
-from rds.grading.histogram import histogram
-from rds.grading.plain_text import cell, one_line, plain
 from rds.results import Result
 from tests.grading.grades import HOSTILE, grade, score
 from tests.grading.made import HEAD, RMS, SINE, assignment_in

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import rds
-from rds.grading.assignment import Assignment, read_assignment
+from rds.grading.assignment.assignment import Assignment, read_assignment
+from rds.grading.assignment.trusted import TrustedFiles
+from rds.grading.batch.grade_one import grade, grade_with_runs
 from rds.grading.grade import Band, Grade, Status
-from rds.grading.grade_one import grade, grade_with_runs
 from rds.grading.sandbox import Pool
-from rds.grading.trusted import TrustedFiles
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 
 STATEFUL = """

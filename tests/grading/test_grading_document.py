@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.exported import Wanted
 from rds.grading.grade import Status

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.grading.journal import Journal, line, read_journal
+from rds.grading.batch.journal import Journal, line, read_journal
 
 ROWS: list[dict[str, Any]] = [{"student": "ada", "n": 1.5}, {"student": "b\n\u2028é", "n": None}, {"student": "cy"}]
 
@@ -82,7 +82,7 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
 
 def test_what_append_has_returned_from_survives_a_kill(tmp_path: Path) -> None:
     program = (
-        "import sys\nfrom pathlib import Path\nfrom rds.grading.journal import Journal\n"
+        "import sys\nfrom pathlib import Path\nfrom rds.grading.batch.journal import Journal\n"
         "journal = Journal(Path(sys.argv[1]))\n"
         "for n in range(1_000_000):\n    journal.append({'n': n, 'text': 'x' * 5000})\n    print(n, flush=True)\n"
     )

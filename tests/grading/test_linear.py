@@ -10,12 +10,12 @@ import pytest
 
 from rds.core.load import load_student
 from rds.core.types import Model
-from rds.grading.assignment import Assignment, read_assignment
-from rds.grading.grade_one import Opened
-from rds.grading.linear import PULSE, LinearLoop, linear_loop
-from rds.grading.trusted import TrustedFiles
+from rds.grading.assignment.assignment import Assignment, read_assignment
+from rds.grading.assignment.trusted import TrustedFiles
+from rds.grading.batch.grade_one import Opened
+from rds.grading.criteria.linear import PULSE, LinearLoop, linear_loop
+from rds.identification.robustness.margins import linear_law, loop_margins
 from rds.models import library_model
-from rds.robustness.margins import linear_law, loop_margins
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
 
 TEXT = HEAD + SINE.replace("duration = 1.0", "duration = 3.0\n{plant}") + RMS

@@ -12,7 +12,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from rds.grading.one_submission import CONTAINERS, grade_in, main
+from rds.grading.exports.one_submission import CONTAINERS, grade_in, main
 from rds.grading.sandbox import available
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 from tests.grading.test_exports import GRADESCOPE, PRAIRIELEARN

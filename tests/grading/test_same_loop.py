@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rds.grading.assignment import read_assignment
-from rds.grading.grade_one import Opened
-from rds.grading.linear import PULSE, LinearLoop
-from rds.grading.same_loop import MOST, difference, force, free_stretch
-from rds.grading.trusted import TrustedFiles
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.trusted import TrustedFiles
+from rds.grading.batch.grade_one import Opened
+from rds.grading.criteria.linear import PULSE, LinearLoop
+from rds.grading.criteria.same_loop import MOST, difference, force, free_stretch
 from rds.models import library_model
 from tests.grading.made import HEAD, assignment_in
 

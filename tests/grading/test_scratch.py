@@ -13,11 +13,11 @@ import pytest
 
 pytest.importorskip("fcntl")
 
-from rds.grading.scratch import scratch
+from rds.grading.batch.scratch import scratch
 
 HOLDER = """
 import sys
-from rds.grading.scratch import scratch
+from rds.grading.batch.scratch import scratch
 with scratch("solution") as folder:
     (folder / "submission.py").write_text("secret")
     print(folder, flush=True)

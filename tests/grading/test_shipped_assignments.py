@@ -13,11 +13,11 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
-from rds.grading.assignment import read_assignment
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.hand_out import hand_out
 from rds.grading.batch import BatchOutcome, run_batch
+from rds.grading.batch.grade_one import grade
 from rds.grading.grade import Status
-from rds.grading.grade_one import grade
-from rds.grading.hand_out import hand_out
 from rds.grading.sandbox import Pool, available
 
 HERE = Path(__file__).parent

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.grading.similarity import GRAM, LEAST_COMMON, LEAST_SCORE, WINDOW, fingerprints, similar_pairs
-from rds.grading.similarity_table import pairs_html
+from rds.grading.batch.similarity import GRAM, LEAST_COMMON, LEAST_SCORE, WINDOW, fingerprints, similar_pairs
+from rds.grading.batch.similarity_table import pairs_html
 
 LAW = '''"""PD control with a filtered derivative."""
 

@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.grading.assignment import read_assignment
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.self_check import self_check
 from rds.grading.grade import Status
 from rds.grading.intake.items import Refusal
 from rds.grading.intake.notebooks import converted
 from rds.grading.sandbox import Pool
-from rds.grading.self_check import self_check
 from tests.grading.batches import ASSIGNMENT, law, notebook
 from tests.grading.made import assignment_in
 

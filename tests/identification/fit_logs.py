@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rds.identification.axis_structure import make
-from rds.logs.log import Log
+from rds.identification.logs.log import Log
+from rds.identification.structures.axis_structure import make
 from rds.machines import load_machine
 
 RESOLUTION = 0.001  # mm

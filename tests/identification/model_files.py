@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rds.identification.estimate import Estimate, Parameter
-from rds.identification.model_file import write_model
+from rds.identification.fit.estimate import Estimate, Parameter
+from rds.identification.fit.model_file import write_model
 
 UNITS = {
     "tau": "s",

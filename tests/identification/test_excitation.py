@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.identification.excitation import Design, Prediction, Task, design, make_task, predict
-from rds.identification.excitation_plot import excitation_picture
-from rds.identification.fit import fit
-from rds.identification.structures import structure
-from rds.logs.log import Log
+from rds.identification.fit.excitation import Design, Prediction, Task, design, make_task, predict
+from rds.identification.fit.excitation_plot import excitation_picture
+from rds.identification.fit.fit import fit
+from rds.identification.logs.log import Log
+from rds.identification.structures.structures import structure
 from rds.machines import load_machine
-from rds.signals import make_signal, sample_voltage
+from rds.references import make_signal, sample_voltage
 
 NOISE = 0.002  # mm
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.identification.fit import fit
-from rds.identification.model_file import read_model
-from rds.identification.structures import structure
-from rds.logs.log import Log
+from rds.identification.fit.fit import fit
+from rds.identification.fit.model_file import read_model
+from rds.identification.logs.log import Log
+from rds.identification.structures.structures import structure
 from tests.identification.fit_logs import axis_log, mini_cnc
 
 X = mini_cnc("X")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.identification.axis_structure import make
-from rds.identification.fit import fit
-from rds.logs.log import Log
+from rds.identification.fit.fit import fit
+from rds.identification.logs.log import Log
+from rds.identification.structures.axis_structure import make
 from tests.identification.fit_logs import axis_log, mini_cnc
 
 

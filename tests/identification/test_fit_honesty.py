@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.identification.axis_structure import make
-from rds.identification.fit import fit
-from rds.logs.log import Log
+from rds.identification.fit.fit import fit
+from rds.identification.logs.log import Log
+from rds.identification.structures.axis_structure import make
 from tests.identification.fit_logs import axis_log, mini_cnc
 
 X = mini_cnc("X")
@@ -107,7 +107,7 @@ def test_friction_of_a_direction_that_hardly_shows_does_not_disturb_the_rest(see
 def test_a_search_that_does_not_settle_is_said_loudly_and_widens_the_intervals(monkeypatch: pytest.MonkeyPatch) -> None:
     log, start = axis_log(X), {name: 3.0 * value for name, value in X.items()}
     settled = fit([log], make(), options={"start": start})
-    monkeypatch.setattr("rds.identification.solve.EVALUATIONS", 2)
+    monkeypatch.setattr("rds.identification.fit.solve.EVALUATIONS", 2)
     found = fit([log], make(), options={"start": start})
     assert found.warnings[0].startswith("do not use these parameters yet: the search had not settled after 2 free runs")
     for name, value in X.items():

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.identification.axis_structure import OPTIONS, make
+from rds.identification.structures.axis_structure import OPTIONS, make
 from rds.models import library_model
 from rds.models.machine_axis import MachineAxis, MachineParameters
 from tests.identification.fit_logs import mini_cnc

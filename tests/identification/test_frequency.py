@@ -10,15 +10,14 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats
 
 from rds.core.errors import InputError
-from rds.identification.estimate import UNUSABLE
-from rds.identification.fit import fit
-from rds.identification.frequency import model_response
-from rds.identification.frequency_plot import bode_picture
-from rds.identification.frequency_response import find_period, frequency_response
-from rds.identification.mass_kernel import positions
-from rds.identification.structures import structure
-from rds.logs.log import Log
-from rds.signals import Signal, chirp, multisine, sample_voltage, square
+from rds.identification.fit.estimate import UNUSABLE
+from rds.identification.fit.fit import fit
+from rds.identification.fit.frequency_plot import bode_picture
+from rds.identification.fit.frequency_response import find_period, frequency_response, model_response
+from rds.identification.logs.log import Log
+from rds.identification.structures.mass_kernel import positions
+from rds.identification.structures.structures import structure
+from rds.references import Signal, chirp, multisine, sample_voltage, square
 
 T = 1e-3  # s
 TAU, K, PLUS, MINUS = 9.943e-3, 1.764, 0.539, -0.222  # X of the mini CNC

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.identification.axis_structure import make
-from rds.identification.design import write_tracking
-from rds.identification.estimate import Estimate, guesses
-from rds.identification.estimate_json import parameter_rows
-from rds.identification.fit import fit
-from rds.identification.fit_report import fragment
-from rds.identification.made_estimate import made_estimate
-from rds.identification.model_file import read_model, write_model
-from rds.identification.run_model import check_model_file
-from rds.logs.log import Log
-from rds.validation.report import _parameters
-from rds.validation.validate import validate
+from rds.cli.main import app
+from rds.identification.fit.design import write_tracking
+from rds.identification.fit.estimate import Estimate, guesses
+from rds.identification.fit.estimate_json import parameter_rows
+from rds.identification.fit.fit import fit
+from rds.identification.fit.fit_report import fragment
+from rds.identification.fit.made_estimate import made_estimate
+from rds.identification.fit.model_file import read_model, write_model
+from rds.identification.fit.run_model import check_model_file
+from rds.identification.logs.log import Log
+from rds.identification.structures.axis_structure import make
+from rds.identification.validate.report import _parameters
+from rds.identification.validate.validate import validate
 from tests.identification.fit_logs import mini_cnc
 
 SAID = "not told by the data that were fitted: friction_minus = "

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.identification.axis_structure import OPTIONS
+from rds.cli.main import app
+from rds.identification.structures.axis_structure import OPTIONS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "identification.md").read_text(encoding="utf-8")
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.identification.fit import fit
-from rds.identification.mass_kernel import positions
-from rds.identification.structures import structure
-from rds.logs.log import Log
+from rds.identification.fit.fit import fit
+from rds.identification.logs.log import Log
+from rds.identification.structures.mass_kernel import positions
+from rds.identification.structures.structures import structure
 
 EMPS = Path(__file__).parents[2].parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 TRUTH = {"tau": 9.943e-3, "K": 1.764, "friction_plus": 0.539, "friction_minus": -0.222}  # X of the mini CNC

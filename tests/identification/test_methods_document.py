@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rds.identification.inverse_dynamics import OPTIONS
-from rds.identification.motion_form import _FORMS
-from rds.logs.map import LogMap
+from rds.identification.fit.inverse_dynamics import OPTIONS
+from rds.identification.logs.map import LogMap
+from rds.identification.structures.motion_form import _FORMS
 
 TEXT = (Path(__file__).parents[2] / "docs" / "identification-methods.md").read_text(encoding="utf-8")
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rds.identification.fit import fit
-from rds.identification.missing import missing_option, with_hint
-from rds.identification.structures import structure
-from rds.logs import shipped
-from rds.logs.log import Log
+from rds.identification.fit.fit import fit
+from rds.identification.fit.missing_options import missing_option, with_hint
+from rds.identification.logs import shipped
+from rds.identification.logs.log import Log
+from rds.identification.structures.structures import structure
 from tests.identification.fit_logs import mini_cnc
 
 T = 1e-3  # s

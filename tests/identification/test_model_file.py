@@ -13,8 +13,8 @@ from hypothesis.strategies import floats, lists, text
 
 from rds.core.errors import InputError
 from rds.core.toml_text import toml_text
-from rds.identification.estimate import Errors, Estimate, Parameter
-from rds.identification.model_file import ModelFile, read_model, write_model
+from rds.identification.fit.estimate import Errors, Estimate, Parameter
+from rds.identification.fit.model_file import ModelFile, read_model, write_model
 
 LOG = {"name": 'X "first"', "source": "log.csv", "sha256": "ab" * 32, "first": 0, "end": 5000, "command": (-4.0, 4.0)}
 

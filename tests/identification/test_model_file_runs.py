@@ -10,11 +10,11 @@ import pytest
 
 import rds
 from rds.core.errors import InputError
-from rds.identification.design import linear_axis_of
-from rds.identification.machine_file import write_machine
-from rds.identification.model_file import read_model
-from rds.identification.run_model import check_model_file, run_model
-from rds.identification.structures import structure
+from rds.identification.fit.design import linear_axis_of
+from rds.identification.fit.machine_file import write_machine
+from rds.identification.fit.model_file import read_model
+from rds.identification.fit.run_model import check_model_file, run_model
+from rds.identification.structures.structures import structure
 from rds.machines import load_machine
 from tests.identification.model_files import UNITS, X, write_made
 

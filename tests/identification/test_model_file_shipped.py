@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.data.make import AXES, DURATION, sines, steps
-from rds.logs import shipped
+from rds.identification.data.make import AXES, DURATION, sines, steps
+from rds.identification.logs import shipped
 
 
 def test_there_are_two_of_each_axis_and_they_are_small() -> None:

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 import rds
 from rds.checks import check_file
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.identification.design import design_tracking, linear_axis_of, tracking_system, write_tracking
-from rds.identification.machine_file import write_machine
+from rds.identification.fit.design import design_tracking, linear_axis_of, tracking_system, write_tracking
+from rds.identification.fit.machine_file import write_machine
 from rds.machines import load_machine
 from tests.identification.model_files import X, write_made
 

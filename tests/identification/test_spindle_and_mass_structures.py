@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import InputError
-from rds.identification.structure import Structure
-from rds.identification.structures import structure
+from rds.identification.structures.structure import Structure
+from rds.identification.structures.structures import structure
 from rds.models import linear_axis, spindle
 
 

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats
 
 from rds.core.errors import InputError
-from rds.identification.fit import fit
-from rds.identification.mass_kernel import positions
-from rds.identification.structures import structure
-from rds.logs.log import Log
+from rds.identification.fit.fit import fit
+from rds.identification.logs.log import Log
+from rds.identification.structures.mass_kernel import positions
+from rds.identification.structures.structures import structure
 from rds.machines import load_machine
 from rds.models.machine_axis import MachineAxis, MachineParameters
 

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import ContractError
-from rds.interface import as_voltage, converter, encoder
+from rds.machines.converter import as_voltage, converter
+from rds.machines.encoder import encoder
 
 STEP = 20.0 / 4096
 

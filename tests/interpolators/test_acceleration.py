@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from interpolators.strategies import arcs, lines
 from rds.core.errors import InputError
 from rds.core.types import LineSegment, Segment
-from rds.interpolators import interpolator_names, library_interpolator
+from rds.interpolators import interpolator_names
 from rds.interpolators.acceleration import adder_output, make_acceleration, output_pulses, smooth
+from rds.interpolators.interpolator import library_interpolator
 from rds.interpolators.path import interpolate
 
 # oacs-thesis, tables N30 and N31: eight samples of 5, adder output and output pulse at k = 1 ... 12

@@ -13,7 +13,7 @@ import pytest
 from documents import ROOT
 from typer.testing import CliRunner, Result
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.results import open_result
 
 PROGRAM = """G21 G90 G17 G94 G54

@@ -10,10 +10,9 @@ import pytest
 
 from rds.core.errors import ContractError, InputError
 from rds.core.types import ArcSegment, LineSegment
-from rds.interpolators import library_interpolator
 from rds.interpolators.acceleration import make_acceleration
 from rds.interpolators.deviation import distances
-from rds.interpolators.interpolator import find_interpolator
+from rds.interpolators.interpolator import find_interpolator, library_interpolator
 from rds.interpolators.path import interpolate
 from rds.interpolators.plots import pictures
 from rds.results import open_result

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from interpolators.strategies import arcs, lines
 from rds.core.types import ArcSegment, LineSegment, Segment
-from rds.interpolators import library_interpolator
 from rds.interpolators.acceleration import make_acceleration
+from rds.interpolators.interpolator import library_interpolator
 from rds.interpolators.path import interpolate
 from rds.interpolators.reference_pulse import generation_error, pulses, pulses_without_carry
 

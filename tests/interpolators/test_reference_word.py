@@ -13,9 +13,10 @@ from interpolators.strategies import arcs, lines
 from rds.core.errors import InputError
 from rds.core.geometry import length, radius
 from rds.core.types import ArcSegment, LineSegment
-from rds.interpolators import interpolator_module, library_interpolator
+from rds.interpolators import interpolator_module
 from rds.interpolators.deviation import distances
 from rds.interpolators.division import Turn
+from rds.interpolators.interpolator import library_interpolator
 from rds.interpolators.reference_word import steps
 
 METHODS = ("euler", "improved-euler", "taylor", "tustin", "improved-tustin")

@@ -9,8 +9,8 @@ import can
 import pytest
 
 from rds.core.errors import InputError
-from rds.logs.log import Log
-from rds.logs.read_log import read_log
+from rds.identification.logs.log import Log
+from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis
 from tests.logs.test_formats import DBC
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.logs.describe import describe
-from rds.logs.read_log import read_log
-from rds.logs.table import remedy
+from rds.identification.logs.describe import describe
+from rds.identification.logs.read_log import read_log
+from rds.identification.logs.table import remedy
 from tests.logs.data_files import axis, headed, write
 
 

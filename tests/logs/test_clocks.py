@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.logs.clocks import align, hold, resample
-from rds.logs.read_log import read_log
-from rds.logs.units import dimension, factor
+from rds.identification.logs.clocks import align, hold, resample
+from rds.identification.logs.read_log import read_log
+from rds.identification.logs.units import dimension, factor
 from tests.logs.data_files import axis, headed, write
 
 

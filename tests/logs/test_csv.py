@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.logs.csv_table import read_csv
-from rds.logs.read_log import read_log
+from rds.identification.logs.csv_table import read_csv
+from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis, headed, write
 
 LAYOUTS = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), (" ", ".")]

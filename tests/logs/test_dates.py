@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from rds.core.errors import InputError
-from rds.logs.read_log import read_log
+from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis, headed
 
 BEGIN = np.datetime64("2024-10-27T00:59:59.900", "ns")

@@ -10,9 +10,9 @@ import pytest
 from documents import ROOT, blocks, save
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.logs.map import LogMap
+from rds.identification.logs.map import LogMap
 
 DOCUMENT = "docs/data.md"
 TEXT = (ROOT / DOCUMENT).read_text(encoding="utf-8")

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.logs.log import Finding, Log
-from rds.logs.read_log import read_log
-from rds.logs.steps import step_of
-from rds.logs.time_base import time_base
+from rds.identification.logs.log import Finding, Log
+from rds.identification.logs.read_log import read_log
+from rds.identification.logs.steps import step_of
+from rds.identification.logs.time_base import time_base
 from tests.logs.data_files import MAP, axis, headed, write
 
 Columns = dict[str, np.ndarray]

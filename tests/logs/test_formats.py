@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus import frames
-from rds.bus.logs import LogWriter
-from rds.cli import app
+from rds.bus.modules.rds import frames
+from rds.bus.tools.logs import LogWriter
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.logs.describe import describe
-from rds.logs.read_log import read_log
+from rds.identification.logs.describe import describe
+from rds.identification.logs.read_log import read_log
 from rds.results import Result
 from tests.logs.data_files import MAP, axis, headed, write
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.logs.csv_headings import name_and_unit
-from rds.logs.read_log import read_log
-from rds.logs.tables import read_table
+from rds.identification.logs.csv_headings import name_and_unit
+from rds.identification.logs.read_log import read_log
+from rds.identification.logs.tables import read_table
 
 T = np.arange(400)  # ms
 U, X = np.sin(0.03 * T), 3.0 * np.cos(0.03 * T)

@@ -9,10 +9,10 @@ import pytest
 from scipy.io import savemat
 
 from rds.core.errors import InputError
-from rds.logs.guess import draft, guess
-from rds.logs.map import LogMap
-from rds.logs.read_log import read_log
-from rds.logs.tables import read_table
+from rds.identification.logs.guess import draft, guess
+from rds.identification.logs.map import LogMap
+from rds.identification.logs.read_log import read_log
+from rds.identification.logs.tables import read_table
 from tests.logs.data_files import MAP, axis, write
 
 SECOND = """[second]

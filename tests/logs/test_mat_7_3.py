@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.logs import apart, hdf5_mat
-from rds.logs.hdf5_mat import parts_here
-from rds.logs.read_log import read_log
+from rds.identification.logs import hdf5_mat
+from rds.identification.logs import reader_process as apart
+from rds.identification.logs.hdf5_mat import parts_here
+from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import MAP, axis
 
 h5py = pytest.importorskip("h5py")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.logs import mf4_channels, tables
-from rds.logs.mf4_channels import rasters_here
-from rds.logs.read_log import read_log
+from rds.identification.logs import mf4_channels, tables
+from rds.identification.logs.mf4_channels import rasters_here
+from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis
 
 asammdf = pytest.importorskip("asammdf")

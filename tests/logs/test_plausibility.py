@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from rds.identification.axis_structure import make
-from rds.logs.findings import with_findings
-from rds.logs.log import Gravity, Log
+from rds.identification.logs.findings import with_findings
+from rds.identification.logs.log import Gravity, Log
+from rds.identification.structures.axis_structure import make
 from rds.machines import load_machine
 
 KINDS = {

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rds.logs.describe import Description, describe
-from rds.logs.units import dimension
+from rds.identification.logs.describe import Description, describe
+from rds.identification.logs.units import dimension
 
 
 def described(folder: Path, heading: str) -> Description:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.logs.log import Gravity, Log
-from rds.logs.read_log import read_log
+from rds.identification.logs.log import Gravity, Log
+from rds.identification.logs.read_log import read_log
 from tests.logs.data_files import axis, write
 
 MAP = """

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis.strategies import floats, integers
 
 from rds.core.errors import InputError
-from rds.identification.structures import structure
+from rds.identification.structures.structures import structure
 from rds.models import library_model, model_names
 
 

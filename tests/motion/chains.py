@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from rds.motion import Limits, SampleBlock, plan
-from rds.motion.certificate import Certificate, certified
-from rds.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, arc, chain, in_plane, line
+from rds.interpolators.motion import Limits, SampleBlock, plan
+from rds.interpolators.motion.certificate import Certificate, certified
+from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, arc, chain, in_plane, line
 
 MODES = (EXACT_PATH, EXACT_STOP, BLEND)
 MACHINES = (

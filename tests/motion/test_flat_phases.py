@@ -7,7 +7,7 @@ from math import nextafter
 import numpy as np
 import pytest
 
-from rds.motion.profile import hold_tops
+from rds.interpolators.motion.profile import hold_tops
 
 
 def test_a_top_beside_a_speed_one_bit_lower_is_held() -> None:

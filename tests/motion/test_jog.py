@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.motion.jog import advance
+from rds.interpolators.motion.jog import advance
 
 T = 0.002  # s
 

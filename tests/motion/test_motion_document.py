@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from documents import ROOT, blocks
 
-from rds.motion.path import MOST_JOINED, SHARP, STOP_SHARE, TURN_SHARE
-from rds.motion.planner import MARGIN, TOLERANCE
-from rds.motion.speed import BEND_SHARE
-from rds.motion.stretch import WINDOW
+from rds.interpolators.motion.path import MOST_JOINED, SHARP, STOP_SHARE, TURN_SHARE
+from rds.interpolators.motion.planner import MARGIN, TOLERANCE
+from rds.interpolators.motion.speed import BEND_SHARE
+from rds.interpolators.motion.stretch import WINDOW
 
 DOCUMENT = "docs/motion.md"
 TEXT = (ROOT / DOCUMENT).read_text(encoding="utf-8")

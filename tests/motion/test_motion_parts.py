@@ -15,12 +15,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.interpolators.motion import Limits, plan
+from rds.interpolators.motion.certificate import Certificate
+from rds.interpolators.motion.deviation import deviation
+from rds.interpolators.motion.profile import hold_tops, phases_of, speeds
+from rds.interpolators.motion.segments import BLEND, SEGMENT, arc, chain, line, point_at
 from rds.machines import load_machine
-from rds.motion import Limits, plan
-from rds.motion.certificate import Certificate
-from rds.motion.deviation import deviation
-from rds.motion.profile import hold_tops, phases_of, speeds
-from rds.motion.segments import BLEND, SEGMENT, arc, chain, line, point_at
 
 from .chains import MACHINES, planned, polygon
 
@@ -184,9 +184,9 @@ if {blocked}:
     sys.modules["numba"] = None
 sys.path.insert(0, {folder!r})
 import numpy as np
-from rds.motion import Limits, plan
-from rds.motion.compiling import COMPILED
-from rds.motion.segments import BLEND, arc, chain, line
+from rds.interpolators.motion import Limits, plan
+from rds.core.compiling import COMPILED
+from rds.interpolators.motion.segments import BLEND, arc, chain, line
 assert COMPILED != {blocked}
 limits = Limits.from_axes({{"X": (13, 200, 1e4), "Y": (13, 200, 1e4), "Z": (11, 150, 7500)}})
 path = chain(line((0, 0), (2, 0), 10.0, mode=BLEND), line((2, 0), (2, 2), 10.0, mode=BLEND),

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from rds.motion.deviation import allowed, deviation
-from rds.motion.segments import BLEND, chain
-from rds.runtime.program import Program
-from rds.runtime.retimed import EXCESS, Retimed
+from rds.interpolators.motion.deviation import allowed, deviation
+from rds.interpolators.motion.segments import BLEND, chain
+from rds.modes.loop.program import Program
+from rds.modes.loop.retimed import EXCESS, Retimed
 
 from .chains import MACHINES, chains, planned, polygon
 

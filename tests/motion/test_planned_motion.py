@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError, RdsError
-from rds.motion import Limits, plan, predicted_time
-from rds.motion.certificate import Certificate, certified
-from rds.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT, arc, chain, line, point_at
+from rds.interpolators.motion import Limits, plan, predicted_time
+from rds.interpolators.motion.certificate import Certificate, certified
+from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT, arc, chain, line, point_at
 
 from .chains import MACHINES, Event, PathBlock, chains, planned, polygon
 

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.motion.blended import ACCEL, CRUISE, DECEL, blended
-from rds.motion.point_to_point import point_to_point
-from rds.motion.segments import line
-from rds.motion.trapezoid import trapezoid
+from rds.interpolators.motion.blended import ACCEL, CRUISE, DECEL, blended
+from rds.interpolators.motion.point_to_point import point_to_point
+from rds.interpolators.motion.segments import line
+from rds.interpolators.motion.trapezoid import trapezoid
 
 from .chains import MACHINES, planned
 

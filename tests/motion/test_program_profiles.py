@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.motion import Limits, SampleBlock
-from rds.motion.certificate import Certificate
-from rds.motion.profiles import PROFILES, motion_of
-from rds.motion.segments import BLEND, EXACT_PATH, SEGMENT, arc, chain, line
+from rds.interpolators.motion import Limits, SampleBlock
+from rds.interpolators.motion.certificate import Certificate
+from rds.interpolators.motion.profiles import PROFILES, motion_of
+from rds.interpolators.motion.segments import BLEND, EXACT_PATH, SEGMENT, arc, chain, line
 
 from .chains import MACHINES, Event, PathBlock, chains, polygon
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import pytest
 from hypothesis import strategies as st
 
-from rds.nc.canon import ARC, FEED, TRAVERSE, Call
-from rds.nc.compensation import LEFT, RIGHT, Compensation, Item
-from rds.nc.compensation_moves import Stretch
+from rds.nc.compensation.compensation import LEFT, RIGHT, Compensation, Item
+from rds.nc.compensation.moves import Stretch
+from rds.nc.language.canon import ARC, FEED, TRAVERSE, Call
 
 NAMES = {TRAVERSE: "STRAIGHT_TRAVERSE", FEED: "STRAIGHT_FEED", ARC: "ARC_FEED"}
 COUNTS = {TRAVERSE: 6, FEED: 6, ARC: 9}

@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from rds.nc import Dialect, ProgramError, canon
-from rds.nc.fast_lane import NEVER
-from rds.nc.interpreter import Interpreter
-from rds.nc.parameters import COUNT, read_parameters
-from rds.nc.state import State
-from rds.nc.tools import Tool, read_tools
+from rds.nc import Dialect, ProgramError
+from rds.nc.language import canon, canon_text
+from rds.nc.language.fast_lane import NEVER
+from rds.nc.language.interpreter import Interpreter
+from rds.nc.language.parameters import COUNT, read_parameters
+from rds.nc.language.state import State
+from rds.nc.language.tools import Tool, read_tools
 
 NAME = "p.ngc"
 TOOLS = (Tool(1, 1, 3.0), Tool(2, 2, 6.0, (0.0, 0.0, 10.0, 0.0, 0.0, 0.0)), Tool(9, 3, -2.0))
@@ -41,7 +42,7 @@ def outcome(program: bytes, wait: int, options: Dialect = DIALECTS[0]) -> dict[s
     fault: ProgramError | None = None
     names = canon.MOTION.names or ()
     try:
-        with patch("rds.nc.fast_lane.LONGEST_PAUSE", 0):
+        with patch("rds.nc.language.fast_lane.LONGEST_PAUSE", 0):
             for item in interpreter.run():
                 if isinstance(item, canon.Call):
                     items.append(item)
@@ -84,7 +85,7 @@ def program(data: bytes) -> None:
         check_fault(found["fault"], NAME, data[1:].split(b"\n"))
     elif len(found["items"]) < 1000:
         calls = [item for item in found["items"] if isinstance(item, canon.Call)]
-        for line in canon.text(calls):  # a line of (PRINT, ) is empty
+        for line in canon_text.text(calls):  # a line of (PRINT, ) is empty
             line.encode("utf-8", "surrogateescape")
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from rds.nc import Dialect, ProgramError, interpret
-from rds.nc.canon import text
-from rds.nc.tools import read_tools
+from rds.nc.language.canon_text import text
+from rds.nc.language.tools import read_tools
 
 needs_rs274 = pytest.mark.skipif(shutil.which("rs274") is None, reason="rs274 (Debian's linuxcnc-uspace) is missing")
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from rds.nc.canon import FEED, Call
-from rds.nc.compensation import LEFT, RIGHT, Compensation
-from rds.nc.compensation_geometry import arc_arc, arc_line, entry_centre, line_arc, line_line, sweep
-from rds.nc.errors import ProgramError
+from rds.nc.compensation.compensation import LEFT, RIGHT, Compensation
+from rds.nc.compensation.geometry import arc_arc, arc_line, entry_centre, line_arc, line_line, sweep
+from rds.nc.language.canon import FEED, Call
+from rds.nc.language.errors import ProgramError
 
 from .compensation_cases import (
     OFF,

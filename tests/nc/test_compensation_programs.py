@@ -8,9 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from rds.nc import Dialect, ProgramError, interpret
-from rds.nc.canon import text
-from rds.nc.proof import Proof, proof
-from rds.nc.proof_pieces import CONTOUR, ENTRY, EXIT
+from rds.nc.compensation.proof import Proof, proof
+from rds.nc.compensation.proof_pieces import CONTOUR, ENTRY, EXIT
+from rds.nc.language.canon_text import text
 
 from .compensation_cases import Case, cases, needs_rs274, program, rs274
 

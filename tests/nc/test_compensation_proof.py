@@ -10,12 +10,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from rds.nc.compensation import LEFT, RIGHT
-from rds.nc.compensation_moves import Stretch
-from rds.nc.errors import ProgramError
-from rds.nc.proof import Proof, StretchProof, measure
-from rds.nc.proof_geometry import Contour, Curve
-from rds.nc.proof_pieces import CONTOUR, ENTRY, EXIT, LEAD_IN, LEAD_OUT, RAPID
+from rds.nc.compensation.compensation import LEFT, RIGHT
+from rds.nc.compensation.moves import Stretch
+from rds.nc.compensation.proof import Proof, StretchProof, measure
+from rds.nc.compensation.proof_geometry import Contour, Curve
+from rds.nc.compensation.proof_pieces import CONTOUR, ENTRY, EXIT, LEAD_IN, LEAD_OUT, RAPID
+from rds.nc.language.errors import ProgramError
 
 from .compensation_cases import OFF, Case, Op, Round, Straight, cases, made
 

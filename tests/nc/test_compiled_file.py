@@ -14,7 +14,7 @@ from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.nc.check import Setup, check_program, compiled_if_current, sources
 from rds.nc.compiled_file import MAGIC, open_compiled
-from rds.nc.dialect import Dialect
+from rds.nc.language.dialect import Dialect
 from rds.nc.toolpath import toolpath
 
 PROGRAM = """G21 G90

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from rds.nc.blocks import G_GROUPS, M_GROUPS
+from rds.nc.language.blocks import G_GROUPS, M_GROUPS
 from tests.nc.rs274 import calls, needs_rs274, ours, rs274
 
 BEFORE = "G21 F100 S100 T1\n"

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rds.nc import Dialect, canon
-from rds.nc.fast_lane import NEVER, FastLane
-from rds.nc.interpreter import Interpreter
-from rds.nc.source import CHUNK, LONGEST
+from rds.nc import Dialect
+from rds.nc.language import canon
+from rds.nc.language.fast_lane import NEVER, FastLane
+from rds.nc.language.interpreter import Interpreter
+from rds.nc.language.source import CHUNK, LONGEST
 
 from .fuzz_targets import outcome, same
 
@@ -146,7 +147,7 @@ def test_it_goes_over_buffers_and_blocks(taken: Callable[[bytes], int]) -> None:
 def test_without_numba_the_usual_way_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     program = HEAD + b"G1\n" + b"X1 Y2\nX3\n" * 50 + b"M2\n"
     usual = outcome(program, NEVER)
-    monkeypatch.setattr("rds.nc.fast_lane.kernel", lambda: None)
+    monkeypatch.setattr("rds.nc.language.fast_lane.kernel", lambda: None)
     assert outcome(program, 0) == usual
 
 

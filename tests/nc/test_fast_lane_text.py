@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from rds.nc import canon
+from rds.nc.language import canon, canon_text
 
 pytest.importorskip("numba", reason="without numba (extra fast) rows are written by Python")
 
@@ -37,10 +37,10 @@ def rows(draw: st.DrawFn) -> np.ndarray:
 @example(np.array([(3, 0, 0, 1, (0.03125, *[0] * 8)), (3, 0, 0, 1, (0.09375, *[0] * 8))], canon.MOTION), 1)
 @example(np.array([(0, 0, 0, 1, (99999999999.99998, -1e11, 1e11, 0, 0, 0, 0, 0, 0))], canon.MOTION), 1)
 def test_the_same_text(rows: np.ndarray, number: int) -> None:
-    from rds.nc.fast_lane_text import written
+    from rds.nc.language.fast_lane_text import written
 
-    usual = list(canon.text([canon.MotionBlock(rows)]))
-    assert len(rows) < canon.MANY  # written by Python
+    usual = list(canon_text.text([canon.MotionBlock(rows)]))
+    assert len(rows) < canon_text.MANY  # written by Python
     usual = [f"{number + k:5d} {line[6:]}" for k, line in enumerate(usual)]
     at = 0
     for count, lines in written(rows, number):
@@ -60,9 +60,9 @@ def test_large_blocks_are_written_alike(monkeypatch: pytest.MonkeyPatch) -> None
     rows["values"] = rng.normal(0, 1000, (len(rows), 9))
     rows["values"][:, 4] = np.copysign(1, rows["values"][:, 4])
     rows["values"][::5000, 0] = 1e15  # by Python, in between
-    monkeypatch.setattr(canon, "LONG_TEXT", 0)
+    monkeypatch.setattr(canon_text, "LONG_TEXT", 0)
     items = [canon.Call("SELECT_PLANE", ("XY",)), canon.MotionBlock(rows), canon.Call("PROGRAM_END")]
-    fast = list(canon.text(items))
-    monkeypatch.setattr(canon, "_compiled", lambda: None)
-    assert fast == list(canon.text(items))
+    fast = list(canon_text.text(items))
+    monkeypatch.setattr(canon_text, "_compiled", lambda: None)
+    assert fast == list(canon_text.text(items))
     assert len(fast) == len(rows) + 2

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rds.nc import Dialect, ProgramError, interpret
-from rds.nc.canon import text as canon_text
-from rds.nc.tools import Tool
+from rds.nc.language.canon_text import text as canon_text
+from rds.nc.language.tools import Tool
 from tests.nc.random_programs import program
 
 

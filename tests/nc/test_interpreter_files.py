@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rds.nc import Dialect, ProgramError, interpret
-from rds.nc.canon import text
-from rds.nc.parameters import read_parameters
-from rds.nc.tools import Tool, read_tools
+from rds.nc.language.canon_text import text
+from rds.nc.language.parameters import read_parameters
+from rds.nc.language.tools import Tool, read_tools
 from tests.nc.rs274 import TOOLS, needs_rs274, rs274
 
 ANY_FILE = settings(max_examples=200, suppress_health_check=list(HealthCheck))

@@ -14,10 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.nc import Dialect, ProgramError, interpret
-from rds.nc.blocks import G_GROUPS, M_GROUPS
-from rds.nc.canon import ARC, BLOCK_ROWS, FEED, RATE, TRAVERSE, Call, MotionBlock, text
-from rds.nc.interpreter import Interpreter
-from rds.nc.tools import Tool
+from rds.nc.language.blocks import G_GROUPS, M_GROUPS
+from rds.nc.language.canon import ARC, BLOCK_ROWS, FEED, RATE, TRAVERSE, Call, MotionBlock
+from rds.nc.language.canon_text import text
+from rds.nc.language.interpreter import Interpreter
+from rds.nc.language.tools import Tool
 
 numbers = st.floats(-1e6, 1e6).map(lambda value: round(value, 4))
 

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from rds.cli import app
+from rds.cli.main import app
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.planner import plan, predicted_time
 from rds.machines import load_machine
-from rds.motion.limits import Limits
-from rds.motion.planner import plan, predicted_time
-from rds.nc.canon import text
 from rds.nc.check import Setup, motion
+from rds.nc.language.canon_text import text
 
 PROGRAM = """(lines, arcs in three planes, a helix, a compensated contour)
 G21 G90 G17
@@ -166,7 +166,7 @@ def test_canon_of_an_invalid_program(folder: Path) -> None:
 
 def test_canon_into_a_pipe_that_closes(folder: Path) -> None:
     (folder / "long.ngc").write_text("G1 F100\n" + "X1\nX2\n" * 20000 + "M2\n", encoding="utf-8")
-    program = f"{sys.executable} -m rds.cli nc canon long.ngc | head -1"
+    program = f"{sys.executable} -m rds.cli.main nc canon long.ngc | head -1"
     done = subprocess.run(["bash", "-o", "pipefail", "-c", program], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == "    1 N..... USE_LENGTH_UNITS(CANON_UNITS_MM)\n"

@@ -10,8 +10,8 @@ import pytest
 from documents import Block, blocks, save
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.commands.nc_options import DIALECT
+from rds.cli.main import app
+from rds.cli.nc_options import DIALECT
 from rds.nc.compiled_file import MAGIC
 from rds.nc.validate import Validation
 from tests.nc.rs274 import PROGRAMS

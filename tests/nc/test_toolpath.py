@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, LINE, XY, YZ, ZX, point_at
-from rds.nc.canon import ARC, FEED, MOTION, RATE, TRAVERSE, Call, MotionBlock
-from rds.nc.errors import ProgramError
+from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, LINE, XY, YZ, ZX, point_at
+from rds.nc.language.canon import ARC, FEED, MOTION, RATE, TRAVERSE, Call, MotionBlock
+from rds.nc.language.errors import ProgramError
 from rds.nc.toolpath import PathBlock, toolpath
 
 

@@ -11,14 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
+from rds.interpolators.motion.segments import LINE, SEGMENT, arc, chain, point_at
 from rds.machines import load_machine
-from rds.motion.segments import LINE, SEGMENT, arc, chain, point_at
 from rds.nc.check import Setup, check_program
 from rds.nc.extent import extents
-from rds.nc.places import find_word
-from rds.nc.tool_limits import tool_limits
+from rds.nc.fault_columns import find_word
 from rds.nc.trace import MOST_POINTS, Trace, sample
-from rds.nc.validate import MOST_FAULTS, Validation, plain
+from rds.nc.validate import MOST_FAULTS, Validation, plain, tool_limits
 
 TOOLS = "T1 P1 Z10 D3 ;end mill, max S8000 F400\nT2 P2 D6 ;face mill\n"
 

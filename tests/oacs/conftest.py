@@ -50,7 +50,7 @@ def serve(channel: str) -> Iterator[Callable[..., subprocess.Popen[str]]]:
     with contextlib.ExitStack() as stack:
 
         def starter(modules: str | None = None) -> subprocess.Popen[str]:
-            command = [sys.executable, "-m", "rds.bus.oacs.server", "mrmt-oacs", "--channel", channel]
+            command = [sys.executable, "-m", "rds.bus.modules.oacs.server", "mrmt-oacs", "--channel", channel]
             command += ["--exit-with-stdin"] + (["--modules", modules] if modules else [])
             pipe = subprocess.PIPE
             process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)

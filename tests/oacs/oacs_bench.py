@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rds.bus.oacs import messages, words
-from rds.bus.oacs.messages import Decoded
-from rds.bus.oacs.module import OacsModule
-from rds.bus.oacs.module_data import read_modules
+from rds.bus.modules.oacs import codes as words
+from rds.bus.modules.oacs import messages
+from rds.bus.modules.oacs.messages import Decoded
+from rds.bus.modules.oacs.module import OacsModule
+from rds.bus.modules.oacs.module_data import read_modules
 from rds.machines import load_machine
 
 MACHINE = load_machine("mrmt-oacs")

@@ -16,8 +16,8 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus.oacs.pid import MEANINGS, Tuning
-from rds.cli import app
+from rds.bus.modules.oacs.pid import MEANINGS, Tuning
+from rds.cli.main import app
 
 pytestmark = pytest.mark.realtime
 Serve = Callable[..., subprocess.Popen[str]]
@@ -128,7 +128,7 @@ def test_what_ends_the_command_ends_the_motion(
 ) -> None:
     """At once: by a stop on the bus, not by the module's own watchdog, 2 s after the host's last word."""
     serve("X")
-    command = [sys.executable, "-m", "rds.cli", "module", "4", *words, "--channel", channel]
+    command = [sys.executable, "-m", "rds.cli.main", "module", "4", *words, "--channel", channel]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as process:
         heard = hear(bus, lambda message: message.arbitration_id == 4 and message.data[:1] == b"\x03")
         assert heard.data[1] != 0  # a motion begins

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from documents import blocks
 
-from rds.bus.oacs.module import OacsModule
-from rds.bus.oacs.module_data import IDENTITY, ModuleData, read_modules
-from rds.bus.oacs.transfer import decode_description, encode_description
-from rds.bus.oacs.words import Kind
+from rds.bus.modules.oacs.codes import Kind
+from rds.bus.modules.oacs.module import OacsModule
+from rds.bus.modules.oacs.module_data import IDENTITY, ModuleData, read_modules
+from rds.bus.modules.oacs.transfer import decode_description, encode_description
 from rds.core.errors import InputError
 from rds.machines import load_machine, machine_names
 

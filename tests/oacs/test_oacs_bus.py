@@ -13,9 +13,9 @@ import can
 import numpy as np
 import pytest
 
-from rds.bus.oacs import Change, Module, OacsDrivers, Watch, estop, scan
-from rds.bus.oacs.tuning import gains_from_step
-from rds.bus.oacs.watch import ANSWERS, INTERVAL, PATIENCE
+from rds.bus.modules.oacs import Change, Module, OacsDrivers, Watch, estop, scan
+from rds.bus.modules.oacs.tuning import gains_from_step
+from rds.bus.modules.oacs.watch import ANSWERS, INTERVAL, PATIENCE
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.results import Result, open_result
@@ -215,7 +215,7 @@ def test_a_broken_wire_stops_a_motion(serve: Serve, bus: can.BusABC) -> None:
 def test_a_host_that_is_killed_leaves_nothing_moving(serve: Serve, bus: can.BusABC, channel: str) -> None:
     serve("X")
     code = (
-        "import can, rds.bus.oacs as o\n"
+        "import can, rds.bus.modules.oacs as o\n"
         f"bus = can.Bus(interface='rds', channel={channel!r})\n"
         "print('going', flush=True)\n"
         "o.Module(bus, 4).move(by=100.0)\n"
@@ -262,7 +262,7 @@ def test_hostile_frames_do_not_end_the_modules(serve: Serve, bus: can.BusABC) ->
 
 
 def test_the_program_refuses_what_it_does_not_know() -> None:
-    command = [sys.executable, "-m", "rds.bus.oacs.server"]
+    command = [sys.executable, "-m", "rds.bus.modules.oacs.server"]
     answer = subprocess.run([*command, "nothing"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
     assert answer.returncode == 2 and "there is no machine 'nothing'" in answer.stderr
     answer = subprocess.run(

@@ -15,9 +15,10 @@ from cantools.database.can.c_source import camel_to_snake_case, generate
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus import frames
-from rds.bus.frames import Answer
-from rds.bus.oacs import messages, words
+from rds.bus.modules.oacs import codes as words
+from rds.bus.modules.oacs import messages
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Answer
 
 DATABASE = messages.load()
 MODULES = {"Z": 2, "A": 3, "X": 4, "Drill": 5}

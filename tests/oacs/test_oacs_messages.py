@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.oacs import messages, words
+from rds.bus.modules.oacs import codes as words
+from rds.bus.modules.oacs import messages
 from rds.core.errors import InputError, MachineError
 
 DATABASE = messages.load()
@@ -130,7 +131,6 @@ def test_slots_of_two_modules_never_meet(node: int, at: float, base: float) -> N
 
 
 def test_the_cyclic_path_never_loads_the_dbc() -> None:
-    code = (
-        "import sys, rds.bus.drivers, rds.bus.oacs.drivers, rds.bus.oacs.module; assert 'cantools' not in sys.modules"
-    )
+    code = "import sys, rds.bus.modules.rds.drivers, rds.bus.modules.oacs.drivers, rds.bus.modules.oacs.module\n"
+    code += "assert 'cantools' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oacs_bench import MACHINE, Bench
 
-from rds.bus import frames
-from rds.bus.oacs import messages, words
-from rds.bus.oacs.words import Acknowledges, Code, Mode, Move, Parameter, Result, Select
+from rds.bus.modules.oacs import codes as words
+from rds.bus.modules.oacs import messages
+from rds.bus.modules.oacs.codes import Acknowledges, Code, Mode, Move, Parameter, Result, Select
+from rds.bus.modules.rds import frames
 
 Benches = Callable[..., Bench]
 

@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.module import machine_parameters
-from rds.bus.oacs import pid
-from rds.bus.oacs.module_data import read_modules
-from rds.bus.oacs.pid import Memory, Tuning
-from rds.bus.oacs.plant import Plant
-from rds.bus.oacs.quadrature import Counter, Interrupts, decode, highest_rate, levels
-from rds.bus.oacs.sensors import gravities, motor_current, vibrating
-from rds.bus.oacs.switches import Debouncer, LimitSwitch
-from rds.bus.oacs.words import DUTY, Parameter, Select
+from rds.bus.modules.oacs import pid
+from rds.bus.modules.oacs.codes import DUTY, Parameter, Select
+from rds.bus.modules.oacs.module_data import read_modules
+from rds.bus.modules.oacs.pid import Memory, Tuning
+from rds.bus.modules.oacs.plant import Plant
+from rds.bus.modules.oacs.quadrature import Counter, Interrupts, decode, highest_rate, levels
+from rds.bus.modules.oacs.sensors import gravities, motor_current, vibrating
+from rds.bus.modules.oacs.switches import Debouncer, LimitSwitch
+from rds.bus.modules.rds.module import machine_parameters
 from rds.core.errors import InputError
 from rds.machines import load_machine
 

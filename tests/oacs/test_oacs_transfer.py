@@ -13,16 +13,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.oacs.iso_tp import Receiver, Sender
-from rds.bus.oacs.module_data import read_modules
-from rds.bus.oacs.transfer import (
+from rds.bus.modules.oacs.codes import Kind
+from rds.bus.modules.oacs.iso_tp import Receiver, Sender
+from rds.bus.modules.oacs.module_data import read_modules
+from rds.bus.modules.oacs.transfer import (
     JOINTS,
     LENGTH,
     ModuleDescription,
     decode_description,
     encode_description,
 )
-from rds.bus.oacs.words import Kind
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 

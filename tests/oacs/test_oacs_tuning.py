@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.oacs.tuning import Gains, ReactionCurve, gains_from_step, reaction_curve, ziegler_nichols
+from rds.bus.modules.oacs.tuning import Gains, ReactionCurve, gains_from_step, reaction_curve, ziegler_nichols
 from rds.core.errors import InputError
 from rds.results import Result
 

@@ -12,10 +12,10 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus.oacs.events import EventFile, Happened, Reconfigurations
-from rds.cli import app
+from rds.bus.modules.oacs.events import EventFile, Happened, Reconfigurations
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.reports import make_report
+from rds.results.reports import make_report
 
 Serve = Callable[..., subprocess.Popen[str]]
 
@@ -67,7 +67,7 @@ def test_a_module_replaced_by_another_is_a_reconfiguration_that_ends_when_it_is_
 def test_it_is_not_ready_while_a_number_is_used_twice_or_modules_are_missing(
     serve: Serve, bus: can.BusABC, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rds.bus.oacs.watch.PATIENCE", 12)  # calls: they follow each other without a pause here
+    monkeypatch.setattr("rds.bus.modules.oacs.watch.PATIENCE", 12)  # calls: they follow each other without a pause here
     serve("X")
     watching = Reconfigurations(bus, modules=2)
     watching.look()

@@ -13,16 +13,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.oacs import Module, messages
-from rds.bus.oacs.module_data import read_modules
-from rds.bus.oacs.recording import PositionRecorder
-from rds.bus.oacs.talk import Heard
-from rds.bus.oacs.words import Says
-from rds.commands.modules import folder_for
+from rds.bus.modules.oacs import Module, messages
+from rds.bus.modules.oacs.codes import Says
+from rds.bus.modules.oacs.module_data import read_modules
+from rds.bus.modules.oacs.recording import PositionRecorder
+from rds.bus.modules.oacs.talk import Heard
+from rds.cli.modules import folder_for
 from rds.core.errors import InputError
 from rds.machines import load_machine
+from rds.panels.design.step_plot import plot
 from rds.results import Result
-from rds.session.step_plot import plot
 
 X = read_modules(load_machine("mrmt-oacs"))["X"].describe(1)  # 169 counts per mm
 PERIOD = 0.01

@@ -172,7 +172,7 @@ def folders() -> Iterator[set[Path]]:
     free: the next test, or the same one tried again, would find it in use.
     """
     from rds.core.errors import InputError
-    from rds.session import Session
+    from rds.panels.session import Session
 
     used: set[Path] = set()
     yield used

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rds.panels.colours import Colours
+from rds.panels.page.colours import Colours
 
 
 def test_the_browser_s_preference_is_followed_until_the_button_is_pressed() -> None:

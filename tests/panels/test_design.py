@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rds.panels.design_picture import design_picture
-from rds.session import Session
-from rds.session.design import Design
+from rds.panels.design.picture import design_picture
+from rds.panels.design.state import Design
+from rds.panels.session import Session
 from tests.panels.conftest import App
 
 

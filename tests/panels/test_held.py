@@ -15,9 +15,9 @@ import pytest
 
 from rds.core.errors import MachineError
 from rds.panels.app.whereabouts import ask, own_line
-from rds.panels.rescue import Rescue
-from rds.panels.shell import Shell
-from rds.session import Session
+from rds.panels.page.rescue import Rescue
+from rds.panels.page.shell import Shell
+from rds.panels.session import Session
 from tests.panels.conftest import App, begin_with
 from tests.panels.test_interrupted import wait_for
 

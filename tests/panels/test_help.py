@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
-from rds.help.build import _local, help_pages, page_file, sources
-from rds.panels import PANELS
+from rds.panels.help.build import _local, help_pages, page_file, sources
+from rds.panels.registry import PANELS
 from rds.results.serve import FolderServer
 
 
@@ -77,8 +77,8 @@ def test_building_ends_when_it_is_asked_to_and_leaves_nothing(tmp_path: Path) ->
 ENDS_MEANWHILE = """
 import sys, threading
 from pathlib import Path
-from rds.help.build import help_pages
-from rds.session.task import Task
+from rds.panels.help.build import help_pages
+from rds.panels.session.task import Task
 
 begun = threading.Event()
 Task("help", lambda task: help_pages(Path(sys.argv[1]) / "pages", begun.set)).start()

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rds.panels.session import Session
+from rds.panels.session.kept_runs import State, state_of
 from rds.results import open_result
-from rds.session import Session
-from rds.session.kept_runs import State, state_of
 from tests.panels.conftest import App, begin_with
 
 LONG = 120.0  # s of a run that is stopped

@@ -11,21 +11,21 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
-from rds.panels.hold import HoldButtons
-from rds.panels.jog import JogView
+from rds.panels.equipment.fields import MODES
+from rds.panels.jog.hold import HoldButtons
+from rds.panels.jog.panel import JogView
+from rds.panels.jog.state import Jog
+from rds.panels.jog.turn import TurnButtons
 from rds.panels.kit.button import run_order
 from rds.panels.kit.notice import Notice
-from rds.panels.presence import Presence
-from rds.panels.program_operator import Operator
-from rds.panels.shell import Shell
-from rds.panels.turn import TurnButtons
-from rds.session import Session
-from rds.session.choices import Choices
-from rds.session.equipment_fields import MODES
-from rds.session.fields import Choice
-from rds.session.jog import Jog
-from rds.session.late import LATE
-from rds.session.program import program_choices
+from rds.panels.page.presence import Presence
+from rds.panels.page.shell import Shell
+from rds.panels.program.operator import Operator
+from rds.panels.program.state import program_choices
+from rds.panels.session import Session
+from rds.panels.session.choices import Choices
+from rds.panels.session.expired_orders import LATE
+from rds.panels.session.fields import Choice
 
 KEEPS = """
 window.sent = []; // what the page said of its buttons
@@ -182,7 +182,7 @@ def test_a_late_step_and_a_late_turn_are_said_and_not_done(
 def test_words_of_a_held_button_that_come_all_at_once_move_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     heard: list[str] = []
     now = [100.0]
-    monkeypatch.setattr("rds.panels.answers.time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr("rds.panels.jog.answers.time", SimpleNamespace(monotonic=lambda: now[0]))
     for made, kind, lasts in ((HoldButtons, "hold", 0.5), (TurnButtons, "turn", 1.0)):
         buttons = made(lambda kind, direction: heard.append(kind))
         answers: list[Any] = []

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from rds.machines import load_machine
+from rds.modes.loop.execution import State
 from rds.nc.active import Modes
-from rds.panels.program_status import status_html
-from rds.programs.run import Status
-from rds.runtime.execution import State
+from rds.nc.run.run import Status
+from rds.panels.program.status import status_html
 from tests.panels.conftest import App
 
 EDITOR = ".rds-editor textarea"

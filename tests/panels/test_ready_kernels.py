@@ -24,7 +24,7 @@ from rds.panels.app.ready_kernels import LAUNCHER, ForkedKernel, ReadyKernels
 APP = Path(serve.__file__).parent
 ASK = (
     "import os, sys; 'ipywidgets' in sys.modules and print("
-    "os.environ['SAID'], os.getcwd(), 'rds.panels.program' in sys.modules, os.environ['APP'] in sys.path, "
+    "os.environ['SAID'], os.getcwd(), 'rds.panels.program.panel' in sys.modules, os.environ['APP'] in sys.path, "
     "__import__('numpy').random.rand())"
 )
 

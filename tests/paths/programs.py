@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rds.core.types import ArcSegment, Segment
-from rds.nc.canon import ARC, FEED, RATE, MotionBlock
-from rds.paths.measure import pieces
+from rds.nc.language.canon import ARC, FEED, RATE, MotionBlock
+from rds.nc.paths.measure import pieces
 from tests.nc.rs274 import calls, ours, rs274
 
 HAS_RS274 = shutil.which("rs274") is not None

@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.paths.deviation import ACCURACY, hausdorff
+from rds.nc.paths.deviation import ACCURACY, hausdorff
 
 coordinates = st.floats(-10, 10).map(lambda value: round(value, 6))  # mm
 points = st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=12, unique=True)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from rds.core.errors import InputError
-from rds.paths.drawing import MOST_CELLS, parse_text_drawing, read_drawing
+from rds.nc.paths.drawing import MOST_CELLS, parse_text_drawing, read_drawing
 
 BLOB = np.zeros((12, 15))
 BLOB[3:9, 4:11] = 1.0  # dark
@@ -167,7 +167,7 @@ def test_without_the_extra_the_command_that_installs_it_is_told(
             raise ImportError(f"No module named {name!r}")
         return real(name, *rest)
 
-    from rds.paths import needs, outline
+    from rds.nc.paths import needs, outline
 
     monkeypatch.setattr(needs, "import_module", missing)
     with pytest.raises(InputError, match=r"needs pillow .*; install it with: pip install 'rds\[drawing\]'"):

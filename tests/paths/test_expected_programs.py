@@ -11,8 +11,17 @@ from pathlib import Path
 import pytest
 
 from rds.core.types import Segment
-from rds.paths import arc, line, outline, part_program, path_of_points, quadrilateral_by_moves, read_points, spiral_cone
-from rds.paths.drawing import parse_text_drawing
+from rds.nc.paths import (
+    arc,
+    line,
+    outline,
+    part_program,
+    path_of_points,
+    quadrilateral_by_moves,
+    read_points,
+    spiral_cone,
+)
+from rds.nc.paths.drawing import parse_text_drawing
 from tests.nc.rs274 import calls, needs_rs274, ours, rs274
 
 EXPECTED = Path(__file__).parent / "expected"

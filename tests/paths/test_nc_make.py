@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.paths import arc, outline, picture, spiral_cone
-from rds.paths.drawing import parse_text_drawing
+from rds.cli.main import app
+from rds.nc.paths import arc, outline, picture, spiral_cone
+from rds.nc.paths.drawing import parse_text_drawing
 from tests.paths.programs import agreed
 
 DRAWING = "......\n.####.\n.####.\n.##...\n......\n"

@@ -11,14 +11,14 @@ from scipy.ndimage import binary_dilation, binary_fill_holes, label
 
 from rds.core.errors import InputError
 from rds.core.types import ArcSegment
-from rds.paths import outline, part_program
-from rds.paths.boundary import boundary_cells
-from rds.paths.deviation import hausdorff
-from rds.paths.drawing import parse_text_drawing
-from rds.paths.measure import is_closed, pieces, signed_area, trace
-from rds.paths.outlines import Outline
-from rds.paths.region import single_region, without_specks
-from rds.paths.smoothing import smoothed
+from rds.nc.paths import outline, part_program
+from rds.nc.paths.boundary import boundary_cells
+from rds.nc.paths.deviation import hausdorff
+from rds.nc.paths.drawing import parse_text_drawing
+from rds.nc.paths.measure import is_closed, pieces, signed_area, trace
+from rds.nc.paths.outlines import Outline
+from rds.nc.paths.region import single_region, without_specks
+from rds.nc.paths.smoothing import smoothed
 from tests.paths.programs import agreed, assert_cuts
 
 FEED = 5.0

@@ -9,7 +9,7 @@ import pytest
 from documents import ROOT, blocks, save
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from tests.nc.test_part_programs_document import commands
 from tests.paths.programs import agreed
 

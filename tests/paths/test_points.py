@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from rds.core.errors import InputError
 from rds.core.geometry import radius, sweep
 from rds.core.types import ArcSegment, LineSegment
-from rds.paths import part_program, path_of_points, read_points
-from rds.paths.arc_fit import fit
-from rds.paths.deviation import hausdorff
-from rds.paths.measure import is_closed, pieces, total_length, trace
+from rds.nc.paths import part_program, path_of_points, read_points
+from rds.nc.paths.arc_fit import fit
+from rds.nc.paths.deviation import hausdorff
+from rds.nc.paths.measure import is_closed, pieces, total_length, trace
 from tests.paths.programs import agreed, assert_cuts
 
 FEED = 5.0

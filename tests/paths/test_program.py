@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.core.types import ArcSegment, LineSegment
-from rds.paths import arc, line, part_program
-from rds.paths.program import comment
+from rds.nc.paths import arc, line, part_program
+from rds.nc.paths.program import comment
 from tests.nc.rs274 import ours
 from tests.paths.programs import agreed, assert_cuts
 
@@ -62,7 +62,7 @@ def test_rounding_never_turns_an_arc_the_long_way_round(
     _, complaint = ours(text.encode())
     assert not complaint
     from rds.nc import interpret
-    from rds.nc.canon import ARC, MotionBlock
+    from rds.nc.language.canon import ARC, MotionBlock
 
     whole = 0.0
     for item in interpret(text):

@@ -9,8 +9,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rds.motion.segments import XY, YZ, ZX, arc, chain, in_plane, line, point_at
-from rds.programs.contour import contour_error
+from rds.interpolators.motion.segments import XY, YZ, ZX, arc, chain, in_plane, line, point_at
+from rds.nc.run.contour import contour_error
 
 DENSE = 1500
 

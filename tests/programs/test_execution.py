@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.core.types import Ending
+from rds.interpolators.motion.segments import BLEND, SEGMENT, arc, chain, line
 from rds.machines import load_machine
-from rds.motion.segments import BLEND, SEGMENT, arc, chain, line
+from rds.modes.loop.changes import Heed, plan_changes, stop_channel
+from rds.modes.loop.execution import Execution, State
+from rds.modes.loop.laws import LiveReference
+from rds.modes.loop.program import program_channels
+from rds.modes.loop.retimed import EXCESS, Retimed
+from rds.nc.run.contour import contour_error
+from rds.nc.run.prepare import Prepared, planned
 from rds.nc.toolpath import Event, PathBlock
-from rds.programs.contour import contour_error
-from rds.programs.prepare import Prepared, planned
-from rds.runtime.changes import Heed, plan_changes, stop_channel
-from rds.runtime.execution import Execution, State
-from rds.runtime.laws import LiveReference
-from rds.runtime.program import program_channels
-from rds.runtime.retimed import EXCESS, Retimed
 
 T = 0.001
 MACHINE = load_machine("mini-cnc")

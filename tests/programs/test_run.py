@@ -16,14 +16,14 @@ import pytest
 from typer.testing import CliRunner
 
 import rds
-from rds.cli import app
-from rds.programs.prepare import prepare
-from rds.programs.report import findings, program_report, save_run
-from rds.programs.run import PartProgram, ProgramRun
+from rds.cli.main import app
+from rds.modes.loop.execution import State
+from rds.modes.loop.retimed import EXCESS
+from rds.nc.run.prepare import prepare
+from rds.nc.run.report import findings, program_report, save_run
+from rds.nc.run.run import PartProgram, ProgramRun
 from rds.results.html import all_notes
 from rds.results.metrics import MOVING
-from rds.runtime.execution import State
-from rds.runtime.retimed import EXCESS
 
 PERIOD = 0.002  # s: with room for a busy computer
 STOP_LINE = 7
@@ -163,11 +163,11 @@ def test_words_that_do_not_go_with_a_program_are_refused(part: Path, tmp_path: P
 def test_what_is_too_long_is_told_before_it_is_planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "slow.ngc"
     file.write_text("G21 G94\nG1 X50 F0.01\nM2\n")
-    monkeypatch.setattr("rds.programs.prepare.plan", lambda *_: pytest.fail("it was planned"))
+    monkeypatch.setattr("rds.nc.run.prepare.plan", lambda *_: pytest.fail("it was planned"))
     with pytest.raises(rds.InputError, match=r"at least 300000 s \(83\.3 h\), .* about 2\.9e\+02 GB of memory"):
         PartProgram(file)
     file.write_text("G21 G94\nG1 X50 F1\nM2\n")
-    monkeypatch.setattr("rds.programs.prepare._free_memory", lambda: 1e9)
+    monkeypatch.setattr("rds.nc.run.prepare._free_memory", lambda: 1e9)
     with pytest.raises(rds.InputError, match=r"at least 3000 s .* about 2\.9 GB of memory \(1 are free\)"):
         PartProgram(file)
 
@@ -276,7 +276,7 @@ def test_an_implementation_is_held_on_its_path_and_goes_home(slow_part: Path, al
 
 OPERATOR = """
 import sys, time
-from rds.programs.run import PartProgram
+from rds.nc.run.run import PartProgram
 run = PartProgram(sys.argv[1], sample_period=0.002).start("implementation", out=sys.argv[2])
 run.ready()
 while run.progress[0] < 300:
@@ -308,7 +308,7 @@ def test_a_program_whose_operator_is_killed_comes_to_rest_on_its_path(part: Path
 @pytest.mark.realtime
 def test_a_program_is_operated_from_another_terminal(part: Path, alone: Path) -> None:
     host = subprocess.Popen(
-        [sys.executable, "-m", "rds.cli", "nc", "run", str(part), "--mode", "emulation", "--out", "run", "--json"],
+        [sys.executable, "-m", "rds.cli.main", "nc", "run", str(part), "--mode", "emulation", "--out", "run", "--json"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -19,12 +19,12 @@ import pytest
 from documents import blocks
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.commands.keys import Keys
-from rds.commands.nc_run import _press
-from rds.programs.judge import WAITS
-from rds.runtime.execution import State
-from rds.runtime.program import COLUMNS, program_channels
+from rds.cli.keys import Keys
+from rds.cli.main import app
+from rds.cli.nc_run import _press
+from rds.modes.loop.execution import State
+from rds.modes.loop.program import COLUMNS, program_channels
+from rds.nc.run.judge import WAITS
 
 DOCUMENT = "docs/part-programs.md"
 TEXT = (Path(__file__).parents[2] / DOCUMENT).read_text(encoding="utf-8").partition("## Running")[2]
@@ -90,7 +90,7 @@ def test_a_folder_that_cannot_be_is_told_before_anything_runs(
     words = 'axis = "X"\nduration = 1.0\n[reference]\nkind = "constant"\nvalue = 1.0\n[controller]\nname = "p"\n'
     Path("experiment.toml").write_text(words)
     started: list[object] = []
-    monkeypatch.setattr("rds.experiment.experiment.run_plan", lambda *arguments: started.append(arguments))
+    monkeypatch.setattr("rds.modes.experiment.experiment.run_plan", lambda *arguments: started.append(arguments))
     done = CliRunner().invoke(app, [*command, "--out", out])
     assert done.exit_code == 2
     assert "name another folder" in done.stderr
@@ -164,7 +164,7 @@ def test_keys_come_one_by_one() -> None:
 def test_a_terminal_operates_the_run(slow_part: Path, alone: Path) -> None:
     """In a real terminal: faster, hold, on, and home from the stop."""
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "rds.cli", "nc", "run", str(slow_part), "--mode", "emulation", "--out", "run"]
+    command = [sys.executable, "-m", "rds.cli.main", "nc", "run", str(slow_part), "--mode", "emulation", "--out", "run"]
     host = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, close_fds=True)
     os.close(theirs)
     screen = b""

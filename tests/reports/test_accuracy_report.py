@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from thesis_data import COUNTS_A, COUNTS_X, COUNTS_Z, save
 
-from rds.reports import Report, make_report
-from rds.reports.accuracy import Moves, report_on
+from rds.results.reports import Report, make_report
+from rds.results.reports.accuracy import Moves, report_on
 
 ABOUT = """
 [x]

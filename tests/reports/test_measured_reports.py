@@ -19,7 +19,7 @@ from thesis_data import (
 )
 
 from rds.core.errors import InputError
-from rds.reports import Report, make_report
+from rds.results.reports import Report, make_report
 
 
 def moves(tmp_path: Path, **options: str) -> Report:

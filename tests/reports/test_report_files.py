@@ -13,9 +13,9 @@ import pytest
 from thesis_data import COUNTS_X, CURRENT_X, DRILLING, MOVE_TIMES, RECONFIGURATION, VIBRATION, save
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.reports import KINDS, Report, make_report, option_table, options_of, write
+from rds.results.reports import KINDS, Report, make_report, option_table, options_of, write
 
 MOVE = {"distance": "80", "counts_per_unit": "169"}
 LOG = "time_s,id,data\n0,001,01\n0.002,000,0102\n0.003,000,0103\n"
@@ -100,7 +100,7 @@ def test_a_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
 def test_light_to_import(tmp_path: Path) -> None:
     path = save(tmp_path / "x.csv", DRILLING)
     program = (
-        "import sys; from rds.reports import make_report; "
+        "import sys; from rds.results.reports import make_report; "
         f"make_report('current', [{str(path)!r}]).to_json(); "
         "sys.exit(bool({'matplotlib', 'can', 'pandas', 'scipy', 'control'} & set(sys.modules)))"
     )

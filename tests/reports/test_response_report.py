@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis.strategies import floats, lists
 
 from rds.core.errors import InputError
-from rds.reports import make_report
-from rds.reports.dialects import DIALECTS, OACS_MOVES
-from rds.reports.pairing import Frame, exchanges, parse_pairs, parse_pattern
+from rds.results.reports import make_report
+from rds.results.reports.dialects import DIALECTS, OACS_MOVES
+from rds.results.reports.pairing import Frame, exchanges, parse_pairs, parse_pattern
 
 # table 20, ms: modules 0x05, 0x04, 0x03, 0x02
 TABLE_20 = {
@@ -112,7 +112,7 @@ def test_each_module_answers_a_general_call_once() -> None:
 
 
 def test_the_cyclic_exchange_of_this_projects_modules(tmp_path: Path) -> None:
-    from rds.bus.frames import ANSWER, COMMAND, Answer, Kind, Status, encode_answer, encode_voltages
+    from rds.bus.modules.rds.frames import ANSWER, COMMAND, Answer, Kind, Status, encode_answer, encode_voltages
 
     lines = ["time_s,id,data"]
     for k in range(5):

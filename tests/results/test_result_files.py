@@ -22,9 +22,9 @@ from made_results import make_result
 from pyarrow import parquet
 from scipy.io import savemat
 
+from rds.core.atomic import write_files
 from rds.core.errors import InputError
 from rds.results import Result, open_result, save_all, save_result
-from rds.results.atomic import write_files
 
 SUFFIXES = [".csv", ".mat", ".parquet"]
 
@@ -133,7 +133,7 @@ def test_a_killed_writer_leaves_the_old_file_whole(tmp_path: Path, result: Resul
     target = result.save(tmp_path / "run.mat")
     before = target.read_bytes()
     program = (
-        "import sys, time\nfrom pathlib import Path\nfrom rds.results.atomic import write_files\n"
+        "import sys, time\nfrom pathlib import Path\nfrom rds.core.atomic import write_files\n"
         "def slow(stream):\n"
         "    stream.write(b'x' * 100000); stream.flush(); print('writing', flush=True); time.sleep(60)\n"
         "write_files({Path(sys.argv[1]): slow})\n"

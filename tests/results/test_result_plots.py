@@ -14,8 +14,8 @@ from made_results import make_result
 from matplotlib.image import imread
 
 from rds.core.errors import InputError
+from rds.core.figure import CYCLE, Picture
 from rds.results import Result, compare, plots, plots_overlay, plots_timing
-from rds.results.figure import CYCLE, Picture
 
 MODES = [make_result("simulation", "XY"), make_result("emulation", "XY"), make_result("implementation", "XY")]
 PICTURES: dict[str, Any] = {
@@ -108,7 +108,7 @@ def test_the_timing_marks_period_and_late_samples(result: Result) -> None:
 def test_the_first_sample_is_never_late() -> None:
     columns = {"time": [0.0, 0.1, 0.2], "lateness": [5e5, 1e5, 1e5], "io": [0.0, 0.0, 1.0]}
     result = Result(columns, meta={"axes": ["X"], "sample_period": 0.1})
-    from rds.results.late import late_samples
+    from rds.results.late_samples import late_samples
 
     late = late_samples(result)
     assert late is not None and late.tolist() == [False, False, True]

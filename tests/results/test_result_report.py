@@ -11,9 +11,9 @@ import pytest
 from made_results import make_result
 
 from rds.core.errors import InputError
-from rds.experiment.report import save_with_report
+from rds.core.figure import Picture
+from rds.modes.experiment.report import save_with_report
 from rds.results import Result, write_report
-from rds.results.figure import Picture
 from rds.results.report import page
 
 HOSTILE = "<script>alert('x')</script>\"><img src=http://evil.example/x onerror=alert(1)>{title}"

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rds.identification.robustness.margins import LinearLaw, loop_margins, margins_of, open_loop
 from rds.models import library_model
-from rds.robustness.margins import LinearLaw, loop_margins, margins_of, open_loop
 
 T = 0.001  # s
 NONE = np.zeros(0)

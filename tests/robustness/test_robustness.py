@@ -14,15 +14,15 @@ from hypothesis.strategies import integers
 from typer.testing import CliRunner
 
 import rds
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.identification.robustness import study
+from rds.identification.robustness.draws import Spread, draws
+from rds.identification.robustness.margins import linear_law, loop_margins
+from rds.identification.robustness.report import write_study
+from rds.identification.robustness.summary import sentences, summaries, to_json
+from rds.identification.robustness.uncertain import uncertain
 from rds.models import library_model
-from rds.robustness import study
-from rds.robustness.draws import Spread, draws
-from rds.robustness.margins import linear_law, loop_margins
-from rds.robustness.report import write_study
-from rds.robustness.summary import sentences, summaries, to_json
-from rds.robustness.uncertain import uncertain
 from tests.identification.model_files import X, Y, write_made
 
 FULL = X | {"stribeck": 0.1, "stribeck_velocity": 0.8, "delay": 0.0017, "backlash": 0.003, "dead_zone": 0.1}

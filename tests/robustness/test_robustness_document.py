@@ -12,9 +12,9 @@ import pytest
 from documents import ROOT, blocks, save
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.identification.model_file import ModelFile, read_model
-from rds.robustness.figures import FIGURES
+from rds.cli.main import app
+from rds.identification.fit.model_file import ModelFile, read_model
+from rds.identification.robustness.figures import FIGURES
 
 DOCUMENT = "docs/robustness.md"
 TEXT = (ROOT / DOCUMENT).read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import rds
-from rds.runtime.recorder import PROCESSES
+from rds.modes.process.recorder import PROCESSES
 
 
 def process(folder: Path, name: str) -> int:

@@ -19,9 +19,9 @@ from misbehaviour import send
 
 import rds
 from rds.core.types import Ending
-from rds.runtime.changes import Heed, as_text, plan_changes, read_changes, stop_channel, timed
-from rds.runtime.desk import NOTES, Channel, Desk, Note
-from rds.runtime.ring import Ring
+from rds.modes.loop.changes import Heed, as_text, plan_changes, read_changes, stop_channel, timed
+from rds.modes.loop.live_values import NOTES, Channel, Desk, Note
+from rds.modes.process.ring import Ring
 
 Maker = Callable[..., rds.Experiment]
 
@@ -50,7 +50,9 @@ def test_a_reader_sees_what_was_set_last(values: list[tuple[str, float]]) -> Non
 
 def test_two_processes_share_a_desk(tmp_path: Path) -> None:
     desk = Desk.create(tmp_path / "a.desk", [GAIN, OVERRIDE])
-    other = f"from rds.runtime.desk import Desk; Desk.open({str(tmp_path / 'a.desk')!r}).set('override', 0.25)"
+    other = (
+        f"from rds.modes.loop.live_values import Desk; Desk.open({str(tmp_path / 'a.desk')!r}).set('override', 0.25)"
+    )
     subprocess.run([sys.executable, "-c", other], check=True)
     assert desk.take() == (10.0, 0.25)
     desk.note(Note(3, "override", 1.0, 0.25))
@@ -355,7 +357,7 @@ def test_changes_of_a_run_that_was_killed_are_kept(experiment: Maker, alone: Pat
 
 APPEND = """
 import sys
-from rds.runtime.ring import Ring
+from rds.modes.process.ring import Ring
 ring = Ring.open(sys.argv[1])
 while not ring.stop_asked():
     ring.append([0.0])

@@ -21,17 +21,17 @@ from lost_machines import TRIES, unless_lost
 from misbehaviour import every, process, send
 
 import rds
-from rds.bus.address import runtime_directory
-from rds.bus.calling import find_machine
-from rds.bus.command import Command, remove_left
-from rds.bus.dialects import server_module
-from rds.bus.frames import CALL, Kind, Status, answer_identifier, decode_answer
-from rds.bus.server_process import start_server
+from rds.bus.hub.address import runtime_directory
+from rds.bus.hub.command import Command, remove_left
+from rds.bus.modules.calling import find_machine
+from rds.bus.modules.dialects import server_module
+from rds.bus.modules.rds.frames import CALL, Kind, Status, answer_identifier, decode_answer
+from rds.bus.modules.server_process import start_server
+from rds.modes.loop.live_values import Desk
+from rds.modes.process import recorder
+from rds.modes.process.recorder import READY, Recorder, conclude, watch
+from rds.modes.process.ring import Ring
 from rds.results import Result
-from rds.runtime import recorder
-from rds.runtime.desk import Desk
-from rds.runtime.recorder import READY, Recorder, conclude, watch
-from rds.runtime.ring import Ring
 
 pytestmark = pytest.mark.realtime
 
@@ -57,7 +57,7 @@ channel = "{channel}"
 
 HOST = """
 import subprocess
-from rds.cli import main
+from rds.cli.main import main
 
 class Popen(subprocess.Popen):
     def __init__(self, command, **options):  # a machine that nobody needs any more ends after 3 s instead of 10
@@ -200,7 +200,7 @@ def test_what_is_kept_of_a_killed_run_is_said_only_if_there_is_something(tmp_pat
 
 def test_the_command_of_a_killed_run_is_cleared_away(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each had a channel of its own, and its file stayed."""
-    monkeypatch.setattr("rds.bus.command._YOUNG", -1.0)
+    monkeypatch.setattr("rds.bus.hub.command._YOUNG", -1.0)
     folder = runtime_directory()
     (folder / "killed.command").write_text("process 1")
     with Command("living"):
@@ -303,7 +303,7 @@ def test_a_machine_that_is_not_there(alone: Path) -> None:
     """On a bus that is not the built-in one, nothing is started in its place."""
     bus = 'interface = "virtual"\n'
     (alone / "e.toml").write_text(FILE.format(mode="implementation", duration=1.0, channel="empty") + bus)
-    command = [sys.executable, "-m", "rds.cli", "run", "e.toml", "--out", "run", "--json"]
+    command = [sys.executable, "-m", "rds.cli.main", "run", "e.toml", "--out", "run", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
     assert "no answer from X (node 2) on bus virtual:empty" in done.stderr

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from rds.runtime.processes import wait_for_end
+from rds.modes.process.processes import wait_for_end
 
 
 @pytest.fixture(params=["told by the kernel", "looked after"])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.runtime.ramp import EXTRA_SHARPEST, EXTRA_STEEPEST, FURTHEST, Ramp
+from rds.modes.loop.ramp import EXTRA_SHARPEST, EXTRA_STEEPEST, FURTHEST, Ramp
 
 rates = st.floats(0.0, 2.0)
 

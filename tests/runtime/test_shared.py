@@ -11,16 +11,15 @@ from lost_machines import unless_lost
 
 import rds
 from rds.core.errors import InputError
-from rds.modes import host
-from rds.runtime import shared
-from rds.runtime.desk import Desk
-from rds.runtime.ring import Ring
+from rds.modes.loop.live_values import Desk
+from rds.modes.process import host, shared
+from rds.modes.process.ring import Ring
 
 pytest.importorskip("fcntl")
 
 HOLDER = """
 import sys
-from rds.runtime.ring import Ring
+from rds.modes.process.ring import Ring
 ring = Ring.open(sys.argv[1])
 print("held", flush=True)
 sys.stdin.read()

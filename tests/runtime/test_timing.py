@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis.strategies import booleans, dictionaries, floats, integers
 
 from rds.core.types import Verdict
-from rds.runtime.timing import Timing, judge, late_samples, longest_run, own_wait, replay, summary
+from rds.modes.process.timing import Timing, judge, late_samples, longest_run, own_wait, replay, summary
 
 MS = 1_000_000
 N = 1000

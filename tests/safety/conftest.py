@@ -17,11 +17,11 @@ from typing import Any
 import can
 import pytest
 
-from rds.bus import frames
-from rds.bus.cia402.codes import State, state_of
-from rds.bus.dialects import server_module
-from rds.bus.estop import reset_everything
-from rds.bus.frames import Status
+from rds.bus.modules.cia402.codes import State, state_of
+from rds.bus.modules.dialects import server_module
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Status
+from rds.bus.tools.estop import reset_everything
 from rds.core.errors import MachineError
 from rds.machines import load_machine
 from rds.results import open_result
@@ -91,7 +91,7 @@ class Bench:
 
     def rds(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """The command line, on this channel."""
-        command = [sys.executable, "-m", "rds.cli", *arguments, "--channel", self.channel]
+        command = [sys.executable, "-m", "rds.cli.main", *arguments, "--channel", self.channel]
         return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60)
 
     @contextlib.contextmanager

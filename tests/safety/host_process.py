@@ -15,9 +15,9 @@ import sys
 import time
 from typing import Any
 
-from rds.bus.command import Command
-from rds.bus.dialects import open_drivers
-from rds.bus.faults import Faults
+from rds.bus.hub.command import Command
+from rds.bus.hub.faults import Faults
+from rds.bus.modules.dialects import open_drivers
 from rds.core.errors import MachineError
 from rds.machines import load_machine
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from rds.core.errors import RdsError
-from rds.experiment.experiment import Experiment
+from rds.modes.experiment.experiment import Experiment
 
 if __name__ == "__main__":
     try:

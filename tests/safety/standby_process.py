@@ -9,8 +9,8 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from rds.bus.dialects import server_module
-from rds.bus.oacs import messages
+from rds.bus.modules.dialects import server_module
+from rds.bus.modules.oacs import messages
 from rds.machines import load_machine
 
 MACHINES = {"rds": "mini-cnc", "oacs": "mrmt-oacs", "cia402": "mini-cnc"}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rds.bus.estop import reset_everything, stop_everything
+from rds.bus.tools.estop import reset_everything, stop_everything
 from rds.core.errors import MachineError
 
 from .conftest import Bench, ended, expect, tell

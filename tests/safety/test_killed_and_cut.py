@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rds.bus.faults import Faults
+from rds.bus.hub.faults import Faults
 
 from .conftest import HERE, Bench, ended, expect, hub_pid, tell
 
@@ -85,6 +85,10 @@ def target(place: Path) -> int:
             command, environment = (path / "cmdline").read_bytes(), (path / "environ").read_bytes()
         except OSError:
             continue
-        if b"rds.modes.target" in command and b"runtime.recorder" not in command and str(place).encode() in environment:
+        if (
+            b"rds.modes.process.target" in command
+            and b"process.recorder" not in command
+            and str(place).encode() in environment
+        ):
             return int(path.name)
     raise AssertionError("no target")

@@ -28,7 +28,7 @@ def start(bench: Bench, folder: Path) -> subprocess.Popen[str]:
     (folder / "part.ngc").write_text("G21 G90\nG1 X60 F120\nM2\n")
     (folder / "bus.toml").write_text(f'[bus]\nchannel = "{bench.channel}"\n')
     words = ["--mode", "implementation", "--controller", str(folder / "bus.toml"), "--out", str(folder / "out")]
-    run = bench.start("-m", "rds.cli", "nc", "run", str(folder / "part.ngc"), *words)
+    run = bench.start("-m", "rds.cli.main", "nc", "run", str(folder / "part.ngc"), *words)
     bench.wait_until_moving(run, 60.0)  # it is checked and planned first
     return run
 

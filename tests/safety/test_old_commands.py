@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from rds.bus import frames
-from rds.bus.dialects import open_drivers
-from rds.bus.frames import Kind, Status
-from rds.bus.freshness import OLDEST, Freshness, Verdict
-from rds.bus.module import AxisModule
+from rds.bus.modules.dialects import open_drivers
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Kind, Status
+from rds.bus.modules.rds.freshness import OLDEST, Freshness, Verdict
+from rds.bus.modules.rds.module import AxisModule
 from rds.core.errors import InputError
 from rds.machines import load_machine
 

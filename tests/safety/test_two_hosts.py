@@ -10,8 +10,8 @@ from pathlib import Path
 import can
 import pytest
 
-from rds.bus import frames
-from rds.bus.module import WATCHDOG_PERIODS
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.module import WATCHDOG_PERIODS
 
 from .conftest import Bench, T, expect
 

@@ -8,7 +8,7 @@ import pytest
 
 from rds.core.errors import MachineError
 from rds.machines import load_machine
-from rds.session import Session
+from rds.panels.session import Session
 
 
 def test_the_emergency_stop_reaches_a_machine_whose_file_is_broken_by_now(

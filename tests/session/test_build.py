@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
-from rds.session.build import Builds
+from rds.panels.equipment.build import Builds
 
 GOOD = "def control(t, r, y, state, params):\n    return 10.0 * (r.position - y), state\n"
 

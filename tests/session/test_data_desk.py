@@ -10,8 +10,8 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.nc.compiled_file import MAGIC
-from rds.session import Session
-from rds.session.data_desk import DataDesk
+from rds.panels.data.state import DataDesk
+from rds.panels.session import Session
 
 PATIENCE = 120  # s
 

@@ -13,8 +13,8 @@ from rds.controllers import library_controller
 from rds.controllers.design import tracking_gains
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.session import Session
-from rds.session.design import Design
+from rds.panels.design.state import Design
+from rds.panels.session import Session
 from tests.documents import blocks
 
 X = load_machine("mini-cnc").axis("X").model
@@ -48,8 +48,8 @@ def test_the_loop_has_the_poles_that_were_placed(tmp_path_factory: pytest.TempPa
 
 
 def test_margins_are_those_of_the_robustness_study(tmp_path: Path) -> None:
+    from rds.identification.robustness.margins import linear_law, loop_margins
     from rds.models import library_model
-    from rds.robustness.margins import linear_law, loop_margins
 
     made = design(tmp_path).now()
     law = linear_law(library_controller("tracking", X, 0.001, 10.0))
@@ -164,7 +164,7 @@ def test_from_a_fitted_model(tmp_path: Path) -> None:
 
 
 def test_try_it_chooses_the_file_in_equipment_control(tmp_path: Path) -> None:
-    from rds.session.equipment import Equipment
+    from rds.panels.equipment.state import Equipment
 
     chosen = design(tmp_path)
     chosen.choices.set("axis", "Y")
@@ -176,7 +176,7 @@ def test_try_it_chooses_the_file_in_equipment_control(tmp_path: Path) -> None:
 def test_the_command_line_writes_the_same_file(tmp_path: Path) -> None:
     from typer.testing import CliRunner
 
-    from rds.cli import app
+    from rds.cli.main import app
 
     chosen = design(tmp_path)
     chosen.move("pair", -40 + 10j)

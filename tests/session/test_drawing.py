@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.session import Session
-from rds.session.drawing import Drawing, _fields, traced
-from rds.session.fields import Field
-from rds.session.program import program_choices
+from rds.panels.drawing.state import Drawing, _fields, traced
+from rds.panels.program.state import program_choices
+from rds.panels.session import Session
+from rds.panels.session.fields import Field
 
 PATIENCE = 60.0  # s
 BLOCK = "\n".join(["." * 10] * 2 + ["..." + "#" * 4 + "..."] * 4 + ["." * 10] * 2)

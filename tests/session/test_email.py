@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError, MachineError
-from rds.session.email import Server, check_address, mail_server, send_files
+from rds.panels.session.email import Server, check_address, mail_server, send_files
 
 aiosmtpd_controller = pytest.importorskip(
     "aiosmtpd.controller", reason="aiosmtpd is not installed: pip install rds[dev]"
@@ -165,7 +165,7 @@ def test_a_server_that_never_comes_to_the_point_is_left_in_time_and_at_once_when
     files = [tmp_path / "result.csv"]
     with dripping() as port, pytest.raises(MachineError, match="it was stopped; the files are kept"):
         send_files(Server("127.0.0.1", port, "lab@example.edu"), "me@example.edu", "s", "t", files, lambda: True)
-    monkeypatch.setattr("rds.session.email.LONGEST", 0.3)
+    monkeypatch.setattr("rds.panels.session.email.LONGEST", 0.3)
     with dripping() as port, pytest.raises(MachineError, match=r"took more than 0\.3 s"):
         send_files(Server("127.0.0.1", port, "lab@example.edu"), "me@example.edu", "s", "t", files)
 

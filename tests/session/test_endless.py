@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from rds.core.interrupt import Endless, interruptible
-from rds.session import Session
-from rds.session.equipment import Equipment
-from rds.session.interpolator import Interpolating
+from rds.panels.equipment.state import Equipment
+from rds.panels.interpolator.state import Interpolating
+from rds.panels.session import Session
 
 PATIENCE = 10.0  # s, on a busy computer
 

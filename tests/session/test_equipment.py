@@ -12,11 +12,11 @@ import pytest
 
 import rds
 from rds.core.errors import InputError
+from rds.panels.equipment.diagram import diagram
+from rds.panels.equipment.state import Equipment
 from rds.panels.kit.diagram import diagram_svg
-from rds.session import Session
-from rds.session.as_file import as_python, as_toml, write_toml
-from rds.session.diagram import diagram
-from rds.session.equipment import Equipment
+from rds.panels.session import Session
+from rds.panels.session.as_file import as_python, as_toml, write_toml
 
 CONTROLLER = """params = {"Kp": 20.0}
 

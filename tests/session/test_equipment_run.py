@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
+from rds.modes.process.record import PROCESSES
+from rds.panels.equipment.state import Equipment
+from rds.panels.session import Session
+from rds.panels.session.kept_runs import State
+from rds.panels.session.live_values import LiveValues
+from rds.panels.session.save_as import save_as
 from rds.results import open_result
-from rds.runtime.record import PROCESSES
-from rds.session import Session
-from rds.session.equipment import Equipment
-from rds.session.kept_runs import State
-from rds.session.live_values import LiveValues
-from rds.session.save_as import save_as
 
 
 def test_a_simulation_leaves_its_files_and_its_traces(tmp_path: Path) -> None:
@@ -49,7 +49,7 @@ def test_a_run_that_is_being_saved_is_not_cut_short(tmp_path: Path, monkeypatch:
         seen.extend(kept.state for kept in Session(tmp_path).runs())
         return {}
 
-    monkeypatch.setattr("rds.session.equipment_run.save_with_report", save)
+    monkeypatch.setattr("rds.panels.equipment.run.save_with_report", save)
     equipment = Equipment(Session(tmp_path), "control")
     equipment.choices.set("duration", 0.01)
     run = equipment.run().start()
@@ -171,9 +171,9 @@ def test_a_folder_that_is_taken_away_during_a_run_is_said_so(alone: Path) -> Non
 ORPHAN = """
 import os, sys, time
 from rds import open_result
-from rds.runtime.record import NAME
-from rds.session import Session
-from rds.session.equipment import Equipment
+from rds.modes.process.record import NAME
+from rds.panels.session import Session
+from rds.panels.equipment.state import Equipment
 
 equipment = Equipment(Session(sys.argv[1]), "control")
 equipment.choices.set("mode", "implementation")

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.session import Session
-from rds.session.choices import Choices
-from rds.session.fields import Choice, Flag, Number, Several, Text
+from rds.panels.session import Session
+from rds.panels.session.choices import Choices
+from rds.panels.session.fields import Choice, Flag, Number, Several, Text
 
 AMPLITUDE = Number("amplitude", "Amplitude", "half of the whole stroke", 5.0, unit="mm", low=0.0, high=150.0)
 KIND = Choice("kind", "Kind", "form of the signal", "sine", options={"sine": "Sinusoid", "square": "Square"})

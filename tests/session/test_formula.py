@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.session.formula import formula_file, formula_values
-from rds.signals import make_signal, sample_voltage
+from rds.panels.session.formula import formula_file, formula_values
+from rds.references import make_signal, sample_voltage
 
 TIMES = np.linspace(0.0, 2.0, 201)
 

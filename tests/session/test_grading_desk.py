@@ -12,8 +12,8 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.grading.grade import Grade, Status
-from rds.session import Session
-from rds.session.grading_desk import GradingDesk, _said, progress, rows
+from rds.panels.grading.state import GradingDesk, _said, progress, rows
+from rds.panels.session import Session
 
 
 def test_progress_is_what_the_journal_has(tmp_path: Path) -> None:
@@ -80,7 +80,7 @@ def slow_grading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def popen(command: list[str], **options: Any) -> Any:
         return real([command[0], "-c", SLOW, str(begun)], **options)
 
-    monkeypatch.setattr("rds.session.grading_desk.subprocess.Popen", popen)
+    monkeypatch.setattr("rds.panels.grading.state.subprocess.Popen", popen)
     return begun
 
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError, RdsError
 from rds.core.types import ArcSegment
-from rds.interpolators import library_interpolator
+from rds.interpolators.interpolator import library_interpolator
 from rds.interpolators.path import interpolate
 from rds.interpolators.result import Interpolation
+from rds.panels.interpolator.state import Interpolating
+from rds.panels.session import Session
 from rds.results import open_result
-from rds.session import Session
-from rds.session.interpolator import Interpolating
 from tests.documents import blocks
 
 USERS = """

@@ -16,14 +16,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.session import Session
-from rds.session.jog import Jog, _listen
-from rds.session.jog_axes import jog_axes, jog_spindles
-from rds.session.jog_orders import DEAD_MAN, Orders
-from rds.session.late import LATE
+from rds.panels.jog.axes import jog_axes, jog_spindles
+from rds.panels.jog.orders import DEAD_MAN, Orders
+from rds.panels.jog.state import Jog, _listen
+from rds.panels.session import Session
+from rds.panels.session.expired_orders import LATE
 
 pytestmark = pytest.mark.realtime
 PATIENCE = 30.0  # s, on a busy computer
@@ -105,7 +105,7 @@ def test_the_machine_is_given_back_where_no_thread_is_to_be_had(alone: Path, mon
         raise RuntimeError("can't start new thread")
 
     jog = Jog(Session(alone))
-    monkeypatch.setattr("rds.session.session.Task.start", none_left)
+    monkeypatch.setattr("rds.panels.session.session.Task.start", none_left)
     with pytest.raises(RuntimeError):
         jog.begin()
     assert jog.session.machine_user is None
@@ -132,8 +132,8 @@ def test_what_an_interface_prints_is_no_word_of_the_loop(alone: Path) -> None:
 
 DIES = """
 import sys, time
-from rds.session import Session
-from rds.session.jog import Jog
+from rds.panels.session import Session
+from rds.panels.jog.state import Jog
 jog = Jog(Session(sys.argv[1]))
 jog.begin().wait(30)
 while True:

@@ -18,16 +18,16 @@ import pytest
 from typer.testing import CliRunner
 
 from rds import panels
-from rds.bus.cia402.codes import State
-from rds.bus.cia402.scan import scan
-from rds.bus.dialects import server_module
-from rds.cli import app
+from rds.bus.modules.cia402.codes import State
+from rds.bus.modules.cia402.scan import scan
+from rds.bus.modules.dialects import server_module
+from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.session import Session
-from rds.session.jog import Jog
-from rds.session.jog_hands import VoltageHand
-from rds.session.jog_orders import SPINDLE_DEAD_MAN
+from rds.panels.jog.hands import VoltageHand
+from rds.panels.jog.orders import SPINDLE_DEAD_MAN
+from rds.panels.jog.state import Jog
+from rds.panels.session import Session
 
 from .test_jog import PATIENCE, hear, hold_until, wait_for
 
@@ -128,8 +128,8 @@ def test_software_limits_narrow_the_travel_and_home_is_found(alone: Path) -> Non
 
 DIES = """
 import sys, time
-from rds.session import Session
-from rds.session.jog import Jog
+from rds.panels.session import Session
+from rds.panels.jog.state import Jog
 jog = Jog(Session(sys.argv[1]))
 jog.begin().wait(60)
 while True:
@@ -141,7 +141,7 @@ while True:
 
 
 def test_whoever_jogs_drives_dies_and_they_stop(alone: Path) -> None:
-    served = [sys.executable, "-m", "rds.bus.cia402.server", "mini-cnc", "--exit-with-stdin"]
+    served = [sys.executable, "-m", "rds.bus.modules.cia402.server", "mini-cnc", "--exit-with-stdin"]
     pipe = subprocess.PIPE
     with subprocess.Popen(served, stdin=pipe, stdout=pipe, text=True) as server:
         assert server.stdout is not None and server.stdout.readline().startswith("ready")
@@ -188,7 +188,7 @@ def test_a_spindle_keeps_its_speed_and_stops_when_nobody_says_it_any_more(alone:
 def test_a_drive_is_homed_and_the_spindle_turned_from_the_command_line(alone: Path) -> None:
     bus = '[bus]\ndialect = "cia402"\n[bus.cia402.axis.X]\nhoming = 37\nhome = 4.0\n'
     (alone / "drives.toml").write_text(bus)
-    served = [sys.executable, "-m", "rds.bus.cia402.server", "mini-cnc", "--exit-with-stdin"]
+    served = [sys.executable, "-m", "rds.bus.modules.cia402.server", "mini-cnc", "--exit-with-stdin"]
     with subprocess.Popen(served, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None and server.stdout.readline().startswith("ready")
         for words, expected in (
@@ -223,9 +223,9 @@ def test_what_modules_that_take_voltages_cannot_move_is_left_out_with_its_reason
 def test_a_panel_that_nobody_shows_any_more_lets_the_machine_go(alone: Path) -> None:
     """Its axes were held, and the machine in use, for as long as its kernel lived."""
     pytest.importorskip("anywidget", reason="panels need rds[lab]")
-    from rds.panels.jog import JogView
-    from rds.panels.shell import Shell
-    from rds.panels.still_here import IN_BACKGROUND, IN_SIGHT
+    from rds.panels.jog.panel import JogView
+    from rds.panels.page.shell import Shell
+    from rds.panels.page.still_here import IN_BACKGROUND, IN_SIGHT
 
     jog = taken(alone)
     view = JogView(Shell(jog.session), jog)
@@ -258,7 +258,7 @@ def test_a_machine_is_jogged_without_its_spindle(alone: Path, dialect: str) -> N
 
 def test_panels_are_shown_for_a_bus_of_ones_own(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("ipywidgets", reason="panels need rds[lab]")
-    monkeypatch.setattr("rds.panels.shell.Shell", lambda session, panel: SimpleNamespace(widget=session))
+    monkeypatch.setattr("rds.panels.page.shell.Shell", lambda session, panel: SimpleNamespace(widget=session))
     bus = {"interface": "virtual", "channel": "mine", "dialect": "cia402"}
     jog = Jog(panels.main(alone, bus=bus))
     task = jog.begin()

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from rds.machines import load_machine
-from rds.session.jog_axes import jog_axes
-from rds.session.jog_loop import jog
-from rds.session.jog_orders import Orders
+from rds.panels.jog.axes import jog_axes
+from rds.panels.jog.loop import jog
+from rds.panels.jog.orders import Orders
 
 
 class Drives:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 
-from rds.session.latest import Latest
-from rds.session.task import Task
+from rds.panels.session.latest import Latest
+from rds.panels.session.task import Task
 
 
 def test_only_the_latest_answer_is_given_and_only_once() -> None:

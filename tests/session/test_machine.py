@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.bus.oacs.module_data import read_modules
+from rds.bus.modules.oacs.module_data import read_modules
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
-from rds.session import Session
-from rds.session.configuration import directions, faults, first_order, moved, write_machine
-from rds.session.machine import MachineDesk
-from rds.session.monitor import BusMonitor, parse_filter
-from rds.session.task import Stopped, Task
+from rds.panels.machine.configuration import directions, faults, first_order, moved, write_machine
+from rds.panels.machine.monitor import BusMonitor, parse_filter
+from rds.panels.machine.state import MachineDesk
+from rds.panels.session import Session
+from rds.panels.session.task import Stopped, Task
 
 PATIENCE = 60.0  # s, on a busy computer
 

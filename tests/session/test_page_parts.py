@@ -13,19 +13,19 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.nc.check import Setup
-from rds.panels import PANELS
+from rds.panels.equipment.result_actions import ResultActions
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
 from rds.panels.kit.work_bar import WorkBar
-from rds.panels.machine_modules import ModulesView
-from rds.panels.program_view import RESULT, ProgramView
-from rds.panels.result_actions import ResultActions
-from rds.panels.shell import Shell
-from rds.session import Session
-from rds.session.machine import MachineDesk
-from rds.session.program_run import ProgramWork
-from rds.session.task import Task
+from rds.panels.machine.modules_view import ModulesView
+from rds.panels.machine.state import MachineDesk
+from rds.panels.page.shell import Shell
+from rds.panels.program.run import ProgramWork
+from rds.panels.program.view import RESULT, ProgramView
+from rds.panels.registry import PANELS
+from rds.panels.session import Session
+from rds.panels.session.task import Task
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_every_button_of_a_panel_says_what_fails_in_it(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Session, "work", full)
-    monkeypatch.setattr("rds.results.atomic.write_whole", full)
+    monkeypatch.setattr("rds.core.atomic.write_whole", full)
     pressed = [each for each in _within(shell.panels[name]) if isinstance(each, widgets.Button)]
     for each in pressed:
         each.click()  # raises what its handler raises
@@ -122,7 +122,7 @@ def test_what_came_of_a_program_does_not_stand_beside_another_one(tmp_path: Path
 
 
 def test_a_run_whose_files_are_gone_is_not_sent_without_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rds.panels.result_actions.send_files", lambda *_: "sent")
+    monkeypatch.setattr("rds.panels.equipment.result_actions.send_files", lambda *_: "sent")
     actions = ResultActions(Shell(Session(tmp_path)))
     actions.offer(object(), tmp_path / "runs" / "gone", ["report.html", "result.csv"])  # type: ignore[arg-type]
     next(each for each in _within(actions.widget) if getattr(each, "description", "") == "Send").click()

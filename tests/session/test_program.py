@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.nc.active import Follower, modes_at
-from rds.session import Session
-from rds.session.program import Program
-from rds.session.program_check import Look
-from rds.session.program_text import ProgramText
+from rds.panels.program.check import Look
+from rds.panels.program.state import Program
+from rds.panels.program.text import ProgramText
+from rds.panels.session import Session
 
 PATIENCE = 60.0  # s, on a busy computer
 
@@ -110,8 +110,8 @@ def test_a_name_that_leads_elsewhere_is_refused(tmp_path: Path, name: str) -> No
 def test_any_text_is_looked_at_without_an_error(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     from rds.machines import load_machine
     from rds.nc.check import Setup
-    from rds.session.program_check import look
-    from rds.session.task import Task
+    from rds.panels.program.check import look
+    from rds.panels.session.task import Task
 
     source = tmp_path_factory.getbasetemp() / "any.ngc"
     source.write_bytes(text.encode("utf-8", "replace"))
@@ -222,7 +222,7 @@ def test_work_coordinates_undo_the_way_to_the_machine(
     import numpy as np
 
     from rds.nc.active import Modes
-    from rds.nc.frame import Frame
+    from rds.nc.language.frame import Frame
 
     frame = Frame()
     frame.set_origin(1, origin)
@@ -242,7 +242,7 @@ def test_a_run_saves_the_program_and_has_its_results_in_a_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     saved: list[Path] = []  # pictures take seconds, and are not this test's subject
-    monkeypatch.setattr("rds.session.program_run.save_run", lambda result, prepared, folder: saved.append(folder))
+    monkeypatch.setattr("rds.panels.program.run.save_run", lambda result, prepared, folder: saved.append(folder))
     made = program(tmp_path, "G21 G90", "G1 X2 F600", "M2")
     assert looked(made).ok
     work = made.run().start()

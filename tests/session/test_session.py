@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
-from rds.runtime.record import NAME
-from rds.session import Session
-from rds.session.kept_runs import State
-from rds.session.task import Task
+from rds.modes.process.record import NAME
+from rds.panels.session import Session
+from rds.panels.session.kept_runs import State
+from rds.panels.session.task import Task
 
 
 def test_a_task_says_how_far_it_is_and_keeps_its_result(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_the_machine_has_one_user_on_a_page(tmp_path: Path) -> None:
 
 def test_another_page_of_the_folder_is_told_who_has_the_machine(tmp_path: Path) -> None:
     code = (
-        "import sys; from rds.session import Session\n"
+        "import sys; from rds.panels.session import Session\n"
         "session = Session(sys.argv[1]); session.take_machine('a run of X', object()); print('has', flush=True)\n"
         "sys.stdin.read()"
     )
@@ -125,14 +125,14 @@ def test_of_many_runs_only_the_latest_are_looked_into(tmp_path: Path, monkeypatc
         looked.append(folder)
         return State.WHOLE
 
-    monkeypatch.setattr("rds.session.kept_runs.state_of", state)
+    monkeypatch.setattr("rds.panels.session.kept_runs.state_of", state)
     assert [run.name for run in Session(tmp_path).runs(2)] == ["run-49", "run-48"]
     assert len(looked) == 2
 
 
 @pytest.mark.parametrize("content", [b"{", b"\xff\xfe\x00", b"[" * 100_000, b"\xef\xbb\xbf{}"])
 def test_kept_choices_that_cannot_be_read_are_said_to_whoever_opens_the_page(content: bytes, tmp_path: Path) -> None:
-    from rds.panels.shell import Shell
+    from rds.panels.page.shell import Shell
 
     (tmp_path / "session.json").write_bytes(content)
     shell = Shell(Session(tmp_path))
@@ -150,7 +150,7 @@ def test_a_folder_that_is_full_or_gone_refuses_in_words_and_holds_nothing(
     folder.mkdir()
     session, user = Session(folder), object()
     with monkeypatch.context() as patched:
-        patched.setattr("rds.session.claim.write_whole", full)
+        patched.setattr("rds.panels.session.claim.write_whole", full)
         session.take_machine("a run", user)  # what it is for is not told to others: no reason not to run
     session.give_machine_back(user)
     session.take_machine("another", user)

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from rds.bus.link import bus_name
+from rds.bus.tools.link import bus_name
 from rds.core.errors import MachineError
-from rds.session import Session
-from rds.session.jog import Jog
-from rds.session.machine import MachineDesk
-from rds.session.monitor import BusMonitor
+from rds.panels.jog.state import Jog
+from rds.panels.machine.monitor import BusMonitor
+from rds.panels.machine.state import MachineDesk
+from rds.panels.session import Session
 
 REAL = {"interface": "virtual", "channel": 0, "bitrate": 250_000, "dialect": "cia402", "cia402": {"mode": "csp"}}
 

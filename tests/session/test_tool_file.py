@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
-from rds.session.tool_file import ToolFile
+from rds.panels.program.tool_file import ToolFile
 
 
 def test_a_new_table_is_one_that_the_interpreter_reads(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats, integers, sampled_from
 
 from rds.core.errors import InputError
-from rds.signals import chirp, make_signal, multisine, sample_voltage, staircase
+from rds.references import chirp, make_signal, multisine, sample_voltage, staircase
 
 
 @settings(max_examples=25)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis.strategies import floats, sampled_from
 
 from rds.core.errors import InputError
-from rds.signals import constant, make_signal, sample, sample_voltage, signal_kinds, sinusoid, square, triangle
+from rds.references import constant, make_signal, sample, sample_voltage, signal_kinds, sinusoid, square, triangle
 
 amplitudes = floats(0.01, 100)
 frequencies = floats(0.01, 50)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rds.core.errors import ContractError, InputError
-from rds.signals import make_signal, sample, sinusoid, user
+from rds.references import make_signal, sample, sinusoid, user
 
 T = 1e-3
 

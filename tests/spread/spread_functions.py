@@ -94,7 +94,7 @@ def slow_first(work: tuple[int, str]) -> int:
 
 def meeting(work: tuple[str, int]) -> int | None:
     """Which worker it is, once so many processes are at it at the same time."""
-    from rds.spread import worker_number
+    from rds.core.parallel import worker_number
 
     folder, of = work
     (Path(folder) / str(os.getpid())).touch()

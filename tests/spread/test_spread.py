@@ -20,8 +20,8 @@ import spread_functions
 from distributed import Client
 
 from rds.core.errors import InputError, MachineError
-from rds.spread import spread
-from rds.spread.outcome import Failure
+from rds.core.parallel import spread
+from rds.core.parallel.outcome import Failure
 
 HERE = str(Path(__file__).parent)
 
@@ -136,7 +136,7 @@ def test_closing_it_early_leaves_no_process(where: dict[str, object]) -> None:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the kernel's own doing")
 def test_killing_it_ends_its_processes_in_the_middle_of_an_item() -> None:
     program = (
-        f"import sys; sys.path.append({HERE!r})\nimport spread_functions\nfrom rds.spread import spread\n"
+        f"import sys; sys.path.append({HERE!r})\nimport spread_functions\nfrom rds.core.parallel import spread\n"
         "list(spread(spread_functions.process_of_a_long_item, [1], jobs=1))\n"
     )
     with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE) as process:
@@ -152,7 +152,7 @@ def test_killing_it_ends_its_processes_in_the_middle_of_an_item() -> None:
 
 def test_ctrl_c_ends_it_and_its_processes() -> None:
     program = (
-        f"import sys; sys.path.append({HERE!r})\nimport spread_functions\nfrom rds.spread import spread\n"
+        f"import sys; sys.path.append({HERE!r})\nimport spread_functions\nfrom rds.core.parallel import spread\n"
         "for o in spread(spread_functions.process, range(10000), jobs=2): print(o.value, flush=True)\n"
     )
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
@@ -183,13 +183,13 @@ def test_nothing_to_do() -> None:
 def test_what_will_not_do_is_said_at_once(
     options: dict[str, object], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rds.spread.cluster.CONNECT", 0.3)
+    monkeypatch.setattr("rds.core.parallel.cluster.CONNECT", 0.3)
     with pytest.raises(InputError, match=re.escape(said)):
         spread(spread_functions.square, [1], **options)
 
 
 def test_a_scheduler_that_is_lost_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rds.spread.cluster.CONNECT", 2.0)  # dask looks for it so long before it lets go
+    monkeypatch.setattr("rds.core.parallel.cluster.CONNECT", 2.0)  # dask looks for it so long before it lets go
     with cluster("n_workers=1, threads_per_worker=1, processes=False, protocol='tcp'") as (address, process):
         found = spread(spread_functions.slow, range(3), scheduler=address)
         assert next(iter(found)).value == 0

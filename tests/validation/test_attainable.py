@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rds.identification.fit import fit
-from rds.identification.structures import structure
-from rds.logs.log import Log
-from rds.validation import attainable
-from rds.validation.validate import validate
-from rds.validation.verdict import Bands, Side, Word
+from rds.identification.fit.fit import fit
+from rds.identification.logs.log import Log
+from rds.identification.structures.structures import structure
+from rds.identification.validate import attainable
+from rds.identification.validate.validate import validate
+from rds.identification.validate.verdict import Bands, Side, Word
 from tests.validation.validation_logs import STEP, X, candidate, log, square
 
 AXIS = structure("axis")

@@ -8,9 +8,9 @@ from dataclasses import fields
 from documents import ROOT, blocks
 from typer.testing import CliRunner
 
-from rds.cli import app
-from rds.validation.validate import validate
-from rds.validation.verdict import Bands
+from rds.cli.main import app
+from rds.identification.validate.validate import validate
+from rds.identification.validate.verdict import Bands
 from tests.validation.validation_logs import candidate, log, square
 
 DOCUMENT = "docs/validation.md"

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rds.core.errors import InputError
-from rds.identification.initial_state import estimate_start
-from rds.identification.needed_voltage import needed_voltage, static_curve
-from rds.identification.residuals import BAND, LONGEST, bandwidth, block_length, effective_samples, residual_tests
-from rds.identification.structures import structure
-from rds.logs.fingerprint import fingerprint, shared
-from rds.validation.assessment import assess, smoothed_velocity
-from rds.validation.candidate import Candidate
-from rds.validation.criterion import Rival, rank
-from rds.validation.validate import compare_models
+from rds.identification.fit.initial_state import estimate_start
+from rds.identification.fit.needed_voltage import needed_voltage, static_curve
+from rds.identification.fit.residuals import BAND, LONGEST, bandwidth, block_length, effective_samples, residual_tests
+from rds.identification.logs.fingerprint import fingerprint, shared
+from rds.identification.structures.structures import structure
+from rds.identification.validate.assessment import assess, smoothed_velocity
+from rds.identification.validate.candidate import Candidate
+from rds.identification.validate.criterion import Rival, rank
+from rds.identification.validate.validate import compare_models
 from tests.validation.validation_logs import STEP, T, X, candidate, moved, square
 from tests.validation.validation_logs import log as made_log
 

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rds.cli import app
+from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.experiment.report import save_with_report
-from rds.experiment.validation import validated
-from rds.identification.estimate import Errors, Estimate, Parameter
-from rds.identification.fitted_stretch import fitted_stretch
-from rds.identification.model_file import write_model
-from rds.logs.log import Log
+from rds.core.figure import Picture
+from rds.identification.fit.estimate import Errors, Estimate, Parameter
+from rds.identification.fit.made_estimate import fitted_stretch
+from rds.identification.fit.model_file import write_model
+from rds.identification.logs.log import Log
+from rds.identification.validate.validate import validate
+from rds.modes.experiment.report import save_with_report
+from rds.modes.experiment.validation import validated
 from rds.results import Result
-from rds.results.figure import Picture
 from rds.results.report import report
-from rds.validation.validate import validate
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
 
 STUDENT = """
@@ -67,7 +67,7 @@ def rds(*arguments: object) -> Any:
 
 def test_the_command_on_new_data_and_on_the_fit_s_own(tmp_path: Path) -> None:
     own, fresh = saved(tmp_path, "own", square(6.0)), saved(tmp_path, "fresh", square(6.0, 2.5, 0.7))
-    from rds.logs.read_log import read_log
+    from rds.identification.logs.read_log import read_log
 
     (first,) = read_log(own)
     model = model_file(tmp_path / "m.toml", first)
@@ -87,7 +87,7 @@ def test_the_command_on_new_data_and_on_the_fit_s_own(tmp_path: Path) -> None:
 
 
 def test_a_copy_of_the_fit_s_data_in_another_format_is_known(tmp_path: Path) -> None:
-    from rds.logs.read_log import read_log
+    from rds.identification.logs.read_log import read_log
 
     (first,) = read_log(saved(tmp_path, "own", square(6.0)))
     model = model_file(tmp_path / "m.toml", first)

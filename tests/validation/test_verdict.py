@@ -10,16 +10,16 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.core.types import Model, Source
-from rds.identification.estimate import Errors
-from rds.identification.fit import fit
-from rds.identification.fitted_stretch import fitted_stretch
-from rds.identification.model_file import write_model
-from rds.identification.structures import structure
-from rds.logs.findings import with_findings
-from rds.logs.log import Finding, Gravity
-from rds.validation.assessment import assess
-from rds.validation.validate import Validation, validate
-from rds.validation.verdict import Bands, Side, Word
+from rds.identification.fit.estimate import Errors
+from rds.identification.fit.fit import fit
+from rds.identification.fit.made_estimate import fitted_stretch
+from rds.identification.fit.model_file import write_model
+from rds.identification.logs.findings import with_findings
+from rds.identification.logs.log import Finding, Gravity
+from rds.identification.structures.structures import structure
+from rds.identification.validate.assessment import assess
+from rds.identification.validate.validate import Validation, validate
+from rds.identification.validate.verdict import Bands, Side, Word
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
 
 FRESH = square(8.0, 3.0, 0.7)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from rds.identification.estimate import Parameter
-from rds.identification.structures import structure
-from rds.logs.log import Log
+from rds.identification.fit.estimate import Parameter
+from rds.identification.logs.log import Log
+from rds.identification.structures.structures import structure
+from rds.identification.validate.candidate import Candidate
 from rds.models.linear_axis import coefficients, respond
-from rds.validation.candidate import Candidate
 
 X = {"tau": 9.943e-3, "K": 1.764, "friction_plus": 0.539, "friction_minus": -0.222}
 STEP = 1e-3  # mm, of the encoder

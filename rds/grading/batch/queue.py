@@ -7,7 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rds.grading.assignment import Assignment
+from rds.core.atomic import write_whole
+from rds.core.parallel import spread
+from rds.grading.assignment.assignment import Assignment
+from rds.grading.assignment.late_rules import days_late
 from rds.grading.batch.work import CODE
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import HandedIn, Intake
@@ -15,9 +18,6 @@ from rds.grading.intake.items import Refusal
 from rds.grading.intake.names import safe_id
 from rds.grading.intake.notebooks import Converted, converted
 from rds.grading.intake.single import wanted
-from rds.grading.late import days_late
-from rds.results.atomic import write_whole
-from rds.spread import spread
 
 _PATIENCE = 30.0  # s for a notebook
 

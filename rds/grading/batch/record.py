@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from rds.core.atomic import write_whole
 from rds.core.errors import InputError
-from rds.grading.assignment import Assignment
-from rds.results.atomic import write_whole
+from rds.grading.assignment.assignment import Assignment
 
 FILE = "batch.json"
 _FORMAT = 1

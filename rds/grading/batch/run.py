@@ -9,24 +9,24 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rds.core.atomic import write_files, write_whole
 from rds.core.errors import InputError
-from rds.grading.assignment import Assignment, read_assignment
+from rds.core.parallel import Outcome, processors, spread
+from rds.core.parallel.spread import Progress
+from rds.grading.assignment.assignment import Assignment, read_assignment
+from rds.grading.batch.journal import FILE as JOURNAL
+from rds.grading.batch.journal import Journal
 from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.queue import Queued, keep, queued, ungraded
 from rds.grading.batch.record import FILE, check_same, read_record, record_of
+from rds.grading.batch.similarity import Pair, fingerprints, similar_pairs
+from rds.grading.batch.similarity_table import pairs_html, pairs_json
 from rds.grading.batch.work import CODE, FEEDBACK, Answer, Task, graded, setup_of
-from rds.grading.class_files import write_class_files
-from rds.grading.feedback import feedback_page
+from rds.grading.feedback.class_files import write_class_files
+from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import collect
-from rds.grading.journal import FILE as JOURNAL
-from rds.grading.journal import Journal
 from rds.grading.sandbox import available
-from rds.grading.similarity import Pair, fingerprints, similar_pairs
-from rds.grading.similarity_table import pairs_html, pairs_json
-from rds.results.atomic import write_files, write_whole
-from rds.spread import Outcome, processors, spread
-from rds.spread.spread import Progress
 
 STUDENTS, SIMILARITY = "students", "similarity.json"
 _PATIENCE = 600.0  # s for one submission beyond all that it may take: then it is the grader that hangs

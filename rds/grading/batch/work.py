@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.grading.assignment import FILE, Assignment, read_assignment
-from rds.grading.feedback import feedback_page
-from rds.grading.grade_one import grade_with_runs
+from rds.core.parallel import worker_number
+from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
+from rds.grading.batch.grade_one import grade_with_runs
+from rds.grading.batch.scratch import scratch
+from rds.grading.feedback.feedback import feedback_page
 from rds.grading.sandbox import Pool, available
-from rds.grading.scratch import scratch
-from rds.spread import worker_number
 
 if TYPE_CHECKING:
     from rds.grading.cases.case import CaseRun

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     import numpy as np
 
-    from rds.grading.linear import LinearLoop
+    from rds.grading.criteria.linear import LinearLoop
     from rds.grading.sandbox.counts import Counts
     from rds.results import Result
 

@@ -10,28 +10,28 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.toml_table import Words
 from rds.core.types import Controller, Model
-from rds.core.words import Words
-from rds.experiment.resolve import PERIODS, resolve
+from rds.grading.assignment.seeds import part_seed
 from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
+from rds.grading.criteria.linear import PULSE, LinearLoop, linear_loop
+from rds.grading.criteria.same_loop import begin_of, difference, force, free_stretch
 from rds.grading.grade import Status
-from rds.grading.linear import PULSE, LinearLoop, linear_loop
-from rds.grading.same_loop import begin_of, difference, force, free_stretch
 from rds.grading.sandbox.errors import SubmissionError
-from rds.grading.seeds import part_seed
-from rds.interface import encoder
+from rds.identification.robustness.draws import Spread
+from rds.identification.robustness.figures import voltage_limits
+from rds.identification.robustness.uncertain import Uncertain, uncertain
 from rds.machines import Axis, Machine, load_machine
+from rds.machines.encoder import encoder
 from rds.models import library_model
+from rds.modes.experiment.resolve import PERIODS, resolve
+from rds.modes.loop.plan import Plan
 from rds.nc.check import Setup, motion
-from rds.programs.judge import judged
-from rds.programs.prepare import SPINDLE_UNIT, Prepared, planned
-from rds.robustness.draws import Spread
-from rds.robustness.figures import voltage_limits
-from rds.robustness.uncertain import Uncertain, uncertain
-from rds.runtime.plan import Plan
+from rds.nc.run.judge import judged
+from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, planned
 
 _NOT_HERE = ("mode", "controller", "bus", "timing", "compiled", "signal")
 _STANDS_IN = Controller(lambda t, r, y, state, params: (0.0, state))

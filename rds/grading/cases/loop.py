@@ -16,9 +16,9 @@ from rds.core.errors import ContractError
 from rds.core.types import Controller, Ending, Model, Source
 from rds.grading.cases.case import Answers
 from rds.modes import load_mode
+from rds.modes.loop.plan import Plan
+from rds.modes.process.record import table
 from rds.results import Result
-from rds.runtime.plan import Plan
-from rds.runtime.record import table
 
 SUBMISSION = Source("submission")
 

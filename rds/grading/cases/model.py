@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.words import Words
-from rds.experiment.resolve import resolve
+from rds.core.toml_table import Words
 from rds.grading.cases.case import COUNTS, CaseRun, Submitted
 from rds.grading.cases.control import plants_of
 from rds.grading.cases.loop import run_loop
@@ -19,9 +18,10 @@ from rds.grading.cases.plant import disturbed, drawn_model, noise_of
 from rds.grading.cases.words import Common, as_own_file, inside, read_common
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
+from rds.identification.robustness.uncertain import Uncertain
+from rds.modes.experiment.resolve import resolve
+from rds.modes.loop.plan import Plan
 from rds.results import Result
-from rds.robustness.uncertain import Uncertain
-from rds.runtime.plan import Plan
 
 _LARGEST = 1e100  # of an output, in the axis's unit: beyond it sums of squares are no numbers
 _NOT_HERE = ("mode", "controller", "bus", "timing", "compiled", "reference")
@@ -112,7 +112,7 @@ def read(words: Words, folder: Path, machine: str) -> ModelCase:
 
 
 def _of_log(words: Words, common: Common, params: dict[str, Any], folder: Path, log: str) -> ModelCase:
-    from rds.logs.read_log import read_log
+    from rds.identification.logs.read_log import read_log
 
     mapping, axis = inside(words, "map", folder), words.text("axis")
     words.any("machine")

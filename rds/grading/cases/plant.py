@@ -12,15 +12,15 @@ import numpy as np
 
 from rds.core.contracts import Motion
 from rds.core.errors import InputError
+from rds.core.toml_table import Words
 from rds.core.types import Model
-from rds.core.words import Words
-from rds.grading.seeds import part_seed
+from rds.grading.assignment.seeds import part_seed
+from rds.identification.robustness.draws import draws
+from rds.identification.robustness.uncertain import Uncertain
 from rds.models import library_model
 from rds.models.machine_model import MachineAxisMotion, linear_part
 from rds.modes.parts import start
-from rds.robustness.draws import draws
-from rds.robustness.uncertain import Uncertain
-from rds.signals import make_signal, signal_kinds
+from rds.references import make_signal, signal_kinds
 
 
 @dataclass(frozen=True)

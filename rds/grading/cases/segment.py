@@ -12,8 +12,8 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.geometry import length
+from rds.core.toml_table import Words
 from rds.core.types import ArcSegment, LineSegment, Segment
-from rds.core.words import Words
 from rds.grading.cases.case import COUNTS, CaseRun, Submitted
 from rds.grading.cases.words import Common, as_own_file, inside, read_common
 from rds.grading.grade import Status

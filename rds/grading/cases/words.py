@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.words import Words
+from rds.core.toml_table import Words
 
 MOST_RUNS = 1000
 _SHARE = re.compile(r"(?:±|\+-|\+/-)\s*(\d+(?:\.\d*)?(?:e-?\d+)?)\s*(%?)")

@@ -6,8 +6,8 @@ import numpy as np
 
 from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.measuring import NotMeasured, Options, actual, used
-from rds.motion.segments import LINE, SEGMENT
-from rds.programs.contour import contour_error
+from rds.interpolators.motion.segments import LINE, SEGMENT
+from rds.nc.run.contour import contour_error
 
 _LINEAR = ("X", "Y", "Z")
 

@@ -1,4 +1,4 @@
-"""The least damping ratio of the linearized closed loop's poles; see `rds.grading.linear`."""
+"""The least damping ratio of the linearized closed loop's poles; see `rds.grading.criteria.linear`."""
 
 from __future__ import annotations
 

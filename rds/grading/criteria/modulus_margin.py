@@ -1,4 +1,4 @@
-"""The least distance of the linearized loop's frequency response from -1; see `rds.grading.linear`."""
+"""The least distance of the linearized loop's frequency response from -1; see `rds.grading.criteria.linear`."""
 
 from __future__ import annotations
 

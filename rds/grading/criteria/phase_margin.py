@@ -1,4 +1,4 @@
-"""The phase margin of the linearized loop, measured from outside; see `rds.grading.linear`."""
+"""The phase margin of the linearized loop, measured from outside; see `rds.grading.criteria.linear`."""
 
 from __future__ import annotations
 

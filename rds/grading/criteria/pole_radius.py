@@ -1,4 +1,4 @@
-"""The closed loop's slowest pole: the largest |z| of the linearized, sampled loop; see `rds.grading.linear`."""
+"""The closed loop's slowest pole: the largest |z| of the linearized loop; see `rds.grading.criteria.linear`."""
 
 from __future__ import annotations
 

@@ -12,5 +12,5 @@ FOR = ("controller", "model", "interpolator", "functions")
 
 
 def measure(run: CaseRun, options: Options) -> float:
-    """Its tests are no run of a case; see `rds.grading.unit_tests`."""
+    """Its tests are no run of a case; see `rds.grading.assignment.unit_tests`."""
     raise NotMeasured("unit tests are called, not run")

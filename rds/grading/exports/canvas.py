@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 
 from rds.core.errors import InputError
+from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
 from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source
-from rds.grading.finished import Finished
 
 FILE = "canvas.csv"
 USES = ("gradebook", "column", "points")

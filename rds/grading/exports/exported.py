@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from rds.core.errors import InputError
-from rds.grading.finished import Finished
+from rds.grading.batch.finished import Finished
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from rds.grading.batch.finished import Finished
 from rds.grading.exports import one_json
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
 from rds.grading.exports.pictures import Picture
 from rds.grading.exports.said import of_criterion, of_grade, printed
-from rds.grading.finished import Finished
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 
 FILE = "gradescope"

@@ -8,12 +8,12 @@ by hand: `useridnumber`, `useremail` and the points.
 from __future__ import annotations
 
 from rds.core.errors import InputError
+from rds.grading.batch.finished import Finished
+from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
 from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source
 from rds.grading.exports.said import comment
-from rds.grading.finished import Finished
 from rds.grading.grade import Grade
-from rds.grading.grades_table import csv_text
 
 FILE = "moodle.csv"
 USES = ("gradebook", "column", "points")

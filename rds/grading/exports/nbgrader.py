@@ -5,11 +5,12 @@ The table has no columns for criteria (nbgrader's export plug-in has none), and 
 
 from __future__ import annotations
 
+from rds.grading.batch.finished import Finished
+from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.roster import platform, source
-from rds.grading.finished import Finished
+from rds.grading.exports.nbgrader_gradebook import assignment_name, into_gradebook, naive_utc
+from rds.grading.exports.roster import source
 from rds.grading.grade import Grade
-from rds.grading.grades_table import csv_text
 
 FILE = "nbgrader.csv"
 USES = ("gradebook", "column", "points")
@@ -32,19 +33,11 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     """`grades.csv`; or nothing but the changed database, if one is named."""
     wanted.refuse_all_but(USES, "nbgrader")
     if wanted.gradebook is not None:
-        from rds.grading.exports.nbgrader_gradebook import into_gradebook
-
         return into_gradebook(finished, wanted)
     name, factor = assignment_name(finished, wanted), scale(finished, wanted.points)
     rows = [_row(finished, grade, name, factor) for grade in finished.to_hand_on]
     text = csv_text([COLUMNS, *rows])
     return Exported({FILE: text.encode()}, students=len(rows))
-
-
-def assignment_name(finished: Finished, wanted: Wanted) -> str:
-    """The instructor's word, else the name in nbgrader's folders from which the submissions came, else the title."""
-    names = {name for grade in finished.grades for name in platform(grade, "nbgrader", "assignment")}
-    return wanted.column or (names.pop() if len(names) == 1 else finished.title)
 
 
 def _row(finished: Finished, grade: Grade, assignment: str, factor: float) -> list[str | float | None]:
@@ -61,12 +54,3 @@ def _row(finished: Finished, grade: Grade, assignment: str, factor: float) -> li
         email[0] if email else "",
         *(float(scaled(number, factor)) for number in numbers),
     ]
-
-
-def naive_utc(time: object) -> str:
-    """A time as nbgrader keeps it, in UTC without saying so; empty where there is none."""
-    from datetime import UTC, datetime
-
-    if not isinstance(time, datetime):
-        return ""
-    return time.astimezone(UTC).replace(tzinfo=None, microsecond=0).isoformat(" ")

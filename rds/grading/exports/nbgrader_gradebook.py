@@ -7,15 +7,16 @@ there, and touches nothing else.
 from __future__ import annotations
 
 import warnings
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.grading.batch.finished import Finished
+from rds.grading.batch.grades_table import criteria_of
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.nbgrader import assignment_name, naive_utc
-from rds.grading.finished import Finished
+from rds.grading.exports.roster import platform
 from rds.grading.grade import Grade
-from rds.grading.grades_table import criteria_of
 
 NOTEBOOK = "rds"
 
@@ -100,3 +101,16 @@ def _notebook(gradebook: Any, assignment: str, student: str) -> Any:
             gradebook.db.add(CellGrade(cell_id=cell.id, notebook=notebook))
     gradebook.db.commit()
     return notebook
+
+
+def assignment_name(finished: Finished, wanted: Wanted) -> str:
+    """The instructor's word, else the name in nbgrader's folders from which the submissions came, else the title."""
+    names = {name for grade in finished.grades for name in platform(grade, "nbgrader", "assignment")}
+    return wanted.column or (names.pop() if len(names) == 1 else finished.title)
+
+
+def naive_utc(time: object) -> str:
+    """A time as nbgrader keeps it, in UTC without saying so; empty where there is none."""
+    if not isinstance(time, datetime):
+        return ""
+    return time.astimezone(UTC).replace(tzinfo=None, microsecond=0).isoformat(" ")

@@ -10,9 +10,9 @@ from typing import Any
 
 from nbgrader.plugins import ExportPlugin  # type: ignore[import-not-found]
 
+from rds.core.atomic import write_whole
+from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.nbgrader_gradebook import NOTEBOOK
-from rds.grading.grades_table import csv_text
-from rds.results.atomic import write_whole
 
 
 class CriteriaExportPlugin(ExportPlugin):

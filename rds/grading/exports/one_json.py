@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from rds.grading.batch.finished import FEEDBACK, Finished
 from rds.grading.exports.exported import Exported
 from rds.grading.exports.pictures import Picture, pictures_of
-from rds.grading.finished import FEEDBACK, Finished
 from rds.grading.grade import Grade
 
 LARGEST = 1_000_000  # bytes

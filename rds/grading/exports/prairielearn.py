@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from rds.grading.batch.finished import Finished
 from rds.grading.exports import one_json
 from rds.grading.exports.exported import Exported, Wanted
 from rds.grading.exports.pictures import Picture
 from rds.grading.exports.said import of_criterion, of_grade, printed
-from rds.grading.finished import Finished
+from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import CriterionScore, Grade, Status
-from rds.grading.plain_text import one_line
 
 FILE = "prairielearn"
 _NOT_GRADABLE = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD, Status.GRADER_ERROR)

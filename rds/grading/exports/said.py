@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
+from rds.grading.feedback.plain_text import one_line, plain
 from rds.grading.grade import CriterionScore, Grade, Status
-from rds.grading.plain_text import one_line, plain
 
 HIDDEN = "Hidden: its value is not shown."
 

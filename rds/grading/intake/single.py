@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rds.core.errors import InputError
-from rds.grading.assignment import Assignment
+from rds.grading.assignment.assignment import Assignment
 from rds.grading.intake.folders import read_regular
 from rds.grading.intake.items import Refusal
 from rds.grading.intake.notebooks import INTERFACE, LARGEST, converted

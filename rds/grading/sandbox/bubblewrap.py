@@ -13,7 +13,7 @@ PROGRAM = "bwrap"
 SITE, SOURCES = "/opt/packages", "/opt/rds"
 
 ROOMS = (
-    *("__init__.py", "core", "checks", "interface", "models", "modes", "machines", "runtime"),
+    *("__init__.py", "core", "checks", "models", "modes", "machines"),
     *("grading/__init__.py", "grading/grade.py", "grading/sandbox"),
 )
 """What of this package is visible inside: the fixed interfaces. The laws and methods of the library are not: to write

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rds.runtime.scheduling import end_with_parent
+from rds.core.scheduling import end_with_parent
 
 LAUNCHER = ["-m", "ipykernel_launcher"]  # after the interpreter: how Jupyter starts such a kernel otherwise
 _LONGEST = 64  # bytes of a process's number
@@ -131,8 +131,10 @@ def main() -> None:
     except ImportError:  # the server says what is not installed
         return
     with contextlib.suppress(Exception):  # whatever it is, the page says so
-        from rds.panels import PANELS, shell  # noqa: F401
+        from rds.bus.tools.mf4 import put_off_asammdf
+        from rds.panels.registry import PANELS
 
+        put_off_asammdf()
         for name in PANELS.names():
             PANELS.module(name)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # a kernel that has ended is gone at once

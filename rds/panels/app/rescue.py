@@ -35,7 +35,7 @@ class EmergencyStop(APIHandler):
         """Makes ready for it: imports what it needs, and sets the cookie without which the rest is refused."""
         self.xsrf_token  # noqa: B018
         self.finish({})
-        await asyncio.to_thread(import_module, "rds.bus.estop")
+        await asyncio.to_thread(import_module, "rds.bus.tools.estop")
 
     @web.authenticated
     async def post(self) -> None:
@@ -78,8 +78,8 @@ class Kernel(APIHandler):
 
 def emergency_stop(channels: Iterable[str]) -> tuple[str, str]:
     """What the page's kernel would do: the sentence, and whether it is a warning or an error."""
-    from rds.session import Session
-    from rds.session.emergency import emergency_stop as stop
+    from rds.panels.page.emergency import emergency_stop as stop
+    from rds.panels.session import Session
 
     session = Session(os.environ[FOLDER], os.environ[MACHINE], json.loads(os.environ.get(BUS, "{}")))
     session.channels.update(channels)

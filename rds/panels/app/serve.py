@@ -12,9 +12,9 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.panels import PANELS
 from rds.panels.app.page import BUS, FOLDER, MACHINE, PANEL, WHEREABOUTS
 from rds.panels.app.ready_kernels import ReadyKernels
+from rds.panels.registry import PANELS
 
 _HERE = Path(__file__).parent
 LEFT = 60  # s after which a kernel ends that no browser shows and that has nothing to say: nothing goes on in it

@@ -11,9 +11,9 @@ import ipywidgets as widgets
 from rds.core.errors import RdsError
 from rds.panels.kit.notice import Notice as Line
 from rds.panels.kit.work_bar import WorkBar
-from rds.session.choices import Choices
-from rds.session.late import STILL
-from rds.session.task import Task
+from rds.panels.session.choices import Choices
+from rds.panels.session.expired_orders import STILL
+from rds.panels.session.task import Task
 
 T = TypeVar("T")
 _ORDER = "rds-order"  # what static/presence.js lets go only in time

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from rds.session.diagram import Block, Diagram, Link
+from rds.panels.equipment.diagram import Block, Diagram, Link
 
 _WIDTH, _GAP, _ROW, _TOP = 130, 56, 104, 12  # px
 _LINE = 16  # px of text

@@ -8,8 +8,8 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.session.choices import Choices
-from rds.session.fields import Choice, Field, Flag, Number, Several, Text
+from rds.panels.session.choices import Choices
+from rds.panels.session.fields import Choice, Field, Flag, Number, Several, Text
 
 _BUTTONS = 4  # as many options or fewer are all in sight; more are a list
 

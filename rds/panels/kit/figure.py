@@ -11,7 +11,7 @@ import ipywidgets as widgets
 
 from rds.core.errors import RdsError
 from rds.panels.kit.ticker import Ticker
-from rds.session.session import Session
+from rds.panels.session.session import Session
 
 DPI = 94  # on the page: letters that can be read on a projector
 WIDTH = 7.6  # inches: as wide as what is beside the settings on a screen of 1280, or of 1024

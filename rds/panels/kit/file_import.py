@@ -22,7 +22,7 @@ LARGEST = 250_000_000  # bytes of a file: it is in the kernel's memory until it 
 
 @cache
 def _module() -> str:
-    return (Path(__file__).parent.parent / "static" / "file_import.js").read_text(encoding="utf-8")
+    return (Path(__file__).parent / "static" / "file_import.js").read_text(encoding="utf-8")
 
 
 class FileImport(anywidget.AnyWidget):

@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from rds.session.task import Stopped
+from rds.panels.session.task import Stopped
 
 PERIOD = 0.09  # s: what is a little late still is ten times a second
 PATIENCE = 20  # failures one after the other before a call is given up

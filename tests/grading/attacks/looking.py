@@ -57,8 +57,8 @@ while environ[at]:
 assert not [each for each in raw if b"ATTACK-CANARY" in each], raw
 """
 _LIBRARY = """
-for name in ("rds.controllers", "rds.interpolators", "rds.grading.assignment", "rds.grading.cases", "rds.grading.criteria",
-             "rds.experiment", "rds.identification", "pytest", "rds.session"):
+for name in ("rds.controllers", "rds.interpolators", "rds.grading.assignment.assignment", "rds.grading.cases", "rds.grading.criteria",
+             "rds.modes.experiment", "rds.identification", "pytest", "rds.panels.session"):
     try:
         __import__(name)
     except ImportError:

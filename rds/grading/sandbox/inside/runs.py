@@ -21,10 +21,10 @@ from rds.grading.sandbox import records
 from rds.grading.sandbox.inside import walls
 from rds.grading.sandbox.inside.channel import Channel, Receive, Send
 from rds.grading.sandbox.inside.counting import Counted
-from rds.interface import as_voltage
+from rds.machines.converter import as_voltage
 from rds.models.student import student_model
+from rds.modes.loop.laws import LiveReference, controlled, coupled
 from rds.modes.parts import start
-from rds.runtime.laws import LiveReference, controlled, coupled
 
 
 def control(channel: Channel, student: StudentFile, order: dict[str, Any], counted: Counted | None = None) -> None:

@@ -26,7 +26,7 @@ from rds.grading.sandbox.inside.counting import Counted, counted, work_alone
 from rds.grading.sandbox.inside.plain import NotPlain, plain
 
 _RUNS = {"control": runs.control, "model": runs.model, "rows": runs.rows}
-_OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.interface.converter", "rds.runtime.laws")
+_OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.machines.converter", "rds.modes.loop.laws")
 """Modules that ask a submission at each sample, besides `runs`: their work is not the submission's."""
 
 

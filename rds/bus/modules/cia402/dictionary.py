@@ -1,0 +1,110 @@
+"""A device's object dictionary: what its EDS says, the values now, and the rules of access (CiA 301, 7.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib.resources import as_file, files
+from typing import Any
+
+import canopen
+from canopen.objectdictionary import ODVariable
+from canopen.objectdictionary.datatypes import NUMBER_TYPES
+from canopen.sdo import SdoAbortedError
+
+from rds.bus.modules.cia402.codes import Abort
+
+Key = tuple[int, int]  # index, sub-index
+
+
+def axis_eds(node: int) -> canopen.ObjectDictionary:
+    """The object dictionary of the simulated drive, `axis.eds`, for a node-ID from 1 to 127."""
+    with as_file(files("rds.bus.modules.cia402").joinpath("axis.eds")) as path:
+        return canopen.import_od(str(path), node)
+
+
+@cache
+def _axis_variables(node: int) -> dict[Key, ODVariable]:
+    # below 0x1000 are data types, the dummies for mappings among them, but no objects
+    return {(v.index, v.subindex): v for v in _variables(axis_eds(node)) if v.index >= 0x1000}
+
+
+def _variables(objects: canopen.ObjectDictionary) -> list[ODVariable]:
+    found: list[ODVariable] = []
+    for thing in objects.values():
+        found.extend([thing] if isinstance(thing, ODVariable) else thing.values())
+    return found
+
+
+class Dictionary:
+    """The objects of the simulated drive with node-ID `node`.
+
+    `values` holds what is neither computed nor text, by (index, sub-index). A reader computes an object's value when
+    it is asked for; a writer takes a new value before it is stored, and may refuse it by SdoAbortedError.
+    """
+
+    def __init__(self, node: int):
+        self.variables = self.object_dictionary = _axis_variables(node)
+        self._indices = {index for index, _ in self.variables}
+        self.values: dict[Key, Any] = {}
+        self.readers: dict[Key, Callable[[], Any]] = {}
+        self.writers: dict[Key, Callable[[Any], None]] = {}
+        self.reset()
+
+    def reset(self, lowest: int = 0, highest: int = 0xFFFF) -> None:
+        """Values as in the EDS, for the objects from `lowest` to `highest`."""
+        for key, variable in self.variables.items():
+            if lowest <= key[0] <= highest:
+                self.values[key] = variable.default if variable.default is not None else 0
+
+    def __getitem__(self, index: int) -> Any:
+        """The stored value of an object without sub-indices."""
+        return self.values[index, 0]
+
+    def variable(self, index: int, subindex: int) -> ODVariable:
+        """The description of an object; SdoAbortedError if there is none."""
+        variable = self.variables.get((index, subindex))
+        if variable is None:
+            raise SdoAbortedError(Abort.NO_SUBINDEX if index in self._indices else Abort.NO_OBJECT)
+        return variable
+
+    def read(self, index: int, subindex: int = 0) -> Any:
+        """The value now."""
+        key = index, subindex
+        reader = self.readers.get(key)
+        return self.values[key] if reader is None else reader()
+
+    def write(self, index: int, subindex: int, value: Any) -> None:
+        """Take a value, within its limits and with the writer's consent. Raises SdoAbortedError."""
+        variable = self.variable(index, subindex)
+        if variable.max is not None and value > variable.max:
+            raise SdoAbortedError(Abort.TOO_HIGH)
+        if variable.min is not None and value < variable.min:
+            raise SdoAbortedError(Abort.TOO_LOW)
+        writer = self.writers.get((index, subindex))
+        if writer is not None:
+            writer(value)
+        self.values[index, subindex] = value
+
+    # --- what canopen's SDO server asks for
+
+    def get_data(self, index: int, subindex: int, check_readable: bool = False) -> bytes:
+        """An object's bytes, little-endian. Raises SdoAbortedError."""
+        variable = self.variable(index, subindex)
+        if check_readable and not variable.readable:
+            raise SdoAbortedError(Abort.WRITE_ONLY)
+        return bytes(variable.encode_raw(self.read(index, subindex)))
+
+    def set_data(self, index: int, subindex: int, data: bytes, check_writable: bool = False) -> None:
+        """Take an object's bytes. Raises SdoAbortedError."""
+        variable = self.check_writable(index, subindex) if check_writable else self.variable(index, subindex)
+        if variable.data_type in NUMBER_TYPES and 8 * len(data) != len(variable):
+            raise SdoAbortedError(Abort.TOO_LONG if 8 * len(data) > len(variable) else Abort.TOO_SHORT)
+        self.write(index, subindex, variable.decode_raw(bytes(data)))
+
+    def check_writable(self, index: int, subindex: int) -> ODVariable:
+        """The description of an object that may be written; SdoAbortedError if there is none or it may not."""
+        variable = self.variable(index, subindex)
+        if not variable.writable:
+            raise SdoAbortedError(Abort.READ_ONLY)
+        return variable

@@ -1,0 +1,149 @@
+"""What the host knows of one drive, and its two process data objects as bytes. No bus here."""
+
+from __future__ import annotations
+
+from struct import Struct
+
+import can
+
+from rds.bus.modules.cia402 import codes
+from rds.bus.modules.cia402.codes import State, state_of
+from rds.bus.modules.cia402.settings import Command, DriveSettings
+from rds.core.errors import InputError
+
+_STATUS = Struct("<Hi")  # statusword, actual position or velocity
+_HALF, _TURN = 1 << 31, 1 << 32
+
+# The controlword that leads from a state towards OPERATION ENABLED; where power stays off, the way ends before.
+_TOWARDS = {
+    State.NOT_READY: codes.DISABLE_VOLTAGE,
+    State.SWITCH_ON_DISABLED: codes.SHUTDOWN,
+    State.READY: codes.SWITCH_ON,
+    State.SWITCHED_ON: codes.ENABLE_OPERATION,
+    State.OPERATION_ENABLED: codes.ENABLE_OPERATION,
+}
+
+
+class Remote:
+    """One drive: its frames, and what it said last. Values are in the axis's units, or V for torque."""
+
+    __slots__ = (
+        "_command",
+        "_counts",
+        "_counts_limit",
+        "_factor",
+        "_pack",
+        "_settings",
+        "actual",
+        "actual_counts",
+        "controlword",
+        "emergency",
+        "enabled",
+        "heard_at",
+        "message",
+        "missed",
+        "origin",
+        "seen",
+        "state",
+        "status",
+        "target",
+        "was_enabled",
+    )
+
+    def __init__(self, settings: DriveSettings):
+        self._settings, self._command = settings, settings.command
+        torque = settings.command is Command.CST
+        self._pack = Struct("<Hh" if torque else "<Hi").pack_into
+        per_unit = settings.velocity_counts if settings.reads_velocity else settings.counts
+        self._counts = settings.direction / per_unit  # units per count
+        self._factor = (
+            settings.direction
+            * {
+                Command.CST: 1000.0 / settings.rated_voltage,
+                Command.CSP: settings.counts,
+                Command.CSV: settings.velocity_counts,
+            }[settings.command]
+        )
+        self._counts_limit = settings.torque_limit if torque else _HALF - 1
+        self.message = can.Message(
+            arbitration_id=0x200 + settings.node, is_extended_id=False, data=bytes(4 if torque else 6)
+        )
+        self.controlword = codes.DISABLE_VOLTAGE
+        self.target = 0  # in the drive's units, as the next RPDO carries it
+        self.actual = 0.0
+        self.actual_counts = 0
+        self.origin = 0  # counts where `actual` is 0
+        self.status = 0
+        self.state: State | None = None
+        self.enabled = self.was_enabled = False
+        self.emergency = 0  # error code of the last emergency message; 0 none
+        self.missed = 0  # answers in a row
+        self.seen = False
+        self.heard_at = 0.0  # s, of the last heartbeat; infinite before the first
+
+    @property
+    def name(self) -> str:
+        """For messages: "X (node 2)"."""
+        return self._settings.name
+
+    @property
+    def node(self) -> int:
+        """Node-ID."""
+        return self._settings.node
+
+    @property
+    def reads_velocity(self) -> bool:
+        """Whether `actual` is a speed, which has no origin."""
+        return self._settings.reads_velocity
+
+    def take_status(self, data: bytes | bytearray) -> None:
+        """A TPDO has come."""
+        self.status, counts = _STATUS.unpack_from(data)
+        if self.status & 0x6F != 0x27 or not self.enabled:
+            self.state = state_of(self.status)
+            self.enabled = self.state is State.OPERATION_ENABLED
+        self.actual_counts = counts
+        self.actual = ((counts - self.origin + _HALF) % _TURN - _HALF) * self._counts
+        self.missed = 0
+        self.seen = True
+
+    def aim(self, value: float) -> float:
+        """Take the next target (V, or the axis's unit, or unit/s); returns it as it will be sent.
+
+        Raises InputError for one that the drive's numbers can't say, or above the torque limit.
+        """
+        target = value * self._factor
+        if not -self._counts_limit <= target <= self._counts_limit:  # false for NaN too
+            unit, limit = self._unit()
+            raise InputError(f"{value!r} {unit} for {self.name} must be from -{limit:g} to {limit:g} {unit}")
+        self.target = round(target)
+        if self._command is Command.CSP:
+            self.target = (self.target + self.origin + _HALF) % _TURN - _HALF
+            return round(target) / self._factor
+        return self.target / self._factor
+
+    def hold(self) -> None:
+        """The target at which nothing moves: no torque, no velocity, or the position where the axis is."""
+        self.target = self.actual_counts if self._command is Command.CSP else 0
+
+    def fill(self) -> can.Message:
+        """The RPDO with controlword and target as they are."""
+        self._pack(self.message.data, 0, self.controlword, self.target)
+        return self.message
+
+    def quit(self) -> None:
+        """Set the controlword that takes the power: at once in mode cst, by a quick stop in csp and csv."""
+        self.controlword = codes.DISABLE_VOLTAGE if self._command is Command.CST else codes.QUICK_STOP
+
+    def lead(self, arm: bool) -> None:
+        """Set the controlword towards OPERATION ENABLED, or with `arm` false no further than SWITCHED ON."""
+        state = self.state or State.NOT_READY
+        if not arm and state in (State.SWITCHED_ON, State.OPERATION_ENABLED):
+            self.controlword = codes.SWITCH_ON
+        else:
+            self.controlword = _TOWARDS.get(state, codes.DISABLE_VOLTAGE)
+
+    def _unit(self) -> tuple[str, float]:
+        unit = self._settings.axis.unit
+        name = {Command.CST: "V", Command.CSP: unit, Command.CSV: unit if self.reads_velocity else f"{unit}/s"}
+        return name[self._command], self._counts_limit / abs(self._factor)

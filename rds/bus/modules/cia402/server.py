@@ -1,0 +1,66 @@
+"""Simulated CiA 402 drives for a machine's axes, all in one process.
+
+`python -m rds.bus.modules.cia402.server MACHINE [--axes X,Y,Z] [--interface I] [--channel C]`
+writes one line, "ready ...", on stdout when all drives have sent their boot-up messages, and reports on stderr.
+Its options and its end are those of rds/bus/modules/server_program.py.
+"""
+
+from __future__ import annotations
+
+if __name__ == "__main__":  # a program of our own
+    from rds.bus.tools.mf4 import put_off_asammdf
+
+    put_off_asammdf()
+
+import queue
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from rds.bus.modules import server_program
+from rds.bus.modules.buttons import press_buttons
+from rds.bus.modules.cia402.drive import Drive
+from rds.bus.modules.cia402.node import DriveNode
+from rds.bus.modules.serve_loop import Opener, serve_nodes
+from rds.bus.tools.link import BUILTIN
+from rds.machines import Machine
+from rds.machines.machine import Axis
+
+
+def serve(
+    machine: Machine,
+    interface: str = BUILTIN,
+    channel: str | None = None,
+    axes: Sequence[str] | None = None,
+    ready: Callable[[], Any] | None = None,
+    stop: threading.Event | None = None,
+    **options: Any,
+) -> None:
+    """Serve a drive for each axis of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`.
+
+    A drive's node-ID is its axis's node, its full voltage the converter's range. It counts as commanded while SYNC
+    comes.
+    """
+    make_node = partial(_make_node, machine.converter.range)
+    serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
+
+
+def _make_node(volts: float, slot: int, axis: Axis, opener: Opener) -> DriveNode:
+    return DriveNode(axis.name, partial(_make_drive, axis, volts), opener)
+
+
+def _make_drive(axis: Axis, volts: float, start: float) -> Drive:
+    return Drive(axis, start, volts)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The program. Exit code 0: told to end; 1: the bus failed at the start; 2: bad input."""
+    lines = queue.SimpleQueue[str]()
+    with_buttons = partial(serve, chores=partial(press_buttons, lines))
+    return server_program.run(with_buttons, "rds.bus.modules.cia402.server", "serve simulated drives", arguments, lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""What the modules on a bus speak: for each dialect its server, its drivers on the host, and how to see it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.machines.machine import Machine
+
+_DRIVERS = {
+    "rds": ("rds.bus.modules.rds.drivers", "AxisDrivers"),
+    "oacs": ("rds.bus.modules.oacs.drivers", "OacsDrivers"),
+    "cia402": ("rds.bus.modules.cia402.host", "Cia402Drivers"),
+}
+_SERVERS = {
+    "rds": "rds.bus.modules.rds.server",
+    "oacs": "rds.bus.modules.oacs.server",
+    "cia402": "rds.bus.modules.cia402.server",
+}
+DEFAULT = "rds"
+
+
+def dialect_names() -> list[str]:
+    """The dialects there are; the first is the cyclic frames of `rds.bus.modules.rds.frames`."""
+    return list(_DRIVERS)
+
+
+def check_dialect(dialect: str) -> None:
+    """InputError listing the dialects there are, for another one."""
+    if dialect not in _DRIVERS:
+        raise InputError(f"unknown dialect {dialect!r}; known dialects: {', '.join(_DRIVERS)}")
+
+
+def server_module(dialect: str) -> str:
+    """The module that serves a machine in this dialect, for `python -m`."""
+    return _SERVERS[dialect]
+
+
+def open_drivers(
+    dialect: str, machine: Machine, axes: Sequence[str], sample_period: float, dry_run: bool, bus: dict[str, Any]
+) -> Any:
+    """The host's drivers (`rds.core.contracts.Drivers`) of a machine's axes; `bus` goes to them as it is."""
+    module, name = _DRIVERS[dialect]
+    drivers: Any = getattr(import_module(module), name)
+    return drivers(machine, axes, sample_period=sample_period, dry_run=dry_run, **bus)
+
+
+def is_served(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:
+    """Whether modules of this dialect answer on a channel; nothing moves there. `options` go to the interface.
+
+    InputError naming the dialects of those that answer, if none of them speaks this one.
+    """
+    if _answers(dialect, machine, interface, channel, **options):
+        return True
+    rest = [other for other in _DRIVERS if other != dialect]
+    others = [other for other in rest if _answers(other, machine, interface, channel, **options)]
+    if not others:
+        return False
+    from rds.bus.tools.link import bus_name
+
+    speak = " and ".join(others)
+    raise InputError(
+        f"what answers on bus {bus_name(interface, channel)} speaks {speak}, not {dialect}: set [bus] dialect = "
+        f'"{others[0]}", or choose another channel'
+    )
+
+
+def find_dialect(
+    machine: Machine, interface: str, channel: str | None, first: str = DEFAULT, **options: Any
+) -> str | None:
+    """What the modules on a channel speak; None where none answers. Nothing moves there.
+
+    The dialect `first` is asked for before the others; `options` go to the interface.
+    """
+    order = sorted(_DRIVERS, key=lambda dialect: dialect != first)
+    return next((each for each in order if _answers(each, machine, interface, channel, **options)), None)
+
+
+def _answers(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:
+    if dialect == "cia402":
+        from rds.bus.modules.cia402.scan import scan
+
+        return any(device.is_drive for device in scan(interface, channel, **options))
+    from rds.bus.modules.calling import find_machine
+
+    # the modules of the oacs dialect answer cyclic frames as well
+    nodes = {machine.axis(name).node for name in find_machine(machine, interface, channel, **options)}
+    if not nodes:
+        return False
+    from rds.bus.modules.oacs.host import identify
+    from rds.bus.tools.link import open_bus
+
+    bus = open_bus(interface, channel, node="scan", **options)
+    try:
+        distributed = {info.id for info in identify(bus)}
+    finally:
+        bus.shutdown()
+    return bool(nodes & distributed if dialect == "oacs" else nodes - distributed)

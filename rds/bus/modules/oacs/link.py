@@ -1,0 +1,137 @@
+"""One module's conversation: a command out, its acknowledgements and positions in, each with a time limit."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import can
+
+from rds.bus.modules.oacs import messages, talk
+from rds.bus.modules.oacs.codes import Acknowledges, Code, Move, Parameter, Result, Says, check_node
+from rds.bus.modules.oacs.messages import Decoded
+from rds.bus.modules.oacs.refusals import reason
+from rds.core.errors import MachineError
+
+PATIENCE = 0.5  # s for a module to say a word
+_KEEP_ALIVE = 0.5  # s; modules stop a motion when they hear nothing for 2 s
+
+
+class Done(NamedTuple):
+    """How a command ended."""
+
+    result: Result
+    counts: int  # where the axis stands; a tool: its speed, rev/min
+    seconds: float  # from the command to this, on the bus's clock where it has one
+
+
+class Conversation:
+    """With the module `number` on an open `bus`, which stays the caller's."""
+
+    def __init__(self, bus: can.BusABC, number: int, name: str = ""):
+        self.bus = bus
+        self.number = check_node(number)
+        self.name = f"module {name} (number {number})" if name else f"module {number}"
+        self.listen: Callable[[talk.Heard], None] = lambda heard: None  # everything that the module says
+
+    def send(self, **fields: Any) -> None:
+        """A command."""
+        talk.send(self.bus, messages.encode("Command", self.number, **fields))
+
+    def wait_for(self, wanted: Callable[[Decoded], bool], what: str, seconds: float = PATIENCE) -> talk.Heard:
+        """The module's next message that is `wanted`. MachineError naming module and `what` after `seconds`."""
+        heard = self._hear(wanted, seconds)
+        if heard is None:
+            raise MachineError(
+                f"{self.name} was told {what} and did not answer within {seconds:g} s; check its power and cable "
+                "(a scan of the bus shows who is there)"
+            )
+        return heard
+
+    def _hear(self, wanted: Callable[[Decoded], bool], seconds: float) -> talk.Heard | None:
+        """The same, None if it does not come in time. Meanwhile the module hears that the host lives."""
+        until = time.monotonic() + seconds
+        alive = time.monotonic() + _KEEP_ALIVE
+        while True:
+            heard = talk.hear(self.bus, min(until, alive))
+            if heard is not None and self._is_mine(heard.message):
+                self.listen(heard)
+                if wanted(heard.message):
+                    return heard
+            now = time.monotonic()
+            if now >= until:
+                return None
+            if now >= alive:
+                alive = now + _KEEP_ALIVE
+                self.send(Code=Code.READ_PARAMETER, ReadIndex=Parameter.SELECT)
+
+    def command(self, what: str, answers: Acknowledges, **fields: Any) -> Done:
+        """Send a command and wait until it is carried out or accepted. MachineError if it is refused, or not heard."""
+        asked = time.monotonic()
+        self.drain()
+        self.send(**fields)
+        heard = self.wait_for(acknowledgement(answers), what)
+        done = Done(Result(heard.message.fields["Result"]), heard.message.fields["AcknowledgePosition"], 0.0)
+        if done.result > Result.ACCEPTED:
+            raise MachineError(f"{self.name} refused {what}: {reason(done.result)}")
+        return done._replace(seconds=heard.at - asked)
+
+    def finish(
+        self, what: str, answers: Acknowledges, seconds: float, also: Collection[Result] = (Result.CARRIED_OUT,)
+    ) -> Done:
+        """Wait until an accepted command is carried out, or ends with one of `also`.
+
+        MachineError if it fails or takes longer than `seconds`.
+        Whatever ends the wait otherwise (an error, Ctrl-C), the module is told to stop.
+        """
+        asked = time.monotonic()
+        with self._stopping():
+            heard = self.wait_for(acknowledgement(answers, last=True), what, seconds)
+        result, counts = Result(heard.message.fields["Result"]), heard.message.fields["AcknowledgePosition"]
+        if result not in also:
+            raise MachineError(f"{self.name} was told {what} and did not finish: {reason(result)}")
+        return Done(result, counts, heard.at - asked)
+
+    def hold(self, what: str, answers: Acknowledges, seconds: float) -> None:
+        """Let an accepted command that has no end of its own go on for `seconds`. MachineError if it ends before."""
+        with self._stopping():
+            heard = self._hear(acknowledgement(answers, last=True), seconds)
+        if heard is not None:
+            ended = Result(heard.message.fields["Result"])
+            raise MachineError(f"{self.name} was told {what} and did not go on: {reason(ended)}")
+
+    @contextmanager
+    def _stopping(self) -> Iterator[None]:
+        """Tell the module to stop if the block fails or is interrupted."""
+        try:
+            yield
+        except BaseException:
+            self.send(Code=Code.MOVE, Move=Move.STOP)
+            raise
+
+    def drain(self) -> None:
+        """Take what was said before, so that an old word does not count as the answer to a new command."""
+        while talk.hear(self.bus, 0.0) is not None:
+            pass
+
+    def _is_mine(self, message: Decoded) -> bool:
+        if message.kind == "Reply":
+            return message.fields["BoardID"] == self.number
+        return message.node == self.number and message.kind not in ("Command", "Flow")
+
+
+def acknowledgement(answers: Acknowledges, last: bool = False) -> Callable[[Decoded], bool]:
+    """Whether a message acknowledges that command; with `last`, as its end."""
+
+    def wanted(message: Decoded) -> bool:
+        fields = message.fields
+        return (
+            message.kind == "Reply"
+            and fields["Code"] == Says.ACKNOWLEDGEMENT
+            and fields["Acknowledges"] == answers
+            and not (last and fields["Result"] == Result.ACCEPTED)
+        )
+
+    return wanted

@@ -1,0 +1,68 @@
+"""A module that answers the cyclic frames of rds/bus/modules/rds/frames.py, on a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import can
+
+from rds.bus.modules.bus_node import BusNode, Outgoing
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.module import AxisModule
+
+
+class ModuleNode(BusNode):
+    """The module that `make_module` makes, given the bus time now, s."""
+
+    def __init__(
+        self, name: str, make_module: Callable[[float], AxisModule], open_bus: Callable[[list[int]], can.BusABC]
+    ):
+        super().__init__(name, open_bus)
+        self.module = make_module(self.clock.now())
+        self.join()
+
+    @property
+    def identifiers(self) -> list[int]:
+        """The cyclic exchange, and the emergency stop of all."""
+        return [frames.GENERAL, frames.COMMAND, frames.DRY_COMMAND, frames.SETUP, frames.CALL]
+
+    @property
+    def expires(self) -> float | None:
+        """The module's own: when its watchdog cuts the voltage."""
+        return self.module.expires
+
+    @property
+    def heard(self) -> float:
+        """Ticks."""
+        return self.module.ticks
+
+    @property
+    def number(self) -> int:
+        """Its node."""
+        return self.module.identity.node
+
+    def receive(self, message: can.Message, at: float) -> list[Outgoing]:
+        """To the module; extended frames mean nothing to it."""
+        if message.is_extended_id:
+            return []
+        answers = self._answers(self.module.receive(message.arbitration_id, message.data, at))
+        if message.arbitration_id == frames.CALL and message.data == frames.WHO:
+            return [(*frames.encode_identity(self.module.identity), True), *answers]
+        return answers
+
+    def expire(self, now: float) -> list[Outgoing]:
+        """The module's."""
+        return self._answers(self.module.expire(now))
+
+    def press(self, active: bool) -> None:
+        """The module's emergency stop button: pressed, it stops this module, which stops all others on its bus.
+
+        can.CanError if the bus fails; this module has stopped even so.
+        """
+        reports = self.module.set_emergency_input(active, self.clock.now())
+        if reports:
+            self.send([(frames.GENERAL, frames.EMERGENCY, False)])
+        self.send(self._answers(reports))
+
+    def _answers(self, answers: list[bytes]) -> list[Outgoing]:
+        return [(self.module.identifier, data, False) for data in answers]

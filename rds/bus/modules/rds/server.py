@@ -1,0 +1,58 @@
+"""The machine behind the bus: all axis modules of a machine in one process.
+
+`python -m rds.bus.modules.rds.server MACHINE [--interface I] [--channel C]` writes one line, "ready ...", on stdout
+when all modules are on the bus, and reports on stderr. Its options and its end are those of server_program.py.
+"""
+
+from __future__ import annotations
+
+if __name__ == "__main__":  # a program of our own
+    from rds.bus.tools.mf4 import put_off_asammdf
+
+    put_off_asammdf()
+
+import queue
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from rds.bus.modules import server_program
+from rds.bus.modules.buttons import press_buttons
+from rds.bus.modules.rds.module import AxisModule
+from rds.bus.modules.rds.module_node import ModuleNode
+from rds.bus.modules.serve_loop import Opener, serve_nodes
+from rds.bus.tools.link import BUILTIN
+from rds.machines import Machine
+from rds.machines.machine import Axis
+
+
+def serve(
+    machine: Machine,
+    interface: str = BUILTIN,
+    channel: str | None = None,
+    axes: Sequence[str] | None = None,
+    ready: Callable[[], Any] | None = None,
+    stop: threading.Event | None = None,
+    **options: Any,
+) -> None:
+    """Serve the modules of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`."""
+
+    def make_node(slot: int, axis: Axis, opener: Opener) -> ModuleNode:
+        return ModuleNode(axis.name, partial(AxisModule, axis, slot, machine.sample_period), opener)
+
+    serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The program. Exit code 0: told to end; 1: the bus failed at the start; 2: bad input."""
+    lines = queue.SimpleQueue[str]()
+    with_buttons = partial(serve, chores=partial(press_buttons, lines))
+    return server_program.run(
+        with_buttons, "rds.bus.modules.rds.server", "serve a machine's axis modules", arguments, lines
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

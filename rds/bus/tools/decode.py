@@ -1,0 +1,133 @@
+"""Frames in words: the cyclic messages by rds/bus/modules/rds/frames.py, all others by DBC files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import can
+
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.frames import Kind, Status
+from rds.core.errors import InputError, MachineError
+
+OWN_DBC = "oacs.dbc"  # in rds/bus/modules/oacs
+_LONGEST_REASON = 300  # characters
+
+
+class Decoded(NamedTuple):
+    """A frame's name and its signals: numbers with their unit, words for codes."""
+
+    name: str
+    signals: dict[str, str]
+
+
+Decoder = Callable[[can.Message], Decoded | None]
+
+
+def decoder(files_: Sequence[Path] = ()) -> Decoder:
+    """What decodes a frame: the cyclic messages first, then the DBC files in their order, then the dialect's own.
+
+    The dialect's own file is left out where cantools isn't installed. A frame that nothing knows is None; one that
+    does not fit its description says so under its name. Raises InputError for a file that is no DBC, or if a file is
+    given and cantools is missing.
+    """
+    databases = [load_dbc(path) for path in files_]
+    own = own_dbc()
+    if own is not None and find_spec("cantools") is not None:
+        databases.append(load_dbc(own))
+
+    def decode(message: can.Message) -> Decoded | None:
+        if message.is_error_frame or message.is_remote_frame:
+            return None
+        found = None if message.is_extended_id else cyclic(message.arbitration_id, bytes(message.data))
+        for database in databases:
+            found = found or _by_database(database, message)
+        return found
+
+    return decode
+
+
+def cyclic(identifier: int, data: bytes) -> Decoded | None:
+    """The cyclic messages between host and modules; None for others and for those of another length."""
+    try:
+        if identifier in (frames.COMMAND, frames.DRY_COMMAND):
+            voltages = frames.decode_voltages(identifier, data)
+            name = "command" if identifier == frames.COMMAND else "dry command"
+            return Decoded(name, {f"slot {i}": f"{volts:+.3f} V" for i, volts in enumerate(voltages)})
+        if identifier == frames.SETUP:
+            return Decoded("set-up", {"period": f"{frames.decode_setup(identifier, data) * 1e3:g} ms"})
+        if identifier == frames.CALL and not data:
+            return Decoded("call", {})
+        if identifier - frames.ANSWER in frames.NODES:
+            answer = frames.decode_answer(identifier, data)
+            status = Status(answer.status)
+            return Decoded(
+                f"{_name(Kind, answer.kind)} of module {identifier - frames.ANSWER}",
+                {
+                    "position": f"{answer.counts} counts",
+                    "status": "none" if not status else (status.name or hex(status)).lower().replace("|", "+"),
+                    "ticks": str(answer.ticks),
+                },
+            )
+    except MachineError:
+        return None
+    return None
+
+
+def _name(kinds: Any, value: int) -> str:
+    try:
+        return str(kinds(value).name).lower()
+    except ValueError:
+        return f"kind {value}"
+
+
+def own_dbc() -> Path | None:
+    """The file of the dialect's own messages, where it is installed."""
+    try:
+        path = Path(str(files("rds.bus.modules.oacs").joinpath(OWN_DBC)))
+    except ModuleNotFoundError:
+        return None
+    return path if path.is_file() else None
+
+
+def load_dbc(path: Path) -> Any:
+    """cantools' database of a DBC file; InputError if it is none, or where cantools is missing."""
+    try:
+        import cantools.database
+    except ImportError as error:
+        raise InputError("DBC files need the package cantools: pip install cantools", str(path)) from error
+    if not path.is_file():
+        raise InputError("there is no such DBC file; check the name", str(path))
+    try:
+        return cantools.database.load_file(path, strict=False)
+    # cantools raises errors of its parsers, of textparser and plain ones
+    except Exception as error:
+        reason = str(error).strip() or type(error).__name__
+        if len(reason) > _LONGEST_REASON:  # it quotes the line
+            reason = f"{reason[:_LONGEST_REASON]}..."
+        raise InputError(f"it can't be read as a DBC file: {reason}", str(path)) from error
+
+
+def _by_database(database: Any, message: can.Message) -> Decoded | None:
+    try:
+        description = database.get_message_by_frame_id(message.arbitration_id, force_extended_id=message.is_extended_id)
+    except KeyError:
+        return None
+    if bool(description.is_extended_frame) != message.is_extended_id:
+        return None
+    try:
+        values = description.decode(bytes(message.data))
+    # a short frame, an unknown multiplexer: whatever is wrong with it, the monitor goes on
+    except Exception as error:
+        return Decoded(description.name, {"does not fit": str(error).strip() or type(error).__name__})
+    units = {signal.name: signal.unit for signal in description.signals}
+    return Decoded(description.name, {name: _quantity(value, units.get(name)) for name, value in values.items()})
+
+
+def _quantity(value: Any, unit: str | None) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{text} {unit}" if unit else text

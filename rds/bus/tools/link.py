@@ -1,0 +1,81 @@
+"""Opening a bus: any python-can interface, errors in the words of the machine's user."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rds.core.errors import InputError, MachineError
+from rds.machines.machine import Machine
+
+if TYPE_CHECKING:
+    import can
+
+BUILTIN = "rds"  # the built-in bus's name among python-can's interfaces
+_NO_OPTIONS = ("dialect", "cia402", "faults", "interface", "channel")  # keys of a [bus] table that are not can.Bus's
+
+
+def bus_name(interface: str, channel: str | None) -> str:
+    """How messages call a bus."""
+    return interface if channel in (None, "") else f"{interface}:{channel}"
+
+
+def bus_options(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a `[bus]` table goes to can.Bus beside interface and channel, such as the bit rate."""
+    return {key: value for key, value in table.items() if key not in _NO_OPTIONS}
+
+
+def default_channel(machine: Machine, interface: str, channel: str | None) -> str | None:
+    """The channel that was asked for, else the machine's name on the built-in bus, else the interface's own default."""
+    return channel if channel is not None or interface != BUILTIN else machine.name
+
+
+def open_bus(
+    interface: str,
+    channel: str | None,
+    identifiers: Sequence[int] | None = None,
+    mask: int = 0x7FF,
+    node: str | None = None,
+    **options: Any,
+) -> can.BusABC:
+    """An open bus that receives the standard frames whose identifier, masked, is one of `identifiers` (None: all).
+
+    `node` is what the built-in bus calls this node; `options` go to the interface as they are (bitrate, fd...).
+    Raises MachineError if the bus can't be opened.
+    """
+    import can
+
+    if node is not None and interface == BUILTIN:
+        options.setdefault("name", node)
+    filters = None
+    if identifiers is not None:
+        filters = standard_filters(identifiers, mask)
+    try:
+        return can.Bus(
+            interface=interface,
+            channel=channel,
+            can_filters=filters,
+            # what a user's python-can files say of real buses (a bit rate...) isn't meant for the built-in one
+            ignore_config=interface == BUILTIN,
+            **options,
+        )
+    except (can.CanError, OSError, ValueError, TypeError, NotImplementedError) as error:
+        raise MachineError(
+            f"bus {bus_name(interface, channel)} can't be opened: {error}; check interface, channel and "
+            "options (on the command line, or in the [bus] table)"
+        ) from error
+
+
+def standard_filters(identifiers: Sequence[int], mask: int = 0x7FF) -> list[Any]:
+    """Filters, in python-can's form, for the standard frames whose identifier, masked, is one of `identifiers`."""
+    return [{"can_id": wanted, "can_mask": mask, "extended": False} for wanted in identifiers]
+
+
+def pair(text: str) -> tuple[str, Any]:
+    """KEY=VALUE; a value that looks like a number or true/false becomes one, as in python-can's own files."""
+    from can.util import cast_from_string
+
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise InputError(f"option {text!r} must be KEY=VALUE", "--option")
+    return key, cast_from_string(value)

@@ -1,0 +1,186 @@
+"""python-can's log writers, each with a `flush()` after which a killed recording can be read."""
+
+from __future__ import annotations
+
+import gzip
+import sqlite3
+from pathlib import Path
+from typing import Any, Protocol, TextIO, cast
+
+import can
+
+from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf
+
+_LEAST_EPOCH = 631152000.0  # s; BLF keeps no start before 1990
+
+
+class Writer(Protocol):
+    """What a log needs of its format."""
+
+    def on_message_received(self, msg: can.Message) -> None: ...
+    def flush(self) -> None: ...
+    def stop(self) -> None: ...
+
+
+def open_writer(path: Path, ending: str, packed: bool) -> Writer:
+    """A writer that begins the file anew. InputError if a package is missing."""
+    if ending == ".blf":
+        return BlfWriter(path)
+    if ending == ".db":
+        return DatabaseWriter(path)
+    if ending == ".mf4":
+        return _Mf4Writer(path)
+    how: dict[str, Any] = {"mode": "wt", "encoding": "utf-8", "newline": "\n"}  # the same on every system
+    file = cast(TextIO, gzip.open(path, **how) if packed else path.open(**how))  # noqa: SIM115
+    return TextWriter(file, ending)
+
+
+class CandumpWriter(can.CanutilsLogWriter):
+    """Keeps the length that a remote frame asks for, which python-can's reader knows and its writer forgets."""
+
+    def on_message_received(self, msg: can.Message) -> None:
+        if not (msg.is_remote_frame and msg.dlc):
+            super().on_message_received(msg)
+            return
+        identifier = f"{msg.arbitration_id:08X}" if msg.is_extended_id else f"{msg.arbitration_id:03X}"
+        channel = f"can{msg.channel}" if str(msg.channel).isdigit() else msg.channel or self.channel
+        self.file.write(f"({msg.timestamp:f}) {channel} {identifier}#R{msg.dlc} {'R' if msg.is_rx else 'T'}\n")
+
+
+class TextWriter:
+    """ASC, candump, TRC and CSV."""
+
+    def __init__(self, file: TextIO, ending: str):
+        kinds: dict[str, Any] = {
+            ".asc": can.ASCWriter,
+            ".log": CandumpWriter,
+            ".trc": can.TRCWriter,
+            ".csv": can.CSVWriter,
+        }
+        self._file = file
+        self._writer = kinds[ending](file)
+        self.on_message_received = self._writer.on_message_received
+
+    def flush(self) -> None:
+        """To the operating system: a killed process loses nothing of it."""
+        self._file.flush()
+
+    def stop(self) -> None:
+        """Finish and close."""
+        if not self._file.closed:
+            self._writer.stop()
+
+
+class BlfWriter:
+    """BLF keeps its start time and object count in a header that is written at the end, so each flush ends the file."""
+
+    def __init__(self, path: Path):
+        self._path = path
+        self._writer = can.BLFWriter(path)
+        self._shift: float | None = None  # s
+        self._stopped = False
+        self._new = False  # since the last flush
+
+    def on_message_received(self, msg: can.Message) -> None:
+        """Add a frame."""
+        if self._shift is None:  # times that do not begin at an epoch begin at 0, as the header will say
+            self._shift = msg.timestamp if msg.timestamp < _LEAST_EPOCH else 0.0
+        msg.timestamp -= self._shift
+        self._writer.on_message_received(msg)
+        self._new = True
+
+    def flush(self) -> None:
+        """End the file and go on behind its end."""
+        if self._new:
+            self._new = False
+            self._writer.stop()
+            self._writer = can.BLFWriter(self._path, append=True)
+
+    def stop(self) -> None:
+        """Finish and close."""
+        if not self._stopped:
+            self._stopped = True
+            self._writer.stop()
+
+
+class DatabaseWriter:
+    """python-can's table of frames in SQLite.
+
+    Not by python-can's writer: that one writes in a thread, forgets frames that are waiting at the end, and a disk
+    that is full ends the thread in silence.
+    """
+
+    _TABLE = (
+        "CREATE TABLE messages (ts REAL, arbitration_id INTEGER, extended INTEGER, remote INTEGER, error INTEGER, "
+        "dlc INTEGER, data BLOB)"
+    )
+
+    def __init__(self, path: Path):
+        path.unlink(missing_ok=True)
+        self._connection: sqlite3.Connection | None = sqlite3.connect(path)
+        self._rows: list[tuple[object, ...]] = []
+        self._execute(self._TABLE)
+
+    def on_message_received(self, msg: can.Message) -> None:
+        """Add a frame."""
+        self._rows.append(
+            (
+                msg.timestamp,
+                msg.arbitration_id,
+                msg.is_extended_id,
+                msg.is_remote_frame,
+                msg.is_error_frame,
+                msg.dlc,
+                bytes(msg.data),
+            )
+        )
+
+    def flush(self) -> None:
+        """Commit what waits."""
+        rows, self._rows = self._rows, []
+        if rows:
+            self._execute("INSERT INTO messages VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
+
+    def stop(self) -> None:
+        """Commit and close."""
+        if self._connection is None:
+            return
+        try:
+            self.flush()
+        finally:
+            self._connection.close()
+            self._connection = None
+
+    def _execute(self, statement: str, rows: list[tuple[object, ...]] | None = None) -> None:
+        assert self._connection is not None, "the log is closed"
+        try:
+            with self._connection:
+                if rows is None:
+                    self._connection.execute(statement)
+                else:
+                    self._connection.executemany(statement, rows)
+        except sqlite3.Error as error:
+            raise OSError(f"the log can't be written: {error}") from error
+
+
+class _Mf4Writer:
+    """MDF is put together in memory and written at the end."""
+
+    def __init__(self, path: Path):
+        bring_asammdf()
+        try:
+            self._writer = can.MF4Writer(path)
+        except NotImplementedError as error:
+            path.unlink(missing_ok=True)  # made empty to claim the name
+            raise asammdf_missing(path) from error
+        self._stopped = False
+        self.on_message_received = self._writer.on_message_received
+
+    def flush(self) -> None:
+        """Nothing that could be done."""
+
+    def stop(self) -> None:
+        """Write the file."""
+        if not self._stopped:
+            self._stopped = True
+            self._writer.stop()

@@ -1,0 +1,235 @@
+"""Bus logs in python-can's formats: read with every damage named, written with every omission counted.
+
+| ending   | format        | keeps                                         | of a killed recording remains |
+| -------- | ------------- | --------------------------------------------- | ----------------------------- |
+| .asc     | Vector ASCII  | all but FD frames without data                | a readable log                |
+| .blf     | Vector binary | all                                           | a readable log                |
+| .log     | candump -L    | all; of error frames only that there were any | a readable log                |
+| .trc     | PEAK          | classic data frames                           | a readable log                |
+| .csv     | python-can    | all but FD frames                             | a readable log                |
+| .db      | SQLite        | all but FD frames                             | a readable log                |
+| .mf4     | ASAM MDF 4    | all                                           | nothing                       |
+| .asc.gz… | gzip of text  | as the text                                   | what `zcat` can read          |
+
+It is readable up to the last `flush()`, at most a second before. Times are exact to 1 µs in all; .asc keeps them from
+its first frame on. An error frame of .asc, too, is one and no more.
+"""
+
+from __future__ import annotations
+
+import gzip
+import math
+import sqlite3
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, TextIO, cast
+
+import can
+from can.io.blf import BLFParseError
+from can.util import dlc2len
+
+from rds.bus.tools import log_lock, log_writers
+from rds.bus.tools.log_lines import TEXT, Lines
+from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf, close_unopened
+from rds.core.errors import InputError
+
+ENDINGS = (".asc", ".blf", ".log", ".trc", ".csv", ".db", ".mf4")
+_READERS = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader, ".csv": can.CSVReader}
+_DAMAGE = (
+    ValueError,
+    IndexError,
+    KeyError,
+    TypeError,
+    OverflowError,
+    EOFError,
+    struct.error,
+    NotImplementedError,
+    AssertionError,
+)
+
+
+def ending(path: Path) -> tuple[str, bool]:
+    """The format's ending in small letters, and whether the file is compressed. InputError for one that is not ours."""
+    suffix = path.suffix.lower()
+    packed = suffix == ".gz"
+    if packed:
+        suffix = path.with_suffix("").suffix.lower()
+    if suffix not in ENDINGS or (packed and suffix not in TEXT):
+        raise InputError(
+            f"there is no log format {path.suffix if not packed else suffix + '.gz'!r}; "
+            f"end the name in {', '.join(ENDINGS)}, or {', '.join(f'{text}.gz' for text in sorted(TEXT))}",
+            str(path),
+        )
+    return suffix, packed
+
+
+# --- reading
+
+
+class LogFile:
+    """A log to iterate over, again and again. `skipped` counts lines of the last pass that describe no frame.
+
+    Raises InputError at once if there is no such file or format, and while iterating, with the line or the offset,
+    where the log is damaged.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path = path = Path(path)
+        self._ending, self._packed = ending(path)
+        self.skipped = 0
+        if not path.is_file():
+            raise InputError("there is no such log; check the name", str(path))
+
+    def __iter__(self) -> Iterator[can.Message]:
+        try:
+            frames = self._lines() if self._ending in TEXT else self._records()
+            yield from frames
+        except OSError as error:
+            raise InputError(f"it can't be read: {error.strerror or error}", str(self.path)) from error
+
+    def _lines(self) -> Iterator[can.Message]:
+        with self._open() as file:
+            lines = Lines(file, str(self.path), self._ending)
+            found = False
+            try:
+                for message in _READERS[self._ending](cast(TextIO, lines)):
+                    lines.frames += 1
+                    problem = _problem(message)
+                    if problem:
+                        raise lines.fault(problem)
+                    found = True
+                    yield message
+            except (*_DAMAGE, zlib.error, gzip.BadGzipFile) as error:
+                raise lines.fault(f"it can't be read as {self._ending}: {error or 'damaged'}") from error
+            nothing = None if found else lines.nothing()
+            if nothing:
+                raise nothing
+            self.skipped = lines.skipped
+
+    def _open(self) -> TextIO:
+        if self._packed:
+            return cast(TextIO, gzip.open(self.path, "rt", encoding="utf-8", errors="replace"))
+        return self.path.open(encoding="utf-8", errors="replace")
+
+    def _records(self) -> Iterator[can.Message]:
+        damage: tuple[type[Exception], ...] = (*_DAMAGE, zlib.error, sqlite3.Error, BLFParseError)
+        if self._ending == ".blf":
+            from rds.bus.tools.blf import check_containers
+
+            check_containers(self.path)
+        elif self._ending == ".mf4":
+            bring_asammdf()
+            damage = (Exception,)  # asammdf raises whatever its decoder trips over
+        number = 0
+        reader: Any = None
+        try:
+            reader = can.LogReader(self.path)
+            for number, message in enumerate(reader, 1):  # noqa: B007
+                problem = _problem(message)
+                if problem:
+                    raise ValueError(problem)
+                yield message
+        except NotImplementedError as error:
+            raise asammdf_missing(self.path) from error
+        except damage as error:
+            if self._ending == ".mf4":
+                close_unopened(error)
+            what = f"after {number} frames" if number else "it"
+            raise InputError(
+                f"{what} can't be read as {self._ending}: {error or 'damaged'}; record it again, or use another log",
+                str(self.path),
+            ) from error
+        finally:
+            if reader is not None:
+                reader.stop()
+
+
+def _problem(message: can.Message) -> str | None:
+    """Why there is no such frame, or None. Mends what python-can's readers make of some files first."""
+    size = len(message.data)
+    if message.is_fd and message.is_remote_frame:
+        message.is_fd = False  # CAN FD has none: it is a classic frame on a bus that carries both
+    if message.is_fd and dlc2len(message.dlc) == size:
+        message.dlc = size  # was the code of the length
+    elif not message.is_fd and message.dlc > 8:
+        message.dlc = 8  # codes 9 to 15 mean 8 too, and were taken for those of CAN FD
+    if not math.isfinite(message.timestamp):
+        return f"its time {message.timestamp} is no number of seconds"
+    if message.is_error_frame:
+        return None
+    if not 0 <= message.arbitration_id <= (0x1FFFFFFF if message.is_extended_id else 0x7FF):
+        return f"identifier {message.arbitration_id:#x} is too large for {29 if message.is_extended_id else 11} bits"
+    if not message.is_remote_frame and size != message.dlc:
+        return f"the frame has {size} bytes of data, and its length says {message.dlc}"
+    return None
+
+
+# --- writing
+
+
+class LogWriter:
+    """A log that is being written. `unkept` counts, by their kind, the frames that the format cannot hold.
+
+    Never overwrites an existing file without `force`, and none that another one is writing. Raises InputError for that
+    and for an unknown ending, OSError where the disk says no (whenever it says so).
+    """
+
+    def __init__(self, path: str | Path, force: bool = False):
+        self.path = path = Path(path)
+        self._ending, packed = ending(path)
+        self.frames = 0
+        self.unkept: Counter[str] = Counter()
+        self._last = 0.0
+        if not force:
+            try:
+                path.open("xb").close()
+            except FileExistsError:
+                raise InputError(
+                    "it exists already; choose another name, or overwrite it with --force", str(path)
+                ) from None
+        else:
+            log_lock.release(log_lock.hold(path))  # not while another one writes it
+        self._writer = log_writers.open_writer(path, self._ending, packed)
+        try:
+            self._lock = log_lock.hold(path)
+        except InputError:
+            self._writer.stop()
+            raise
+
+    def write(self, message: can.Message) -> None:
+        """Add a frame. A time before the last frame's (a clock that was set back) becomes the last frame's."""
+        kind = self._unkept(message)
+        if kind is not None:
+            self.unkept[kind] += 1
+            return
+        if message.timestamp < self._last:
+            message.timestamp = self._last
+        self._last = message.timestamp
+        self._writer.on_message_received(message)
+        self.frames += 1
+
+    def flush(self) -> None:
+        """Bring everything so far to the disk, in a form that can be read if nothing more follows (not .mf4)."""
+        self._writer.flush()
+
+    def close(self) -> None:
+        """Finish the file. May be called more than once."""
+        try:
+            self._writer.stop()
+        finally:
+            log_lock.release(self._lock)
+            self._lock = None
+
+    def _unkept(self, message: can.Message) -> str | None:
+        if message.is_fd and self._ending in (".trc", ".csv", ".db"):
+            return "CAN FD frames"
+        if message.is_fd and self._ending == ".asc" and not message.data:
+            return "CAN FD frames without data"
+        if self._ending == ".trc" and message.is_remote_frame:
+            return "remote frames"
+        if self._ending == ".trc" and message.is_error_frame:
+            return "error frames"
+        return None

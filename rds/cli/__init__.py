@@ -1,0 +1,1 @@
+"""Groups of commands, one module each; rds/cli/main.py puts them together."""

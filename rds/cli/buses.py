@@ -1,0 +1,115 @@
+"""Which bus a command is for: what its options say, over the `[bus]` table of an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+BUILTIN = "rds"  # as in rds.bus.tools.link, which takes long to import
+MACHINE = "mini-cnc"  # whose channel of the built-in bus is meant where nothing is said
+
+Interface = Annotated[
+    str | None, typer.Option(help="python-can interface; by default the experiment's, else rds, the built-in.")
+]
+Channel = Annotated[
+    str | None,
+    typer.Option(
+        "--channel", "-c", help=f"By default the experiment's; on the built-in bus its machine's name, else {MACHINE}."
+    ),
+]
+Experiment = Annotated[
+    Path | None,
+    typer.Option(help="An experiment's TOML file, for its \\[bus]: interface, channel, options of the adapter."),
+]
+Machine = Annotated[
+    str | None, typer.Option(help=f"Its name, or its TOML file; by default the experiment's, else {MACHINE}.")
+]
+
+
+@dataclass(frozen=True)
+class ChosenBus:
+    """An interface of python-can, its channel, and what else goes to can.Bus, such as the bit rate."""
+
+    interface: str
+    channel: Any
+    options: dict[str, Any] = field(default_factory=dict)
+    dialect: str | None = None  # what its modules speak, where that is said
+
+    @property
+    def name(self) -> str:
+        """As messages call it."""
+        from rds.bus.tools.link import bus_name
+
+        return bus_name(self.interface, self.channel)
+
+    @contextmanager
+    def opened(self) -> Iterator[Any]:
+        """The bus, shut down at the end. MachineError where it cannot be opened."""
+        from rds.bus.tools.link import open_bus
+
+        bus = open_bus(self.interface, self.channel, **self.options)
+        try:
+            yield bus
+        finally:
+            bus.shutdown()
+
+
+def bus_table_of(experiment: Path | None, interface: str | None = None, channel: str | None = None) -> dict[str, Any]:
+    """The [bus] table of an experiment, `channel` and `interface` over it; empty where nothing is said.
+
+    InputError for a table that will not do, and for an interface other than the table's, whose options are not its own.
+    """
+    table: dict[str, Any] = {}
+    if experiment is not None:
+        from rds.core.toml_table import Words
+        from rds.modes.experiment.resolve import bus_table
+
+        table = bus_table(Words.read(experiment), experiment.parent)
+        said = str(table.get("interface", BUILTIN))
+        if interface not in (None, said) and table:
+            from rds.core.errors import InputError
+
+            raise InputError(
+                f"--interface {interface}, and [bus] of {experiment} is for {said}: its channel and options are no "
+                "other interface's; leave one of the two out"
+            )
+    given = {"interface": interface, "channel": channel}
+    return table | {key: value for key, value in given.items() if value is not None}
+
+
+def machine_of(experiment: Path | None) -> str:
+    """The machine that an experiment is for: a name, or the path of its file."""
+    if experiment is None:
+        return MACHINE
+    from rds.core.toml_table import Words
+    from rds.modes.experiment.resolve import machine_name
+
+    return machine_name(Words.read(experiment), experiment.parent)
+
+
+def chosen_bus(interface: str | None, channel: str | None, experiment: Path | None) -> ChosenBus:
+    """The bus that a command is for. InputError as `bus_table_of`.
+
+    The built-in bus is joined as it is: its timing is that of whoever serves the machine.
+    """
+    table = bus_table_of(experiment, interface, channel)
+    where, place, dialect = str(table.get("interface", BUILTIN)), table.get("channel"), table.get("dialect")
+    if where != BUILTIN:
+        from rds.bus.tools.link import bus_options
+
+        return ChosenBus(where, place, bus_options(table), dialect)
+    return ChosenBus(where, str(place) if place is not None else _channel_of(experiment), {}, dialect)
+
+
+def _channel_of(experiment: Path | None) -> str:
+    """The channel of the built-in bus on which the machine of an experiment is by default."""
+    if experiment is None:
+        return MACHINE
+    from rds.machines import load_machine
+
+    return load_machine(machine_of(experiment)).name

@@ -1,0 +1,154 @@
+"""What all commands share: refusals with exit codes, the one JSON object, progress.
+
+Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained on stderr.
+"""
+
+from __future__ import annotations
+
+import json as json_text
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, redirect_stdout
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Errors that a user can act on go to stderr as a sentence, with exit code 2."""
+    from rds.core.blame import is_students, student_error
+    from rds.core.errors import RdsError
+
+    try:
+        yield
+    except RdsError as error:
+        typer.echo(f"rds: {error}", err=True)
+        raise typer.Exit(2) from error
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        remedy = "check that the folder can be written and that the disk has room"
+        typer.echo(f"rds: {place}{error.strerror or error}; {remedy}", err=True)
+        raise typer.Exit(2) from error
+    except Exception as error:  # a class of the student's may fail wherever it is looked at
+        if not is_students(error):
+            raise
+        typer.echo(f"rds: {student_error(error)}", err=True)
+        raise typer.Exit(2) from error
+
+
+def say_what_is_replaced(folder: Path | None) -> None:
+    """A note on stderr if the results of an earlier run are in `folder`: those of the next one take their place."""
+    from rds.modes.experiment.folder import holds_result
+
+    if folder is not None and holds_result(folder):
+        typer.echo(f"rds: note: {folder}: replaces the results of an earlier run there", err=True)
+
+
+@contextmanager
+def stdout_kept(json: bool) -> Iterator[None]:
+    """With `json`, whatever a student's code prints goes to stderr: stdout is for the one JSON object.
+
+    A copy of the process that the student's code made by os.fork() ends here: it has nothing to say.
+    """
+    process = os.getpid()
+    try:
+        with _stdout_to_stderr() if json else nullcontext():
+            yield
+    finally:
+        if os.getpid() != process:
+            os._exit(0)
+
+
+@contextmanager
+def _stdout_to_stderr() -> Iterator[None]:
+    sys.stdout.flush()
+    try:
+        saved = os.dup(1)
+        os.dup2(2, 1)  # what is not printed through Python as well
+    except OSError:
+        saved = -1
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        if saved >= 0:
+            os.dup2(saved, 1)
+            os.close(saved)
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str], Callable[[int, int], None]]]:
+    """Makes a progress function for a named stage: a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda name: lambda done, of: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+
+        def bar(name: str) -> Callable[[int, int], None]:
+            task = bars.add_task(name, total=None)
+            return lambda done, of: bars.update(task, completed=done, total=of)
+
+        yield bar
+
+
+@contextmanager
+def until_ctrl_c() -> Iterator[threading.Event]:
+    """An event that Ctrl-C and a polite kill set."""
+    from rds.core.interrupt import SignalEvent
+
+    stop = SignalEvent()
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def ends_as_ctrl_c() -> Iterator[None]:
+    """A polite kill and a closed terminal end what runs here as Ctrl-C does, so that its clean-up is done."""
+
+    def interrupt(number: int, _: object) -> None:
+        raise KeyboardInterrupt
+
+    numbers = [number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None]
+    # what is ignored (nohup) stays so
+    before = {number: signal.getsignal(number) for number in numbers}
+    before = {number: handler for number, handler in before.items() if handler is not signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, interrupt)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def explain(result: Any) -> None:
+    """Say on stderr why a run that failed or is void is so."""
+    if result.meta.get("ending") != "done":
+        reason = result.meta.get("ending_reason")
+        typer.echo(f"rds: the run ended early ({result.meta['ending']}){f': {reason}' if reason else ''}", err=True)
+    # overloaded says no more than that samples were late; of the other early endings, repeating is no remedy
+    unexplained = result.meta.get("ending") in ("done", "overloaded")
+    if result.verdict == "missed" or (result.verdict == "void" and unexplained):
+        typer.echo(f"rds: timing {result.verdict}: {result.meta.get('verdict_reason')}", err=True)
+    for note in result.meta.get("notes", ()):
+        typer.echo(f"rds: note: {note}", err=True)
+
+
+def print_json(value: Any) -> None:
+    """One JSON object on stdout."""
+    typer.echo(json_text.dumps(value, allow_nan=False))

@@ -1,0 +1,111 @@
+"""`rds design` and `rds machine from`: what a fitted model is for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rds.cli.common import Json, print_json, refusals
+
+if TYPE_CHECKING:
+    from rds.identification.fit.design import Linear
+
+app = typer.Typer(no_args_is_help=True, help="Controllers designed from a fitted model.")
+
+Model = Annotated[Path, typer.Argument(help="A model file, as `rds fit -o` writes it.")]
+
+
+@app.command()
+def tracking(
+    out: Annotated[Path, typer.Option("--out", "-o", help="The controller's file, FILE.py.")],
+    model: Annotated[Path | None, typer.Argument(help="A model file, as `rds fit -o` writes it.")] = None,
+    axis: Annotated[str | None, typer.Option(help="Instead of a model file: an axis by its machine's data.")] = None,
+    machine: Annotated[str | None, typer.Option(help="The machine of --axis (default mini-cnc).")] = None,
+    sample_period: Annotated[float, typer.Option(help="Of the loop, s.")] = 0.001,
+    poles: Annotated[str, typer.Option(help="Two poles of the error, 1/s.")] = "-32+24j,-32-24j",
+    observer_pole: Annotated[float, typer.Option(help="Of the velocity's observer, 1/s.")] = -320.0,
+    voltage_range: Annotated[float, typer.Option(help="Of the converter, ± V.")] = 10.0,
+    json: Json = False,
+) -> None:
+    """The general tracking controller with its observer, as a file of your own."""
+    with refusals():
+        from rds.core.errors import InputError
+        from rds.identification.fit.design import write_tracking
+
+        if voltage_range == inf:
+            raise InputError("--voltage-range = inf V must be a finite number; a converter has a range")
+        designed = _axis(model, axis, machine)
+        write_tracking(
+            out,
+            designed,
+            sample_period=sample_period,
+            poles=_poles(poles),
+            observer_pole=observer_pole,
+            voltage_range=voltage_range,
+        )
+    _warn(model, designed.doubts)
+    if json:
+        said = {"left_out": list(designed.left_out), "warnings": list(designed.doubts)}
+        print_json({"file": str(out), "tau": designed.tau, "K": designed.K} | said)
+        return
+    typer.echo(f"designed for tau = {designed.tau:.6g} s, K = {designed.K:.6g} (mm/s)/V")
+    for sentence in designed.left_out:
+        typer.echo(f"not in the design: {sentence}")
+    typer.echo(f"wrote {out}")
+
+
+def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:
+    from rds.core.errors import InputError
+    from rds.identification.fit.design import linear_axis_of, linear_axis_of_machine
+    from rds.machines import load_machine
+
+    if (model is None) == (axis is None):
+        raise InputError("give one of a model file and --axis (with --machine, if it is not the mini-cnc)")
+    if model is not None:
+        if machine is not None:
+            raise InputError("--machine is for --axis; a model file says what the axis is")
+        return linear_axis_of(model)
+    return linear_axis_of_machine(load_machine("mini-cnc" if machine is None else machine), str(axis))
+
+
+def _warn(model: Path | None, doubts: Iterable[str]) -> None:
+    """Repeat what the fit said against using its parameters, or some of them."""
+    for sentence in doubts:
+        typer.echo(f"warning: {model}: {sentence}", err=True)
+
+
+def _poles(text: str) -> list[complex]:
+    from rds.core.errors import InputError
+
+    try:
+        return [complex(part.strip().replace("i", "j").replace(" ", "")) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"--poles {text!r} must be two poles, as in -32+24j,-32-24j or -40,-50 (1/s)") from error
+
+
+def machine_from(
+    model: Model,
+    axis: Annotated[str, typer.Option(help="Which axis it is a model of.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The machine's file, FILE.toml.")],
+    base: Annotated[str, typer.Option(help="The machine that it is an axis of: a name or a file.")] = "mini-cnc",
+    json: Json = False,
+) -> None:
+    """A machine file whose axis is what was estimated; the rest is that of a known machine."""
+    with refusals():
+        from rds.identification.fit.machine_file import write_machine
+        from rds.identification.fit.model_file import read_model
+        from rds.machines import load_machine
+
+        file = read_model(model)
+        write_machine(out, file, base, axis)
+        made = load_machine(str(out)).axis(axis)
+    doubts = file.doubts()
+    _warn(model, doubts)
+    if json:
+        print_json({"file": str(out), "axis": axis, "model": made.model, "machine": made.machine, "warnings": doubts})
+    else:
+        typer.echo(f"wrote {out}: axis {axis} as in {model}, the rest of {base}")

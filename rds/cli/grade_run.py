@@ -1,0 +1,68 @@
+"""`rds grade run`: a folder of submissions, graded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, stdout_kept
+
+if TYPE_CHECKING:
+    from rds.grading.batch import BatchOutcome
+
+_INTERRUPTED = 130  # by the shell's custom
+
+
+def run(
+    assignment: Annotated[Path, typer.Argument(help="The assignment's folder.")],
+    submissions: Annotated[Path, typer.Argument(help="Folder of submissions, or a zip as the platform exports it.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for grades and feedback; a new one.")],
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Local processes; default: all.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="A dask scheduler, as tcp://host:8786.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the batch in that folder.")] = False,
+    json: Json = False,
+) -> None:
+    """Grade all submissions, each in a sandbox: one row for each, whatever happens to it.
+
+    The exit code is 1 if a submission could not be graded by the grader's fault, and 130 after Ctrl-C.
+    """
+    try:
+        with refusals(), stdout_kept(json), ends_as_ctrl_c():
+            from rds.grading.batch import run_batch
+
+            with progress_bars() as bar:
+                found = run_batch(
+                    assignment,
+                    submissions,
+                    out,
+                    jobs=jobs,
+                    scheduler=scheduler,
+                    resume=resume,
+                    progress=bar("submissions"),
+                    announce=lambda text: typer.echo(f"rds: {text}", err=True),
+                )
+    except KeyboardInterrupt:
+        typer.echo(f"rds: ended; what is graded is kept: go on with --resume -o {out}", err=True)
+        raise typer.Exit(_INTERRUPTED) from None
+    for note in found.notes:
+        typer.echo(f"rds: note: {note}", err=True)
+    for student in found.grader_errors:
+        typer.echo(f"rds: not graded, by the grader's fault: {student}: {found.grades[student].reason}", err=True)
+    if json:
+        print_json(found.to_json())
+    else:
+        _show(found)
+    raise typer.Exit(1 if found.grader_errors else 0)
+
+
+def _show(found: BatchOutcome) -> None:
+    from rds.cli.console import show_table
+
+    rows = [[str(status), str(count)] for status, count in found.counts().items()]
+    show_table(f"{len(found.grades)} submissions", ["status", "submissions"], rows)
+    if found.graded_now:
+        speed = f"{found.submissions_per_second:.1f} a second"
+        typer.echo(f"graded {found.graded_now} in {found.seconds:.1f} s, {speed}")
+    typer.echo(f"wrote {found.folder}")

@@ -1,0 +1,254 @@
+"""The command line: thin over the rest. What takes long to import is imported by the command that needs it.
+
+Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained on stderr.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rds.cli import (
+    analyse,
+    bus,
+    data,
+    design,
+    docs,
+    estop,
+    excite,
+    fault,
+    fit,
+    grade,
+    grade_export,
+    grade_run,
+    interpolate,
+    jog,
+    modules,
+    nc,
+    reports,
+    robustness,
+    validate,
+)
+from rds.cli.app import app as app_page
+from rds.cli.buses import Channel, Experiment, Interface, bus_table_of
+from rds.cli.common import (
+    Json,
+    ends_as_ctrl_c,
+    explain,
+    print_json,
+    progress_bars,
+    refusals,
+    say_what_is_replaced,
+    stdout_kept,
+)
+from rds.cli.guard import guarded
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Rapid development system for machine-tool axes: one controller file in simulation, emulation and "
+    "implementation.",
+)
+machine_app = typer.Typer(no_args_is_help=True, help="Machines: list them, or serve one on a CAN bus.")
+app.add_typer(machine_app, name="machine")
+app.add_typer(modules.module_app, name="module")
+app.add_typer(bus.app, name="bus")
+app.add_typer(nc.app, name="nc")
+app.add_typer(data.app, name="data")
+bus.app.command()(analyse.analyse)
+bus.app.command()(fault.fault)
+bus.app.command()(fault.nodes)
+app.command()(modules.scan)
+app.command()(estop.estop)
+app.command()(jog.jog)
+app.command()(reports.report)
+app.command()(fit.fit)
+app.command()(excite.excite)
+app.command()(validate.validate)
+app.command("app")(app_page)
+app.command()(docs.docs)
+app.command()(interpolate.interpolate)
+app.command()(robustness.robustness)
+app.add_typer(design.app, name="design")
+app.add_typer(grade.app, name="grade")
+grade.app.command()(grade_run.run)
+grade.app.command()(grade_export.export)
+machine_app.command("from")(design.machine_from)
+
+Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]
+
+
+@app.command()
+def demo(out: Out = None, json: Json = False) -> None:
+    """Track a sine on X, Y and Z in all three modes, and show the published numbers beside ours."""
+    with refusals(), stdout_kept(json), ends_as_ctrl_c():
+        from rds.cli.demo import run_demo
+
+        with progress_bars() as bar:
+            outcome = run_demo(out or Path("demo"), bar)
+    if json:
+        print_json(outcome.to_json())
+    else:
+        from rds.cli.console import show_demo
+
+        show_demo(outcome)
+    for result in outcome.results.values():
+        explain(result)
+    raise typer.Exit(outcome.exit_code)
+
+
+@app.command()
+def run(
+    experiment: Annotated[Path, typer.Argument(help="The experiment, a TOML file.")],
+    mode: Annotated[
+        str | None, typer.Option("--mode", "-m", help="Run in this mode instead of the file's own.")
+    ] = None,
+    out: Out = None,
+    json: Json = False,
+) -> None:
+    """Run an experiment and save its results: tables, plots and a report."""
+    with refusals(), stdout_kept(json), ends_as_ctrl_c():
+        from rds.modes.experiment.report import exit_code, run_and_save, run_json
+
+        say_what_is_replaced(out)
+        with progress_bars() as bar:
+            result, files = run_and_save(experiment, mode, out, bar(mode or "run"))
+    if json:
+        print_json(run_json(result, files))
+    else:
+        from rds.cli.console import show_result
+
+        show_result(result, files)
+    code = exit_code(result)
+    explain(result)
+    raise typer.Exit(code)
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(help="A .py file with control(), derivatives(), ...; or a model file.")],
+    sample_period: Annotated[
+        float, typer.Option(help="Sample period that a call must fit into, s.", max=1000.0)
+    ] = 0.001,
+    axes: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=64, help="The controller is a coupled one: it gets arrays, one value per axis.", metavar="N"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Say which interface a file fills, and whether it keeps it."""
+    with refusals(), stdout_kept(json):
+        if file.suffix == ".toml":
+            from rds.core.errors import InputError
+            from rds.identification.fit.run_model import check_model_file
+
+            if axes is not None:
+                raise InputError(f"--axes {axes} is for a coupled controller, and this is a model file", str(file))
+            report = check_model_file(file, sample_period)
+        else:
+            from rds.checks import check_file
+
+            report = check_file(file, sample_period, coupled=axes is not None, axes=axes or 2)
+    if json:
+        print_json(report.to_json())
+    else:
+        typer.echo(str(report))
+    raise typer.Exit(0 if report.ok else 1)
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="A saved result: a folder or a CSV, MAT or Parquet file.")],
+    b: Annotated[Path, typer.Argument(help="Another one.")],
+    json: Json = False,
+) -> None:
+    """Compare two saved results without running them again."""
+    with refusals():
+        from rds.results import open_result
+        from rds.results.compare import compare as compare_results
+
+        comparison = compare_results(open_result(a), open_result(b))
+    if json:
+        print_json(comparison.to_json())
+    else:
+        typer.echo(str(comparison))
+
+
+@machine_app.command("list")
+def machine_list(json: Json = False) -> None:
+    """The machines that come with the package."""
+    from rds.machines import load_machine, machine_names
+
+    machines = [load_machine(name) for name in machine_names()]
+    if json:
+        print_json({m.name: {"title": m.title, "axes": list(m.axes), "file": m.path} for m in machines})
+        return
+    for machine in machines:
+        typer.echo(f"{machine.name}: {machine.title}")
+        for axis in machine.axes.values():
+            low, high = axis.travel
+            typer.echo(f"  {axis.name:8} node {axis.node}, {low:g} to {high:g} {axis.unit}")
+
+
+@machine_app.command("serve")
+def machine_serve(
+    name: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
+    interface: Interface = None,
+    channel: Channel = None,
+    experiment: Experiment = None,
+    dialect: Annotated[
+        str | None,
+        typer.Option(help="What the modules speak: rds, oacs or cia402; by default as in \\[bus], or rds."),
+    ] = None,
+    bitrate: Annotated[
+        int | None, typer.Option(min=1, help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
+    ] = None,
+    faults: Annotated[Path | None, typer.Option(help="TOML file of faults to inject (built-in bus).")] = None,
+) -> None:
+    """Run the machine's axis modules as CAN nodes, until Ctrl-C."""
+    with refusals():
+        from rds.bus.modules.dialects import DEFAULT
+        from rds.bus.modules.serving import serve_machine
+        from rds.bus.tools.link import BUILTIN, bus_name, bus_options, default_channel
+        from rds.machines import load_machine
+
+        machine = load_machine(name)
+        table = bus_table_of(experiment, interface, channel)
+        where = str(table.get("interface", BUILTIN))
+        place = default_channel(machine, where, table.get("channel"))
+
+        def ready() -> None:
+            typer.echo(f"{machine.name}: {', '.join(machine.axes)} on {bus_name(where, place)}; Ctrl-C ends", err=True)
+
+        options = bus_options(table)  # its faults are the run's, and [bus.cia402] tells a host of its drives
+        if bitrate is not None:
+            options["bitrate"] = bitrate
+        if faults is not None:
+            from rds.bus.medium.fault_file import read_faults
+
+            options["faults"] = read_faults(faults)
+        serve_machine(machine, dialect or table.get("dialect", DEFAULT), where, place, ready, **options)
+
+
+def main() -> None:
+    """The console command `rds`. What runs a student's code in this process does so in a child of it."""
+    # a program in a terminal takes keys, which a process group in the background may not
+    own = sys.argv[1:2] == ["fit"] and any(word.endswith(".py") for word in sys.argv)
+    if own or sys.argv[1:2] in (["run"], ["robustness"]) or (sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()):
+        guarded(_app)
+    app()
+
+
+def _app() -> int:
+    app()
+    return 0
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,250 @@
+"""`rds nc`: part programs, read, checked, drawn and timed."""
+
+from __future__ import annotations
+
+import json as json_text
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rds.cli import nc_make, nc_run
+from rds.cli.common import Json, print_json, progress_bars, refusals
+from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
+
+if TYPE_CHECKING:
+    from rds.nc.check import Setup
+    from rds.nc.compensation.proof import Proof
+
+app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
+app.add_typer(nc_make.app, name="make")
+for _command in nc_run.COMMANDS:
+    app.command()(_command)
+
+PICTURES = ("png", "svg", "pdf")
+
+
+@app.command()
+def check(
+    file: Program,
+    machine: MachineName = "mini-cnc",
+    tools: Tools = None,
+    parameters: Parameters = None,
+    with_: With = None,
+    max_jumps: MaxJumps = None,
+    proof: Annotated[
+        bool, typer.Option("--proof", help="Prove the cutter compensation, with a picture of each stretch beside FILE.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Say whether a machine can run a program: all faults, by line. A valid one leaves its compiled form (.dat)."""
+    with refusals():
+        from rds.machines import load_machine
+        from rds.nc.check import check_program
+
+        what = setup(tools, parameters, with_, max_jumps)
+        with progress_bars() as bar:
+            result, compiled = check_program(file, load_machine(machine), what, bar("check"))
+        proved, pictures = _prove(file, what) if proof else (None, [])
+    gouges = len(proved.gouges()) if proved else 0
+    if json:
+        found: dict[str, Any] = {**result.to_json(), "compiled": str(compiled) if compiled else None}
+        if proof:
+            found |= {"proof": proved.numbers() if proved else None, "pictures": [str(path) for path in pictures]}
+        print_json(found)
+    else:
+        typer.echo(str(result))
+        if compiled:
+            typer.echo(f"compiled: {compiled}")
+        if proof:
+            _show_proof(proved, pictures)
+    raise typer.Exit(0 if result.ok and not gouges else 1)
+
+
+def _prove(file: Path, what: Setup) -> tuple[Proof | None, list[Path]]:
+    """The proof of the compensated stretches and its pictures; None for a program that does not come to its end."""
+    from rds.nc.compensation.proof import proof
+    from rds.nc.language.errors import ProgramError
+    from rds.nc.language.parameters import read_parameters
+
+    parameters = read_parameters(what.parameters) if what.parameters else None
+    try:
+        proved = proof(file, tools=what.tool_list(), parameters=parameters, options=what.options, name=str(file))
+    except ProgramError:
+        return None, []  # the check has told why
+    pictures = []
+    for number in range(len(proved.stretches)):
+        path = file.with_name(f"{file.stem}-proof{f'-{number + 1}' if number else ''}.png")
+        _save(proved.plot(number), path)
+        pictures.append(path)
+    return proved, pictures
+
+
+def _show_proof(proved: Proof | None, pictures: list[Path]) -> None:
+    if proved is None:
+        typer.echo("proof: none, because the program does not come to its end")
+        return
+    if not proved.stretches:
+        typer.echo("proof: the program compensates no cutter (G41, G42)")
+        return
+    typer.echo(
+        f"proof: the cutter's edge keeps to {len(proved.stretches)} contour{'s' * (len(proved.stretches) > 1)} within "
+        f"{proved.max_deviation:.3g} mm"
+    )
+    for part in proved.gouges():
+        typer.echo(f"proof: line {part.line}: the {part.role} move gouges the contour, {-part.least:.4g} mm deep")
+    for path in pictures:
+        typer.echo(f"picture: {path}")
+
+
+@app.command()
+def canon(
+    file: Program,
+    tools: Tools = None,
+    parameters: Parameters = None,
+    with_: With = None,
+    max_jumps: MaxJumps = None,
+    json: Json = False,
+) -> None:
+    """Print the canonical calls of a program, in the form of LinuxCNC's `rs274 -g`: as they are read.
+
+    The move after G40 may be as short as LinuxCNC lets it be; `rds nc check` calls a move that gouges a fault.
+    """
+    with refusals():
+        from rds.nc.language.canon_text import text, texts
+
+        items = setup(tools, parameters, [*(with_ or ()), "any-exit"], max_jumps).interpret(file)
+        if json:
+            calls = (json_text.dumps({"n": n, "call": call}) for n, call in texts(items))
+            _print_when_whole(_json_lines(file, calls))
+            return
+        try:
+            for line in text(items):
+                sys.stdout.write(line + "\n")
+            sys.stdout.flush()
+        except BrokenPipeError:  # `| head` has seen enough
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _json_lines(file: Path, calls: Iterator[str]) -> Iterator[str]:
+    """One JSON object, piece by piece."""
+    yield f'{{"program": {json_text.dumps(str(file))}, "calls": ['
+    for number, call in enumerate(calls):
+        yield f", {call}" if number else call
+    yield "]}\n"
+
+
+def _print_when_whole(pieces: Iterator[str]) -> None:
+    """On stdout only when nothing has failed; what is long waits on disk."""
+    with tempfile.SpooledTemporaryFile(max_size=1 << 24, mode="w+", encoding="utf-8") as waiting:
+        waiting.writelines(pieces)
+        waiting.seek(0)
+        shutil.copyfileobj(waiting, sys.stdout)
+
+
+@app.command()
+def plot(
+    file: Program,
+    machine: MachineName = "mini-cnc",
+    tools: Tools = None,
+    parameters: Parameters = None,
+    with_: With = None,
+    max_jumps: MaxJumps = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The picture: png, svg or pdf; by default FILE's name -path.png.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Draw a program's path in machine coordinates: from three sides and in space."""
+    with refusals():
+        from rds.machines import load_machine
+        from rds.nc.check import followed
+        from rds.nc.plots import plot as draw
+        from rds.nc.toolpath import toolpath
+        from rds.nc.trace import Trace
+        from rds.nc.validate import Validator
+
+        path = out or file.with_name(f"{file.stem}-path.png")
+        of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
+        validator = Validator(of, what.tool_list(), str(file))
+        trace = Trace()
+        with progress_bars() as bar:
+            for block in toolpath(followed(what.interpret(file), file, bar("read")), report=validator.report):
+                validator.look(block)
+                trace.add(block.segments)
+        _save(draw(trace, of, file.name), path)
+        result = validator.result()
+    if not result.ok:
+        count = len(result.faults) + result.more
+        typer.echo(
+            f"rds: note: {of.name} can't run it; `rds nc check` tells why ({count} fault{'s' * (count > 1)})", err=True
+        )
+    if json:
+        print_json({**result.to_json(), "picture": str(path)})
+    else:
+        typer.echo(f"picture: {path}")
+
+
+def _save(figure: Any, path: Path) -> None:
+    """Whole or not at all."""
+    from rds.core.atomic import write_files
+    from rds.core.errors import InputError
+
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in PICTURES:
+        raise InputError("what kind of picture is that? end its name with .png, .svg or .pdf", str(path))
+    write_files({path: lambda stream: figure.savefig(stream, format=kind)})
+
+
+@app.command()
+def time(
+    file: Program,
+    machine: MachineName = "mini-cnc",
+    tools: Tools = None,
+    parameters: Parameters = None,
+    with_: With = None,
+    max_jumps: MaxJumps = None,
+    sample_period: Annotated[
+        float | None, typer.Option(help="Sample period, s; by default the machine's.", min=1e-6, max=1000.0)
+    ] = None,
+    profile: ProfileName = "planned",
+    json: Json = False,
+) -> None:
+    """Predict a program's cycle time, with the planner that runs it: at feed, in rapids, in dwells, for each tool.
+
+    Another --profile is for comparison: `rds nc run` runs the planned one.
+    """
+    with refusals():
+        from rds.machines import load_machine
+        from rds.nc.check import motion
+        from rds.nc.cycle_time import cycle_time
+
+        of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
+        with progress_bars() as bar:
+            found = cycle_time(motion(file, of, what, bar("plan")), of, sample_period, profile)
+    if json:
+        print_json({"program": str(file), "machine": of.name, "profile": profile, **found.to_json()})
+        raise typer.Exit(0 if found.certificate.ok else 1)
+    from rds.cli.console import show_table
+
+    shares = [(str(tool) if tool else "none", share) for tool, share in found.by_tool.items()]
+    if len(shares) != 1:
+        shares.append(("all", found.whole))
+    rows = [[tool, *(f"{value:.3f}" for value in share.seconds)] for tool, share in shares]
+    how = "" if profile == "planned" else f", profile {profile}"
+    title = f"{file}: {_clock(found.total)} on {of.name}{how}, {found.samples} samples of {found.T:g} s"
+    show_table(title, ["tool", "cutting [s]", "rapid [s]", "dwell [s]", "total [s]"], rows)
+    typer.echo(found.certificate.sentence())
+    raise typer.Exit(0 if found.certificate.ok else 1)
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(seconds, 60.0)
+    hours, minutes = divmod(int(minutes), 60)
+    parts = [f"{hours} h"] * (hours > 0) + [f"{minutes} min"] * (hours + minutes > 0)
+    return " ".join([*parts, f"{rest:.3f} s"])

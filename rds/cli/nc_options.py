@@ -1,0 +1,51 @@
+"""The options that all commands on part programs share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rds.nc.check import Setup
+
+Program = Annotated[Path, typer.Argument(help="The part program (RS274NGC, as LinuxCNC reads it).", metavar="FILE")]
+MachineName = Annotated[str, typer.Option("--machine", help="A machine's name, or the path of its TOML file.")]
+Tools = Annotated[Path | None, typer.Option(help="Tool table, as LinuxCNC keeps it, lengths in mm.")]
+Parameters = Annotated[Path | None, typer.Option(help="Parameter file, as LinuxCNC keeps it (offsets, #parameters).")]
+With = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--with",
+        metavar="OPTION",
+        help="Of the dialect: block-delete, gr, program-numbers, inch-machine or any-exit.",
+    ),
+]
+ProfileName = Annotated[
+    str, typer.Option("--profile", help="Of the motion: planned, trapezoid, blended or point-to-point.")
+]
+MaxJumps = Annotated[
+    int | None,
+    typer.Option(
+        min=1, help="Calls and jumps back after which a program is taken for endless (default 1000000).", metavar="N"
+    ),
+]
+DIALECT = ("block-delete", "gr", "program-numbers", "inch-machine", "any-exit")
+
+
+def setup(
+    tools: Path | None, parameters: Path | None, options: list[str] | None, max_jumps: int | None = None
+) -> Setup:
+    """What a program is read with. InputError for an option that there is not."""
+    from rds.core.errors import InputError
+    from rds.nc.check import Setup
+    from rds.nc.language.dialect import Dialect
+
+    for name in options or ():
+        if name not in DIALECT:
+            raise InputError(f"--with {name!r} is no option of the dialect; there are {', '.join(DIALECT)}")
+    given: dict[str, Any] = {name.replace("-", "_"): True for name in options or ()}
+    if max_jumps is not None:
+        given["max_jumps"] = max_jumps
+    return Setup(tools, parameters, Dialect(**given))

@@ -1,0 +1,97 @@
+"""`rds validate`: a model against logs that it has not seen, and the verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli.logs import read_logs
+
+if TYPE_CHECKING:
+    from rds.identification.validate.validate import Validation
+
+
+def validate(
+    model: Annotated[Path, typer.Argument(help="A model file (.toml), or a student's file (.py) with its params.")],
+    logs: Annotated[list[Path], typer.Argument(help="Logs, other than the fit's: CSV, MAT, Parquet, results.")],
+    against: Annotated[
+        list[Path] | None, typer.Option("--against", help="Another model, to be compared on the same logs; repeatable.")
+    ] = None,
+    map_: Annotated[Path | None, typer.Option("--map", help="What the logs' columns mean, a TOML file.")] = None,
+    axis: Annotated[str | None, typer.Option("--axis", help="The axis, where a log holds several.")] = None,
+    band: Annotated[
+        list[str] | None, typer.Option("--band", metavar="NAME=VALUE", help="A band of the verdict; repeatable.")
+    ] = None,
+    initial_samples: Annotated[
+        int | None, typer.Option("--initial-samples", help="Samples from which the initial state is estimated.")
+    ] = None,
+    report: Annotated[Path | None, typer.Option("--report", help="Folder for the page, its pictures and JSON.")] = None,
+    json: Json = False,
+) -> None:
+    """Validate a model on logs. Exit code 0: valid, or valid for what it says; 1: not valid, or cannot tell."""
+    with refusals(), stdout_kept(json):
+        from rds.identification.validate.validate import validate as validate_model
+        from rds.identification.validate.verdict import Bands
+
+        bands = Bands.read(_bands(band or []))
+        with progress_bars() as bar:
+            found = read_logs(logs, map_, axis, bar)
+        made = validate_model(model, found, against=against or (), bands=bands, initial_samples=initial_samples)
+        files = made.write(report) if report is not None else []
+    if json:
+        print_json(made.to_json() | {"files": [str(path) for path in files]})
+    else:
+        _show(made)
+        if files:
+            typer.echo(f"report: {files[0]}")
+    raise typer.Exit(made.exit_code)
+
+
+def _bands(given: list[str]) -> dict[str, float]:
+    from rds.core.errors import InputError
+
+    bands: dict[str, float] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            equals = ""
+        if not name or not equals:
+            raise InputError(f"--band {text!r} must be NAME=VALUE with a number, as in --band fit_percent=80")
+        if name in bands:
+            raise InputError(f"--band {name} is given twice; give it once")
+        bands[name] = number
+    return bands
+
+
+def _show(made: Validation) -> None:
+    from rds.cli.console import cell, show_table
+
+    for name, a in made.assessments.items():
+        errors = {"free run": a.free_run, "free run, velocity": a.velocity}
+        errors |= {f"{k} ahead": e for k, e in a.ahead.items()}
+        rows = [
+            [what, f"{e.fit_percent:.2f}", cell(e.rmse), cell(e.maximum), e.unit] for what, e in errors.items() if e
+        ]
+        note = (
+            f"Initial state estimated from the first {a.first} samples, which no error counts; "
+            f"{len(a.log)} samples of {a.log.sample_period:.6g} s. {a.overlap.how[0].upper()}{a.overlap.how[1:]}."
+        )
+        show_table(f"{made.candidate.name} on {name}", ["prediction", "fit %", "RMSE", "max", "unit"], rows, note)
+    for name, ranking in made.rankings.items():
+        rows = [
+            [
+                *(r.name, str(r.counted), cell(r.rmse), cell(r.aicc_difference), f"{r.aicc_weight:.3f}"),
+                *(cell(r.bic_difference), f"{r.bic_weight:.3f}"),
+            ]
+            for r in ranking.ranks
+        ]
+        columns = ["model", "k", "RMSE", "AICc - best", "weight", "BIC - best", "weight"]
+        show_table(f"Models compared on {name}", columns, rows, " ".join(ranking.warnings))
+    verdict = made.verdict
+    typer.echo(f"verdict: {verdict.word}{f' {verdict.purpose}' if verdict.purpose else ''}")
+    typer.echo(str(verdict))

@@ -1,1 +1,0 @@
-"""Groups of commands, one module each; rds/cli.py puts them together."""

@@ -1,0 +1,114 @@
+"""What all plots share: a figure that needs no display and no pyplot, axis labels, line styles beside the colours."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.backend_bases import FigureCanvasBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from rds.core.colours import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DPI = 128
+WIDTH = 10.0  # inches: 1280 pixels
+
+__all__ = [
+    "BLACK",
+    "BLUE",
+    "CYCLE",
+    "GREEN",
+    "GREY",
+    "ORANGE",
+    "PURPLE",
+    "SKY",
+    "VERMILLION",
+    "Picture",
+    "dress",
+    "legend",
+    "quantity",
+]
+
+CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+
+RESPONSES: dict[str, dict[str, Any]] = {
+    "reference": {"color": GREY, "linewidth": 3.0, "alpha": 0.55},
+    "measured": {"color": BLUE, "linewidth": 1.3},
+    "modelled": {"color": VERMILLION, "linewidth": 1.3, "linestyle": (0, (5, 2))},
+    "simulated": {"color": GREEN, "linewidth": 1.3, "linestyle": (0, (1, 1.5))},
+}
+
+
+class Picture(Figure):
+    """A figure that shows itself in a notebook without pyplot's global state."""
+
+    def __init__(self, height: float, width: float = WIDTH):
+        super().__init__(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
+
+    def draw(self, renderer: Any) -> None:
+        """Names are the user's: a $ in them is a $, and not the beginning of a formula, which may be a wrong one."""
+        for text in self.findobj(Text):
+            if "$" in text.get_text() and "\\mathdefault" not in text.get_text():  # which numbers at ticks hold
+                text.set_parse_math(False)
+        super().draw(renderer)
+
+    def png(self) -> bytes:
+        """The picture as PNG, 128 pixels per inch."""
+        stream, canvas = BytesIO(), self.canvas
+        if type(canvas) is not FigureCanvasBase or self.dpi != DPI:  # it is on a screen, which savefig puts aside
+            self.savefig(stream, format="png", metadata={"Software": None})
+            return stream.getvalue()
+        try:  # savefig would draw all of it twice, the first time for the layout, which a drawing begins with anyway
+            FigureCanvasAgg(self).print_png(stream, metadata={"Software": None})
+        finally:
+            self.set_canvas(canvas)
+        return stream.getvalue()
+
+    def _repr_png_(self) -> bytes:
+        return self.png()
+
+
+def dress(axes: Axes, y: str, x: str | None = "time [s]") -> None:
+    """Labels with units, a quiet grid, no box."""
+    axes.set_ylabel(y)
+    if x is not None:
+        axes.set_xlabel(x)
+    axes.grid(True, color="#E2E2E2", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.01)
+
+
+def legend(axes: Axes, columns: int = 4) -> None:
+    """The legend above the axes, where it covers no line; `columns` entries side by side."""
+    handles, labels = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    drawn = axes.legend(
+        handles,
+        labels,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        handlelength=1.6,
+        handletextpad=0.5,
+        columnspacing=0.9,
+        labelspacing=0.2,  # as close as the lines of the blank title, which keeps the height free
+        borderaxespad=0.2,
+    )
+    # a legend wider than its axes would make the layout shrink them; a blank title keeps just the height free
+    drawn.set_in_layout(False)
+    axes.set_title("\n".join([" "] * -(-len(handles) // columns)), fontsize="small", pad=9)
+
+
+def quantity(axis: str, unit: str) -> str:
+    """The label of an axis's response: what it measures, with the unit."""
+    what = {"rev/min": "speed", "°": "angle", "deg": "angle"}.get(unit, "position")
+    return f"{axis} {what} [{unit}]" if unit else f"{axis} {what}"

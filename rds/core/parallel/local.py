@@ -1,0 +1,82 @@
+"""Items on local processes: each has a thread here that hands it items and waits for its answers."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import threading
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rds.core.parallel.outcome import Outcome
+from rds.core.parallel.process import Work, WorkerProcess
+from rds.core.portable import portable
+
+NUMBER = "RDS_WORKER"  # in its environment, which of its kind a process is
+
+
+def on_processes(work: Work, items: Sequence[Any], jobs: int) -> Iterator[Outcome]:
+    """The outcomes as they come; see `spread`."""
+    todo: queue.SimpleQueue[int | None] = queue.SimpleQueue()
+    for index in [*range(len(items)), *[None] * jobs]:
+        todo.put(index)
+    done: queue.SimpleQueue[Outcome | BaseException] = queue.SimpleQueue()
+    workers = [_Worker(WorkerProcess(work, {NUMBER: str(number)}), items, todo, done) for number in range(jobs)]
+    try:
+        for worker in workers:
+            worker.thread.start()
+        for _ in items:
+            yield following(done)
+    finally:
+        for worker in workers:
+            worker.end()
+
+
+def worker_number() -> int | None:
+    """In a local worker its number, from 0: a process that takes the place of another has the same. Else None."""
+    number = os.environ.get(NUMBER, "")
+    return int(number) if number.isdecimal() else None
+
+
+def following(done: queue.SimpleQueue[Any]) -> Any:
+    """The next of what threads have put there, once it is there; exceptions are raised."""
+    while True:  # a wait without end would not hear of Ctrl-C on every system
+        with contextlib.suppress(queue.Empty):
+            found = done.get(timeout=0.2)
+            break
+    if isinstance(found, BaseException):
+        raise found
+    return found
+
+
+class _Worker:
+    """A process and the thread that asks it."""
+
+    def __init__(
+        self,
+        process: WorkerProcess,
+        items: Sequence[Any],
+        todo: queue.SimpleQueue[int | None],
+        done: queue.SimpleQueue[Outcome | BaseException],
+    ):
+        self._process, self._items, self._todo, self._done = process, items, todo, done
+        self._ending = False
+        self.thread = threading.Thread(target=self._work, name="rds spread", daemon=True)
+
+    def end(self) -> None:
+        """End the process, whatever it is at, and wait for it and the thread."""
+        self._ending = True
+        self._process.end()
+        if self.thread.ident is not None:
+            self.thread.join()
+
+    def _work(self) -> None:
+        try:
+            while not self._ending and (index := self._todo.get()) is not None:
+                self._done.put(self._process.answer(portable(self._items[index])).outcome(index))
+        except BaseException as error:
+            if not self._ending:
+                self._done.put(error)
+        finally:
+            self._process.close()

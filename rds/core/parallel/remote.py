@@ -1,0 +1,79 @@
+"""What runs on the workers of a cluster: each of their threads has items done by a worker process of its own.
+
+So an item that kills its process, or hangs, takes nothing with it: no other item, no other user's work, and not the
+cluster's worker, whose scheduler would count the death against whatever lay there beside it.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from distributed import WorkerPlugin, get_worker
+
+from rds.core.parallel.process import Reply, Work, WorkerProcess
+
+IDLE = 60.0  # s without an item after which a process ends: who began the work may be dead
+
+
+class Desk(WorkerPlugin):
+    """On each of the cluster's workers the processes for one piece of work, until it is taken from there."""
+
+    def __init__(self, work: Work):
+        self._work = work
+
+    def setup(self, worker: Any) -> None:
+        """Called by dask on each worker, also on those that come later."""
+        self._lock = threading.Lock()
+        self._seats: dict[int, _Seat] = {}  # by thread
+        self._is_closed = False
+
+    def teardown(self, worker: Any) -> None:
+        """Called by dask when the work is over or the worker ends: so do the processes, whatever they are at."""
+        with self._lock:
+            self._is_closed = True
+            seats = list(self._seats.values())
+        for seat in seats:
+            seat.process.end()
+
+    def answer(self, data: bytes) -> Reply:
+        """What comes of a pickled item, by the process of the thread that asks."""
+        with self._lock:
+            seat = self._seats.setdefault(threading.get_ident(), _Seat(self._work))
+            if self._is_closed:
+                seat.process.end()
+        return seat.answer(data)
+
+
+class _Seat:
+    """One thread's process, which does not stay for longer than `IDLE` without work."""
+
+    def __init__(self, work: Work):
+        self.process = WorkerProcess(work, {})
+        self._busy = threading.Lock()
+        self._timer: threading.Timer | None = None
+
+    def answer(self, data: bytes) -> Reply:
+        with self._busy:
+            if self._timer is not None:
+                self._timer.cancel()
+            try:
+                return self.process.answer(data)
+            finally:
+                self._timer = threading.Timer(IDLE, self._rest)
+                self._timer.daemon = True
+                self._timer.start()
+
+    def _rest(self) -> None:
+        if self._busy.acquire(blocking=False):  # else there is work again
+            try:
+                self.process.close()
+            finally:
+                self._busy.release()
+
+
+def run_remotely(desk: str, data: bytes) -> Reply:
+    """What comes of an item at the desk of that name."""
+    found = get_worker().plugins[desk]
+    assert isinstance(found, Desk)
+    return found.answer(data)

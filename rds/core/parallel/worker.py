@@ -1,0 +1,59 @@
+"""A worker process: `python -m rds.core.parallel.worker`. Folders and the function first, then items, over stdin.
+
+Whatever the function prints goes to stderr, because stdout is for answers. It ends when stdin does, and on Linux at
+once when who started it is killed: an item may take long, and nobody would read what comes of it.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+from typing import Any
+
+from rds.core.errors import RdsError
+from rds.core.parallel.outcome import reason_of
+from rds.core.parallel.pipe import receive, send
+from rds.core.portable import portable
+from rds.core.scheduling import end_with_parent
+
+
+def main() -> None:
+    """Answer items until there are none."""
+    end_with_parent()
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    questions = sys.stdin.buffer
+    try:
+        sys.path += [folder for folder in pickle.loads(receive(questions)) if folder not in sys.path]
+        function = _function(receive(questions))
+        send(answers, b"ready")
+        while True:
+            send(answers, _answer(function, receive(questions)))
+    except (EOFError, BrokenPipeError):
+        return
+
+
+def _function(data: bytes) -> Any:
+    """The function; if it cannot be had here, one that says so of every item."""
+    try:
+        return pickle.loads(data)
+    except Exception as error:
+        reason = reason_of(error)
+
+        def refuse(item: Any) -> None:
+            raise RdsError(f"the function cannot be loaded in a worker process: {reason}")
+
+        return refuse
+
+
+def _answer(function: Any, data: bytes) -> bytes:
+    """(False, value), or (True, why there is none), pickled."""
+    try:
+        return portable((False, function(pickle.loads(data))))
+    except Exception as error:
+        return pickle.dumps((True, reason_of(error)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,5 +1,0 @@
-"""Experiments: from the words of a user to a run and its result."""
-
-from rds.experiment.experiment import Experiment
-
-__all__ = ["Experiment"]

@@ -1,0 +1,59 @@
+"""What a late submission loses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from math import ceil, inf
+
+from rds.core.toml_table import Words
+
+_DAY = 86_400.0  # s
+
+
+@dataclass(frozen=True)
+class Late:
+    """Each day that has begun after `due` and the hours of grace costs `percent_per_day` of the points earned.
+
+    The loss is at most `cap_percent`. After `zero_after_days` days nothing is left. Within the grace nothing is lost;
+    after it, days count from `due` itself.
+    """
+
+    percent_per_day: float = 0.0
+    grace_hours: float = 0.0
+    cap_percent: float = 100.0
+    zero_after_days: float = inf
+
+    def lost(self, days: float) -> float:
+        """The share of the points that is lost after `days` days, 0 to 1."""
+        if days * 24.0 <= self.grace_hours:
+            return 0.0
+        if days > self.zero_after_days:
+            return 1.0
+        return min(self.percent_per_day * ceil(days), self.cap_percent) / 100.0
+
+    def to_table(self) -> Mapping[str, float]:
+        """As the words of an assignment."""
+        return {key: value for key, value in vars(self).items() if value != inf}
+
+
+def days_late(due: datetime | None, submitted: datetime | None) -> float:
+    """Days from `due` to `submitted`, both with their time zone; 0 where either is unknown, or in time."""
+    if due is None or submitted is None:
+        return 0.0
+    return max(0.0, (submitted - due).total_seconds() / _DAY)
+
+
+def read_late(words: Words | None) -> Late:
+    """The table `[late]`; without one nothing is lost. InputError for a word or value that will not do."""
+    if words is None:
+        return Late()
+    late = Late(
+        percent_per_day=words.number("percent_per_day", 0.0, "% of the points", 0.0, 100.0),
+        grace_hours=words.number("grace_hours", 0.0, "h", 0.0, 1e4),
+        cap_percent=words.number("cap_percent", 100.0, "% of the points", 0.0, 100.0),
+        zero_after_days=words.number("zero_after_days", inf, "days", 0.0, inf),
+    )
+    words.done()
+    return late

@@ -1,0 +1,61 @@
+"""All grades of a class as one table: a line for each student, two columns for each criterion."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+
+from rds.grading.feedback.plain_text import cell
+from rds.grading.grade import CriterionScore, Grade, Status
+from rds.results.units import heading
+
+
+def grades_csv(grades: Sequence[Grade]) -> str:
+    """The table as CSV, for spreadsheets: headings carry units, and no cell is taken for a formula.
+
+    A submission that the grader could not grade has no points at all, rather than none.
+    """
+    criteria = criteria_of(grades)
+    columns = ["student", "status", "score", "max_score", "before_penalty", "late [days]"]
+    for criterion in criteria:
+        columns.append(f"{criterion.name} [points of {_plain(criterion.max_score)}]")
+        columns.append(heading(f"{criterion.name} value", "" if criterion.unit == "1" else criterion.unit))
+    return csv_text([[*columns, "reason", "sha256"], *(_row(grade, criteria) for grade in grades)])
+
+
+def criteria_of(grades: Iterable[Grade]) -> list[CriterionScore]:
+    """One score of each criterion that occurs, in the order of the assignment: its name, unit and points."""
+    found: dict[str, CriterionScore] = {}
+    for grade in grades:
+        for score in grade.criteria:
+            found.setdefault(score.name, score)
+    return list(found.values())
+
+
+def csv_text(rows: Iterable[Sequence[str | float | None]]) -> str:
+    """Rows as CSV. Texts are made harmless; a number is written so that reading it gives it back."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\r\n").writerows([[_cell(value) for value in row] for row in rows])
+    return stream.getvalue()
+
+
+def _row(grade: Grade, criteria: Sequence[CriterionScore]) -> list[str | float | None]:
+    is_graded = grade.status is not Status.GRADER_ERROR
+    scores = {score.name: score for score in grade.criteria} if is_graded else {}
+    points = [grade.score if is_graded else None, grade.max_score, grade.before_penalty if is_graded else None]
+    row: list[str | float | None] = [grade.student, str(grade.status), *points, grade.late_days]
+    for criterion in criteria:
+        score = scores.get(criterion.name)
+        row += [None, None] if score is None else [score.score, score.value]
+    return [*row, grade.reason, grade.sha256]
+
+
+def _cell(value: str | float | None) -> str:
+    if value is None:
+        return ""
+    return cell(value) if isinstance(value, str) else _plain(value)
+
+
+def _plain(value: float) -> str:
+    return f"{value:.12g}"

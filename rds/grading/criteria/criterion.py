@@ -1,0 +1,228 @@
+"""One criterion of an assignment: what is measured on which cases, its bands, points and visibility."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite
+from types import ModuleType
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.core.options import Option
+from rds.core.toml_table import Words
+from rds.grading.assignment.unit_tests import UnitTest, read_tests
+from rds.grading.cases.case import LINEAR, Case, CaseRun
+from rds.grading.criteria import KINDS
+from rds.grading.criteria.bands import Bands
+from rds.grading.criteria.measuring import NotMeasured
+from rds.grading.grade import Band, CriterionScore
+
+DIGITS = 9  # of a value: so many are the same on every computer
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """The words of one table `[[criterion]]`. `cases` are names; `unit` is that of the bands."""
+
+    name: str
+    title: str
+    kind: str
+    cases: tuple[str, ...]
+    max_score: float  # points times weight
+    bands: Bands
+    unit: str
+    is_visible: bool
+    options: Mapping[str, Any]
+    tests: tuple[UnitTest, ...] = ()
+    requires: tuple[str, ...] = ()  # criteria without whose points this one earns none
+
+    @property
+    def module(self) -> ModuleType:
+        """What measures it; see `rds.grading.criteria`."""
+        return KINDS.module(self.kind)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """What its runs must hold besides their samples."""
+        return getattr(self.module, "NEEDS", ())
+
+    def measure(self, run: CaseRun) -> float:
+        """Its value on one run, in `unit`; NotMeasured where there is none."""
+        if run.fault:
+            raise NotMeasured(run.fault)
+        value = float(self.module.measure(run, self.options))
+        if not isfinite(value):
+            raise NotMeasured("the value is beyond measure")
+        return float(f"{value:.{DIGITS}g}")
+
+    def worse(self, value: float, than: float) -> bool:
+        """Whether `value` earns less than another, or as much with less margin."""
+        return self.bands.margin(value) < self.bands.margin(than)
+
+    def score(self, value: float, case: str) -> CriterionScore:
+        """The points that a value earns, and a sentence about it."""
+        band, share = self.bands.band(value), self.bands.share(value)
+        return self._scored(share * self.max_score, value, band, self._sentence(value, band, share), case)
+
+    def nothing(self, why: str, case: str = "") -> CriterionScore:
+        """No value, no points."""
+        return self._scored(0.0, None, Band.NONE, f"{self.meaning} could not be measured: {why.rstrip('.')}.", case)
+
+    def without(self, score: CriterionScore, title: str) -> CriterionScore:
+        """The same value without points, because the criterion called `title` earned none."""
+        assert score.value is not None  # there was a band to lose
+        share = self.bands.share(score.value)
+        sentence = self._sentence(score.value, score.band, share, "would earn")
+        said = f"{sentence.rstrip('.')}; it counts only where points are earned for {title}."
+        return replace(score, score=0.0, band=Band.NONE, sentence=said)
+
+    @property
+    def meaning(self) -> str:
+        """What is measured, to begin a sentence with."""
+        text = str(self.module.MEANING)
+        return text[0].upper() + text[1:]
+
+    @property
+    def bounds(self) -> str:
+        """The bands in words."""
+        way = "at most" if self.bands.more_is_worse else "at least"
+        beyond = "from" if self.bands.more_is_worse else "at or below"
+        tail = "on" if self.bands.more_is_worse else ""
+        nothing = f"none {beyond} {_number(self.bands.none, self.unit)} {tail}".rstrip()
+        return f"full points for {way} {_number(self.bands.full, self.unit)}, {nothing}"
+
+    def _sentence(self, value: float, band: Band, share: float, earns: str = "earns") -> str:
+        said = {
+            Band.FULL: f"which {earns} full points",
+            Band.PARTIAL: f"which {earns} {100 * share:.3g} % of the points",
+            Band.NONE: f"which {earns} no points",
+        }[band]
+        # some meanings end with a comma, as they explain themselves
+        return f"{self.meaning} is {_number(value, self.unit)}, {said} ({self.bounds})."
+
+    def _scored(self, score: float, value: float | None, band: Band, sentence: str, case: str) -> CriterionScore:
+        rounded = float(f"{score:.{DIGITS}g}")
+        return CriterionScore(
+            self.name, self.title, rounded, self.max_score, value, self.unit, band, sentence, self.is_visible, case
+        )
+
+
+def read_criterion(words: Words, kind_of_submission: str, cases: Mapping[str, Case]) -> Criterion:
+    """A table `[[criterion]]`. InputError with its place for a word, a value or a case that will not do."""
+    name = words.text("name")
+    if not name:
+        raise InputError("name is missing; give each criterion a name of its own", words.place())
+    kind = words.choice("kind", "", KINDS.names())
+    module = KINDS.module(kind)
+    if kind_of_submission not in module.FOR:
+        said = f"is for {' and '.join(module.FOR)} assignments; this one's kind is {kind_of_submission}"
+        raise words.fault("kind", said)
+    tests = read_tests(words) if kind == "unit-tests" else ()
+    chosen = _cases(words, cases, kind)
+    if kind == "unit-tests" and not tests:
+        raise InputError("it has no test; add [[criterion.test]] with function, args, expected", words.place())
+    _check_cases(words, module, [cases[each] for each in chosen])
+    options = _options(words, module)
+    points = words.number("points", None, "points", 0.0, 1e6)
+    weight = words.number("weight", 1.0, "a factor of the points", 0.0, 1e6)
+    unit = _unit(words, module, [cases[each] for each in chosen])
+    criterion = Criterion(
+        name,
+        words.text("title", name) or name,
+        kind,
+        chosen,
+        points * weight,
+        _bands(words, module, unit),
+        unit,
+        words.flag("visible", True),
+        options,
+        tests,
+        _requires(words, name),
+    )
+    words.done()
+    return criterion
+
+
+def _cases(words: Words, cases: Mapping[str, Case], kind: str) -> tuple[str, ...]:
+    one, several = words.text("case"), words.any("cases")
+    if kind == "unit-tests":
+        if one is not None or several is not None:
+            raise InputError("unit tests need no case; remove it", words.place("case" if one else "cases"))
+        return ()
+    if one is not None and several is not None:
+        raise InputError("case and cases both say where to measure; give one of them", words.place("cases"))
+    names = [one] if one is not None else list(cases) if several is None else several
+    if not isinstance(names, list) or not names or not all(isinstance(each, str) for each in names):
+        raise words.fault("cases", "must be a list of the names of cases")
+    for each in names:
+        if each not in cases:
+            key = "case" if one is not None else "cases"
+            raise words.fault(key, f"names {each!r}, which is no case; there are {', '.join(cases) or 'none'}")
+    return tuple(dict.fromkeys(names))
+
+
+def _check_cases(words: Words, module: ModuleType, cases: Sequence[Case]) -> None:
+    for case in cases:
+        for part in getattr(module, "CASE_HAS", ()):
+            if not getattr(case, part, None):
+                raise words.fault("kind", f"needs a case with {part}; case {case.name!r} has none")
+        if LINEAR in getattr(module, "NEEDS", ()) and not case.can_be_linearized:
+            said = "needs cases of one axis with a reference and a library model that can be linearized"
+            raise words.fault("kind", f"{said}; case {case.name!r} is not one")
+
+
+def _unit(words: Words, module: ModuleType, cases: Sequence[Case]) -> str:
+    units = {case.unit for case in cases} if module.UNIT is None else {module.UNIT}
+    if len(units) > 1:
+        raise words.fault("cases", f"measure in different units ({', '.join(sorted(units))}); split the criterion")
+    unit = str(units.pop())
+    written = words.text("unit")
+    if written is None:
+        raise InputError(f'unit is missing; write `unit = "{unit}"`, so that nobody mistakes the bands', words.place())
+    if written != unit:
+        raise words.fault("unit", f"must be {unit!r}: that is what this criterion is measured in")
+    return unit
+
+
+def _bands(words: Words, module: ModuleType, unit: str) -> Bands:
+    full, none = words.number("full", None, unit, -inf, inf), words.number("none", None, unit, -inf, inf)
+    partial = words.any("partial", "linear")
+    if partial != "linear" and (isinstance(partial, bool) or not isinstance(partial, int | float)):
+        raise words.fault("partial", 'must be "linear", or a share of the points from 0 to 1')
+    share = None if partial == "linear" else words.number("partial", None, "share of the points", 0.0, 1.0)
+    if not isfinite(full) or not isfinite(none):
+        raise words.fault("full" if not isfinite(full) else "none", f"must be a finite number in {unit}")
+    if full == none or (none > full) is not module.MORE_IS_WORSE:
+        way = "more" if module.MORE_IS_WORSE else "less"
+        raise words.fault("none", f"must be {way} than full = {full:g} {unit}: {way} is worse for this criterion")
+    return Bands(full, none, share)
+
+
+def _options(words: Words, module: ModuleType) -> dict[str, Any]:
+    known: Mapping[str, Option] = getattr(module, "OPTIONS", {})
+    found: dict[str, Any] = dict(getattr(module, "DEFAULTS", {}))
+    for key, option in known.items():
+        if key in words:
+            try:
+                found[key] = option.check(words.any(key), key, "criterion")
+            except InputError as error:
+                raise InputError(str(error), words.place(key)) from error
+    for key in getattr(module, "NEEDED", ()):
+        if key not in found:
+            raise InputError(f"{key} is missing; give it: {known[key].meaning}", words.place())
+    return found
+
+
+def _requires(words: Words, name: str) -> tuple[str, ...]:
+    given = words.any("requires", [])
+    given = [given] if isinstance(given, str) else given
+    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        raise words.fault("requires", "must be a list of the names of criteria")
+    if name in given:
+        raise words.fault("requires", "names the criterion itself")
+    return tuple(given)
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".rstrip() if unit != "1" else f"{value:.4g}"

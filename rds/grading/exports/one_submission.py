@@ -1,0 +1,117 @@
+"""One submission in the container of a platform: graded in the sandbox, answered in the platform's own file.
+
+python -m rds.grading.exports.one_submission gradescope /autograder
+python -m rds.grading.exports.one_submission prairielearn /grade
+
+Whatever happens there is a `results.json`. Where the sandbox does not hold, nothing is run, and it says so.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import stat
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rds.core.atomic import write_whole
+from rds.core.errors import InputError, RdsError
+from rds.grading.batch import run_batch
+from rds.grading.batch.scratch import scratch
+from rds.grading.exports import GRADEBOOKS
+from rds.grading.exports.export import export
+from rds.grading.exports.exported import Wanted
+from rds.grading.grade import Grade, Status
+from rds.grading.intake.layouts import TIMES
+
+RESULTS = "results/results.json"
+
+
+@dataclass(frozen=True)
+class Container:
+    """Where a platform puts things, below its folder. `who` gives the student and the time, "" where unknown."""
+
+    submission: str
+    assignment: str
+    about: str
+    who: Callable[[Mapping[str, Any]], tuple[str, str]]
+
+
+def _of_gradescope(about: Mapping[str, Any]) -> tuple[str, str]:
+    """The first of the submitters: a group's plants are his."""
+    users = about.get("users") or [{}]
+    return str(users[0].get("email") or users[0].get("id") or ""), str(about.get("created_at") or "")
+
+
+def _of_prairielearn(about: Mapping[str, Any]) -> tuple[str, str]:
+    """PrairieLearn tells the variant, not the student: every variant has plants of its own."""
+    return f"variant-{about.get('variant_seed', '')}", ""
+
+
+CONTAINERS: Mapping[str, Container] = {
+    "gradescope": Container("submission", "source/assignment", "submission_metadata.json", _of_gradescope),
+    "prairielearn": Container("student", "tests/assignment", "data/data.json", _of_prairielearn),
+}
+
+
+def grade_in(platform: str, root: Path) -> Path:
+    """Grade the submission in the container below `root`; the path of the answer, which is there in any case.
+
+    InputError only for a platform without a container.
+    """
+    if platform not in CONTAINERS:
+        raise InputError(f"there is no container of {platform!r}; known: {', '.join(CONTAINERS)}")
+    target = root / RESULTS
+    target.unlink(missing_ok=True)
+    try:
+        _grade(CONTAINERS[platform], platform, root, target)
+    except (RdsError, OSError, shutil.Error, ValueError, TypeError, AttributeError) as error:
+        _answer_failure(platform, target, str(error))
+    return target
+
+
+def _grade(container: Container, platform: str, root: Path, target: Path) -> None:
+    about = json.loads((root / container.about).read_bytes())
+    student, time = container.who(about)
+    student = student.replace("/", "_") or "student"
+    with scratch("one") as work:
+        folder = work / "submissions" / student
+        shutil.copytree(root / container.submission, folder, symlinks=True, copy_function=_copied)
+        if time:
+            with open(work / "submissions" / TIMES, "w", newline="", encoding="utf-8") as stream:
+                csv.writer(stream).writerows([["student", "timestamp"], [student, time]])
+        run_batch(root / container.assignment, work / "submissions", work / "out", jobs=1)
+        export(work / "out", platform, target, Wanted())
+
+
+def _copied(source: str, target: str) -> None:
+    """A file's copy. What is none, as a FIFO, is made again empty, so that its author hears what was handed in."""
+    kind = stat.S_IFMT(os.lstat(source).st_mode)
+    if kind == stat.S_IFREG:
+        shutil.copy2(source, target)
+    else:
+        os.mknod(target, kind | 0o600)
+
+
+def _answer_failure(platform: str, target: Path, reason: str) -> None:
+    """An answer without a score: the platform then says that grading failed, and the student can ask."""
+    failed = Grade("", Status.GRADER_ERROR, f"nothing was graded: {reason}", 0.0, 0.0, 0.0, ())
+    write_whole(target, json.dumps(GRADEBOOKS.module(platform).results(failed, ())).encode())
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The command; 2 if it is not called as above."""
+    if len(arguments) != 2 or arguments[0] not in CONTAINERS:
+        sys.stderr.write(f"usage: python -m rds.grading.exports.one_submission {{{','.join(CONTAINERS)}}} FOLDER\n")
+        return 2
+    sys.stderr.write(f"wrote {grade_in(arguments[0], Path(arguments[1]))}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,1 @@
+"""Pages that come of grading: one for each student, one for the class."""

@@ -1,0 +1,39 @@
+"""What a batch leaves for the instructor: `grades.csv` and `index.html`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO
+
+from rds.core.atomic import write_files
+from rds.grading.batch.finished import FEEDBACK, STUDENTS
+from rds.grading.batch.grades_table import grades_csv
+from rds.grading.feedback.class_report import class_page
+from rds.grading.grade import Grade
+from rds.grading.intake.names import safe_id
+
+TABLE, PAGE = "grades.csv", "index.html"
+
+
+def write_class_files(
+    out: Path,
+    title: str,
+    grades: Sequence[Grade],
+    *,
+    seconds: Mapping[str, float] | None = None,
+    similar: str = "",
+    about: str = "",
+) -> list[Path]:
+    """Write both into `out`, whole or not at all; see `class_page`. InputError where the system refuses."""
+    links = {grade.student: f"{STUDENTS}/{safe_id(grade.student)}/{FEEDBACK}" for grade in grades}
+    page = class_page(title, grades, links, seconds=seconds, similar=similar, about=about)
+    # spreadsheets know UTF-8 by its mark
+    made = {TABLE: grades_csv(grades).encode("utf-8-sig", "replace"), PAGE: page.encode("utf-8", "replace")}
+    write_files({out / name: partial(_write, data) for name, data in made.items()})
+    return [out / name for name in made]
+
+
+def _write(data: bytes, stream: BinaryIO) -> None:
+    stream.write(data)

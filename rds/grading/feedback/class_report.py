@@ -1,0 +1,166 @@
+"""The instructor's page of a batch: what needs a look first, then distributions, then everybody."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from html import escape
+from statistics import mean, median
+from urllib.parse import quote
+
+from rds.grading.batch.grades_table import criteria_of
+from rds.grading.feedback import histogram
+from rds.grading.feedback.plain_text import isolated, one_line
+from rds.grading.grade import Band, Grade, Status
+from rds.results import html
+from rds.results.report import page
+
+_SLOWEST = 5  # of the class that are listed
+_STYLE = f"""<style>
+.cards {{ display: flex; flex-wrap: wrap; gap: 1rem 2.5rem; }} .cards figure {{ margin: 0; max-width: 412px; }}
+figcaption {{ font-weight: 600; }} td, p {{ overflow-wrap: anywhere; }} td {{ max-width: 28rem; }}
+td.number, td.status {{ white-space: nowrap; }} td.reason {{ min-width: 22rem; }}
+{histogram.STYLE}</style>"""
+
+
+def class_page(
+    title: str,
+    grades: Sequence[Grade],
+    links: Mapping[str, str],
+    *,
+    seconds: Mapping[str, float] | None = None,
+    similar: str = "",
+    missing: Sequence[str] = (),
+    about: str = "",
+) -> str:
+    """The page as HTML.
+
+    `links` are the students' pages by identifier, as paths from this page; `seconds` is how long each submission took;
+    `similar` is HTML that points out submissions that are alike; `missing` are students without a grade.
+    """
+    graded = [grade for grade in grades if grade.status is not Status.GRADER_ERROR]
+    parts = [
+        _STYLE,
+        f'<header><h1>{escape(one_line(title))}</h1><p class="about">{escape(about)}</p></header>',
+        _first(grades, links, missing),
+        _summary(graded),
+        _distributions(graded),
+        f"<section><h2>Submissions that are alike</h2>{similar}</section>" if similar else "",
+        _slowest(grades, links, seconds or {}),
+        _everybody(grades, links),
+    ]
+    return page(title, "\n".join(filter(None, parts)))
+
+
+def _first(grades: Sequence[Grade], links: Mapping[str, str], missing: Sequence[str]) -> str:
+    """What the instructor has to look at: our own failures, and what could not be graded as it was meant."""
+    parts = []
+    ours = [grade.student for grade in grades if grade.status is Status.GRADER_ERROR]
+    again = [*ours, *(student for student in missing if student not in ours)]
+    if again:
+        names = ", ".join(isolated(student) for student in again)
+        parts.append(
+            f'<p class="verdict missed"><strong>{len(again)} not graded</strong> by no fault of theirs; run the same '
+            f"command again with --resume: {names}</p>"
+        )
+    counts = Counter(grade.status for grade in grades)
+    rows = "".join(
+        f'<tr><td>{escape(str(status))}</td><td class="number">{counts[status]}</td>'
+        f"<td>{_some(grades, links, status)}</td></tr>"
+        for status in Status
+        if counts[status]
+    )
+    head = '<tr><th scope="col">status</th><th class="number" scope="col">students</th><th scope="col">who</th></tr>'
+    table = f'<div class="scroll"><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>'
+    return f"<section><h2>What happened to {len(grades)} submissions</h2>{''.join(parts)}{table}</section>"
+
+
+def _some(grades: Sequence[Grade], links: Mapping[str, str], status: Status) -> str:
+    if status is Status.OK:
+        return ""
+    return ", ".join(_name(grade.student, links) for grade in grades if grade.status is status)
+
+
+def _summary(graded: Sequence[Grade]) -> str:
+    if not graded:
+        return ""
+    rows: list[list[object]] = [["total", *_statistics([g.score for g in graded]), max(g.max_score for g in graded)]]
+    scores = {c.name: [s for g in graded for s in g.criteria if s.name == c.name] for c in criteria_of(graded)}
+    rows[0] += [None, None, None]
+    for criterion in criteria_of(graded):
+        of = scores[criterion.name]
+        counts = Counter(score.band for score in of)
+        values = [score.value for score in of if score.value is not None]
+        middle = f"{median(values):.4g} {criterion.unit}".rstrip() if values else None
+        row = [criterion.title, *_statistics([score.score for score in of]), criterion.max_score]
+        rows.append([*row, middle, counts[Band.FULL], counts[Band.NONE]])
+    columns = ["", "mean", "median", "lowest", "highest", "of points", "median value", "with full points", "with none"]
+    return f"<section><h2>Points</h2>{html.table(columns, rows)}</section>"
+
+
+def _statistics(points: Sequence[float]) -> list[float]:
+    return [mean(points), median(points), min(points), max(points)]
+
+
+def _distributions(graded: Sequence[Grade]) -> str:
+    if not graded:
+        return ""
+    most = max(grade.max_score for grade in graded)
+    parts = [_figure("total", histogram.histogram([grade.score for grade in graded], most))]
+    for criterion in criteria_of(graded):
+        points = [score.score for grade in graded for score in grade.criteria if score.name == criterion.name]
+        parts.append(_figure(criterion.title, histogram.histogram(points, criterion.max_score)))
+    return f'<section><h2>Distributions</h2><div class="cards">{"".join(parts)}</div></section>'
+
+
+def _figure(title: str, drawn: str) -> str:
+    return f"<figure><figcaption>{escape(one_line(title))}</figcaption>{drawn}</figure>"
+
+
+def _slowest(grades: Sequence[Grade], links: Mapping[str, str], seconds: Mapping[str, float]) -> str:
+    timed = sorted(((seconds[g.student], g) for g in grades if g.student in seconds), key=lambda pair: -pair[0])
+    if not timed:
+        return ""
+    rows = "".join(
+        f'<tr><td>{_name(grade.student, links)}</td><td class="number">{took:.2f}</td></tr>'
+        for took, grade in timed[:_SLOWEST]
+    )
+    head = '<tr><th scope="col">student</th><th class="number" scope="col">time [s]</th></tr>'
+    return f"<section><h2>Slowest</h2><table><thead>{head}</thead><tbody>{rows}</tbody></table></section>"
+
+
+def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> str:
+    criteria = criteria_of(grades)
+    heads = ["student", "status", "score", "late [days]", *(criterion.name for criterion in criteria), "reason"]
+    head = "".join(f'<th scope="col">{escape(one_line(each))}</th>' for each in heads)
+    rows = "".join(_student(grade, [criterion.name for criterion in criteria], links) for grade in grades)
+    return (
+        f'<section><h2>Everybody</h2><div class="scroll"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div></section>"
+    )
+
+
+def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) -> str:
+    is_graded = grade.status is not Status.GRADER_ERROR
+    scores = {score.name: score for score in grade.criteria} if is_graded else {}
+    cells = [
+        _points(grade.score) if is_graded else "–",
+        f"{grade.late_days:.2g}" if grade.late_days else "",
+        *(_points(scores[name].score) if name in scores else "–" for name in criteria),
+    ]
+    numbers = "".join(f'<td class="number">{each}</td>' for each in cells)
+    return (
+        f'<tr><td>{_name(grade.student, links)}</td><td class="status">{escape(str(grade.status))}</td>{numbers}'
+        f'<td class="reason">{escape(one_line(grade.reason, 300))}</td></tr>'
+    )
+
+
+def _points(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _name(student: str, links: Mapping[str, str]) -> str:
+    if student not in links:
+        return isolated(student)
+    # "./" keeps a name with a colon from being taken for a scheme
+    return f'<a href="{escape("./" + quote(links[student]))}">{isolated(student)}</a>'

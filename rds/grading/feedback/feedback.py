@@ -1,0 +1,155 @@
+"""The page that a student gets: points, each criterion with its bands, runs beside the reference solution's.
+
+One file that fetches nothing. It is made from what the grader measured, so nothing in it is the submission's doing but
+the text that it printed, which is shown as text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from rds.grading.assignment.assignment import Assignment
+from rds.grading.cases.case import CaseRun
+from rds.grading.criteria.criterion import Criterion
+from rds.grading.feedback import band_bar
+from rds.grading.feedback.feedback_plots import case_picture
+from rds.grading.feedback.plain_text import isolated, one_line, plain
+from rds.grading.grade import Band, CriterionScore, Grade, Status
+from rds.results.report import page
+
+_BANDS = {Band.FULL: "full points", Band.PARTIAL: "part of the points", Band.NONE: "no points"}
+_WHAT_IT_MEANS = {
+    Status.OK: "",
+    Status.MISSING: "Nothing was handed in.",
+    Status.REFUSED: "What was handed in was not opened.",
+    Status.FAILED_TO_LOAD: "Your file could not be loaded. Try it with `rds check` and hand it in again.",
+    Status.BROKE_CONTRACT: "Your file answered in a way that its interface does not allow.",
+    Status.TIMED_OUT: "Your file took longer than the assignment allows.",
+    Status.KILLED: "Your file was ended, because it ended itself or went over a limit.",
+    Status.GRADER_ERROR: "The grader failed. This is not your fault, and will be graded again.",
+}
+
+_STYLE = f"""<style>
+.total {{ font-size: 2rem; margin: .3rem 0; line-height: 1.2; font-weight: 700; font-variant-numeric: tabular-nums; }}
+.criterion {{ border-top: 1px solid var(--line); padding: .7rem 0; display: grid; gap: .1rem 1.6rem;
+  grid-template-columns: minmax(0, 1fr) minmax(0, 340px); }}
+.criterion h3 {{ margin: 0; font-size: 1rem; }} .criterion p {{ margin: .15rem 0; }}
+.points {{ font-variant-numeric: tabular-nums; }} .full b {{ color: var(--met); }}
+.none b {{ color: var(--missed); }} .partial b {{ color: var(--void); }}
+.printed {{ white-space: pre-wrap; overflow-wrap: anywhere; background: var(--band); padding: .6rem .8rem;
+  border: 1px solid var(--line); border-radius: 4px; max-height: 24rem; overflow-y: auto; }}
+h1, p {{ overflow-wrap: anywhere; }}
+@media (max-width: 760px) {{ .criterion {{ grid-template-columns: 1fr; }} }}
+{band_bar.STYLE}</style>"""
+
+
+def feedback_page(
+    assignment: Assignment,
+    grade: Grade,
+    runs: Sequence[CaseRun] = (),
+    solution: Sequence[CaseRun] = (),
+    *,
+    same_plants: bool = True,
+) -> str:
+    """The page of one student as HTML.
+
+    `runs` are the runs that the grade rests on, `solution` those of the reference solution; `same_plants` says whether
+    both were on the same plants. What is hidden is only shown if the assignment says `feedback = "all"`.
+    """
+    shows_all = assignment.feedback == "all"
+    title = f"{assignment.title}: {one_line(grade.student, 80)}"
+    parts = [
+        _STYLE,
+        f"<header><h1>{escape(assignment.title)}</h1>"
+        f'<p class="about">Feedback for {isolated(grade.student)}</p>{_total(grade)}</header>',
+        _criteria(assignment, grade, shows_all),
+        _runs(assignment, runs, solution, shows_all, same_plants),
+        _notes(grade),
+    ]
+    return page(title, "\n".join(filter(None, parts)))
+
+
+def _total(grade: Grade) -> str:
+    if grade.status is Status.GRADER_ERROR:
+        return f'<p class="verdict void"><strong>not graded yet</strong> {_WHAT_IT_MEANS[grade.status]}</p>'
+    parts = [f'<p class="total">{grade.score:.4g} of {grade.max_score:.4g} points</p>']
+    lost = grade.before_penalty - grade.score
+    if grade.late_days > 0.0:
+        said = f"Handed in {grade.late_days:.3g} days after the due time: "
+        said += (
+            f"{lost:.4g} of the {grade.before_penalty:.4g} points earned are lost."
+            if lost > 0.0
+            else "nothing is lost."
+        )
+        parts.append(f'<p class="note">{said}</p>')
+    if grade.status is not Status.OK:
+        parts.append(
+            f'<p class="verdict missed"><strong>{escape(str(grade.status))}</strong> '
+            f"{escape(_WHAT_IT_MEANS[grade.status])}<br>{escape(one_line(grade.reason, 1000))}</p>"
+        )
+    return "".join(parts)
+
+
+def _criteria(assignment: Assignment, grade: Grade, shows_all: bool) -> str:
+    if not grade.criteria:
+        return ""
+    known = {criterion.name: criterion for criterion in assignment.criteria}
+    shown = [_criterion(score, known.get(score.name), shows_all or score.visible) for score in grade.criteria]
+    note = (
+        "The mark above each bar is your value. Green earns full points, amber a part of them, red none; between the "
+        "two bounds the points fall in a straight line unless the sentence says otherwise."
+    )
+    return f'<section><h2>Criteria</h2><p class="note">{note}</p>{"".join(shown)}</section>'
+
+
+def _criterion(score: CriterionScore, criterion: Criterion | None, is_shown: bool) -> str:
+    head = (
+        f'<h3>{escape(score.title)}</h3><p class="points {score.band}"><b>{score.score:.4g} of {score.max_score:.4g} '
+        f"points</b> · {_BANDS[score.band]}"
+    )
+    if not is_shown:
+        return f'<div class="criterion"><div>{head} · hidden: its value is not shown</p></div></div>'
+    value = "" if score.value is None else f" · {_number(score.value, score.unit)}"
+    bar = "" if criterion is None else band_bar.band_bar(criterion.bands, score.value, score.unit)
+    return (
+        f'<div class="criterion"><div>{head}{value}</p><p>{escape(one_line(score.sentence, 1000))}</p></div>'
+        f"<div>{bar}</div></div>"
+    )
+
+
+def _runs(
+    assignment: Assignment, runs: Sequence[CaseRun], solution: Sequence[CaseRun], shows_all: bool, same_plants: bool
+) -> str:
+    parts = []
+    for case in assignment.cases:
+        if not (shows_all or case.is_visible):
+            continue
+        of_case = [run for run in runs if run.case == case.name]
+        beside = [run for run in solution if run.case == case.name]
+        picture = case_picture(of_case, beside, case.title)
+        if picture is not None:
+            has_own = beside and not same_plants and case.is_drawn
+            own = " The reference solution ran on a plant of its own." if has_own else ""
+            caption = escape(picture.caption + own)
+            parts.append(
+                f'<figure style="margin:0"><figcaption>{caption}</figcaption>'
+                f'<img alt="{caption}" src="{picture.chart.url}"></figure>'
+            )
+    if not parts:
+        return ""
+    hidden = 0 if shows_all else sum(not case.is_visible for case in assignment.cases)
+    left_out = f'<p class="note">Hidden cases, not shown: {hidden}.</p>' if hidden else ""
+    return f"<section><h2>Your runs</h2>{''.join(parts)}{left_out}</section>"
+
+
+def _notes(grade: Grade) -> str:
+    parts = [f'<pre class="printed">{escape(plain(note))}</pre>' for note in grade.notes]
+    head = "<h2>Notes, and what your file printed</h2>" if parts else ""
+    if grade.sha256:
+        parts.append(f'<p class="note">SHA-256 of the file that was graded: {escape(grade.sha256)}</p>')
+    return f"<section>{head}{''.join(parts)}</section>" if parts else ""
+
+
+def _number(value: float, unit: str) -> str:
+    return escape(f"{value:.4g} {unit}".rstrip() if unit != "1" else f"{value:.4g}")

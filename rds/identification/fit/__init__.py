@@ -1,0 +1,1 @@
+"""Parameters from logs: the methods, how far their estimates can be trusted, and the model files that come of them."""

@@ -1,0 +1,107 @@
+"""A fit: logs and a structure in, an estimate out, by one of the methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.core.registry import Registry
+from rds.identification.fit.estimate import Estimate
+from rds.identification.logs.log import Log
+from rds.identification.structures.structure import SPEED, Structure
+
+METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Estimate`
+    "method",
+    {
+        "simulation": "rds.identification.fit.simulation_error",
+        "inverse-dynamics": "rds.identification.fit.inverse_dynamics",
+        "step": "rds.identification.fit.step_fit",
+        "frequency": "rds.identification.fit.frequency",
+    },
+    own=False,
+)
+
+
+def fit(
+    logs: Sequence[Log], structure: Structure, method: str | None = None, options: Mapping[str, Any] | None = None
+) -> Estimate:
+    """The parameters of `structure` that explain the logs, all fitted together, by the method's own `options`.
+
+    InputError for an unknown method or option, no logs, or logs that hold nothing to estimate from.
+    """
+    if not logs:
+        raise InputError("there is no log to fit; name at least one")
+    named = _names_apart(logs)
+    _check_units(named, structure)
+    structure = structure.prepare(named) if structure.prepare else structure
+    estimated: Estimate = METHODS.module(method or structure.default_method).estimate(
+        named, structure, dict(options or {})
+    )
+    if estimated.relative_error_percent is None:
+        estimated = replace(estimated, relative_error_percent=voltage_error_percent(named, structure, estimated))
+    return estimated
+
+
+def voltage_error_percent(logs: Sequence[Log], structure: Structure, estimate: Estimate) -> float | None:
+    """100 |the voltage that the model needs beside the one given| / |the one given|, over the motion of all logs.
+
+    None where the logs hold too little motion to say.
+    """
+    from rds.identification.fit.needed_voltage import needed_voltage, smoothed_velocity
+    from rds.identification.fit.residuals import bandwidth, block_length
+
+    values, is_rate = estimate.values(), structure.output_unit == SPEED
+    extra = given = 0.0
+    for log in logs:
+        with np.errstate(all="ignore"):
+            response = structure.respond(log.time, log.command, estimate.initial_state[log.name], values)
+        if len(log) < 20 or not np.isfinite(response).all():
+            return None
+        rate = response if is_rate else np.diff(response) / np.diff(log.time)
+        block = max(block_length(bandwidth(rate, log.sample_period), log.sample_period, len(log)), 4)
+        velocity = smoothed_velocity(log, block, is_rate)
+        found = needed_voltage(log, structure, values, velocity, block, is_rate)
+        if found.relative_percent is None:
+            return None
+        extra = hypot(extra, float(np.linalg.norm(found.extra)))
+        given = hypot(given, float(np.linalg.norm(found.command)))
+    return 100.0 * extra / given
+
+
+def _names_apart(logs: Sequence[Log]) -> list[Log]:
+    """The logs, numbered where two have the same name: an estimate speaks of them by name."""
+    names = [log.name for log in logs]
+    return [
+        replace(log, name=f"{log.name} ({names[: i + 1].count(log.name)})") if names.count(log.name) > 1 else log
+        for i, log in enumerate(logs)
+    ]
+
+
+def check_command(log: Log, model: str) -> None:
+    """InputError where the command is no voltage, which `model` takes."""
+    if (has := log.units.get("command") or "V") != "V":
+        raise InputError(
+            f"command is in {'per cent or a pure number' if has == '1' else has}, and {model} takes V. Where a drive's "
+            'current, torque or per cent stands for the voltage, say so in the map: unit = "V" for the command takes '
+            f"each of its numbers as 1 V (with scale = ... as so many), and K is then per that number. Say the same of "
+            "every log of this axis",
+            log.source or log.name,
+        )
+
+
+def _check_units(logs: Sequence[Log], structure: Structure) -> None:
+    for log in logs:
+        check_command(log, f"structure {structure.name}")
+        unit = structure.output_unit
+        has = log.units.get("position", unit)
+        if unit and has and has != unit:
+            raise InputError(
+                f"position is in {has}, and structure {structure.name} takes {unit}; state the unit in a map beside "
+                "the data, or choose the structure for it (spindle for a speed)",
+                log.source or log.name,
+            )

@@ -1,0 +1,165 @@
+"""From the numbers of a method to an `Estimate`: intervals, the free run and predictions with them, and what to doubt.
+
+Methods that do not fit the free run itself still have it computed: it is how a model will be used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
+from rds.identification.fit.free_run_doubts import held_doubts, other_doubts
+from rds.identification.fit.initial_state import estimate_start
+from rds.identification.fit.kstep import ahead, errors_of
+from rds.identification.logs.fingerprint import fingerprint
+from rds.identification.logs.log import Gravity, Log
+from rds.identification.structures.structure import Structure
+
+_START = 1000  # samples from which a log's initial state is estimated
+_UNTOLD = 0.5  # standard error over value from which a parameter that cannot be zero is not told
+
+
+def made_estimate(
+    structure: Structure,
+    method: str,
+    logs: Sequence[Log],
+    values: Mapping[str, float],
+    covariance: np.ndarray,
+    freedom: float,
+    *,
+    untold: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+    relative_error_percent: float | None = None,
+    details: Mapping[str, Any] | None = None,
+    states: Sequence[tuple[float, ...]] | None = None,
+    judged: bool = True,
+) -> Estimate:
+    """The estimate with `values` in the structure's order; `covariance` is of those, `freedom` for Student's t.
+
+    `states` are the logs' initial states where the method has estimated them, by the free run; else they are estimated
+    here, and the free run of each log in open loop is `judged`: it sees what no method's own intervals count.
+    Parameters that the structure says are given have no error. InputError for values outside the structure's bounds.
+    """
+    values = {name: float(values[name]) for name in structure.parameters}
+    covariance = 0.5 * (covariance + covariance.T)  # rounding leaves that of near twins uneven, which no reader takes
+    given = set(structure.given(logs)) if structure.given else set()
+    width = t_quantile(freedom)
+    errors = np.sqrt(np.diag(covariance))
+    parameters = {}
+    notes = list(untold)
+    for (name, value), error in zip(values.items(), errors.tolist(), strict=True):
+        _check_bounds(structure, name, value, method)
+        reach = 0.0 if name in given else width * error
+        parameters[name] = Parameter(value, error, value - reach, value + reach, structure.units[name])
+        known = any(name in sentence for sentence in notes)
+        if not known and structure.bounds(name)[0] == 0.0 and np.isfinite(error) and error > _UNTOLD * abs(value):
+            unit = structure.units[name]
+            notes.append(
+                f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is hardly told by these data"
+            )
+    begun, free_run, predictions = {}, {}, {}
+    said = [
+        f"{UNUSABLE}: {log.name}: {finding.what}"
+        for log in logs
+        for finding in log.findings
+        if finding.gravity is Gravity.FAULT
+    ]
+    said += [
+        f"{log.name}: {finding.what}" for log in logs for finding in log.findings if finding.gravity is Gravity.WARNING
+    ]
+    said += [*said_of_guesses(parameters), *warnings]
+    for number, log in enumerate(logs):
+        state = None if states is None else states[number]
+        begun[log.name], modelled = _run(structure, log, values, state)
+        free_run[log.name], predictions[log.name] = _errors(structure, log, modelled)
+        if judged and states is None and not log.closed_loop:
+            said += other_doubts(structure, log, log.position - modelled, method)
+        if log.closed_loop:
+            said.append(
+                f"{log.name} is closed-loop data: the command answers the axis's noise and friction, which biases any "
+                "fit a little, and the free run lacks the controller that held the axis, so its error grows with time"
+            )
+            said += held_doubts(structure, log, predictions[log.name])
+    return Estimate(
+        structure=structure.name,
+        options=structure.options,
+        method=method,
+        parameters=parameters,
+        covariance=covariance,
+        untold=tuple(notes),
+        initial_state=begun,
+        free_run=free_run,
+        ahead=predictions,
+        logs=tuple(fitted_stretch(log) for log in logs),
+        relative_error_percent=relative_error_percent,
+        warnings=tuple(dict.fromkeys(said)),
+        details=dict(details or {}),
+    )
+
+
+def t_quantile(freedom: float, share: float = 0.95) -> float:
+    """Half the width of the interval with this share, in standard errors (Student's t)."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), 0.5 + 0.5 * share))
+
+
+def _check_bounds(structure: Structure, name: str, value: float, method: str) -> None:
+    option, high = structure.parameters[name], structure.bounds(name)[1]
+    if not np.isfinite(value) or value < option.at_least or value <= option.more_than or value > high:
+        raise InputError(
+            f"by {method}, {name} = {value:.4g} {structure.units[name]}, which no axis has ({option.meaning}): the "
+            "sign of the command or the position is reversed, columns are swapped, or noise hides the motion; look at "
+            "the data with `rds data describe`, or try another method"
+        )
+
+
+def _run(
+    structure: Structure, log: Log, values: Mapping[str, float], state: tuple[float, ...] | None
+) -> tuple[tuple[float, ...], np.ndarray]:
+    """The initial state, and the free run from there (samples,)."""
+    if state is None:
+        few = slice(0, min(len(log), _START))
+        state = estimate_start(structure, values, log.time[few], log.command[few], log.position[few])
+    with np.errstate(all="ignore"):
+        return state, np.asarray(structure.respond(log.time, log.command, state, values), dtype=float)
+
+
+def _errors(structure: Structure, log: Log, modelled: np.ndarray) -> tuple[Errors, Mapping[int, Errors]]:
+    """Of the free run, and of predictions ahead with it."""
+    if not np.isfinite(modelled).all():
+        return Errors(-np.inf, np.inf, np.inf, structure.output_unit), {}
+    free_run = errors_of(log.position, modelled, structure.output_unit)
+    return free_run, ahead(log.position, modelled, structure.output_unit)
+
+
+_SMOOTH = 0.01  # s over which velocities are taken: an encoder's step in one sample is no speed
+
+
+def fitted_stretch(log: Log) -> dict[str, Any]:
+    """What an estimate, and the model file made of it, say of a log that was fitted: `Estimate.logs` holds these.
+
+    Beside file and rows, the lowest and highest command (V) and velocity (mm/s), beyond which the model is a guess,
+    and the fingerprint by which the data are known again under another name.
+    """
+    step = max(round(_SMOOTH / log.sample_period), 1)
+    rate = log.position if log.units.get("position") == "rev/min" else _slopes(log, min(step, len(log) - 1))
+    found: dict[str, Any] = {
+        "name": log.name,
+        "source": log.source,
+        "sha256": log.sha256,
+        "first": log.first,
+        "end": log.first + len(log),
+        "command": (float(log.command.min()), float(log.command.max())),
+        "velocity": (float(rate.min()), float(rate.max())),
+    }
+    return found | ({"fingerprint": hashes} if (hashes := fingerprint(log)) else {})
+
+
+def _slopes(log: Log, step: int) -> np.ndarray:
+    """Mean velocities over `step` samples."""
+    return (log.position[step:] - log.position[:-step]) / (log.time[step:] - log.time[:-step])

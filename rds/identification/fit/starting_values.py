@@ -1,0 +1,156 @@
+"""Values to begin a fit of the axis with, from the data alone.
+
+Where the sign of the velocity is known (from the smoothed position), the axis is linear. With τ given,
+
+    y = y₀ + v₀ τ (1 - e^(-t/τ)) + K·P[m u] - F₊·P[s₊] - F₋·P[s₋],      P = 1 / (p (τ p + 1)),    p = d/dt
+
+where m is 1 while the axis moves, and s₊, s₋ are 1 while it moves forward or backward. So K, F₊, F₋ follow from
+linear regression of the measured position itself, without any derivative of it, and τ from a grid: this stays usable
+where noise or quantization makes an acceleration worthless.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from math import exp, expm1
+
+import numpy as np
+
+from rds.core.compiling import kernel
+from rds.core.errors import InputError
+from rds.identification.fit.smoothing import Motion, motion_of
+from rds.identification.fit.stick_grid import stick_starts
+from rds.identification.logs.log import Log
+
+GRID = 13  # time constants that are tried
+MOST_SAMPLES = 200_000  # of each log: more say nothing new about where to begin
+
+# Where options begin: small beside what they stand beside, but not 0, where some have no derivative.
+_BEGIN = {"viscous": 0.0, "stribeck": 0.1, "dead_zone": 0.01, "offset": 0.0}
+
+
+def axis_starts(
+    logs: Sequence[Log], names: Sequence[str], states: int
+) -> Iterator[tuple[dict[str, float], list[tuple[float, ...]]]]:
+    """Values of the parameters `names` and each log's initial state, the likeliest first, made as they are asked for.
+
+    InputError where no log holds any motion, or no voltage that differs from 0.
+    """
+    parts = [log.part(0, min(len(log), MOST_SAMPLES)) for log in logs]
+    motions = [motion_of(part) for part in parts]
+    _check_excitation(parts, motions)
+    longest = max(float(part.time[-1] - part.time[0]) for part in parts)
+    finest = min(part.sample_period for part in parts)
+    grid = np.geomspace(0.5 * finest, max(0.1 * longest, 2.0 * finest), GRID)
+    found = [(*_regression(parts, motions, tau), tau) for tau in grid]
+    costs = [cost for cost, _, _ in found]
+    minima = [i for i in range(GRID) if costs[i] <= costs[max(i - 1, 0)] and costs[i] <= costs[min(i + 1, GRID - 1)]]
+    minima.sort(key=lambda i: costs[i])
+    begins = [_initial_state(log, motion, states) for log, motion in zip(parts, motions, strict=True)]
+    first, *rest = ((found[i][1], found[i][2]) for i in minima[:2])
+    for solved, tau in chain([first], stick_starts(parts), rest):
+        yield _values(solved, tau, names, parts, motions), begins
+
+
+def _check_excitation(logs: Sequence[Log], motions: Sequence[Motion]) -> None:
+    if not any(motion.moves for motion in motions):
+        log = logs[0]
+        unit = log.units.get("position", "mm")
+        raise InputError(
+            f"the axis never moves: its position stays within {np.ptp(log.position):.3g} {unit}, which noise and "
+            "quantization explain; there is nothing to estimate from. Record a log in which the voltage overcomes "
+            "friction both ways",
+            log.name,
+        )
+    if all(not np.any(log.command) for log in logs):
+        raise InputError(
+            "the command is 0 throughout while the axis moves; map the column of the voltage that moved it",
+            logs[0].name,
+        )
+
+
+def _initial_state(log: Log, motion: Motion, states: int) -> tuple[float, ...]:
+    speed = float(motion.velocity[0])
+    moving = abs(speed) > motion.threshold
+    return (float(log.position[0]), speed if moving else 0.0, 0.0)[:states]
+
+
+def _values(
+    solved: np.ndarray, tau: float, names: Sequence[str], logs: Sequence[Log], motions: Sequence[Motion]
+) -> dict[str, float]:
+    K, plus, minus = (float(value) for value in solved)
+    fastest = max(float(np.abs(motion.velocity).max()) for motion in motions)
+    slightly = 0.01 * fastest
+    # a direction in which it never moves leaves 0: the other's level is the better guess
+    plus = plus if plus > 0.0 else max(-minus, slightly)
+    minus = minus if minus < 0.0 else -max(plus, slightly)
+    step = max((log.resolution or motion.noise) for log, motion in zip(logs, motions, strict=True))
+    begin = _BEGIN | {
+        "tau": tau,
+        "K": K,
+        "friction_plus": plus,
+        "friction_minus": minus,
+        "friction": 0.5 * (plus - minus),
+        "stribeck_velocity": 0.1 * fastest,
+        "delay": 0.5 * logs[0].sample_period,
+        "backlash": 2.0 * step,
+    }
+    if "offset" in names and K:
+        begin["offset"] = -0.5 * (plus + minus) / K
+    if "stribeck" in names:
+        begin |= {name: begin[name] / 1.05 for name in ("friction_plus", "friction_minus", "friction")}
+    return {name: begin[name] for name in names}
+
+
+def _regression(logs: Sequence[Log], motions: Sequence[Motion], tau: float) -> tuple[float, np.ndarray]:
+    """Sum of squares, and K, F₊, F₋ in the least-squares sense for this time constant; 0 for what never occurs."""
+    gram = np.zeros((4, 4))
+    for log, motion in zip(logs, motions, strict=True):
+        v = motion.velocity
+        products = _products(log.time, log.command, log.position, v > motion.threshold, v < -motion.threshold, tau)
+        # each log has an initial position and velocity of its own: what they explain is taken out first
+        own, across, shared = products[:2, :2], products[:2, 2:], products[2:, 2:]
+        gram += shared - across.T @ np.linalg.lstsq(own, across, rcond=1e-9)[0]
+    scale = np.sqrt(np.diag(gram)[:3])
+    used = np.flatnonzero(scale > 1e-9 * max(float(scale.max()), 1e-300))
+    solved = np.zeros(3)
+    A, b = gram[np.ix_(used, used)] / np.outer(scale[used], scale[used]), gram[used, 3] / scale[used]
+    solved[used] = np.linalg.lstsq(A, b, rcond=1e-9)[0] / scale[used]
+    signs = np.array([1.0, -1.0, -1.0])
+    cost = float(gram[3, 3] - 2.0 * solved @ gram[:3, 3] + solved @ gram[:3, :3] @ solved)
+    return cost, solved * signs
+
+
+@kernel
+def _products(t, u, y, forward, backward, tau):
+    """Sums of products (6, 6) of: 1, the initial velocity's response, those to m u, s₊ and s₋, and the position."""
+    sums, row = np.zeros((6, 6)), np.zeros(6)
+    v = np.zeros(3)  # velocities of the responses
+    row[0] = 1.0
+    step, decay, reach, left = -1.0, 1.0, 0.0, 1.0
+    for k in range(len(t)):
+        row[5] = y[k] - y[0]
+        for i in range(6):
+            for j in range(i, 6):
+                sums[i, j] += row[i] * row[j]
+        if k + 1 == len(t):
+            break
+        if abs(t[k + 1] - t[k] - step) > 1e-12:
+            step = t[k + 1] - t[k]
+            decay = exp(-step / tau)
+            reach = -tau * expm1(-step / tau)
+        row[1] += left * reach
+        left *= decay
+        for i in range(3):
+            force = 0.0
+            if i == 0 and (forward[k] or backward[k]):
+                force = u[k]
+            elif (i == 1 and forward[k]) or (i == 2 and backward[k]):
+                force = 1.0
+            row[2 + i] += force * step + (v[i] - force) * reach
+            v[i] = force + (v[i] - force) * decay
+    for i in range(6):
+        for j in range(i):
+            sums[i, j] = sums[j, i]
+    return sums

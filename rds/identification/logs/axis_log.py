@@ -1,0 +1,253 @@
+"""One axis of a table as logs: its quantities on one time, in stretches without gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.identification.logs.clocks import hold, resample
+from rds.identification.logs.columns import column_time, quantity
+from rds.identification.logs.csv_table import missing_samples
+from rds.identification.logs.findings import with_findings
+from rds.identification.logs.log import Clock, Finding, Gravity, Log
+from rds.identification.logs.map import AxisMap, ColumnMap, LogMap
+from rds.identification.logs.second_file import Second
+from rds.identification.logs.table import Table
+from rds.identification.logs.time_base import TimeBase, time_base
+from rds.machines.machine import Axis
+
+_HELD = ("command",)  # between its samples a command stays what it was
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A quantity with the times at which it was stamped; the times are None where they are those of the rows."""
+
+    values: np.ndarray
+    unit: str
+    time: np.ndarray | None
+    second: bool
+
+
+def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | None) -> list[Log]:
+    """The logs of the axis: one, or one for each stretch between gaps. InputError as `read_log`."""
+    machine_axis = mapping.machine.axis(about.machine_axis) if mapping.machine and about.machine_axis else None
+    resolution = about.resolution
+    if resolution is None and machine_axis is not None:
+        resolution = machine_axis.resolution
+    findings = [*table.findings, *(second.findings if second else ())]
+    findings += [Finding("map", f"guessed: {sentence}") for sentence in mapping.said]
+    parts = _parts(table, about, second, machine_axis, resolution, findings)
+    time, arrays = _on_one_time(table, mapping, parts, second, findings)
+    arrays, time = _without_blanks(arrays, time, mapping, table, findings)
+    if mapping.samples is not None and mapping.samples > len(time):
+        findings.append(missing_samples(mapping.samples, len(time), "the map announces"))
+    base = time_base(time, mapping.jitter_limit, mapping.duplicates, mapping.gaps, str(table.path))
+    findings += base.findings
+    if len(base.keep) < len(time):
+        time, arrays = time[base.keep], {name: values[base.keep] for name, values in arrays.items()}
+    gain, reach = _gain(table, about), about.voltage_range
+    units = {"time": "s"} | {name: part.unit for name, part in parts.items()}
+    if reach is None and mapping.machine is not None and units["command"] == "V":
+        reach = (-mapping.machine.converter.range, mapping.machine.converter.range)
+    name = table.path.stem if len(mapping.axes) == 1 else f"{table.path.stem}:{about.name}"
+    logs = []
+    for number, (first, end) in enumerate(base.stretches, 1):
+        log = Log(
+            name=name if len(base.stretches) == 1 else f"{name} part {number}",
+            time=time[first:end],
+            command=arrays["command"][first:end],
+            position=arrays["position"][first:end],
+            extra={q: v[first:end] for q, v in arrays.items() if q not in ("command", "position")},
+            units=units,
+            resolution=resolution,
+            voltage_range=reach,
+            closed_loop=about.closed_loop,
+            force_gain=gain,
+            source=str(table.path),
+            sha256=table.sha256,
+            findings=tuple(findings),
+            clocks=_clocks(table, mapping, parts, second, base),
+        )
+        logs.append(with_findings(log, machine_axis))
+    return logs
+
+
+def _parts(
+    table: Table,
+    about: AxisMap,
+    second: Second | None,
+    machine_axis: Axis | None,
+    resolution: float | None,
+    findings: list[Finding],
+) -> dict[str, _Part]:
+    target = machine_axis.unit if machine_axis else None
+    parts: dict[str, _Part] = {}
+    for name, column_map in sorted(about.columns.items(), key=lambda item: item[0] != "position"):
+        source = second.table if column_map.second and second is not None else table
+        column = source.column(column_map.column, column_map.place)
+        values, unit, found = quantity(column, column_map, name, resolution, target)
+        findings += found
+        if name == "position":
+            target = unit
+        elif name == "reference" and unit != target:
+            raise InputError(
+                f"reference is in {unit}, and position in {target}; one of the units is wrong", about.place
+            )
+        parts[name] = _Part(values, unit, _own_time(column.time, column_map, second), column_map.second)
+    return parts
+
+
+def _own_time(time: np.ndarray | None, about: ColumnMap, second: Second | None) -> np.ndarray | None:
+    if not about.second or second is None:
+        return time
+    return second.time if time is None else second.alignment.to_first(time)
+
+
+def _on_one_time(
+    table: Table, mapping: LogMap, parts: dict[str, _Part], second: Second | None, findings: list[Finding]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """All quantities at the times of the first file's rows; of a bus log, at those of the position."""
+    grid = column_time(table, mapping.time)
+    if not len(grid):
+        main = parts["position"] if not parts["position"].second else parts["command"]
+        if main.time is None:
+            raise InputError("it is not known when anything was measured; give [time]", mapping.time.place)
+        grid = main.time
+    own = {name: part.time for name, part in parts.items() if part.time is not None and part.time is not grid}
+    for name, time in own.items():
+        _check_order(name, time, parts[name].second, table, second)
+    others = list(own.values())
+    if not others:  # the times themselves are judged by time_base
+        return grid, {name: part.values for name, part in parts.items()}
+    first, last = max([grid[0], *(t[0] for t in others)]), grid[-1]
+    if second is not None and any(part.second for part in parts.values()):
+        last = min([last, *(p.time[-1] for p in parts.values() if p.second and p.time is not None)])
+    inside = (grid >= first) & (grid <= last)
+    if inside.sum() < 2:
+        raise InputError("its columns have hardly a time in common; check the files and their clocks", str(table.path))
+    if not inside.all():
+        what = f"{int((~inside).sum())} samples outside the time that all columns share were left out"
+        findings.append(Finding("clock", what))
+        grid_in = grid[inside]
+    else:
+        grid_in = grid
+    arrays = {}
+    for name, part in parts.items():
+        if part.time is None:
+            arrays[name] = part.values if grid_in is grid else part.values[inside]
+        elif part.time is grid:
+            arrays[name] = part.values[inside]
+        elif name in _HELD or not part.second:
+            arrays[name] = hold(part.time, part.values, grid_in)
+            if not part.second:
+                findings.append(_age(name, part.time, grid_in))
+        else:
+            arrays[name], error = resample(part.time, part.values, grid_in)
+            what = f"{name} was interpolated to the first file's times on straight lines, to {error:.3g} {part.unit}"
+            findings.append(Finding("resampling", what))
+    return grid_in, arrays
+
+
+def _check_order(name: str, time: np.ndarray, of_second: bool, table: Table, second: Second | None) -> None:
+    """InputError for times (s) that are not the rows' own, and cannot be looked up in: none, blank, or going back."""
+    where = str(second.table.path if of_second and second is not None else table.path)
+    if len(time) == 0:
+        raise InputError(f"the column of {name} holds no values", where)
+    blank = np.flatnonzero(~np.isfinite(time))
+    if len(blank):
+        raise InputError(f"the time of {name} has no number in sample {blank[0]}; repair it", where)
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    if len(back):
+        k = int(back[0]) + 1
+        raise InputError(
+            f"the time of {name} goes back at sample {k}, from {time[k - 1]:.9g} to {time[k]:.9g} s ({len(back)} such "
+            "steps); put the samples in order, and take one recording",
+            where,
+        )
+
+
+def _age(name: str, time: np.ndarray, grid: np.ndarray) -> Finding:
+    """How old the last received value is where it is used."""
+    at = np.maximum(np.searchsorted(time, grid, side="right") - 1, 0)
+    age = grid - time[at]
+    what = (
+        f"of {name} the last received value is held: it is {np.median(age):.3g} s old at the median, {age.max():.3g} s"
+    )
+    return Finding("resampling", f"{what} at most")
+
+
+def _without_blanks(
+    arrays: dict[str, np.ndarray], time: np.ndarray, mapping: LogMap, table: Table, findings: list[Finding]
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    good = np.isfinite(time)
+    for name, values in arrays.items():
+        finite = np.isfinite(values)
+        if not finite.all() and mapping.blanks == "refuse":
+            row = int(np.flatnonzero(~finite)[0])
+            raise InputError(
+                f"{name} has no number in {int((~finite).sum())} of {len(values)} samples, first in sample {row}; "
+                'repair it, or leave such samples out with blanks = "drop" in the map',
+                str(table.path),
+            )
+        good &= finite
+    if good.all():
+        return arrays, time
+    if not np.isfinite(time).all() and mapping.blanks == "refuse":
+        row = int(np.flatnonzero(~np.isfinite(time))[0])
+        raise InputError(
+            f'time has no number in sample {row}; repair it, or blanks = "drop" in the map', str(table.path)
+        )
+    bad = int((~good).sum())
+    if good.sum() < 2:
+        raise InputError("hardly a sample has a number in every column of the map", str(table.path))
+    row = int(np.flatnonzero(~good)[0])
+    what = f"{bad} samples without a number in every column were left out, the first is sample {row}"
+    findings.append(Finding("blanks", what, Gravity.WARNING, row))
+    return {name: values[good] for name, values in arrays.items()}, time[good]
+
+
+def _gain(table: Table, about: AxisMap) -> float | None:
+    if not isinstance(about.force_gain, str):
+        return about.force_gain
+    if about.force_gain not in table.constants:
+        known = ", ".join(table.constants) or "none"
+        raise InputError(
+            f"force_gain = {about.force_gain!r} is no single number of {table.path.name} (it has {known}); give it in "
+            "N/V, as in force_gain = 35.15",
+            about.place,
+        )
+    return table.constants[about.force_gain]
+
+
+def _clocks(
+    table: Table, mapping: LogMap, parts: dict[str, _Part], second: Second | None, base: TimeBase
+) -> tuple[Clock, ...]:
+    """Where each quantity's times come from, and how sure they are where nobody says: a step of the stamps' digits."""
+    where = mapping.time.source or (
+        "times of receipt by the recorder of the bus"
+        if table.format == "can"
+        else f"{mapping.time.column or ('times of the rasters' if table.own_times else 'rate')}"
+    )
+    jitter = next((f.what for f in base.findings if f.kind == "jitter"), "")
+    stated = mapping.time.uncertainty
+    source = f"{where} of {table.path.name}" + (f" ({jitter})" if jitter else "")
+    own = tuple(name for name, part in parts.items() if not part.second)
+    clocks = [Clock(own, source, np.nan if stated is None else stated)] if own else []
+    if second is not None:
+        about = second.alignment
+        clocks.append(
+            Clock(
+                tuple(name for name, part in parts.items() if part.second),
+                f"{second.table.path.name}, aligned",
+                about.uncertainty(float(second.time[-1])) if len(second.time) else about.offset_error,
+                about.offset,
+                about.drift,
+                about.offset_error,
+                about.drift_error,
+                about.centre,
+            )
+        )
+    return tuple(clocks)

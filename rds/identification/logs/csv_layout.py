@@ -1,0 +1,214 @@
+"""How a text table is laid out: encoding, delimiter, decimal sign, where its data begin, headings and units.
+
+Recorders write preambles, comments, a row of units, `;` with decimal commas, a mark before the first byte. The layout
+is that under which most lines read as rows of numbers.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rds.core.errors import InputError
+from rds.identification.logs.csv_headings import Headings, alternates, labview_units, name_and_unit, paired_headings
+from rds.identification.logs.units import dimension
+from rds.results.units import split_heading
+
+HEAD = 1 << 16  # bytes looked at
+COMMENTS = ("#", "%", "//", "!")
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
+BLANKS = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf"))
+_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(?P<zone>Z|[+-]\d\d:?\d\d)?")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a reader must know of a text table; `first` is the line, from 0, of the first row of data."""
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    first: int
+    names: tuple[str, ...]
+    units: tuple[str | None, ...]
+    words: frozenset[int]  # columns whose cells are no numbers
+    dates: Mapping[int, bool]  # columns of dates and times of day: whether their first one says its zone
+    announced: int | None = None  # samples, where a comment says how many there should be
+    paired: bool = False  # every other column holds the times of the column after it
+
+
+def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
+    """The layout of a text file; what is given is not guessed. InputError where there is no table of numbers."""
+    lines, encoding = _head(path)
+    choices = [delimiter] if delimiter else [*DELIMITERS.values()]
+    quoted = any('"' in line for line in lines)  # a comma may then be both; "1,234" is 1234 to many, so never by itself
+    best: tuple[float, int, str, str, int] | None = None
+    for mark in choices:
+        for point in [decimal] if decimal else [".", ","]:
+            if mark == point and not (decimal and quoted):
+                continue
+            first, width, score = _data(lines, mark, point)
+            # more numbers is better; then the delimiter that comes first in the table, then the decimal point
+            if score and (best is None or score > best[0]):
+                best = (score, width, mark, point, first)
+    if best is None:
+        shown = next((line for line in lines if line.strip()), "")
+        remedy = "it needs columns of numbers, separated by commas, semicolons, tabs, bars or spaces"
+        if quoted and decimal is None:
+            remedy += '; for decimal commas in quotation marks say decimal = "comma" under [table]'
+        raise InputError(f"no lines of numbers were found in it (it begins {shown[:60]!r}); {remedy}", str(path))
+    _, width, mark, point, first = best
+    found_heads = paired_headings(lines[:first], lambda line: split(line, mark), width)
+    if found_heads is None:
+        first = _with_faulty_rows(lines, first, mark, point, width)
+        found_heads = _headings(lines, first, mark, point, width)
+    names, units, paired = found_heads
+    body = [cells for line in lines[first:] if len(cells := split(line, mark)) == width and not is_comment(line)]
+    stamps = {i: found for i in range(width) for row in body[:1] if (found := _DATE.fullmatch(row[i]))}
+    dates = {i: bool(stamp["zone"]) for i, stamp in stamps.items()}
+    words = frozenset(
+        i
+        for i in range(width)
+        if i not in dates
+        and body
+        and not any(is_number(row[i], point) for row in body)
+        and any(row[i].lower() not in BLANKS for row in body)
+    )
+    return Layout(
+        encoding, mark, point, first, names, units, words, dates, _announced(lines[:first]), paired or alternates(units)
+    )
+
+
+def split(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, without blanks around them."""
+    if delimiter == " ":
+        return line.split()
+    if '"' in line:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell is a number; neither NaN nor infinity is."""
+    if decimal != ".":
+        if "." in cell:
+            return False
+        cell = cell.replace(decimal, ".")
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return cell.lower() not in BLANKS and "_" not in cell
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a remark, and not a row."""
+    return line.lstrip().startswith(COMMENTS)
+
+
+def _head(path: Path) -> tuple[list[str], str]:
+    with open(path, "rb") as stream:
+        data = stream.read(HEAD)
+        whole = not stream.read(1)
+    if not data.strip():
+        raise InputError("it is empty; record it again or take another copy", str(path))
+    for mark, name in ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+        if data.startswith(mark):
+            raise InputError(f"it is text in {name}; save it as CSV (UTF-8)", str(path))
+    if b"\0" in data:
+        raise InputError("it is not text (it has null bytes); is its ending right?", str(path))
+    encoding = "utf-8"
+    try:
+        text = codecs.getincrementaldecoder("utf-8")().decode(data, whole)
+    except UnicodeDecodeError:
+        encoding, text = "cp1252", data.decode("cp1252", errors="replace")
+    if "\r" in text and "\n" not in text:
+        raise InputError("its lines end in a carriage return alone, as on old Macs; save it with line feeds", str(path))
+    # not splitlines(): a form feed ends no line for the reader of the rows
+    lines = [line.rstrip("\r") for line in text.removeprefix("\ufeff").split("\n")]
+    return (lines if whole or len(lines) < 2 else lines[:-1]), encoding
+
+
+def _data(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, int, float]:
+    """First line and width of the rows of numbers, and how many numbers they have (0: none).
+
+    The rows have the width that most have, and numbers where nearly all of them do: a line of a preamble such as
+    `gain;2.5` is none of them.
+    """
+    rows: dict[int, list[tuple[int, list[bool]]]] = {}  # by width: line, and which cells are a number or blank
+    numbers: dict[int, int] = {}
+    for number, line in enumerate(lines):
+        if line.strip() and not is_comment(line):
+            cells = split(line, delimiter)
+            kinds = [is_number(cell, decimal) or bool(_DATE.fullmatch(cell)) for cell in cells]
+            blanks = sum(cell.lower() in BLANKS for cell in cells)
+            if any(kinds) and sum(kinds) + blanks >= len(cells) / 2:
+                fits = [kind or cell.lower() in BLANKS for kind, cell in zip(kinds, cells, strict=True)]
+                rows.setdefault(len(cells), []).append((number, fits))
+                numbers[len(cells)] = numbers.get(len(cells), 0) + sum(kinds)
+    if not rows:
+        return 0, 0, 0.0
+    width = max(rows, key=lambda w: (len(rows[w]), -rows[w][0][0]))
+    found = rows[width]
+    usual = [sum(fits[i] for _, fits in found) > 0.9 * len(found) - 1 for i in range(width)]
+    first = next((n for n, fits in found if all(f or not u for f, u in zip(fits, usual, strict=True))), found[0][0])
+    return first, width, float(numbers[width])
+
+
+def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> int:
+    """The first row below the heading, where rows right above `first` have a word in place of a number."""
+    at = first
+    while at > 0 and not is_comment(lines[at - 1]):
+        cells = split(lines[at - 1], delimiter)
+        if len(cells) != width or not any(is_number(cell, decimal) for cell in cells) or _are_units(cells):
+            break
+        at -= 1
+    heading = _heading_cells(lines[at - 1], delimiter, width) if at > 0 else None
+    return at if heading is not None else first
+
+
+def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
+    """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
+    above = [line for line in lines[:first] if line.strip()][-2:]
+    rows = [_heading_cells(line, delimiter, width) for line in above]
+    units: list[str | None] = [None] * width
+    heads = rows[-1] if rows else None
+    if heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None:
+        units = [split_heading(cell)[1] or cell.strip("[]()") or None for cell in heads]
+        heads = rows[-2]
+    if heads is None or any(is_number(cell, decimal) for cell in heads):
+        return Headings(tuple(f"column {i + 1}" for i in range(width)), tuple(units))
+    names = []
+    for i, cell in enumerate(heads):
+        name, unit = name_and_unit(cell.strip('"'))
+        names.append(name or f"column {i + 1}")
+        units[i] = unit if unit is not None else units[i]
+    of_labview = labview_units(lines[:first], lambda line: split(line, delimiter), names)
+    return Headings(tuple(names), of_labview or tuple(units))
+
+
+def _heading_cells(line: str, delimiter: str, width: int) -> list[str] | None:
+    text = line.lstrip()
+    for mark in COMMENTS:
+        text = text.removeprefix(mark)
+    cells = split(text, delimiter)
+    if delimiter == " " and len(cells) != width:  # `time [s]  position [mm]`
+        cells = [cell.strip() for cell in re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", text)]
+    return cells if len(cells) == width else None
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    given = [cell.strip("[]() ") for cell in cells if cell.strip("[]()- ")]
+    return bool(given) and all(dimension(cell) is not None for cell in given)
+
+
+def _announced(lines: Sequence[str]) -> int | None:
+    for line in lines:
+        found = re.search(r"\b(?:samples|rows|points|records)\b\W{0,3}(\d+)", line, re.IGNORECASE)
+        if found:
+            return int(found[1])
+    return None

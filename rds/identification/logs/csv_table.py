@@ -1,0 +1,251 @@
+"""Text tables as columns of numbers, read in blocks: ten million rows cost the memory of their numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.identification.logs.csv_layout import BLANKS, Layout, is_number, sniff, split
+from rds.identification.logs.log import Finding, Gravity
+from rds.identification.logs.table import Column, Table, since_first
+from rds.identification.logs.units import factor, unit_of_name
+
+Progress = Callable[[int, int], None]
+_BLOCK = 1 << 22  # bytes
+_TAIL = 1 << 14  # bytes at the end in which a cut is looked for
+_REMARK = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!).*(?:\n|\Z)")
+_SPACES = re.compile(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)")
+_NULLS = [*BLANKS, *(word.upper() for word in BLANKS), "NaN", "Null", "None", "Inf", "+Inf", "-Inf"]
+
+
+def read_csv(
+    path: Path, delimiter: str | None = None, decimal: str | None = None, progress: Progress | None = None
+) -> Table:
+    """The table in a text file. Raises InputError, with the line, for a row of another width than the others.
+
+    A last line without its end is left out where it is shorter than the lines before it: the file was cut there.
+    """
+    layout = sniff(path, delimiter, decimal)
+    findings: list[Finding] = []
+    if layout.encoding != "utf-8":
+        findings.append(Finding("encoding", f"it is not UTF-8; it was read as {layout.encoding}"))
+    end, cut = _end(path, layout)
+    if cut is not None:
+        findings.append(cut)
+    names = _unique(layout.names, path)
+    words = set(layout.words)
+    while True:  # a column that turns out to hold words is read again as such, once
+        try:
+            values, texts, remarks = _read(path, layout, words, end, progress)
+            break
+        except _NotNumber as error:
+            words.add(error.column)
+    if remarks:
+        findings.append(Finding("comments", f"{remarks} remarks between the rows were passed over"))
+    rows = max(map(len, values.values()), default=0)
+    if layout.announced is not None and layout.announced > rows:
+        findings.append(missing_samples(layout.announced, rows, "the file announces"))
+    columns = {}
+    for at, (name, unit) in enumerate(zip(names, layout.units, strict=True)):
+        unit = unit_of_name(name) if unit is None else unit
+        if at in texts:
+            columns[name] = Column(name, unit, np.full(rows, np.nan), text=texts[at])
+        elif not (at and at == len(names) - 1 and name == f"column {at + 1}" and np.isnan(values[at]).all()):
+            # but for what a delimiter at the end of each line makes
+            columns[name] = Column(name, "s" if at in layout.dates else unit, values[at])
+    if layout.paired:
+        columns = _with_own_times(columns)
+    return Table(path, "csv", columns, findings=tuple(findings))
+
+
+def _with_own_times(columns: Mapping[str, Column]) -> dict[str, Column]:
+    """Channels with the times before them; one column of time where all have the same, as they are where no unit is."""
+    times, channels = [*columns.values()][::2], [*columns.values()][1::2]
+    if any(
+        c.unit is None or c.text is not None or not (np.diff(c.values[np.isfinite(c.values)]) >= 0.0).all()
+        for c in times
+    ):
+        return dict(columns)  # not known, or no times
+    if all(np.array_equal(column.values, times[0].values, equal_nan=True) for column in times):
+        return {"time": Column("time", times[0].unit, times[0].values)} | {c.name: c for c in channels}
+    found = {}
+    for time, channel in zip(times, channels, strict=True):
+        there = np.isfinite(time.values)  # a slower channel has fewer rows
+        second = factor(str(time.unit), "s")
+        found[channel.name] = replace(channel, values=channel.values[there], time=time.values[there] * second)
+    return found
+
+
+def missing_samples(announced: int, found: int, who: str) -> Finding:
+    """That a file has fewer samples than somebody says."""
+    share = 100.0 * (1.0 - found / announced)
+    what = f"{who} {announced} samples, and there are {found}: {share:.0f} % are missing; take a whole copy"
+    return Finding("cut", what, Gravity.FAULT)
+
+
+class _NotNumber(Exception):
+    """A column that began with numbers goes on with words."""
+
+    def __init__(self, column: int):
+        self.column = column
+
+
+def _read(
+    path: Path, layout: Layout, words: set[int], end: int, progress: Progress | None
+) -> tuple[dict[int, np.ndarray], dict[int, tuple[int, str]], int]:
+    """Numbers by column; of columns of words the first word with its row; how many remarks were passed over."""
+    import pyarrow as pa
+    from pyarrow import csv as arrow_csv
+
+    keys = [str(i) for i in range(len(layout.names))]
+    types = {key: pa.string() if int(key) in words else pa.float64() for key in keys}
+    dates = {i: zone for i, zone in layout.dates.items() if i not in words}
+    types |= {str(i): pa.timestamp("ns", tz="UTC" if zone else None) for i, zone in dates.items()}
+
+    refused: list[Any] = []
+
+    def refuse(row: Any) -> str:
+        refused.append(row)  # Arrow passes on no error that is raised here
+        return "error"
+
+    stream = _Rows(path, layout, end)
+    values: dict[int, list[np.ndarray]] = {i: [] for i in range(len(keys)) if i not in words}
+    texts: dict[int, tuple[int, str]] = {}
+    rows = 0
+    try:
+        reader = arrow_csv.open_csv(
+            pa.PythonFile(stream, mode="r"),
+            read_options=arrow_csv.ReadOptions(column_names=keys, block_size=_BLOCK, encoding=layout.encoding),
+            parse_options=arrow_csv.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=refuse),
+            convert_options=arrow_csv.ConvertOptions(
+                column_types=types, decimal_point=layout.decimal, null_values=_NULLS
+            ),
+        )
+        for batch in reader:
+            for i in values:
+                values[i].append(_numbers(batch.column(i)))
+            for i in words - set(texts):
+                found = _first_word(batch.column(i).to_pylist(), layout.decimal)
+                if found is not None:
+                    texts[i] = (rows + found[0], found[1])
+            rows += batch.num_rows
+            if progress is not None:
+                progress(min(stream.done, end), end)
+    except pa.ArrowInvalid as error:
+        if refused:
+            raise _line_fault(path, layout, refused[0].text, refused[0].actual_columns) from error
+        found_column = re.search(r"CSV column #(\d+): CSV conversion error", str(error))
+        if found_column is None or int(found_column[1]) in words:
+            raise InputError(f"it cannot be read as a table: {error}", str(path)) from error
+        raise _NotNumber(int(found_column[1])) from error
+    finally:
+        stream.close()
+    joined = {}
+    for i in list(values):
+        column = np.concatenate(values.pop(i) or [np.empty(0, dtype="datetime64[ns]" if i in dates else np.float64)])
+        joined[i] = since_first(column) if i in dates else column
+    return joined, {i: texts.get(i, (0, "")) for i in words}, stream.remarks
+
+
+class _Rows:
+    """The rows of the file as Arrow wants them: no lines above the data, no remarks, one blank where there are many."""
+
+    def __init__(self, path: Path, layout: Layout, end: int):
+        self._file = open(path, "rb")  # noqa: SIM115 (closed by close())
+        self._end, self._spaces = end, layout.delimiter == " "
+        for _ in range(layout.first):
+            self._file.readline()
+        self.remarks, self.closed = 0, False
+
+    @property
+    def done(self) -> int:
+        return self._file.tell()
+
+    def read(self, size: int) -> bytes:
+        """Whole lines, about `size` bytes of them; none at the end."""
+        data = b""
+        while not data:
+            room = self._end - self._file.tell()
+            if room <= 0:
+                return b""
+            data = self._file.read(min(size, room))
+            data += self._file.readline(max(self._end - self._file.tell(), 0))
+            data, remarks = _REMARK.subn(b"", data)
+            self.remarks += remarks
+            if self._spaces:
+                data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))
+        return data
+
+    def close(self) -> None:
+        self._file.close()
+        self.closed = True
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return False
+
+
+def _numbers(cells: Any) -> np.ndarray:
+    """A batch's cells as float64, NaN for blanks; dates as they are."""
+    import pyarrow as pa
+
+    if pa.types.is_timestamp(cells.type):
+        return np.asarray(cells.to_numpy(zero_copy_only=False), dtype="datetime64[ns]")
+    return np.asarray(cells.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _first_word(cells: Sequence[str | None], decimal: str) -> tuple[int, str] | None:
+    return next(
+        ((row, cell) for row, cell in enumerate(cells) if cell is not None and not is_number(cell.strip(), decimal)),
+        None,
+    )
+
+
+def _line_fault(path: Path, layout: Layout, text: str, found: int) -> InputError:
+    """The error that a line has too few or too many cells, with its number."""
+    cells = split(text, layout.delimiter)
+    where = str(path)
+    with open(path, encoding=layout.encoding, errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if number > layout.first and split(line.rstrip("\r\n"), layout.delimiter) == cells:
+                where = f"{path}, line {number}"
+                break
+    return InputError(
+        f"it has {found} cells ({text.strip()[:60]!r}) where the rows above have {len(layout.names)}; "
+        "repair or remove the line",
+        where,
+    )
+
+
+def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
+    """Where whole lines end, and what to say where the last one is cut."""
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        file.seek(max(0, size - _TAIL))
+        tail = file.read()
+    if tail.endswith((b"\n", b"\r")):
+        return size, None
+    *before, last = tail.rstrip(b" \t").split(b"\n")
+    others = [line for line in before[1:] if line.strip()]
+    cells = len(split(last.decode(layout.encoding, "replace"), layout.delimiter))
+    if others and (cells < len(layout.names) or len(last) < min(map(len, others)) - 1):  # a \r is no character of a row
+        what = f"it ends in the middle of a line ({last.decode(layout.encoding, 'replace')[:40]!r}): the file is cut. "
+        return size - len(tail) + tail.rindex(b"\n") + 1, Finding(
+            "cut", what + "The last line is left out; check that the rest is as long as the recording", Gravity.WARNING
+        )
+    return size, Finding("cut", "its last line has no end: if the file was cut there, its last number may be wrong")
+
+
+def _unique(names: Sequence[str], path: Path) -> list[str]:
+    doubled = next((name for name in names if names.count(name) > 1), None)
+    if doubled is not None:
+        raise InputError(f"two columns are headed {doubled!r}; rename one", str(path))
+    return list(names)

@@ -1,0 +1,71 @@
+"""Whether a log can tell anything: a command that varies, an axis that moves, both ways, at more than one speed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rds.identification.logs.log import Finding, Gravity, Log
+from rds.identification.logs.motion import motion, noise, travel
+from rds.machines.machine import Axis
+
+_FEW_STEPS = 20  # encoder steps of motion, and samples, below which a log tells nothing
+_LEAST = 0.01  # of the windows
+_LEVEL = 0.02  # of the largest command: what is nearer counts as the same level
+_SHORT = 100  # samples
+_MOVED = 5.0  # encoder steps
+_BEYOND_NOISE = 12.0  # standard deviations: noise alone spans 10.4 in 10^7 samples
+
+
+def excitation(log: Log, axis: Axis | None) -> list[Finding]:
+    """What the data leave untold, for want of excitation."""
+    unit, volts = log.units.get("position", "mm"), log.units.get("command", "V")
+    if np.ptp(log.command) == 0.0:
+        what = f"the command is {log.command[0]:g} {volts} throughout: it excites nothing, and no gain can be told"
+        return [Finding("excitation", what, Gravity.FAULT)]
+    reach = float(np.ptp(log.position))
+    if reach == 0.0 or (log.resolution is not None and reach < _FEW_STEPS * log.resolution):
+        steps = f" ({reach / log.resolution:.0f} encoder steps)" if log.resolution else ""
+        what = f"the axis hardly moves: {reach:.4g} {unit}{steps} in all; give it a larger command"
+        return [Finding("excitation", what, Gravity.FAULT)]
+    found = []
+    if len(log) < _SHORT:
+        what = f"it has only {len(log)} samples; intervals from so few are wide, if they hold at all"
+        found.append(Finding("excitation", what, Gravity.WARNING))
+    seen = motion(log)
+    for way, word, sign in ((1.0, "positive", "+"), (-1.0, "negative", "-")):
+        share = float(np.mean(way * seen.speed > seen.moves))
+        if share < _LEAST and not _goes(log, way, reach):
+            what = (
+                f"the axis never moves in the {word} direction: the friction of that direction (F{sign}) cannot be told"
+            )
+            found.append(Finding("excitation", what, Gravity.WARNING))
+    if _levels(log.command, 1.0) <= 1 and _levels(log.command, -1.0) <= 1:
+        what = (
+            "the command has one level in each direction: from one steady speed the gain K and the friction cannot be "
+            "told apart; use two amplitudes or more, or a signal that sweeps"
+        )
+        found.append(Finding("excitation", what, Gravity.WARNING))
+    still = np.abs(seen.speed) < seen.moves
+    driven = np.abs(seen.command) > _LEVEL * float(np.abs(log.command).max())
+    if not (still & driven).any():
+        what = "the axis never stands still against a command: the data say little about friction at standstill"
+        found.append(Finding("excitation", what))
+    return found
+
+
+def _goes(log: Log, way: float, reach: float) -> bool:
+    """Whether the position moves that way by more than noise and steps, however slowly; a speed tells by its sign."""
+    if log.units.get("position") == "rev/min":
+        return False
+    least = max(_MOVED * (log.resolution or 0.0), _BEYOND_NOISE * noise(log.position), _LEAST * reach)
+    return travel(log.position, way) > least
+
+
+def _levels(command: np.ndarray, sign: float) -> int:
+    """How many distinct levels the command takes in a direction, each for at least a hundredth of that time."""
+    largest = float(np.abs(command).max())
+    there = sign * command[sign * command > _LEVEL * largest]
+    if len(there) == 0:
+        return 0
+    counts = np.bincount(np.rint(there / (_LEVEL * largest)).astype(int))
+    return int((counts > max(_LEAST * len(there), 1)).sum()) or 2

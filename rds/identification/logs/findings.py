@@ -1,0 +1,34 @@
+"""What the data of a log say about themselves: resolution, saturation, excitation, sign, units, a closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from rds.identification.logs import excitation, plausibility, steps
+from rds.identification.logs.log import Finding, Log
+from rds.machines.machine import Axis
+
+_CHECKS: tuple[Callable[[Log, Axis | None], list[Finding]], ...] = (
+    steps.quantization,
+    steps.saturation,
+    excitation.excitation,
+    plausibility.direction,
+    plausibility.magnitudes,
+    plausibility.loop,
+)
+
+
+def with_findings(log: Log, axis: Axis | None = None) -> Log:
+    """The log with the findings about its data added, and with the resolution and the loop that were found.
+
+    What was stated stays: a resolution that the data contradict is a finding. `axis` gives travel and limits, where
+    the machine is known.
+    """
+    if log.resolution is None:
+        log = replace(log, resolution=steps.step_of(log.position))
+    found = [finding for check in _CHECKS for finding in check(log, axis)]
+    closed = log.closed_loop
+    if closed is None and any(finding.kind == "closed-loop" for finding in found):
+        closed = True
+    return replace(log, findings=(*log.findings, *found), closed_loop=closed)

@@ -1,0 +1,298 @@
+"""What the columns of a file mean, where their names and units leave no doubt; else a draft of a map to correct."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rds.core.toml_text import toml_text
+from rds.identification.logs.map import DIMENSIONS, SUFFIX, UNKNOWN, AxisMap, ColumnMap, LogMap, TimeMap
+from rds.identification.logs.table import Column, Table, remedy
+from rds.identification.logs.units import dimension, known_units
+from rds.results.units import default_unit
+
+# words of names, lower case, that tell a quantity; the first that fits
+_WORDS: Mapping[str, frozenset[str]] = {
+    "time": frozenset(("time", "t", "zeit", "timestamp", "timestamps", "elapsed", "seconds", "zeitstempel")),
+    "reference": frozenset(
+        ("reference", "ref", "setpoint", "desired", "target", "soll", "demand", "qg", "sollposition", "lagesollwert")
+    ),
+    "velocity": frozenset(
+        ("velocity", "vel", "speed", "v", "rate", "geschwindigkeit", "drehzahl", "istdrehzahl", "drehzahlistwert")
+    ),
+    "current": frozenset(("current", "amps", "strom", "iststrom", "i", "amperage")),
+    "command": frozenset(("voltage", "command", "cmd", "volt", "volts", "u", "input", "control", "vir", "spannung")),
+    "position": frozenset(
+        ("measured", "position", "pos", "encoder", "enc", "y", "x", "q", "qm", "ist", "output", "angle", "counts")
+    ).union(("istposition", "lageistwert", "lage")),
+}
+_OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration"))  # never what was measured
+_LIKELY = {"time": "s", "command": "V", "position": "mm", "velocity": "mm/s", "current": "A", "reference": "mm"}
+_RISING = 0.9  # of the steps of a time go up
+_NO_LOG = "it is no log over time"
+_TOLD = 5  # columns that a sentence names
+_ORDINALS = ("reading", "iteration", "move", "index", "n", "count", "sample")
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A map, or why there is none; and in any case one to correct."""
+
+    map: LogMap | None
+    problem: str  # a sentence; "" where there is a map
+    is_log: bool = True  # whether the file can be a log over time at all
+
+
+def guess(table: Table) -> Guess:
+    """The map of a table, from names together with units. Nothing without a unit is ever guessed."""
+    time, problem = _time(table)
+    if problem:
+        spoiled = _spoiled(table, "time")
+        return Guess(None, spoiled or problem, is_log=not spoiled and problem[: len(_NO_LOG)] != _NO_LOG)
+    said = ["each signal has its own times"]
+    if time:
+        said = [f"time is {time!r} [{table.columns[time].unit}]"]
+    groups = _groups(table, time)
+    axes: dict[str, AxisMap] = {}
+    doubts: list[str] = []
+    for name, columns in groups.items():
+        found, doubt = _axis(columns)
+        if doubt:
+            doubts.append(f"{name}: {doubt}" if len(groups) > 1 else doubt)
+            continue
+        axes[name] = AxisMap(name, {q: ColumnMap(c.name, place="the guessed map") for q, c in found.items()})
+        said += [f"{q} of {name} is {c.name!r} [{c.unit}]" for q, c in found.items()]
+    strange = [c for c in table.columns.values() if _is_strange(c)]
+    said += [f"{c.name!r} is not used, as its unit {c.unit!r} is unknown" for c in strange]
+    if doubts or not axes:
+        for quantity in ("command", "position"):
+            spoiled = _spoiled(table, quantity)
+            if spoiled and not any(_fitting(columns, quantity) for columns in groups.values()):
+                return Guess(None, spoiled, is_log=False)
+        return Guess(None, "; ".join(doubts) or "no column tells a command and a position by its name and unit")
+    return Guess(LogMap(TimeMap(time, place="the guessed map"), axes, said=tuple(said)), "")
+
+
+def draft(table: Table) -> str:
+    """A map of the file as TOML, with what is most likely, to be corrected by who knows."""
+    time, _ = _time(table)
+    content: dict[str, object] = {}
+    notes = [f"What the columns of {table.path.name} mean. Check every line: it is a draft, not knowledge."]
+    columns = [c for c in table.columns.values() if c.text is None]
+    named = next((c.name for c in columns if _role(c.name) == "time"), None)
+    if named is None and not any(c.unit or _role(c.name) for c in columns):
+        named = next((c.name for c in columns if _rises(c.values)), None)
+    if not table.own_times:
+        time = time or named
+        if time is not None:
+            content["time"] = {"column": time, "unit": _unit(table, time, "time")}
+        else:
+            content["time"] = {"rate": 1000.0}
+            notes.append("No column tells the time: give the rate in Hz if the samples are equally spaced.")
+    axes: dict[str, object] = {}
+    for name, columns in _groups(table, time).items():
+        parts = {q: _likely(columns, q) for q in ("command", "position", "velocity", "current", "reference")}
+        chosen: dict[str, object] = {
+            q: {"column": c.name, "unit": _unit(table, c.name, q)} for q, c in parts.items() if c is not None
+        }
+        for needed in ("command", "position"):
+            if needed not in chosen:
+                chosen[needed] = {"column": UNKNOWN, "unit": _LIKELY[needed]}
+        if any(c is not None and dimension(c.unit or "") == "counts" for c in parts.values()):
+            chosen["resolution"] = 0.001
+            notes.append("resolution: mm (or degrees) per encoder count, or name a machine.")
+        if {"command", "position"} & {q for q, c in parts.items() if c is not None}:
+            axes[name] = chosen
+    if not axes:
+        axes["X"] = {q: {"column": UNKNOWN, "unit": _LIKELY[q]} for q in ("command", "position")}
+    missing = [c.name for c in table.columns.values() if c.unit is None and c.text is None]
+    if missing:
+        notes.append(f"The file gives no unit for {', '.join(missing[:8])}{' ...' if len(missing) > 8 else ''}.")
+    strange = [f"{c.unit!r} of {c.name!r}" for c in table.columns.values() if _is_strange(c)]
+    if strange:
+        notes.append(f"Unknown units, for which {UNKNOWN!r} stands here: {', '.join(strange[:8])}.")
+    content["axis"] = axes
+    return toml_text(content, "\n".join(notes))
+
+
+def map_path(data: Path) -> Path:
+    """Where the map of a data file is found by itself."""
+    return data.with_name(data.name + SUFFIX)
+
+
+def _unit(table: Table, name: str | None, quantity: str) -> str:
+    unit = table.columns[name].unit if name is not None and name in table.columns else None
+    if unit is not None and dimension(unit) in DIMENSIONS[quantity]:
+        return unit
+    if name is not None and name in table.columns and _is_strange(table.columns[name]):
+        return UNKNOWN
+    return (name and default_unit(name)) or _LIKELY[quantity]
+
+
+def _time(table: Table) -> tuple[str | None, str]:
+    """The column of time, or a sentence why there is none; neither where each column has times of its own."""
+    if table.own_times:
+        return None, ""
+    columns = [c for c in table.columns.values() if c.text is None]
+    in_time = [c for c in columns if dimension(c.unit or "") == "time"]
+    rising = [c for c in in_time if _rises(c.values)]
+    named = [c for c in rising if _role(c.name) == "time"]
+    for found in (rising, named):
+        if found and all(_are_alike(c, found[0]) for c in found):
+            return found[0].name, ""  # one alone, or the same in several columns
+    if rising:
+        return None, f"{', '.join(c.name for c in rising)} could each be the time; say which in a map"
+    named = [c for c in columns if _role(c.name) == "time"]
+    if named and not in_time:
+        if named[0].unit is not None:
+            return None, f"{named[0].name!r} may be the time, but {_unknown(named[0], 'time')}"
+        return None, f"{named[0].name!r} may be the time, but nothing gives its unit; give it in a map"
+    if columns and not any(c.unit or _role(c.name) for c in columns):
+        names = ", ".join(c.name for c in columns[:5]) + (" ..." if len(columns) > 5 else "")
+        return None, f"nothing tells what {names} are, and in which units; say it in a map"
+    return None, _no_series(columns, in_time)
+
+
+def _spoiled(table: Table, quantity: str) -> str:
+    """That the column which tells by its name and unit that it is the quantity has a word among its numbers, or ""."""
+    for c in table.columns.values():
+        if c.text is not None and _role(c.name) == quantity and (c.unit is None or dimension(c.unit) is not None):
+            row, cell = c.text
+            where = f"holds {cell!r:.60} in data row {row + 1}"
+            return f"{quantity} is {c.name!r}, as it seems, and {where}; {remedy(cell)}"
+    return ""
+
+
+def _no_series(columns: Sequence[Column], in_time: Sequence[Column]) -> str:
+    """Why a table is no log over time, and what it is instead."""
+    units = {dimension(c.unit or "") for c in columns} | {"adc" for c in columns if c.name.endswith("_adc")}
+    numbered = next((c.name for c in columns if c.name.lower() in _ORDINALS), None)
+    sentence = f"{_NO_LOG}: "
+    if any(_role(c.name) == "time" for c in in_time):
+        name = next(c.name for c in in_time if _role(c.name) == "time")
+        return f"{sentence}{name!r} does not increase from row to row ({len(in_time[0].values)} rows)"
+    if in_time:
+        names = ", ".join(c.name for c in in_time[:3]) + (" ..." if len(in_time) > 3 else "")
+        sentence += f"its columns in s ({names}) are durations, and none increases from row to row"
+    elif numbered:
+        sentence += f"no column is a time, and {numbered!r} only numbers the rows"
+    else:
+        sentence += "no column is a time"
+    kinds = {"time": "moves", "counts": "accuracy", "current": "current", "adc": "vibration"}
+    kind = next((report for of, report in kinds.items() if of in units), None)
+    if kind is not None and (numbered or in_time):
+        sentence += f"; such readings are for `rds report {kind}`"
+    return sentence + "; if its rows are equally spaced in time, say so in a map: rate = 1000.0 (Hz) under [time]"
+
+
+def _are_alike(a: Column, b: Column) -> bool:
+    return a is b or (a.unit == b.unit and np.array_equal(a.values, b.values, equal_nan=True))
+
+
+def _rises(values: np.ndarray) -> bool:
+    steps = np.diff(values[:100_000])
+    return len(steps) > 0 and bool(np.mean(steps > 0.0) >= _RISING)
+
+
+def _tokens(name: str) -> list[str]:
+    return [word for word in re.split(r"[^A-Za-z0-9]+|(?<=[a-z])(?=[A-Z])", name) if word]
+
+
+def _role(name: str) -> str | None:
+    words = [word.lower().rstrip("0123456789") or word for word in _tokens(name)]  # time1, u2
+    return next((role for role, known in _WORDS.items() if any(word in known for word in words)), None)
+
+
+def _groups(table: Table, time: str | None) -> dict[str, list[Column]]:
+    """Columns by axis: `X_measured`, `X voltage` are those of X; without such beginnings there is one axis."""
+    columns = [c for c in table.columns.values() if c.name != time and c.text is None]
+    groups: dict[str, list[Column]] = {}
+    for column in columns:
+        match = re.fullmatch(r"([A-Za-z][A-Za-z0-9]*?)[_. ](.+)", column.name)
+        if match and _role(match[2]) and (len(match[1]) <= 2 or match[1] == "spindle"):
+            groups.setdefault(match[1], []).append(column)
+    whole = {n: cs for n, cs in groups.items() if all(_likely(cs, q) is not None for q in ("command", "position"))}
+    return whole if whole else {"axis": columns}
+
+
+def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
+    """Quantities of one axis, or a sentence on what is in doubt."""
+    measured = [c for c in columns if not _OTHERS & {word.lower() for word in _tokens(c.name)}]
+    found: dict[str, Column] = {}
+    for quantity in ("command", "position"):
+        fits = _fitting(measured, quantity)
+        if not fits:
+            bare = [c.name for c in measured if c.unit is None]
+            doubt = f"no column tells by its unit that it is the {quantity}"
+            if quantity == "position" and (speeds := _fitting(measured, "velocity")):
+                doubt += (
+                    f"; {speeds[0].name} is a velocity, which alone does not do: log the position, or add the "
+                    "velocity's integral over time as a column"
+                )
+            strange = [c for c in measured if _is_strange(c) and _role(c.name) in (quantity, None)]
+            doubt += "".join(f"; {c.name!r}: {_unknown(c, quantity)}" for c in strange[:_TOLD])
+            doubt += _may_stand_for(measured) if quantity == "command" else ""
+            return {}, doubt + (f" (no unit: {', '.join(bare[:_TOLD])})" if bare else "")
+        if len(fits) > 1:
+            names = ", ".join(f"{c.name} [{c.unit}]" for c in fits)
+            return {}, f"{names} could each be the {quantity}"
+        found[quantity] = fits[0]
+    if dimension(found["position"].unit or "") == "counts":
+        return {}, f"{found['position'].name!r} is in encoder counts; give the resolution (mm per count) or the machine"
+    for quantity in ("velocity", "current", "reference"):
+        fits = [c for c in _fitting(measured, quantity) if c not in found.values()]
+        if len(fits) == 1:
+            found[quantity] = fits[0]
+    return found, ""
+
+
+def _is_strange(column: Column) -> bool:
+    """Whether the file gives a unit that is none of those known."""
+    return bool(column.unit) and dimension(str(column.unit)) is None
+
+
+def _unknown(column: Column, quantity: str) -> str:
+    return (
+        f"its unit {column.unit!r} is unknown ({known_units(str(column.unit), DIMENSIONS[quantity])}); give the right "
+        "one in a map, with scale = ... where a number of the column is not one of it"
+    )
+
+
+def _may_stand_for(columns: Sequence[Column]) -> str:
+    """That a current, torque or percentage may be the command, which nobody but the user knows."""
+    of = [d for d in DIMENSIONS["command"] if d != "voltage"]
+    drives = [f"{c.name} [{c.unit}]" for c in columns if dimension(c.unit or "") in of]
+    if not drives:
+        return ""
+    return f"; where a drive's {' or '.join(drives[:_TOLD])} stands for the voltage, say so in a map"
+
+
+def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
+    """The columns whose unit admits the quantity, and of those the ones that have its name, if any do."""
+    dimensions = ("voltage",) if quantity == "command" else DIMENSIONS[quantity]
+    fits = [c for c in columns if dimension(c.unit or "") in dimensions]
+    if quantity == "reference":
+        return [c for c in fits if _role(c.name) == "reference"]
+    fits = [c for c in fits if _role(c.name) != "reference" or quantity == "command"]
+    if quantity == "position":  # a speed is a spindle's position only where it is called so, or nothing else is there
+        places = [c for c in fits if dimension(c.unit or "") != "angular speed"]
+        fits = places or fits
+    named = [c for c in fits if _role(c.name) == quantity]
+    fits = named or fits
+    if quantity == "command" and len(fits) > 1:  # what acts, where the controller's unlimited answer is there too
+        acting = [c for c in fits if "voltage" in {word.lower() for word in _tokens(c.name)}]
+        fits = acting if len(acting) == 1 else fits
+    return fits
+
+
+def _likely(columns: Sequence[Column], quantity: str) -> Column | None:
+    """The first column that may be the quantity, by unit or else by name."""
+    measured = [c for c in columns if not _OTHERS & {word.lower() for word in _tokens(c.name)}]
+    fits = _fitting(measured, quantity)
+    named = [c for c in measured if _role(c.name) == quantity and (c.unit is None or _is_strange(c))]
+    chosen = [*fits, *named] if any(_role(c.name) == quantity for c in fits) else [*named, *fits]
+    return next(iter(chosen), None)

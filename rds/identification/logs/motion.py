@@ -1,0 +1,73 @@
+"""The motion in a log over windows long enough that an encoder's steps do not matter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rds.identification.logs.log import Log
+
+_WINDOW = 0.02  # s: a few time constants of a table-top axis
+_MOST = 200_000  # windows
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Means over windows of `width` samples: command, speed (per s, in the position's unit), and where each begins."""
+
+    width: int
+    command: np.ndarray
+    speed: np.ndarray
+    noise: float  # of a speed, from the encoder's steps
+
+    @property
+    def moves(self) -> float:
+        """The speed beyond which the axis is taken to move."""
+        return max(3.0 * self.noise, 0.02 * float(np.abs(self.speed).max(initial=0.0)))
+
+
+def motion(log: Log) -> Motion:
+    """Window means of a log; a spindle's position is its speed already."""
+    width = max(2, round(_WINDOW / log.sample_period), len(log) // _MOST)
+    count = (len(log) - 1) // width
+    if count < 2:
+        width, count = 1, len(log) - 1
+    ends = np.arange(count + 1) * width
+    command = np.add.reduceat(log.command, ends[:-1])[:count]
+    command[-1:] = log.command[ends[-2] : ends[-1]].sum()
+    command = command / width
+    spans = log.time[ends[1:]] - log.time[ends[:-1]]
+    if log.units.get("position") == "rev/min":
+        speed = np.add.reduceat(log.position, ends[:-1])[:count]
+        speed[-1:] = log.position[ends[-2] : ends[-1]].sum()
+        speed = speed / width
+    else:
+        speed = np.diff(log.position[ends]) / spans
+    noise = (log.resolution or 0.0) / (1.0 if log.units.get("position") == "rev/min" else float(np.median(spans)))
+    return Motion(width, command, speed, noise)
+
+
+def noise(values: np.ndarray) -> float:
+    """The standard deviation of the noise on a smooth motion, quantization included; 0 for fewer than 8 values.
+
+    From third differences, in which the motion leaves next to nothing; the median leaves out jolts.
+    """
+    if len(values) < 8:
+        return 0.0
+    third = np.diff(values, 3)  # 1, 3, 3, 1: the variance is 20 times the noise's
+    robust = 1.4826 * float(np.median(np.abs(third)))
+    return (robust or float(np.sqrt(np.mean(third**2)))) / np.sqrt(20.0)
+
+
+def travel(position: np.ndarray, way: float) -> float:
+    """The farthest that a position moves forward (`way` = 1) or backward (-1), noise included."""
+    y = way * position
+    return float((y - np.minimum.accumulate(y)).max())
+
+
+def correlation(a: np.ndarray, b: np.ndarray) -> float:
+    """Of two series, -1 to 1; 0 where one is constant."""
+    a, b = a - a.mean(), b - b.mean()
+    scale = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / scale if scale > 0.0 else 0.0

@@ -1,0 +1,5 @@
+"""How a design fares over everything that an axis may be: closed loops with drawn parameters, thousands of them."""
+
+from rds.identification.robustness.study import Study, study
+
+__all__ = ["Study", "study"]

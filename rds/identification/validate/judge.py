@@ -1,0 +1,361 @@
+"""From what was measured of a model to the verdict, by reasons. Each rule is a function that gives some or none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import sqrt
+
+from rds.identification.fit.estimate import said_of_guesses
+from rds.identification.fit.kstep import over_noise
+from rds.identification.logs.log import Finding, Gravity
+from rds.identification.validate.assessment import Assessment, largest
+from rds.identification.validate.candidate import Candidate
+from rds.identification.validate.conclusion import DATA, conclude, sentence_of
+from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
+from rds.identification.validate.within import passes, skilled_at
+
+_FACTORS = {  # of measured over modelled, and what makes it
+    -1.0: "the sign of the position or of the command is reversed",
+    1000.0: "the position is in a unit 1000 times smaller than stated (µm for mm, mm for m), or the command in mV",
+    0.001: "the position is in a unit 1000 times larger than stated (m for mm, mm for µm)",
+    25.4: "the position is in mm where inches are stated",
+    1.0 / 25.4: "the position is in inches where mm are stated",
+    60.0: "the speed is per minute where it is stated per second",
+    1.0 / 60.0: "the speed is per second where it is stated per minute",
+}
+_MISLEADING = ("sign", "units", "columns", "wrap")  # findings of a log after which a good fit proves nothing
+_BLOCKS = 50  # with fewer, the residual tests find nothing
+_NEAR = 0.15  # how near to such a factor is suspicious
+_FEW = 0.1  # share of lags beyond the plain band that is still called white
+_IDENTICAL = 1e-9  # RMSE over the motion: only the model's own output comes so near
+
+
+def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
+    """The verdict on `candidate` by its assessment on one log."""
+    reasons = [
+        *_data(a, bands),
+        *_unstable(candidate, a),
+        *_free_run(a, bands),
+        *_scale(a, bands),
+        *_ahead(a, bands),
+        *_voltage(a, bands),
+        *_residuals(a, bands),
+        *_attainable(a, bands),
+        *_structure(a, bands),
+        *_guesses(candidate),
+        *_overfit(candidate, a, bands),
+        *_extent(a, bands),
+    ]
+    word, purpose = conclude(a, reasons, bands)
+    if word is Word.UNTOLD and all(reason.side is not Side.UNTOLD for reason in reasons):
+        reasons.append(
+            Reason(
+                Side.UNTOLD,
+                "closed-loop",
+                "in a closed loop, the free run drifts away while the voltage it needs is right: only a log without "
+                "feedback tells which is at fault",
+            )
+        )
+    return Verdict(word, sentence_of(candidate, a, word, purpose, reasons), tuple(reasons), purpose)
+
+
+def _data(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    log, resolution = a.log, a.log.resolution or 0.0
+    if a.overlap.share > bands.seen:
+        yield Reason(
+            Side.UNTOLD,
+            "same-data",
+            f"{100 * a.overlap.share:.0f} % of the log was seen by the fit ({a.overlap.how}): how well the model "
+            "repeats it says nothing of other data; validate on another log",
+        )
+    elif not a.overlap.known:
+        yield Reason(Side.NOTE, "provenance", f"{a.overlap.how}; make sure that they are others")
+    if a.motion == 0.0:
+        yield Reason(Side.UNTOLD, "no-motion", f"the axis never moves ({a.measured[0]:.6g} {a.unit} throughout)")
+    elif a.motion < bands.least_steps * resolution:
+        steps = a.motion / resolution
+        yield Reason(
+            Side.UNTOLD,
+            "no-motion",
+            f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of its encoder; {bands.least_steps:.0f} are "
+            "needed to tell a model from none",
+        )
+    elif a.changes < bands.least_changes:
+        yield Reason(
+            Side.UNTOLD,
+            "short",
+            f"in {a.time[-1] - a.time[0]:.3g} s the velocity changes between fast and slow, or forward and back, "
+            f"{a.changes} times; {bands.least_changes:.0f} are needed to see any dynamics",
+        )
+    if float(log.command.min()) == float(log.command.max()):
+        yield Reason(
+            Side.UNTOLD, "no-excitation", f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics"
+        )
+    for finding in log.findings:
+        if finding.gravity is not Gravity.NOTE:
+            yield Reason(_side_of(finding), f"{DATA}{finding.kind}", finding.what)
+    yield from _too_good(a, bands)
+
+
+def _side_of(finding: Finding) -> Side:
+    """What speaks against a log speaks against what a model shows there: both may share a sign or a unit that is wrong.
+
+    That samples are missing at its end, and what only the excitation lacks, takes nothing from the rest.
+    """
+    if finding.kind not in _MISLEADING:
+        return Side.NOTE
+    return Side.UNTOLD if finding.gravity is Gravity.FAULT else Side.AGAINST
+
+
+def _too_good(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.free_run is None or a.motion == 0.0:
+        return
+    if a.free_run.rmse <= _IDENTICAL * a.motion:
+        yield Reason(
+            Side.UNTOLD,
+            "own-output",
+            f"the model repeats the log to {a.free_run.rmse:.1g} {a.unit}: the log is this model's own output",
+        )
+    elif a.log.resolution and a.free_run.rmse < bands.floor * a.log.resolution / sqrt(12.0):
+        yield Reason(
+            Side.UNTOLD,
+            "too-good",
+            f"the RMSE of {a.free_run.rmse:.2g} {a.unit} is below the encoder's own rounding "
+            f"({a.log.resolution / sqrt(12.0):.2g} {a.unit}): the log is not what this encoder measured, or the "
+            "stated resolution is wrong",
+        )
+
+
+def _unstable(candidate: Candidate, a: Assessment) -> Iterator[Reason]:
+    if a.unstable_at is None:
+        return
+    if a.log.closed_loop:
+        yield Reason(
+            Side.UNTOLD,
+            "unstable",
+            f"the free run is unstable from {a.unstable_at:.4g} s on, which in a closed loop may be the axis's own way",
+        )
+    else:
+        yield Reason(
+            Side.AGAINST,
+            "unstable",
+            f"the free run is unstable from {a.unstable_at:.4g} s on; the axis stays within {a.motion:.4g} {a.unit}",
+        )
+
+
+def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.free_run is None or a.motion == 0.0:
+        return
+    e = a.free_run
+    position, velocity = passes(a, bands)
+    what = "speed" if a.velocity is None else "position"
+    yield Reason(
+        Side.FOR if position else Side.AGAINST,
+        "free-run",
+        f"free run, {what}: fit {e.fit_percent:.2f} %, RMSE {e.rmse:.4g} {e.unit}, at most {e.maximum:.4g} {e.unit}",
+    )
+    if a.velocity is None:
+        return
+    v = a.velocity
+    yield Reason(
+        Side.FOR if velocity else Side.AGAINST,
+        "free-run-velocity",
+        f"free run, velocity: fit {v.fit_percent:.2f} %, RMSE {v.rmse:.4g} {v.unit}, at most {v.maximum:.4g} {v.unit}",
+    )
+    if velocity and not position and a.drift is not None:
+        yield Reason(
+            Side.AGAINST,
+            "drift",
+            f"the position drifts from the model's by {a.drift:.3g} {a.unit}/s: the error of the velocity adds up",
+        )
+
+
+def _scale(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.gain is None or all(passes(a, bands)):
+        return
+    for factor, meaning in _FACTORS.items():
+        if abs(a.gain / factor - 1.0) < _NEAR:
+            text = f"the measured velocity is {a.gain:.4g} times the model's: {meaning}"
+            yield Reason(Side.AGAINST, "sign" if factor < 0.0 else "unit", text)
+            return
+    if a.gain < 0.0:
+        text = f"the measured velocity is {a.gain:.4g} times the model's: it moves the other way"
+        yield Reason(Side.AGAINST, "sign", text)
+
+
+def _ahead(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if not a.ahead or a.motion == 0.0:
+        return
+    skilled = skilled_at(a, bands)
+    said = ", ".join(
+        f"{k}: {e.rmse:.3g} ({a.naive[k].rmse:.3g} without a model)" for k, e in a.ahead.items() if k in a.naive
+    )
+    unskilled = [str(k) for k in a.ahead if k not in skilled]
+    text = f"RMSE of predictions so many samples ahead, {a.unit}: {said}"
+    if unskilled:
+        text += f"; {', '.join(unskilled)} ahead, the model is worth little more than none, whatever its fit"
+    yield Reason(Side.NOTE if skilled else Side.AGAINST, "ahead", text)
+
+
+def _voltage(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    if a.voltage is None or a.motion == 0.0:
+        return
+    percent = a.voltage.relative_percent
+    if percent is None:
+        yield Reason(
+            Side.NOTE,
+            "voltage",
+            f"no voltage error: {len(a.voltage.extra)} blocks of steady direction are too few, or the model does not "
+            "answer to voltage there",
+        )
+        return
+    unit = a.ranges["command"].unit
+    yield Reason(
+        Side.FOR if percent <= bands.voltage_percent else Side.AGAINST,
+        "voltage",
+        f"the voltage that the model needs for the measured motion differs by {percent:.2f} % "
+        f"(RMS {a.voltage.rmse:.3g} {unit}) from the one given",
+    )
+
+
+def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    tests = a.tests
+    if tests is None or tests.blocks < _BLOCKS or a.motion == 0.0:
+        return
+    r, lag = tests.auto.largest
+    numbers = (
+        f"p = {tests.p_white:.3f}, {tests.blocks} means over {tests.block * a.log.sample_period * 1e3:.3g} ms; largest "
+        f"autocorrelation {r:.2f} after {lag:.3g} s"
+    )
+    if tests.p_white <= bands.significance:
+        yield Reason(Side.AGAINST, "whiteness", f"the residual is not white ({numbers})")
+    elif tests.auto.outside > _FEW:
+        yield Reason(
+            Side.FOR,
+            "whiteness",
+            "the residual is not white, but no less so than the encoder's rounding and the uncertainty of the "
+            f"parameters make it ({numbers})",
+        )
+    else:
+        yield Reason(Side.FOR, "whiteness", f"the residual is white ({numbers})")
+    if a.log.closed_loop:
+        yield Reason(
+            Side.NOTE,
+            "closed-loop",
+            "the log is of a closed loop: the command answers the axis, so a correlation of residual and command "
+            "proves nothing either way",
+        )
+        return
+    free = tests.p_command > bands.significance
+    c, lag = tests.cross.largest
+    yield Reason(
+        Side.FOR if free else Side.AGAINST,
+        "command",
+        f"the residual is {'independent of' if free else 'correlated with'} the command "
+        f"(p = {tests.p_command:.3f}; largest correlation {c:.2f} at {lag:.3g} s)",
+    )
+
+
+def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    found = a.attainable
+    if found is None or a.motion == 0.0:
+        return
+    numbers = f"{found.rmse:.3g} {a.unit} (RMSE) for the model, {found.reached:.3g} {a.unit} for the fit"
+    if found.reached < found.noise:
+        numbers += f", {found.noise:.3g} {a.unit} for the measurement's noise"
+    if found.samples < len(a.log):
+        numbers += f", over the first {found.samples * a.log.sample_period:.3g} s"
+    if found.ratio > bands.attainable:
+        text = (
+            f"the free run is {found.ratio:.3g} times as far off as that of the same structure fitted to this log "
+            f"({numbers}): noise and structure do not explain that, the parameters are off"
+        )
+        yield Reason(Side.AGAINST, "attainable", text)
+    elif all(passes(a, bands)):
+        text = f"no other parameters of this structure would come much nearer ({numbers})"
+        yield Reason(Side.FOR, "attainable", text)
+    if off := [p for p in found.parameters if p.apart > bands.apart]:
+        said = ", ".join(
+            f"{p.name} {p.model:.4g} {p.unit}".rstrip()
+            + f" where this log says {p.here:.4g} ({p.apart:.1f} standard errors)"
+            for p in off
+        )
+        yield Reason(Side.AGAINST, "parameters", f"beyond their intervals: {said}")
+
+
+def _guesses(candidate: Candidate) -> Iterator[Reason]:
+    for sentence in candidate.unusable:
+        yield Reason(Side.AGAINST, "fit", f"the fit warned: {sentence}")
+    for sentence in said_of_guesses(candidate.parameters):
+        yield Reason(Side.AGAINST, "guess", f"{sentence}, whatever this log says of the model as a whole")
+
+
+def _structure(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    """What no parameters of this structure explain. The residual tests cannot see it: a fit with such residuals states
+    wide intervals, which allow for as much.
+    """
+    if a.free_run is None or a.noise == 0.0 or a.motion == 0.0:
+        return
+    if a.log.closed_loop:
+        found = over_noise(a.ahead, a.noise)
+        if found is not None and found[1] > bands.unexplained:
+            yield Reason(
+                Side.AGAINST,
+                "structure-held",
+                f"{found[0]} samples ahead, where the missing controller hardly shows, the model is {found[1]:.3g} "
+                f"times as far off as noise makes it ({a.ahead[found[0]].rmse:.3g} {a.unit} RMSE): the axis does "
+                "something that the model lacks (a delay, play, ...), or the parameters are off",
+            )
+        return
+    if a.attainable is not None:
+        left, what = a.attainable.reached, "fitted to this very log, the same structure still leaves"
+    else:
+        left, what = a.free_run.rmse, "the free run leaves"
+    if left > bands.unexplained * a.noise:
+        yield Reason(
+            Side.AGAINST,
+            "structure",
+            f"{what} {left:.3g} {a.unit} (RMS), {left / a.noise:.3g} times the measurement's noise "
+            f"({a.noise:.2g} {a.unit}, if it is white): the axis does something that the model lacks, and its "
+            "parameters may make up for that",
+        )
+
+
+def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reason]:
+    """Errors on the fit's data beside those here, where no fit to this log is the measure.
+
+    Errors of a free run grow with the length of a log; those of predictions over the same time can be compared.
+    """
+    if a.attainable is not None or a.overlap.share > bands.seen:
+        return
+    known = [ahead for ahead in candidate.fit_predictions() if ahead]
+    shared = [k for k in a.ahead if all(k in ahead for ahead in known)]
+    if not known or not shared:
+        return
+    k = max(shared)
+    own = max(max(ahead[k].rmse for ahead in known), (a.log.resolution or 0.0) / sqrt(12.0))
+    speed = a.ranges["velocity"]
+    if speed.fitted is not None and largest(speed.fitted) > 0.0:
+        own *= max(1.0, largest(speed.here) / largest(speed.fitted))
+    if own > 0.0 and (ratio := a.ahead[k].rmse / own) > bands.worse:
+        yield Reason(
+            Side.AGAINST,
+            "overfitted",
+            f"{k} samples ahead, the RMSE is {ratio:.1f} times what it was on the fit's own data at such speeds "
+            f"({own:.3g} {a.unit}): the fit followed what was particular to them, the model lacks what shows here, or "
+            "the axis has changed",
+        )
+
+
+def _extent(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    for name, found in a.ranges.items():
+        if found.fitted is None:
+            continue
+        here, fitted = largest(found.here), largest(found.fitted)
+        if here > bands.beyond * fitted:
+            yield Reason(
+                Side.NOTE,
+                "extrapolation",
+                f"{name} up to {here:.3g} {found.unit} here, and up to {fitted:.3g} {found.unit} in the fit's data: "
+                "beyond that the model extrapolates",
+            )

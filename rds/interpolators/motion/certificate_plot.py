@@ -1,0 +1,49 @@
+"""The certificate of a motion as a picture: how much of each limit is used, over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rds.interpolators.motion.segments import AXES
+
+if TYPE_CHECKING:
+    from rds.interpolators.motion.certificate import Certificate
+
+
+def plot_certificate(certificate: Certificate, path: str | Path | None = None) -> Any:
+    """Largest velocity, acceleration and jerk of each axis in % of its limit, and the deviation from the path, over
+    time.
+
+    Saved as PNG at `path` if given.
+    """
+    from rds.core.figure import CYCLE, GREY, VERMILLION, Picture, dress, legend
+
+    trace = certificate.trace()
+    drawn = Picture(7.6)
+    grid = drawn.subplots(4, 1, sharex=True)
+    time = trace[:, 0]
+    styles = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (8, 2)))
+    for row, kind in enumerate(("velocity", "acceleration", "jerk")):
+        for i, axis in enumerate(AXES):
+            if certificate.limits.velocity[i] > 0.0:
+                worst = certificate.worst.get((kind, axis))
+                label = f"{axis}, at most {100 * worst.share:.1f} % in line {worst.line}" if worst else axis
+                values = 100.0 * trace[:, 1 + 6 * row + i]
+                grid[row].step(
+                    time, values, where="post", color=CYCLE[i], linestyle=styles[i], linewidth=1.1, label=label
+                )
+        grid[row].axhline(100.0, color=GREY, linewidth=0.9)
+        grid[row].set_ylim(0.0, None)
+        dress(grid[row], f"{kind} [% of limit]", None)
+        legend(grid[row], 3)
+    worst = certificate.worst.get(("deviation", ""))
+    label = f"at most {1000.0 * worst.value:.3g} µm in line {worst.line}" if worst else "deviation"
+    grid[3].step(time, 1000.0 * trace[:, 19], where="post", color=VERMILLION, linewidth=1.1, label=label)
+    grid[3].set_ylim(0.0, max(1.05e3 * trace[:, 19].max(initial=0.0), 0.001))
+    dress(grid[3], "off the path [µm]")
+    legend(grid[3])
+    drawn.align_ylabels()
+    if path is not None:
+        drawn.savefig(path)
+    return drawn

@@ -1,0 +1,214 @@
+"""From the segments of a program to samples of all axes, within the limits: `plan`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from math import ceil, inf
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.interpolators.motion.checking import check_segments
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.samples import Rows, SampleBlock
+from rds.interpolators.motion.segments import SEGMENT
+
+TOLERANCE = 0.05  # mm (degrees), of G64 without P; chosen
+LONGEST_RAMP = 1000.0  # s, acceleration over jerk of an axis, over which the motion is averaged
+MARGIN = 1e-3  # relative, kept off the limits for rounding
+PASSING = ("coolant",)  # kinds of events for which the motion does not come to rest
+ENOUGH = 2048  # segments, or samples, that are gathered before they are handed on
+
+
+def plan(
+    blocks: Iterable[Any],
+    limits: Limits,
+    T: float,
+    *,
+    tolerance: float = TOLERANCE,
+    start: np.ndarray | None = None,
+) -> Iterator[SampleBlock]:
+    """The samples of a program's motion, T s apart, in bounded memory; the same for the same segments.
+
+    blocks: arrays of dtype SEGMENT, or objects with `.segments` and `.events` (each with `after`, `kind`, `value`,
+    `line`: what happens after segment `after` of the block, −1 before the first). The motion comes to rest for each
+    event but coolant, and stays there for the `value` s of a "dwell". tolerance: mm or degrees, of mode BLEND without
+    one. start: where the axes are if events come before motion (6); default the first segment's start.
+
+    Each finite difference of the samples keeps to the velocity, acceleration and jerk of each axis; the speed along the
+    path to the programmed rate. On exact paths all samples are on the path, and the motion slows down where direction
+    or curvature jump, down to a stop. In mode BLEND corners are cut within the tolerance; where the path turns back by
+    more than 150° it is stopped at. The last sample is at rest on the end.
+
+    Raises InputError, by line, for a segment that cannot be: a rate of 0, an axis without limits, a gap before it.
+    """
+    if not T > 0.0:
+        raise InputError(f"sample period T = {T!r} must be more than 0 s")
+    planner = _Planner(limits, T, tolerance, start)
+    for block in blocks:
+        planner.take(getattr(block, "segments", block), getattr(block, "events", ()))
+        yield from planner.run(final=False)
+    yield from planner.run(final=True)
+
+
+def predicted_time(blocks: Iterable[SampleBlock]) -> float:
+    """s: the number of samples times their period."""
+    total = 0.0
+    for block in blocks:
+        total = (block.first + len(block)) * block.T
+    return total
+
+
+class _Planner:
+    def __init__(self, limits: Limits, T: float, tolerance: float, start: np.ndarray | None):
+        from rds.interpolators.motion.stretch import Stretch  # numba, where it is installed
+
+        self.limits, self.T, self.tolerance = limits, T, tolerance
+        share = 1.0 - MARGIN
+        self.within = Limits(limits.velocity * share, limits.acceleration * share, limits.jerk * share)
+        axes = limits.present
+        self.tau = float((limits.acceleration[axes] / limits.jerk[axes]).max()) if axes.any() else T
+        if self.tau > LONGEST_RAMP:
+            raise InputError(
+                f"an axis needs {self.tau:.3g} s to reach its acceleration at its jerk, more than {LONGEST_RAMP:g}; "
+                "raise the jerk of [axis.NAME.limits], or lower the acceleration"
+            )
+        self.stretch = Stretch(self.within, self.tau, T)
+        self.state = np.array([0.0, 0.0, float(limits.velocity.max())])
+        self.point = None if start is None else np.array(start, dtype=float)
+        self.new = np.empty(0, SEGMENT)  # not yet handed to `build`, or not done with
+        self.kept, self.kept_first = (
+            np.empty(0, SEGMENT),
+            0,
+        )  # whose samples are not handed out yet, and their neighbours
+        self.kept_at = np.empty(0)  # programmed distance of their starts
+        self.taken, self.length = 0, 0.0  # segments, and their length
+        self.waiting: list[np.ndarray] = []
+        self.events: list[tuple[int, Any]] = []  # (segment after which, event)
+        self.rested = -1  # the segment after which the motion last came to rest
+        self.end: np.ndarray | None = None
+        self.out = Rows(T)
+
+    def take(self, segments: np.ndarray, events: Iterable[Any]) -> None:
+        for event in events:
+            self.events.append((self.taken + event.after, event))
+        if not len(segments):
+            return
+        check_segments(segments, self.limits.present, self.end)
+        self.end = segments["end"][-1].copy()
+        self.waiting.append(segments)
+        self.taken += len(segments)
+
+    def run(self, final: bool) -> Iterator[SampleBlock]:
+        if not final and sum(map(len, self.waiting)) < ENOUGH:
+            return
+        self._gather()
+        if self.point is None:
+            if not final and not len(self.new):
+                return
+            self.point = self.new["start"][0].copy() if len(self.new) else np.zeros(6)
+        if self.out.total == 0 and (len(self.new) or self.events):
+            self._stay(1, self.point)
+        yield from self._rest_events(self.point)
+        self._build(final)
+        for (position, *samples), rest in self.stretch.run():
+            self._add(position, *samples)
+            if rest is not None:
+                self.rested = rest
+                yield from self._rest_events(position[-1])
+            if len(self.out) >= ENOUGH:
+                yield self._block()
+        if final and len(self.out):
+            yield self._block()
+
+    def _gather(self) -> None:
+        if not self.waiting:
+            return
+        fresh = np.concatenate(self.waiting)
+        self.waiting = []
+        starts = self.length + np.concatenate(([0.0], np.cumsum(fresh["length"])))
+        self.length = float(starts[-1])
+        self.kept_at = np.concatenate((self.kept_at, starts[:-1]))
+        self.kept = np.concatenate((self.kept, fresh))
+        self.new = np.concatenate((self.new, fresh))
+
+    def _build(self, final: bool) -> None:
+        from rds.interpolators.motion.path import build
+        from rds.interpolators.motion.speed import piece_limits
+
+        new, n = self.new, len(self.new)
+        if not n:
+            return
+        first = self.kept_first + len(self.kept) - n  # number of the first segment in `new`
+        rest = np.zeros(n, np.bool_)
+        for after, event in self.events:
+            if event.kind not in PASSING and first <= after < first + n:
+                rest[after - first] = True
+        path = {name: np.ascontiguousarray(new[name]) for name in SEGMENT.fields or () if name not in ("line", "rapid")}
+        path["rate"] = np.where(new["rapid"], inf, new["rate"])
+        path["tolerance"] = np.where(np.isfinite(new["tolerance"]), new["tolerance"], self.tolerance)
+        f, u, done = build(
+            **path, rest=rest, point=self.point, final=final, state=self.state, jerk=self.within.jerk, T=self.T
+        )
+        u[:, 1:3] += first
+        piece_limits(f, self.within.velocity, self.within.acceleration, self.within.jerk, self.tau)
+        self.stretch.extend(f, u)
+        self.new = new[done:]
+
+    def _add(self, position, velocity, acceleration, distance, first, last) -> None:
+        at = np.searchsorted(self.kept_at, distance, side="right") - 1 + self.kept_first
+        segment = np.clip(at, first, last)
+        line = self.kept["line"][segment - self.kept_first]
+        self._passing_events(segment)
+        self.out.add(position, velocity, acceleration, line, segment, distance)
+
+    def _passing_events(self, segment: np.ndarray) -> None:
+        while self.events and self.events[0][1].kind in PASSING:
+            after, event = self.events[0]
+            row = int(np.searchsorted(segment, after, side="right"))
+            if row == len(segment):
+                return
+            self.out.events.append((self.out.total + row, event))
+            self.events.pop(0)
+
+    def _rest_events(self, position: np.ndarray) -> Iterator[SampleBlock]:
+        """What happens now that the motion rests after segment `rested`."""
+        while self.events and self.events[0][0] <= self.rested:
+            _, event = self.events.pop(0)
+            self.out.events.append((self.out.total - 1, event))
+            rows = ceil(event.value / self.T - 1e-9) if event.kind == "dwell" else 0
+            while rows > 0:
+                part = min(rows, 16384)
+                self._stay(part, position)
+                rows -= part
+                if len(self.out) >= ENOUGH:
+                    yield self._block()
+
+    def _stay(self, rows: int, position: np.ndarray) -> None:
+        """Rows at rest; they count as part of the segment that has ended, or of the first."""
+        segment = max(self.rested, 0)
+        k = segment - self.kept_first
+        line = int(self.kept["line"][k]) if 0 <= k < len(self.kept) else 0
+        at = float(self.kept_at[k] + self.kept["length"][k] * (self.rested >= 0)) if 0 <= k < len(self.kept) else 0.0
+        still = np.zeros((rows, 6))
+        self.out.add(
+            *(np.tile(position, (rows, 1)), still, still),
+            *(np.full(rows, line, np.int32), np.full(rows, segment), np.full(rows, at)),
+        )
+
+    def _block(self) -> SampleBlock:
+        segments = self.out.segments()
+        low = max(int(segments[0]) - 2 - self.kept_first, 0)
+        high = min(int(segments[1]) + 3 - self.kept_first, len(self.kept))
+        block = self.out.block(
+            self.kept[low:high].copy(), self.kept_first + low, float(self.kept_at[low]) if low < len(self.kept) else 0.0
+        )
+        oldest = self.stretch.oldest_segment
+        unbuilt = self.kept_first + len(self.kept) - len(self.new)
+        drop = min(max(self.rested, int(segments[1])), unbuilt if oldest is None else oldest, unbuilt) - 3
+        drop -= self.kept_first
+        if drop > 0:
+            self.kept, self.kept_at = self.kept[drop:], self.kept_at[drop:]
+            self.kept_first += drop
+        return block

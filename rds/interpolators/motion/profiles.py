@@ -1,0 +1,67 @@
+"""The profiles that a program's motion can have, and what each promises of its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.interpolators.motion.certificate import Certificate, certified
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.samples import SampleBlock
+
+
+class Profile(NamedTuple):
+    """`promised`: which kinds of limits its samples keep; `about`: what it does, for people."""
+
+    promised: tuple[str, ...]
+    about: str
+
+
+PROFILES = {
+    "planned": Profile(
+        ("velocity", "acceleration", "jerk", "deviation"), "look-ahead and blending within G64's tolerance"
+    ),
+    "trapezoid": Profile(("velocity", "acceleration", "deviation"), "constant accelerations, at rest after each move"),
+    "blended": Profile(("velocity",), "velocities held through corners, all axes in the same stage (three-axis-mill)"),
+    "point-to-point": Profile(
+        ("velocity", "acceleration", "jerk", "deviation"),
+        "least time within the jerk, at rest after each move",
+    ),
+}
+
+
+def motion_of(
+    profile: str, blocks: Iterable[Any], limits: Limits, T: float, *, start: np.ndarray | None = None
+) -> tuple[Iterator[SampleBlock], Certificate]:
+    """The samples of a program's motion, checked as they pass by the certificate of what the profile promises.
+
+    start: where the axes are if events come before motion (6). Raises InputError for a name that there is not, and as
+    the profile does; RdsError without ruckig where it is needed.
+    """
+    if profile not in PROFILES:
+        raise InputError(f"profile {profile!r} is not one of {', '.join(PROFILES)}")
+    if not T > 0.0:
+        raise InputError(f"sample period T = {T!r} must be more than 0 s")
+    certificate = Certificate(limits, promised=PROFILES[profile].promised)
+    return certified(_samples(profile, blocks, limits, T, start), certificate), certificate
+
+
+def _samples(
+    profile: str, blocks: Iterable[Any], limits: Limits, T: float, start: np.ndarray | None
+) -> Iterator[SampleBlock]:
+    if profile == "planned":
+        from rds.interpolators.motion.planner import plan
+
+        return plan(blocks, limits, T, start=start)
+    if profile == "blended":
+        from rds.interpolators.motion.blended_path import blended_path
+
+        return blended_path(blocks, limits, T, start=start)
+    from rds.interpolators.motion.each_move import each_move, point_to_point_law, trapezoid_law
+
+    if profile == "trapezoid":
+        return each_move(blocks, limits, T, trapezoid_law(T), jerk_limited=False, start=start)
+    return each_move(blocks, limits, T, point_to_point_law(T), jerk_limited=True, start=start)

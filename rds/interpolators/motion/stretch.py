@@ -1,0 +1,146 @@
+"""The motion along pieces, from rest to rest: it looks ahead over a window of pieces, and hands out samples.
+
+It plans as if the motion ended with the window, and takes over the part of the profile that this end does not touch. So
+memory is bounded. What is in a window does not depend on how many pieces come at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil, sqrt
+
+import numpy as np
+
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.pieces import END, FIRST, LAST, LENGTH, REST, no_pieces
+from rds.interpolators.motion.profile import cut, hold_tops, phases_of, settled, speeds
+from rds.interpolators.motion.sampling import LASTS, PLACE, SINCE, sample, timed
+from rds.interpolators.motion.speed import envelope, joint_limits
+
+WINDOW = 1024  # pieces that are looked ahead over, at least
+LONGEST_WINDOW = 65536  # pieces: if these are too short a way to stop in, the motion stops after them
+PROGRESS = 0.2  # of a window, that must be settled; else a longer one is taken
+MOST_ROWS = 16384  # samples at a time
+
+# position, velocity, acceleration (m, 6), programmed distance (m), first and last segment of each sample's piece (m)
+Samples = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+class Stretch:
+    """Takes pieces in (`extend`) and gives samples out (`run`); at the end of each stretch it stops giving.
+
+    limits: what is planned with; tau: s, what the profile is averaged over; T: s between samples.
+    """
+
+    def __init__(self, limits: Limits, tau: float, T: float):
+        self._limits, self._tau, self._T = limits, tau, T
+        highest = float(limits.velocity.max()) * sqrt(float(limits.present.sum()))
+        # As far as the limits of a place reach, of a joint also through its neighbours within 3 T.
+        self._reach = highest * (0.5 * tau + 4.5 * T)
+        self._f, self._u = no_pieces()
+        self._begin()
+
+    def _begin(self) -> None:
+        self._place, self._speed, self._time = 0.0, 0.0, 0.0  # where the profile is known to
+        self._passed = 0  # pieces before this place
+        self._next = 1  # sample of the stretch
+        self._window = WINDOW
+        self._rows = np.empty((0, 5))
+
+    def extend(self, f: np.ndarray, u: np.ndarray) -> None:
+        """More pieces that follow. Between stretches and within."""
+        self._f, self._u = np.concatenate((self._f, f)), np.concatenate((self._u, u))
+
+    @property
+    def oldest_segment(self) -> int | None:
+        """The first segment of which a piece is kept; None without pieces."""
+        return int(self._u[0, FIRST]) if len(self._u) else None
+
+    def run(self) -> Iterator[tuple[Samples, int | None]]:
+        """Samples, and the segment after which they end at rest (None: the motion goes on, when there are more
+        pieces).
+        """
+        while True:
+            last = self._passed + self._window
+            at = np.concatenate(([0.0], np.cumsum(self._f[:last, LENGTH])))
+            rests = np.flatnonzero(self._u[:last, REST])
+            if len(rests):
+                count, ends = int(rests[0]) + 1, True
+            elif len(self._f) >= last:
+                count, ends = last, False
+            else:
+                return
+            if not self._look_ahead(at[: count + 1], count, ends):
+                self._window *= 2
+                if self._window > LONGEST_WINDOW:
+                    self._u[count - 1, REST] = 1
+                    self._window = WINDOW
+                continue
+            if ends:
+                finish = int(self._u[count - 1, LAST])
+                yield from self._samples(at, count, finish)
+                self._f, self._u = self._f[count:], self._u[count:]
+                self._begin()
+            else:
+                yield from self._samples(at, count, None)
+                self._forget(at)
+
+    def _look_ahead(self, at: np.ndarray, count: int, ends: bool) -> bool:
+        """Extend the profile; whether that was possible in this window."""
+        f, limits = self._f[:count], self._limits
+        end = at[count] if ends else at[count] - self._reach
+        if end <= self._place:
+            return False
+        joints = joint_limits(f, at, limits.acceleration, limits.jerk, self._tau, self._T)
+        edges, cap, push = envelope(f, at, joints, self._tau, self._place, end)
+        v = speeds(edges, cap, push, self._speed, 0.0)
+        phases = hold_tops(phases_of(edges, cap, push, v), self._tau)
+        if not ends:
+            done = settled(edges, cap, push, self._speed, v) - self._place
+            if done < PROGRESS * (end - self._place):
+                return False
+            phases = cut(phases, done)
+        rows = timed(phases, self._time, self._place)
+        self._rows = np.concatenate((self._rows, rows))
+        self._place = end if ends else self._place + float(phases[:, 0].sum())
+        self._speed = float(phases[-1, 2])
+        self._time = float(rows[-1, SINCE] + rows[-1, LASTS])
+        return True
+
+    def _samples(self, at: np.ndarray, count: int, finish: int | None) -> Iterator[tuple[Samples, int | None]]:
+        if finish is None:
+            stop = int(self._time / self._T * (1.0 - 1e-12))
+        else:
+            stop = ceil((self._time + self._tau) / self._T - 1e-9)
+        f, u = self._f[:count], self._u[:count]
+        while self._next <= stop:
+            m = min(stop - self._next + 1, MOST_ROWS)
+            position, velocity, acceleration = np.empty((m, 6)), np.empty((m, 6)), np.empty((m, 6))
+            distance, piece = np.empty(m), np.empty(m, np.int64)
+            out = (position, velocity, acceleration, distance, piece)
+            sample(self._rows, self._tau, self._T, self._next, m, f, u, at, *out)
+            self._next += m
+            ended = finish is not None and self._next > stop
+            if ended:
+                position[-1], velocity[-1], acceleration[-1] = f[-1, END : END + 6], 0.0, 0.0
+                piece[-1] = count - 1
+            samples = (position, velocity, acceleration, distance, u[piece, FIRST], u[piece, LAST])
+            yield samples, finish if ended else None
+
+    def _forget(self, at: np.ndarray) -> None:
+        """Drop what no further sample needs, and count place and time from later on, which keeps them precise."""
+        since = self._next * self._T - self._tau
+        old = int(np.searchsorted(self._rows[:, SINCE], since, side="right")) - 1
+        if old > 0:
+            self._rows = self._rows[old:]
+        whole = max(int(since / self._T) - 1, 0)
+        self._rows[:, SINCE] -= whole * self._T
+        self._time -= whole * self._T
+        self._next -= whole
+        needed = float(self._rows[0, PLACE]) - 2.0 * self._reach
+        gone = max(int(np.searchsorted(at, needed, side="right")) - 1, 0)
+        self._passed = max(int(np.searchsorted(at, self._place, side="right")) - 1 - gone, 0)
+        if gone > 0:
+            self._f, self._u = self._f[gone:], self._u[gone:]
+            self._rows[:, PLACE] -= at[gone]
+            self._place -= at[gone]

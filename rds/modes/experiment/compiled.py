@@ -1,0 +1,141 @@
+"""Simulations compiled with numba, for sweeps and fits: the same functions as the loop's, in machine code.
+
+Only a linear axis under a library law (or a voltage signal) can be compiled; anything else runs in Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from rds.core.types import Ending
+from rds.models.linear_axis import LinearAxisMotion, coefficients, respond
+from rds.modes.loop.plan import AxisPlan, Plan
+from rds.modes.process.host import Rows
+
+
+def obstacle(plan: Plan) -> str | None:
+    """Why the plan can't be compiled, in a sentence; None if it can."""
+    try:
+        import_module("numba")
+    except ImportError:
+        return "numba is not installed (pip install 'rds[fast]')"
+    if plan.program is not None:
+        return "a part program drives the axes"
+    if plan.changes:
+        return "live values change while it runs"
+    if plan.mode != "simulation":
+        return f"{plan.mode} runs in real time; only simulations can be compiled"
+    for axis in plan.axes:
+        name = axis.axis.name
+        if axis.model.motion is not LinearAxisMotion:
+            return f"axis {name}: only the library's linear-axis model can be compiled"
+        if axis.controller is not None and pure_law(axis) is None:
+            return f"axis {name}: only the library's controllers can be compiled"
+    return None
+
+
+def run_compiled(plan: Plan) -> Rows:
+    """What the loop would have recorded of a simulation, to the last bit. See `obstacle` for what can be compiled."""
+    columns, units = plan.columns(None)
+    rows = np.empty((plan.samples, len(columns)))
+    rows[:, 0] = np.arange(plan.samples)
+    board = plan.machine.converter
+    step = 2.0 * board.range / 2**board.bits if plan.quantization else 0.0
+    low, high = (-board.range, board.range - step) if plan.saturation else (-np.inf, np.inf)
+    for axis in plan.axes:
+        name = axis.axis.name
+        resolution = axis.axis.resolution if plan.quantization else 0.0
+        start = tuple(float(value) for value in axis.model.initial_state)
+        voltage = rows[:, columns.index(f"{name}_voltage")]
+        first = columns.index(f"{name}_reference" if axis.controller else f"{name}_measured")
+        table = rows[:, first : columns.index(f"{name}_command") + 1]
+        interface = (step, low, high, resolution)
+        constants = coefficients(axis.model.params, plan.T)
+        if axis.controller is None:
+            playing()(np.asarray(axis.signal, dtype=float), constants, start, interface, table, voltage)
+        else:
+            reference, law = axis.reference, pure_law(axis)
+            assert reference is not None and law is not None
+            parts = (reference.position, reference.velocity, reference.acceleration)
+            tracking = controlled(law)
+            tracking(
+                *(np.asarray(part, dtype=float) for part in parts),
+                tuple(axis.controller.params["coefficients"]),
+                tuple(float(value) for value in axis.controller.initial_state),
+                constants,
+                start,
+                interface,
+                table,
+                voltage,
+            )
+    return Rows(columns, units, rows, Ending.DONE, "", {})
+
+
+@lru_cache
+def controlled(law: Callable[..., Any]) -> Callable[..., None]:
+    """The compiled loop of one axis under `law`, filling its columns from the reference to the command, and voltage."""
+    from numba import njit
+
+    law, move = njit(law), njit(respond)
+
+    @njit
+    def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage):
+        x, w = start
+        T, decay, reach, tau, K, plus, minus = constants
+        step, low, high, resolution = interface
+        for k in range(len(p)):
+            y = round(x / resolution) * resolution if resolution > 0.0 else x
+            u, state = law(p[k], v[k], a[k], y, state, coefficients)
+            table[k, 0] = p[k]
+            table[k, 1] = v[k]
+            table[k, 2] = a[k]
+            table[k, 3] = y
+            table[k, 4] = u
+            u = min(max(u, low), high)
+            if step > 0.0 and abs(u) < step * 2.0**52:
+                u = round(u / step) * step
+            voltage[k] = u
+            x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
+
+    compiled: Callable[..., None] = simulate
+    return compiled
+
+
+@lru_cache
+def playing() -> Callable[..., None]:
+    """The compiled loop of one axis under a voltage signal, filling its columns measured and command, and voltage."""
+    from numba import njit
+
+    move = njit(respond)
+
+    @njit
+    def simulate(command, constants, start, interface, table, voltage):
+        x, w = start
+        T, decay, reach, tau, K, plus, minus = constants
+        step, low, high, resolution = interface
+        for k in range(len(command)):
+            table[k, 0] = round(x / resolution) * resolution if resolution > 0.0 else x
+            table[k, 1] = command[k]
+            u = min(max(command[k], low), high)
+            if step > 0.0 and abs(u) < step * 2.0**52:
+                u = round(u / step) * step
+            voltage[k] = u
+            x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
+
+    compiled: Callable[..., None] = simulate
+    return compiled
+
+
+def pure_law(axis: AxisPlan) -> Callable[..., Any] | None:
+    """The pure function behind a library controller."""
+    assert axis.controller is not None
+    control = axis.controller.control
+    module = getattr(control, "__module__", "")
+    if not module.startswith("rds.controllers.") or axis.controller.coupled:
+        return None
+    return getattr(import_module(module), "law", None)

@@ -1,0 +1,231 @@
+"""An experiment: which axes of which machine, driven by what, in which mode. Made in Python or from a TOML file."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rds.core.errors import ContractError, InputError, MachineError, RdsError
+from rds.core.folder_kept import folder_kept
+from rds.core.toml_table import Words
+from rds.core.types import Ending
+from rds.modes import load_mode
+from rds.modes.experiment.folder import new_folder, require_writable
+from rds.modes.experiment.outcome import outcome
+from rds.modes.experiment.resolve import resolve
+from rds.modes.experiment.run import Run
+from rds.modes.experiment.validation import validated
+from rds.modes.loop.changes import FILE as CHANGES
+from rds.modes.loop.changes import as_text
+from rds.modes.loop.plan import Plan
+from rds.modes.process.host import Progress, Rows, run_plan
+from rds.modes.process.live import Live
+from rds.modes.process.record import write_whole
+from rds.results import Result
+
+
+class Experiment:
+    """One or more axes of a machine, driven by controllers after references, or by voltage signals.
+
+    The arguments are the keys of an experiment file (docs/experiments.md), with these liberties: `controller`
+    may be a library name, the path of a student's .py file, a function `control(t, r, y, state, params)`,
+    `globals()` of a notebook that defines one, a python-control system, an `rds.Controller`, or a table (dict);
+    `model` likewise with `derivatives` or `advance`; `reference` and `signal` a signal (`rds.sinusoid(5.0, 0.2)`),
+    a function of time, or a table. `axis` may be one name or several; with several, `overrides` such as
+    {"Y": {"controller": ...}} differ for one axis. What is wrong raises InputError at once.
+
+        experiment = rds.Experiment(axis="X", reference=rds.sinusoid(5.0, 0.2), controller="my_controller.py")
+        simulated = experiment.run()
+        emulated = experiment.run("emulation")
+    """
+
+    def __init__(
+        self,
+        machine: str = "mini-cnc",
+        axis: str | Sequence[str] = "X",
+        mode: str = "simulation",
+        duration: float = 10.0,
+        sample_period: float | None = None,
+        *,
+        reference: Any = None,
+        controller: Any = None,
+        signal: Any = None,
+        model: Any = None,
+        overrides: Mapping[str, Mapping[str, Any]] | None = None,
+        interface: Mapping[str, bool] | None = None,
+        timing: Mapping[str, Any] | None = None,
+        bus: Mapping[str, Any] | None = None,
+        compiled: bool = False,
+        title: str | None = None,
+    ):
+        given: dict[str, Any] = {
+            "title": title,
+            "machine": machine,
+            "mode": mode,
+            "duration": duration,
+            "sample_period": sample_period,
+            "reference": reference,
+            "controller": controller,
+            "signal": signal,
+            "model": model,
+            "interface": interface,
+            "timing": timing,
+            "bus": bus,
+            "compiled": compiled,
+        }
+        table = {key: value for key, value in given.items() if value is not None}
+        if isinstance(axis, str) and not overrides:
+            table["axis"] = axis
+        else:
+            table["axes"] = [axis] if isinstance(axis, str) else list(axis) if isinstance(axis, Iterable) else axis
+            if overrides:
+                table["axis"] = dict(overrides)
+        self._words = Words(table)
+        self._folder = Path.cwd()
+        self.plan()
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Experiment:
+        """The experiment that a file describes; the files that it names are looked for from its own folder."""
+        experiment = cls.__new__(cls)
+        experiment._words = Words.read(path)
+        experiment._folder = Path(path).resolve().parent
+        experiment.plan()
+        return experiment
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], folder: str | Path = ".") -> Experiment:
+        """The experiment of a table that says what a TOML file would; files are looked for from `folder`."""
+        experiment = cls.__new__(cls)
+        experiment._words = Words(dict(table))
+        experiment._folder = Path(folder).resolve()
+        experiment.plan()
+        return experiment
+
+    @property
+    def mode(self) -> str:
+        """The mode that `run()` takes unless it is told another."""
+        return str(self._words.table.get("mode", "simulation"))
+
+    @property
+    def title(self) -> str | None:
+        """What the user calls it."""
+        title = self._words.table.get("title")
+        return None if title is None else str(title)
+
+    def with_model(self, model: Any) -> Experiment:
+        """The same experiment with another model of its axis, given as for `Experiment`; controllers are designed anew.
+
+        InputError for an experiment of several axes, each of which has a model of its own.
+        """
+        table = {key: value for key, value in self._words.table.items() if key != "model"}
+        if len(self.plan().axes) > 1 or isinstance(table.get("axis"), dict):
+            raise InputError("it has several axes, each with a model of its own; name these in the experiment's file")
+        changed = copy.copy(self)
+        changed._words = self._words.over_written(table | {"model": model})
+        changed.plan()
+        return changed
+
+    @property
+    def periods(self) -> dict[str, float | None]:
+        """The period of each axis's reference, s; None where it does not repeat. Metrics leave the first one out."""
+        return dict(self._resolve(None)[1]["period"])
+
+    def plan(self, mode: str | None = None) -> Plan:
+        """What would run: every part made and checked. Raises InputError for what will not do."""
+        return self._resolve(mode)[0]
+
+    def run(
+        self,
+        mode: str | None = None,
+        *,
+        out: str | Path | None = None,
+        progress: Progress | None = None,
+        changes: Iterable[Any] = (),
+    ) -> Result:
+        """Run in `mode` (default: the experiment's own) and return the result.
+
+        With `out`, the result is saved in that folder (CSV, MAT, Parquet); a real-time run keeps its raw record
+        there while it runs, and in a new folder under `runs/` where none is given. `progress(samples taken, samples
+        in all)` is called now and then. `changes` of live values, as (time in s, name, value), are made at their times;
+        those of an earlier run are in its `meta["changes"]`, and repeat it in a simulation sample for sample.
+
+        Raises ContractError if the student's code breaks its contract or raises, and MachineError if the machine
+        was never there; the samples of a real-time run are kept in its record. A run that ended early for another
+        reason says so in the result's `meta["ending"]`.
+        """
+        run = self._prepared(mode, out, changes)
+        return run.start().wait(progress) if load_mode(run.plan.mode).real_time else run.here(progress)
+
+    def start(self, mode: str | None = None, *, out: str | Path | None = None, changes: Iterable[Any] = ()) -> Run:
+        """Begin to run in `mode`, and return at once: a handle on the run, which can be watched, changed and stopped.
+
+            run = experiment.start("emulation")
+            run.ready()
+            run.desk.set("X.Pgain", 30.0)
+            result = run.wait()
+
+        `out` and `changes` as for `run`. Raises InputError for what will not do; the run's own errors come from
+        `wait()`. A simulation takes no more time than it needs, so there is little to watch in it.
+        """
+        return self._prepared(mode, out, changes).start()
+
+    def _prepared(self, mode: str | None, out: str | Path | None, changes: Iterable[Any]) -> Run:
+        plan, known = self._resolve(mode)
+        plan = plan.with_changes(changes)
+        if out is not None:
+            require_writable(out)
+            folder: Path | None = Path(out)
+        else:
+            folder = new_folder(plan.names, plan.mode) if load_mode(plan.mode).real_time else None
+
+        def work(live: Live | None, progress: Progress | None) -> Result:
+            with folder_kept():
+                rows = self._rows(plan, folder, progress, live)
+            return self._finished(plan, known, rows, folder, out)
+
+        return self._handle(plan, folder, work)
+
+    def _handle(self, plan: Plan, folder: Path | None, work: Callable[[Live | None, Progress | None], Result]) -> Run:
+        return Run(plan, folder, work)
+
+    def _finished(
+        self, plan: Plan, known: dict[str, Any], rows: Rows, folder: Path | None, out: str | Path | None
+    ) -> Result:
+        if rows.ending is Ending.FAULT:
+            kept = f" (the samples up to then are in {folder})" if len(rows.values) else ""
+            raise ContractError(f"{rows.reason}{kept}")
+        if not len(rows.values):
+            raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
+        result = self._complete(outcome(plan, rows, known))
+        if load_mode(plan.mode).validates:
+            result = validated(plan, result)
+        if out is not None:
+            result.save(out)
+            if rows.changes:
+                write_whole(Path(out) / CHANGES, as_text(rows.changes).encode())
+            else:
+                (Path(out) / CHANGES).unlink(missing_ok=True)  # of an earlier run
+        return result
+
+    def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
+        return resolve(self._words, self._folder, mode)
+
+    def _complete(self, result: Result) -> Result:
+        """What else is to be said of a result; a run of another kind adds to it."""
+        return result
+
+    def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None, live: Live | None) -> Rows:
+        note = None
+        if self._words.flag("compiled", False):
+            from rds.modes.experiment.compiled import obstacle, run_compiled
+
+            note = obstacle(plan) or (None if live is None else "somebody may change it while it runs")
+            if note is None:
+                return run_compiled(plan)
+            note = f"not compiled: {note}"
+        rows = run_plan(plan, folder, progress, live)
+        return replace(rows, notes=(note,)) if note else rows

@@ -1,0 +1,161 @@
+"""From the rows that a loop recorded to the result that a user sees."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from rds.core.types import Ending, Model, Source
+from rds.core.values import shown
+from rds.modes import load_mode
+from rds.modes.loop.plan import Plan
+from rds.modes.loop.stopwatch import TIMING_COLUMNS
+from rds.modes.process.environment import sentence
+from rds.modes.process.host import Rows, run_plan
+from rds.modes.process.record import table
+from rds.modes.process.replay import as_recorded
+from rds.modes.process.second_look import own_times
+from rds.modes.process.timing import Timing, judge, summary
+from rds.results import Result
+
+_LONGEST = 1024  # bits of an int that is kept as a number: beyond some thousand digits Python does not print it
+
+
+def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
+    """The result of a run: its table, and in `meta` all that was known of it."""
+    mode = load_mode(plan.mode)
+    columns, units = table(rows.columns, rows.units, rows.values, plan.T)
+    sample = rows.values[:, 0].astype(np.int64)
+    if mode.followed and plan.controlled:
+        columns |= _simulated(plan, rows, sample)
+    meta = _description(plan, rows) | known
+    if mode.real_time:
+        meta |= _judged(plan, rows, sample)
+        if note := bus_note(meta["drivers"], meta["bus"]):
+            meta["notes"].append(note)
+    return Result(columns, units, meta)
+
+
+def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
+    """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
+    same = replace(as_recorded(plan, rows), mode="simulation", samples=int(sample[-1]) + 1)
+    simulated = run_plan(same, None)
+    of = dict(zip(simulated.columns, simulated.values.T, strict=True))
+    return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}
+
+
+def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
+    """The timing summary and the verdict, with the environment that they were measured in."""
+    environment, drivers = rows.report.get("environment", {}), rows.report.get("drivers", {})
+    recorded = dict(zip(rows.columns, rows.values.T, strict=True))
+    timing = Timing(sample, *(recorded[name] for name in TIMING_COLUMNS))
+    period = round(plan.T * 1e9)
+    whole = rows.ending is Ending.DONE and plan.program is None
+    passed = plan.samples if whole else int(sample[-1]) + 1
+    judgement = judge(
+        timing,
+        period,
+        limit=plan.late_limit,
+        discarded=passed - len(sample),
+        stalls=environment.get("rehearsal", {}).get("stalls", 0),
+        threads=environment.get("threads", 0),
+        missing=drivers.get("missing", 0),
+        silent=drivers.get("silent", 0),
+        again=partial(own_times, plan, rows),
+    )
+    return {
+        "verdict": str(judgement.verdict),
+        "verdict_reason": judgement.reason,
+        "timing": summary(timing, period)
+        | {"discarded": judgement.discarded, "late_without_system": judgement.late_without_system},
+        "environment": environment | {"sentence": sentence(environment)} if environment else {},
+        "drivers": drivers,
+        "bus": rows.report.get("bus", {}),
+    }
+
+
+def _description(plan: Plan, rows: Rows) -> dict[str, Any]:
+    board = plan.machine.converter
+    return {
+        "mode": plan.mode,
+        "machine": plan.machine.name,
+        "axes": plan.names,
+        "sample_period": plan.T,
+        "duration": plan.samples * plan.T,
+        "voltage_range": board.range,
+        "saturation": plan.saturation,
+        "quantization": plan.quantization,
+        "controller": {
+            p.axis.name: _part(p.controller.source, p.controller.params) for p in plan.axes if p.controller is not None
+        },
+        "model": {p.axis.name: _model(p.model) for p in plan.axes},
+        "ending": str(rows.ending),
+        "ending_reason": rows.reason,
+        "changes": [list(change) for change in rows.changes],
+        "notes": list(rows.notes),
+        "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
+        "versions": _versions(),
+    }
+
+
+def _part(source: Source, params: Any) -> dict[str, Any]:
+    plain = {key: _plain(value) for key, value in dict(params).items()}
+    return {"name": source.name, "path": source.path, "sha256": source.sha256, "source": source.text, "params": plain}
+
+
+def _model(model: Model) -> dict[str, Any]:
+    part, file = _part(model.source, model.params), model.fitted
+    return part | ({"fitted": {"path": file.path, "sha256": file.sha256, "source": file.text}} if file else {})
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    plain = isinstance(value, bool | float | str | None) or (isinstance(value, int) and value.bit_length() <= _LONGEST)
+    return value if plain else shown(value, 200)
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for name in ("rds", "numpy", "python-can", "numba"):
+        if name in ("rds", "numpy") or name.replace("python-", "") in sys.modules:
+            try:
+                versions[name] = version(name)
+            except PackageNotFoundError:
+                continue
+    return versions
+
+
+def bus_note(drivers: Mapping[str, Any], bus: Mapping[str, Any]) -> str | None:
+    """From the drivers' counters and the statistics of the built-in bus (either may be empty); None: all went well."""
+    parts = []
+    if missing := drivers.get("missing", 0):
+        late = min(drivers.get("late", 0), missing)
+        came = f", {late} of them came later" if late else ""
+        of = "the position before stood in for " + ("it" if missing == 1 else "each")
+        parts.append(f"{_some(missing, 'answer')} of modules did not come within the period{came} ({of})")
+    if lost := drivers.get("lost_ticks", 0):
+        parts.append(f"modules missed {_some(lost, 'command')}")
+    if cut := drivers.get("cut", 0):
+        parts.append(f"zero volts for {_some(cut, 'period')}, because a module was silent")
+    if emergencies := drivers.get("emergencies", 0):
+        parts.append(_some(emergencies, "emergency message"))
+    if errors := bus.get("error_frames", 0):
+        parts.append(f"{_some(errors, 'error frame')}, after which the frames were sent again")
+    if struck := bus.get("struck", 0):
+        parts.append(f"{_some(struck, 'frame')} struck by injected faults")
+    return f"on the bus: {'; '.join(parts)}" if parts else None
+
+
+def _some(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -1,0 +1,195 @@
+"""Models, controllers and signals, from whatever way a user names them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rds.controllers import controller_names, library_controller
+from rds.core.adapt import as_controller, as_model, is_control_system
+from rds.core.errors import InputError
+from rds.core.integrate import SUBSTEPS
+from rds.core.load import StudentFile, from_function, from_namespace, load_student
+from rds.core.toml_table import Words
+from rds.core.types import Controller, Model
+from rds.machines import Axis
+from rds.models import library_model, model_names
+from rds.models.machine_model import MachineAxisMotion, linear_part
+from rds.models.student import student_model
+from rds.references import Signal, make_signal, signal_kinds, user
+
+_FUNCTIONS = ("control", "derivatives", "advance", "output")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What parts are made for: the axis, its sample period in s, its converter's limit in V, the user's folder."""
+
+    axis: Axis
+    T: float
+    limit: float
+    folder: Path
+
+    def path(self, name: str) -> Path:
+        """A file that the user named, from the folder of the experiment."""
+        return self.folder / name
+
+
+def make_model(words: Words, setting: Setting) -> Model:
+    """The axis's model; the machine's own where the user names none."""
+    given = words.any("model")
+    default = dict(setting.axis.model)
+    if given is None:
+        return library_model(default.pop("name"), **default)
+    if isinstance(given, Model):
+        return given
+    if is_control_system(given):
+        return as_model(given, setting.T)
+    table, student = _table_or_student(words, "model", setting)
+    if student is not None:
+        substeps = table.whole("substeps", SUBSTEPS, "steps of RK4 in each sample", 1, 10_000)
+        params = _params(table)
+        table.done()
+        with _named(table):
+            return student_model(student, params, substeps or SUBSTEPS)
+    if "file" in table:
+        return _fitted_model(table, setting)
+    name, options = _name_and_options(table, "model", model_names())
+    with _named(table):
+        return library_model(name, **((default if name == default.pop("name", None) else {}) | options))
+
+
+def _fitted_model(table: Words, setting: Setting) -> Model:
+    """The model of a model file, as `rds fit` writes it."""
+    from rds.identification.fit.model_file import read_model
+    from rds.identification.fit.run_model import run_model
+
+    path = setting.path(str(table.text("file")))
+    table.done()
+    return run_model(read_model(path), unit=setting.axis.unit)
+
+
+def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
+    """The axis's controller, designed for its model where it is a library's."""
+    given = words.any("controller")
+    if given is None:
+        raise InputError(
+            f"controller of axis {setting.axis.name} is missing; add `[controller]` with `name` or `file`, or a "
+            f"`[signal]` to drive without one",
+            words.place(),
+        )
+    if isinstance(given, Controller):
+        return given
+    if is_control_system(given):
+        return as_controller(given, setting.T)
+    table, student = _table_or_student(words, "controller", setting)
+    if student is not None:
+        is_coupled, params = table.flag("coupled", False), _params(table)
+        table.done()
+        with _named(table):
+            return student.controller(coupled=is_coupled, params=params)
+    name, options = _name_and_options(table, "controller", controller_names())
+    if model.motion is MachineAxisMotion:
+        design: Mapping[str, Any] = linear_part(model.params)
+    else:
+        design = model.params if {"tau", "K"} <= set(model.params) else setting.axis.model
+    with _named(table):
+        return library_controller(name, design, setting.T, setting.limit, unit=setting.axis.unit, **options)
+
+
+def make_drive(words: Words, key: str, setting: Setting, unit: str) -> Signal:
+    """The reference or the voltage signal of an axis, in `unit`. InputError if sampling is too slow for it."""
+    given = words.any(key)
+    table = words.inner(key) if not isinstance(given, Signal) and not callable(given) else None
+    with _named(table or words.table_of(key, {})):
+        signal = _signal(given, table, setting, unit)
+        signal.check_sampling(setting.T)
+    return signal
+
+
+def _signal(given: Any, table: Words | None, setting: Setting, unit: str) -> Signal:
+    if isinstance(given, Signal):
+        return given
+    if table is None:
+        return user(function=given)
+    if "kind" not in table:
+        raise InputError(f'kind is missing; as in `kind = "sinusoid"` (amplitudes in {unit})')
+    kind = table.choice("kind", "", signal_kinds())
+    options = {name: table.any(name) for name in table.table if name != "kind"}
+    if isinstance(options.get("file"), str):
+        options["file"] = str(setting.path(options["file"]))
+    return make_signal(kind, **options)
+
+
+def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, StudentFile | None]:
+    """The table that was given under `key`, and the student's functions if it was a file, or these themselves."""
+    given = words.any(key)
+    nameless = words.table_of(key, {})
+    if isinstance(given, StudentFile):
+        return nameless, given
+    if isinstance(given, str):
+        given = {"file" if given.endswith((".py", ".toml")) else "name": given}
+    elif isinstance(given, dict) and any(callable(given.get(name)) for name in _FUNCTIONS):
+        with _named(nameless):
+            return _functions(words, key, given), from_namespace(given)
+    elif callable(given):
+        with _named(nameless):
+            return nameless, from_function(given)
+    elif not isinstance(given, dict):
+        raise words.fault(key, f"must be a name, the path of a .py file, a function, or a table, as in `[{key}]`")
+    table = words.table_of(key, given)
+    if "file" not in table:
+        return table, None
+    if "name" in table:
+        raise InputError("name and file both say what to take; give one of them", table.place("name"))
+    path = setting.path(str(table.text("file")))
+    if not path.is_file():
+        kind = f"{path} is a folder" if path.is_dir() else f"there is no such file as {path}"
+        raise table.fault("file", f"will not do: {kind}; a name counts from the experiment's folder")
+    if path.suffix == ".toml":
+        if key != "model":
+            raise table.fault("file", f"is no {key}: a .toml file is a model; name the {key}'s .py file")
+        return table, None
+    return table, load_student(path)
+
+
+def _functions(words: Words, key: str, given: dict[str, Any]) -> Words:
+    """What a table of functions says besides. A notebook's `globals()` holds much else; a table by hand does not."""
+    if "__name__" in given:
+        return words.table_of(key, {})
+    table = words.table_of(key, given)
+    for name in ("control",) if key == "controller" else _FUNCTIONS[1:]:
+        table.any(name)
+    table.any("initial_state")
+    return table
+
+
+def _name_and_options(table: Words, kind: str, known: Sequence[str]) -> tuple[str, dict[str, Any]]:
+    """The library part that a table names, and the rest of the table."""
+    if "name" not in table:
+        raise InputError(f"{kind} needs `name` ({', '.join(known)}) or `file`", table.place())
+    name = table.choice("name", "", known)
+    return name, {key: table.any(key) for key in table.table if key != "name"}
+
+
+def _params(table: Words) -> dict[str, Any] | None:
+    inner = table.inner("params")
+    return dict(inner.table) if inner else None
+
+
+class _named:
+    """Errors inside tell the place of the table that asked for it, unless they know a better one."""
+
+    def __init__(self, table: Words):
+        self._table = table
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: Any) -> None:
+        if isinstance(error, InputError) and error.where is None and (self._table.path or self._table.name):
+            text = str(error)
+            key = next((key for key in self._table.table if f"{key} = " in text or repr(key) in text), None)
+            raise type(error)(text, self._table.place(key)) from error

@@ -1,0 +1,335 @@
+"""From the words of an experiment to the plan of a run."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rds.bus.hub.bus_settings import BITRATES, DATA_BITRATES, OUR_WORDS
+from rds.bus.medium.fault_file import read_faults
+from rds.bus.modules.dialects import DEFAULT, dialect_names
+from rds.core.clock import LatePolicy
+from rds.core.errors import InputError
+from rds.core.folder_kept import folder_kept
+from rds.core.toml_table import Words
+from rds.machines import Axis, Machine, load_machine
+from rds.modes import load_mode, mode_names
+from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model
+from rds.modes.loop.laws import ReferenceSamples
+from rds.modes.loop.mode import Mode
+from rds.modes.loop.plan import AxisPlan, Plan
+from rds.modes.loop.program import Program
+from rds.modes.process.machine import BUILTIN
+
+MOST_SAMPLES = 20_000_000
+PERIODS = (1e-6, 1000.0)  # s: the shortest and the longest sample period
+AXIS_WORDS = ("reference", "signal", "controller", "model")
+
+
+@folder_kept()
+def resolve(
+    words: Words, folder: Path, mode_name: str | None = None, program: Program | None = None
+) -> tuple[Plan, dict[str, Any]]:
+    """The plan of the experiment, in `mode_name` if that is given, and what is known of it for the result's meta.
+
+    With a part program, that drives its axes and the spindle: the words say their controllers, and no reference.
+    Raises InputError with file, line, key, value and remedy for anything that will not do.
+    """
+    words.text("title")
+    machine = _machine(words, folder)
+    written = words.choice("mode", "simulation", mode_names())
+    mode = load_mode(written if mode_name is None else mode_name)
+    T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
+    samples = _samples(words, T) if program is None else program.samples
+    words.flag("compiled", False)
+    saturation, quantization = _interface(words, mode)
+    limit = machine.converter.range if saturation else inf
+    timing = _timing(words, mode)
+    driven = _drive(words, mode) if program is None else _program(words, mode)
+    axes, periods = [], {}
+    for axis, own in _axes(words, machine) if program is None else _program_axes(words, machine, program):
+        made, periods[axis.name] = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
+        axes.append(made)
+    bus = bus_table(words, folder)
+    words.done()
+    _check_coupling(axes, words)
+    plan = Plan(
+        mode=mode.name,
+        machine=machine,
+        axes=tuple(axes),
+        T=T,
+        samples=samples,
+        saturation=saturation,
+        quantization=quantization,
+        bus=bus,
+        import_path=_import_path(axes),
+        program=program,
+        **timing,
+    )
+    return plan, {"period": periods}
+
+
+def _samples(words: Words, T: float) -> int:
+    duration = words.number("duration", None, "s", 0.0, 1e9)
+    samples = round(duration / T)
+    if duration < T * (1.0 - 1e-9):
+        raise words.fault("duration", f"s must be at least one sample period, {T:g} s")
+    if samples > MOST_SAMPLES:
+        raise words.fault("duration", f"s makes {samples} samples of {T:g} s; it takes at most {MOST_SAMPLES}")
+    return samples
+
+
+def machine_name(words: Words, folder: Path) -> str:
+    """The machine's name, or the path of its file, which an experiment names as seen from its own folder."""
+    name = words.text("machine", "mini-cnc") or ""
+    return str(folder / name) if name.endswith(".toml") else name
+
+
+def _machine(words: Words, folder: Path) -> Machine:
+    name = machine_name(words, folder)
+    try:
+        return load_machine(name)
+    except InputError as error:
+        raise error if error.where else InputError(str(error), words.place("machine")) from error
+
+
+def _axes(words: Words, machine: Machine) -> list[tuple[Axis, Words]]:
+    """Each axis of the run with its words: its own tables over the general ones."""
+    given, several = words.any("axis"), words.any("axes")
+    if given is not None and not isinstance(given, str | dict):
+        raise words.fault(
+            "axis", f"must be the name of an axis in quotes; {machine.name} has {', '.join(machine.axes)}"
+        )
+    if several is None:
+        if not isinstance(given, str):
+            raise InputError('axis is missing; as in `axis = "X"`, or `axes = ["X", "Y"]` for several', words.place())
+        several = [given]
+    elif isinstance(given, str):
+        raise InputError("axis and axes both say which axes run; give one of them", words.place("axis"))
+    if not isinstance(several, list) or not several or not all(isinstance(name, str) for name in several):
+        raise words.fault("axes", f"must be a list of axis names; {machine.name} has {', '.join(machine.axes)}")
+    if len(set(several)) != len(several):
+        raise words.fault("axes", "names an axis twice")
+    key = "axes" if "axes" in words.table else "axis"
+    for name in several:
+        if name not in machine.axes:
+            remedy = f"names {name!r}, which machine {machine.name!r} does not have; it has {', '.join(machine.axes)}"
+            raise words.fault(key, remedy)
+    return _with_words(words, machine, several)
+
+
+def _with_words(words: Words, machine: Machine, several: list[str]) -> list[tuple[Axis, Words]]:
+    """Each axis with its own tables over the general ones."""
+    given = words.any("axis")
+    for key in AXIS_WORDS:
+        _ = key in words  # known even where every axis has its own
+    overrides = words.inner("axis") if isinstance(given, dict) else None
+    for name in overrides.table if overrides else ():
+        if name not in several:
+            text = f"[axis.{name}] is for an axis that does not run; axes = {several}"
+            raise InputError(text, overrides.place(name) if overrides else None)
+    return [(machine.axes[name], _own_words(words, overrides, name)) for name in several]
+
+
+def _own_words(words: Words, overrides: Words | None, name: str) -> Words:
+    own = overrides.inner(name) if overrides else None
+    if own is None:
+        return words
+    own = own.over(words, AXIS_WORDS)
+    for key in AXIS_WORDS:
+        _ = key in own
+    return own
+
+
+def _drive(words: Words, mode: Mode) -> str:
+    """Whether controllers or voltage signals drive this run."""
+    overrides = words.table.get("axis")
+    tables = [words.table, *(overrides.values() if isinstance(overrides, dict) else ())]
+    has = {key: any(isinstance(table, dict) and key in table for table in tables) for key in AXIS_WORDS}
+    controlled = has["reference"] or has["controller"]
+    if controlled and has["signal"]:
+        raise InputError(
+            "[signal] drives the axes without a controller; give either [signal], or [reference] and [controller]",
+            words.place("signal"),
+        )
+    if has["signal"] and "signal" not in mode.drives:
+        raise InputError(f"mode {mode.name} needs [reference] and [controller], not [signal]", words.place("signal"))
+    if not has["signal"] and "controller" not in mode.drives:
+        raise InputError(
+            f"mode {mode.name} sends a voltage signal: give [signal] (kind, amplitude in V, frequency in Hz) "
+            "instead of [reference] and [controller]",
+            words.place("mode"),
+        )
+    return "signal" if has["signal"] else "controller"
+
+
+def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tuple[AxisPlan, float | None]:
+    axis = setting.axis
+    times = np.arange(samples) * setting.T
+    model = make_model(words, setting)
+    period: float | None
+    if driven == "program":
+        plan, period = AxisPlan(axis, model, make_controller(words, setting, model)), None
+    elif driven == "signal":
+        if "signal" not in words:
+            raise InputError(f"axis {axis.name} has no [signal]", words.place())
+        signal = make_drive(words, "signal", setting, "V")
+        plan, period = AxisPlan(axis, model, signal=signal.value(times).tolist()), signal.period
+    else:
+        if "reference" not in words:
+            raise InputError(f'axis {axis.name} has no [reference]; as in `kind = "sinusoid"`', words.place())
+        reference = make_drive(words, "reference", setting, axis.unit)
+        samples_of = ReferenceSamples(*(np.asarray(part, dtype=float) for part in reference.reference(times)))
+        _check_travel(samples_of, axis, words)
+        plan = AxisPlan(axis, model, make_controller(words, setting, model), samples_of)
+        period = reference.period
+    if words.name:
+        words.done()
+    return plan, period
+
+
+def _program(words: Words, mode: Mode) -> str:
+    """What a part program takes the place of is refused."""
+    if "controller" not in mode.drives:
+        raise InputError(f"mode {mode.name} has no controllers, which a part program needs", words.place("mode"))
+    axes = words.any("axis")
+    tables = [words, *(filter(None, map(words.table_of("axis", axes).inner, axes)) if isinstance(axes, dict) else ())]
+    for table in tables:
+        for key in ("reference", "signal", "duration", "axes"):
+            if key in table:
+                raise InputError(f"the part program says what the axes do: remove {key}", table.place(key))
+    return "program"
+
+
+def _program_axes(words: Words, machine: Machine, program: Program) -> list[tuple[Axis, Words]]:
+    """The axes that a program moves and the spindle, in the machine's order."""
+    given = words.any("axis")
+    if given is not None and not isinstance(given, dict):
+        raise words.fault("axis", "names an axis; the part program drives all of them: remove it")
+    used = {*program.axes, program.spindle}
+    axes = [name for name in machine.axes if name in used]
+    for name in given or ():
+        if name not in axes:
+            raise InputError(f"the program drives {', '.join(axes)}, and no axis {name!r}", words.place("axis"))
+    return _with_words(words, machine, axes)
+
+
+def _check_travel(reference: ReferenceSamples, axis: Axis, words: Words) -> None:
+    low, high = axis.travel
+    lowest, highest = reference.position.min(), reference.position.max()
+    if lowest < low or highest > high:
+        raise InputError(
+            f"the reference goes from {lowest:g} to {highest:g} {axis.unit}, "
+            f"but axis {axis.name} travels from {low:g} to {high:g} {axis.unit}; bring the reference into that range",
+            words.place("reference"),
+        )
+
+
+def _interface(words: Words, mode: Mode) -> tuple[bool, bool]:
+    """Whether the simulated converter saturates, and whether it and the encoder quantize."""
+    table = words.inner("interface")
+    if table is None:
+        return True, True
+    flags = table.flag("saturation", True), table.flag("quantization", True)
+    table.done()
+    for key, on in zip(("saturation", "quantization"), flags, strict=True):
+        if not on and mode.drivers == "live":
+            raise table.fault(
+                key, f"cannot be in mode {mode.name}: the machine has its own converter and encoders; remove it"
+            )
+    return flags
+
+
+def bus_table(words: Words, folder: Path) -> dict[str, Any]:
+    """The keyword arguments of can.Bus; python-can itself knows which options an interface has.
+
+    On the built-in bus also "faults", the schedule that is injected during the run.
+    """
+    table = words.inner("bus")
+    if table is None:
+        return {}
+    interface = table.text("interface", BUILTIN) or BUILTIN
+    channel = table.any("channel")
+    if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
+        raise table.fault("channel", "must be the name or the number of a channel")
+    table.choice("dialect", DEFAULT, dialect_names())
+    if "cia402" in table and table.any("dialect") != "cia402":
+        raise table.fault("cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it')
+    drives = table.any("cia402")
+    for name, mode in _drive_modes(drives):
+        if mode in ("csp", "csv"):
+            raise InputError(
+                f'{name} = "{mode}" takes positions or velocities, and every mode of an experiment hands out voltages: '
+                'use "cst"; rds.bus.modules.cia402.follow sends references to drives in csp and csv',
+                table.place("cia402"),
+            )
+    if interface == BUILTIN:
+        table.whole("bitrate", None, "bit/s", *BITRATES)
+        table.whole("data_bitrate", None, "bit/s, of CAN FD", *DATA_BITRATES)
+        if "data_bitrate" in table and "bitrate" not in table:
+            raise table.fault("data_bitrate", "needs a bitrate beside it: only a bus with bit timing has a data rate")
+        table.whole("restart_ms", None, "ms until the host comes back from bus off", 0, 3_600_000)
+        file = table.text("faults")
+        table.done()
+        return dict(table.table) | ({} if file is None else {"faults": read_faults(folder / file)})
+    if "faults" in table:
+        raise table.fault("faults", "can be injected on the built-in bus only; remove it, or the interface")
+    from can.interfaces import VALID_INTERFACES
+
+    if ours := sorted(OUR_WORDS & table.table.keys()):
+        raise table.fault(ours[0], f"cannot be said: {ours[0]} is no option of a bus, but a word of our own; remove it")
+    table.choice("interface", "", sorted(VALID_INTERFACES))
+    return dict(table.table)
+
+
+def _drive_modes(drives: Any) -> Iterator[tuple[str, Any]]:
+    """The modes that a [bus.cia402] table gives, by their keys; what is no such table is refused where it is read."""
+    if not isinstance(drives, Mapping):
+        return
+    yield "bus.cia402.mode", drives.get("mode")
+    axes = drives.get("axis")
+    for name, axis in axes.items() if isinstance(axes, Mapping) else ():
+        if isinstance(axis, Mapping):
+            yield f"bus.cia402.axis.{name}.mode", axis.get("mode")
+
+
+def _timing(words: Words, mode: Mode) -> dict[str, Any]:
+    """Late policy and real-time settings; the mode's own where nothing is said."""
+    table = words.inner("timing") or Words({})
+    late = table.choice("late", "discard" if mode.late.discard else "process", ("process", "discard"))
+    phase = table.choice("phase", "keep" if mode.late.keep_phase else "ignore", ("keep", "ignore"))
+    stop_after = table.whole("stop_after", mode.late.stop_after, "late samples in a row that end the run; 0: never")
+    settings = {
+        "late": LatePolicy(late == "discard", phase == "keep", stop_after or 0),
+        "late_limit": table.whole("late_limit", 0, "late samples that the verdict allows"),
+        "priority": table.whole("priority", 80, "of SCHED_FIFO", 1, 99),
+        "cpu": table.whole("cpu", None, "processor to run on", 0, 4095),
+    }
+    table.done()
+    usable = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+    if usable and settings["cpu"] is not None and settings["cpu"] not in usable:
+        raise table.fault("cpu", f"is not a processor that this program may use; it may use {usable}")
+    return settings
+
+
+def _check_coupling(axes: list[AxisPlan], words: Words) -> None:
+    controllers = [plan.controller for plan in axes if plan.controller is not None]
+    if not any(controller.coupled for controller in controllers):
+        return
+    first = controllers[0]
+    same = all(c.coupled and c.source == first.source and c.params == first.params for c in controllers)
+    if not same:
+        raise InputError(
+            "a coupled controller drives all axes of the run; give it in the general [controller] table only",
+            words.place("controller"),
+        )
+
+
+def _import_path(axes: list[AxisPlan]) -> tuple[str, ...]:
+    paths = [part.source.path for plan in axes for part in (plan.controller, plan.model) if part is not None]
+    return tuple(dict.fromkeys(str(Path(path).parent) for path in paths if path and path.endswith(".py")))

@@ -1,0 +1,1 @@
+"""The sampled loop and what is in it: controllers, signals, part programs, live values."""

@@ -1,0 +1,194 @@
+"""What a run consists of, in a form that can be handed to a process of its own."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from rds.core.clock import LatePolicy
+from rds.core.portable import portable
+from rds.core.types import Controller, Model
+from rds.machines import Axis, Machine
+from rds.machines.converter import converter
+from rds.modes.loop.changes import Heed, plan_changes, stop_channel
+from rds.modes.loop.execution import Execution
+from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
+from rds.modes.loop.live_values import Channel
+from rds.modes.loop.loop import Law
+from rds.modes.loop.program import COLUMNS, Program, program_channels
+from rds.modes.loop.retimed import Retimed
+from rds.modes.loop.tuning import Tuning
+
+_UNBOUNDED = 1 << 50  # samples
+
+
+@dataclass(frozen=True)
+class AxisPlan:
+    """One axis of a run: its model, and a controller with a reference (unless a program gives it) or a signal."""
+
+    axis: Axis
+    model: Model
+    controller: Controller | None = None
+    reference: ReferenceSamples | None = None
+    signal: Sequence[float] | None = None  # V at every sample
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run: mode, axes and everything that the loop is built from. Times in s."""
+
+    mode: str
+    machine: Machine
+    axes: tuple[AxisPlan, ...]
+    T: float
+    samples: int
+    saturation: bool = True
+    quantization: bool = True
+    bus: dict[str, Any] = field(default_factory=dict)  # keyword arguments of can.Bus
+    late: LatePolicy = field(default_factory=LatePolicy)
+    late_limit: int = 0
+    priority: int = 80  # of SCHED_FIFO
+    cpu: int | None = None  # pin the target to this processor
+    rehearsal: float = 0.25  # s of clock and I/O without the student's code, before a real-time run
+    import_path: tuple[str, ...] = ()  # folders of the students' files, for what they import from there
+    changes: tuple[tuple[int, str, float], ...] = ()  # of live values: (sample, channel, value), in order
+    program: Program | None = None  # instead of references; `samples` is then what it takes without waiting
+
+    @property
+    def names(self) -> list[str]:
+        """The axes' names, in axis order."""
+        return [plan.axis.name for plan in self.axes]
+
+    @property
+    def controlled(self) -> bool:
+        """Whether controllers drive the axes (otherwise voltage signals do)."""
+        return self.axes[0].signal is None
+
+    @property
+    def most_samples(self) -> int:
+        """After so many samples the run ends in any case; a program waits for as long as somebody lets it."""
+        return self.samples if self.program is None else _UNBOUNDED
+
+    def limit(self) -> Callable[[Any], float]:
+        """The converter of this run."""
+        board = self.machine.converter
+        return converter(board.range, board.bits, saturation=self.saturation, quantization=self.quantization)
+
+    def channels(self) -> list[Channel]:
+        """What may be changed while it runs: the parameters of controllers, the override of a program, the stop."""
+        own = [] if self.program is None else program_channels()
+        return [channel for tuning in self._tunings() for channel in tuning.channels] + own + [stop_channel()]
+
+    def with_changes(self, changes: Iterable[Any]) -> Plan:
+        """The same run, in which live values change at known times; see `changes.plan_changes`."""
+        channels = {channel.name: channel for channel in self.channels()}
+        return replace(self, changes=plan_changes(changes, channels, self.T))
+
+    def verify(self, values: Mapping[str, float]) -> None:
+        """InputError if a controller cannot be made with these live values."""
+        for tuning in self._tunings():
+            tuning.verify(values)
+
+    def start(self) -> Drive:
+        """What drives the axes, fresh from its initial state, and what takes the changes of live values."""
+        tunings = self._tunings()
+        actions = {name: act for tuning in tunings for name, act in tuning.actions().items()}
+        params = [tuning.params for tuning in tunings]
+        program = self.program
+        if program is None:
+            references = [plan.reference for plan in self.axes if plan.reference is not None]
+            return Drive(self._laws(params, references), Heed(self.channels(), actions, self.changes))
+        live = {name: LiveReference() for name in self.names}
+        spindle = None if program.spindle is None else self.names.index(program.spindle)
+        execution = Execution(
+            program,
+            self.T,
+            Retimed(program, self.T),
+            [live[name] for name in (*program.axes, *([program.spindle] if program.spindle else []))],
+            spindle,
+            0.0 if spindle is None else self.axes[spindle].axis.resolution,
+            lambda names: heed.expects(names),
+        )
+        heed = Heed(self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits)
+        return Drive([execution.law, *self._laws(params, list(live.values()))], heed)
+
+    def _tunings(self) -> list[Tuning]:
+        """The live parameters of each controller; of one controller, if it drives all axes."""
+        first = self.axes[0].controller
+        if first is not None and first.coupled:
+            return [Tuning("controller", first)]
+        return [
+            Tuning(plan.axis.name, plan.controller, plan.axis.unit) for plan in self.axes if plan.controller is not None
+        ]
+
+    def _laws(self, params: list[dict[str, Any]], references: Sequence[ReferenceSamples | LiveReference]) -> list[Law]:
+        limit, plans = self.limit(), self.axes
+        first = plans[0].controller
+        if first is not None and first.coupled:
+            limits = [limit] * len(plans)
+            return [coupled(range(len(plans)), self.names, first, references, self.T, limits, params[0])]
+        laws = []
+        for i, plan in enumerate(plans):
+            if plan.signal is not None:
+                laws.append(played(i, plan.signal, limit))
+            else:
+                assert plan.controller is not None
+                laws.append(controlled(i, plan.axis.name, plan.controller, references[i], self.T, limit, params[i]))
+        return laws
+
+    def columns(self, followed: str | None) -> tuple[list[str], dict[str, str]]:
+        """The names of a record's columns in the order of the loop's rows, and their units.
+
+        `followed` names what the loop's models give besides ("modelled"), if they give anything.
+        """
+        columns = ["sample"]
+        units = {"sample": ""}
+        if self.program is not None:
+            columns += COLUMNS
+            units |= COLUMNS
+        for plan in self.axes:
+            name, unit = plan.axis.name, plan.axis.unit
+            parts = {"measured": unit, "command": "V"}
+            if self.controlled:
+                rates = {"reference_velocity": f"{unit}/s", "reference_acceleration": f"{unit}/s²"}
+                parts = {"reference": unit, **rates, **parts}
+            for part, part_unit in parts.items():
+                columns.append(f"{name}_{part}")
+                units[columns[-1]] = part_unit
+        for part, part_unit in [("voltage", "V"), *([(followed, "")] if followed else [])]:
+            for plan in self.axes:
+                columns.append(f"{plan.axis.name}_{part}")
+                units[columns[-1]] = part_unit or plan.axis.unit
+        return columns, units
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What drives the axes of a run that has begun: its laws, and what takes the changes of live values."""
+
+    laws: list[Law]
+    heed: Heed
+
+
+def dump(plan: Plan) -> bytes:
+    """The plan as bytes for a process of the same user.
+
+    A student's functions travel by value; modules that can be imported here can be imported there as well.
+    """
+    # Twice: the folders are needed before the rest can be read.
+    return portable([*plan.import_path, *sys.path]) + portable(plan)
+
+
+def load(path: Path) -> Plan:
+    """The plan that `dump` wrote to a file; its folders come last in `sys.path`."""
+    import pickle
+
+    with open(path, "rb") as file:
+        folders = [str(Path(folder).resolve()) for folder in pickle.load(file)]
+        sys.path += [folder for folder in dict.fromkeys(folders) if folder not in sys.path]
+        plan = pickle.load(file)
+    assert isinstance(plan, Plan)
+    return plan

@@ -1,0 +1,73 @@
+"""A part program as the loop has it: planned samples of all axes, and what happens where the motion rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from math import ceil
+from typing import TYPE_CHECKING, NamedTuple
+
+from rds.modes.loop.live_values import Channel
+
+if TYPE_CHECKING:
+    import numpy as np
+
+OVERRIDE, HOLD, RESUME, HOME, OPTIONAL_STOP = "override", "hold", "resume", "home", "optional_stop"
+COLUMNS = {"program_line": "", "program_sample": "", "program_override": "", "program_state": ""}
+
+
+class Happening(NamedTuple):
+    """What happens at a planned sample, by a line of the program.
+
+    Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0) or 1 (M1, optional);
+    "tool" its number; "end".
+    """
+
+    sample: int
+    kind: str
+    value: float
+    line: int
+
+
+@dataclass(frozen=True)
+class Program:
+    """Planned samples of the axes that a program moves, one sample period apart, and what happens among them.
+
+    Row 0 is where the motion begins, at rest; dwells have their rows. `position` (m × n, mm or degrees), `velocity` and
+    `acceleration` are in the order of `axes`; `line` (m) is the program line of each row. `spindle` is the axis
+    that the words S, M3 and M4 drive. `home` (n) is where the axes go home to; `limits` (3 × n) are velocity,
+    acceleration and jerk of the axes.
+    """
+
+    axes: tuple[str, ...]
+    spindle: str | None
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    line: np.ndarray
+    happenings: tuple[Happening, ...]
+    home: tuple[float, ...]
+    limits: np.ndarray
+    name: str = ""
+
+    @property
+    def samples(self) -> int:
+        """Samples that the program takes at an override of 100 %, without what it waits for."""
+        return len(self.position)
+
+
+def dwell_samples(seconds: float, T: float) -> int:
+    """A dwell lasts for at least so long."""
+    return ceil(seconds / T - 1e-9)
+
+
+def program_channels() -> list[Channel]:
+    """What may be changed while a program runs, besides the parameters of controllers."""
+    switch = partial(Channel, low=0.0, high=1.0, whole=True)
+    return [
+        Channel(OVERRIDE, 1.0, "feed as a multiple of the programmed one; rapids only get slower", low=0.0, high=2.0),
+        switch(HOLD, 0.0, "1 brings the motion to rest on its path until it is 0 again"),
+        Channel(RESUME, 0.0, "another number than before goes on after M0, M1 and a tool change", low=0.0, high=1e9),
+        switch(HOME, 0.0, "1 ends the program where it is and moves the axes home"),
+        switch(OPTIONAL_STOP, 1.0, "1: M1 waits, 0: it does not"),
+    ]

@@ -1,0 +1,85 @@
+"""The real-time parts of a loop: waiting for due times, and the time that each stage of a sample takes."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from rds.core.clock import RealTimeClock
+from rds.core.types import Ending
+from rds.modes.loop.loop import Loop
+
+TIMING_COLUMNS = ("lateness", "io", "compute", "model", "taken")  # ns
+
+
+class Stopwatch:
+    """Puts a loop under a real-time clock, and the times of each sample in front of its row (after its number).
+
+    Lateness is from the due time to the start; I/O is `read` and `write`; compute is the laws; model is `follow`;
+    taken is what the scheduler took from compute and after (see `core.clock`).
+    """
+
+    def __init__(self, clock: RealTimeClock, append: Callable[[list[float]], None], stop: Callable[[], bool]):
+        self._clock, self._append, self._stop = clock, append, stop
+        self._k = self._started = self._read = self._computed = self._written = self._ended = self._taken = 0
+
+    def time(self, loop: Loop) -> Loop:
+        """The same loop, timed; its rows go to `append`, and it ends when `stop()` is true or by the late policy."""
+        clock, now, taken = self._clock, self._clock.now, self._clock.taken
+        wait_until, read, write, follow = clock.wait, loop.read, loop.write, loop.follow
+
+        def wait(k: int) -> int:
+            k = wait_until(k)
+            self._started = now()
+            return k
+
+        def timed_read() -> Sequence[float]:
+            positions = read()
+            self._read = now()
+            self._taken = taken()
+            return positions
+
+        def timed_write(voltages: Sequence[float]) -> Sequence[float]:
+            self._computed = now()
+            acting = write(voltages)
+            self._written = now()
+            return acting
+
+        def timed_follow(acting: Sequence[float]) -> Sequence[float]:
+            outputs = follow(acting)
+            self._ended = now()
+            return outputs
+
+        return replace(
+            loop, wait=wait, read=timed_read, write=timed_write, follow=timed_follow, record=self._row, finish=self._end
+        )
+
+    def _row(self, row: list[float]) -> None:
+        started, read, computed, written, ended = self._started, self._read, self._computed, self._written, self._ended
+        row[1:1] = (
+            self._clock.lateness(int(row[0]), started),
+            read - started + written - computed,
+            computed - read,
+            ended - written,
+            self._clock.taken() - self._taken,
+        )
+        self._append(row)
+
+    def _end(self, k: int) -> Ending | None:
+        if self._clock.finish(k, self._ended):
+            return Ending.OVERLOADED
+        return Ending.STOPPED if self._stop() else None
+
+
+class quiet_memory:
+    """Garbage collection frozen for as long as the loop runs: a collection pause is a late sample."""
+
+    def __enter__(self) -> None:
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+
+    def __exit__(self, *_: object) -> None:
+        gc.enable()
+        gc.unfreeze()

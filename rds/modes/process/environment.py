@@ -1,0 +1,73 @@
+"""The circumstances of a real-time run: a timing verdict is worth as much as what is known of them."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from pathlib import Path
+from typing import Any
+
+from rds.core.scheduling import lock_memory, raise_priority, set_timer_slack
+
+
+def prepare(priority: int, cpu: int | None) -> dict[str, Any]:
+    """Make this process as real-time as the system permits; returns what was got."""
+    got: dict[str, Any] = {"scheduler": raise_priority(priority), "priority": priority}
+    got["memory_locked"] = lock_memory()
+    set_timer_slack()
+    if cpu is not None:
+        os.sched_setaffinity(0, {cpu})
+    return got
+
+
+def surroundings() -> dict[str, Any]:
+    """What the system says of itself."""
+    available = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+    return {
+        "cores": os.cpu_count(),
+        "affinity": available,
+        "governor": _first_line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor"),
+        "isolated_cores": _first_line("/sys/devices/system/cpu/isolated"),
+        "preempt_rt": _first_line("/sys/kernel/realtime") == "1",
+        "kernel": platform.release(),
+        "system": platform.system(),
+        "processor": platform.machine(),
+        "virtual_machine": _virtual(),
+        "python": platform.python_version(),
+        "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+    }
+
+
+def stolen_ticks() -> int | None:
+    """Clock ticks that a hypervisor has taken from this machine so far; None where the kernel doesn't tell."""
+    line = _first_line("/proc/stat")
+    fields = line.split() if line else []
+    return int(fields[8]) if len(fields) > 8 else None
+
+
+def sentence(environment: dict[str, Any]) -> str:
+    """The environment of a verdict in one line."""
+    parts = [str(environment.get("scheduler") or "scheduler unknown")]
+    parts.append("memory locked" if environment.get("memory_locked") else "memory not locked")
+    parts.append(f"governor {environment.get('governor') or 'unknown'}")
+    parts.append(f"{environment.get('cores')} cores")
+    if environment.get("virtual_machine"):
+        parts.append("virtual machine")
+    parts.append(f"{environment.get('system', sys.platform)} {environment.get('kernel', '')}".strip())
+    return ", ".join(parts)
+
+
+def _first_line(path: str) -> str | None:
+    try:
+        text = Path(path).read_text().strip()
+    except OSError:
+        return None
+    return text.splitlines()[0] if text else None
+
+
+def _virtual() -> bool | None:
+    try:
+        return " hypervisor " in Path("/proc/cpuinfo").read_text().replace("\n", " ")
+    except OSError:
+        return None

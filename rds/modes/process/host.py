@@ -1,0 +1,276 @@
+"""The host's side of a run: simulations here, real-time runs in a target process that this one looks after."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import secrets
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from array import array
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from rds.core.blame import STUDENT_ERRORS
+from rds.core.errors import ContractError, InputError
+from rds.core.interrupt import Endless, interruptible
+from rds.core.types import Ending
+from rds.modes import load_mode
+from rds.modes.loop.changes import Change, read_changes, timed
+from rds.modes.loop.live_values import Desk
+from rds.modes.loop.plan import Plan, dump
+from rds.modes.loop.stopwatch import TIMING_COLUMNS
+from rds.modes.process.blame import fault
+from rds.modes.process.live import Live
+from rds.modes.process.machine import BUILTIN, machine_behind
+from rds.modes.process.processes import is_alive, wait_for_end
+from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
+from rds.modes.process.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
+from rds.modes.process.ring import Ring
+from rds.modes.process.shared import folders, remove_left
+
+Progress = Callable[[int, int], None]  # samples taken, samples in all
+
+_CHUNK = 5000  # samples between two calls of a simulation's progress
+_RING_BYTES = 64 << 20
+_POLL = 0.05  # s
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows that a loop recorded, with their columns and units, and how the run ended."""
+
+    columns: list[str]
+    units: dict[str, str]
+    values: np.ndarray  # rows × columns
+    ending: Ending
+    reason: str
+    report: dict[str, Any]
+    notes: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()  # of live values
+
+
+def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = None, live: Live | None = None) -> Rows:
+    """Run a plan in its mode. A real-time run keeps its raw record in `directory` (made if it doesn't exist).
+
+    `live` shows the run to others while it goes on, and lets them change its live values.
+
+    Raises InputError or ContractError for what a simulated run finds wrong in a student's code; a real-time run
+    reports it in its ending.
+    """
+    if load_mode(plan.mode).real_time:
+        assert directory is not None
+        # The folder first: two runs for one folder are told so before a machine is started.
+        with _folder(directory) as lock, machine_behind(plan) as reached:
+            try:
+                return _in_target(reached, directory, lock, progress, live or Live())
+            except OSError as error:
+                raise InputError(
+                    f"this run could not be recorded to its end ({error.strerror or error}); look whether the disk is "
+                    "full, or the folder was taken away while it went on; what is there can be opened",
+                    str(directory),
+                ) from error
+    return _here(plan, progress, live)
+
+
+def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
+    """A simulation, in this process and in virtual time."""
+    mode = load_mode(plan.mode)
+    columns, units = plan.columns(mode.followed)
+    recorded = array("d")
+    loop = replace(mode.build(plan, None), record=recorded.extend)
+    heed = loop.heed
+    assert heed is not None
+    attached: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
+    if live is not None:
+        heed.desk = Desk.create(None, plan.channels())
+        heed.in_virtual_time = True
+        attached = live.attach(plan, heed.desk, columns, units, recorded=recorded)
+    elif heed.is_idle:
+        loop = replace(loop, heed=None)
+
+    def run() -> Ending:
+        ending = None
+        while ending is None:
+            ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+            if progress:
+                progress(loop.k, plan.samples)
+        return ending
+
+    try:
+        with attached:
+            ending = run() if live is None else interruptible(run, lambda: live.was_stopped, lambda: len(recorded))
+    except (*STUDENT_ERRORS, Endless) as error:
+        raise ContractError(fault(plan, error, loop.k)) from error
+    values = np.frombuffer(recorded).reshape(-1, len(columns))
+    return Rows(columns, units, values, ending, heed.reason, {}, changes=tuple(timed(heed.taken, plan.T)))
+
+
+def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None, live: Live) -> Rows:
+    """A real-time run, in a target process that a recorder starts; `lock` holds the folder."""
+    columns, units = plan.columns(load_mode(plan.mode).followed)
+    columns[1:1] = TIMING_COLUMNS
+    units |= dict.fromkeys(TIMING_COLUMNS, "ns")
+    write_whole(directory / PLAN, _dumped(plan))
+    has_rows = _recorded(plan, directory, columns, units, lock, progress, live)
+    report = read_ending(directory, ENDING if has_rows else UNSTARTED)
+    ending, reason = Ending(report["ending"]), report.get("reason", "")
+    if has_rows:
+        values, changes = read_raw(directory)[1], tuple(read_changes(directory))
+        return Rows(columns, units, values, ending, reason, report, changes=changes)
+    (directory / UNSTARTED).unlink()
+    return Rows(columns, units, np.empty((0, len(columns))), ending, reason, report)
+
+
+def _recorded(
+    plan: Plan,
+    directory: Path,
+    columns: list[str],
+    units: dict[str, str],
+    lock: int,
+    progress: Progress | None,
+    live: Live,
+) -> bool:
+    """Let a recorder start the target, and wait for the end of the run; whether there is a sample."""
+    about: dict[str, Any] = {"units": units, "mode": plan.mode, "machine": plan.machine.name, "axes": plan.names}
+    about |= {"sample_period": plan.T, "samples": plan.samples, "run": secrets.token_hex(8), "ready": READY}
+    if plan.bus.get("interface") == BUILTIN:
+        about["channel"] = plan.bus["channel"]
+    capacity = min(plan.most_samples, max(_RING_BYTES // (8 * len(columns)), 1000))
+    ring, desk = _shared(plan, columns, capacity, about)
+    try:
+        with tempfile.TemporaryFile() as said:  # by the recorder, which says something only if it fails
+            command = [sys.executable, "-P", "-m", "rds.modes.process.recorder", str(directory), str(ring.path)]
+            recorder = subprocess.Popen(
+                [*command, "rds.modes.process.target"],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=said,
+                start_new_session=True,
+                pass_fds=(lock,) if os.name == "posix" else (),
+            )
+            try:
+                with live.attach(plan, desk, columns, units, ring=ring):
+                    _follow(recorder, ring, plan, progress)
+            finally:
+                if recorder.poll() is None:
+                    ring.ask_to_stop()
+                    recorder.wait()
+                if recorder.returncode != 0:
+                    _take_over(directory, ring, plan.T, _how_it_ended(recorder.returncode, said))
+        return bool(ring.head)
+    finally:
+        ring.close()
+        desk.close()
+        for left in (ring.path, ring.desk_path):
+            with contextlib.suppress(OSError):
+                left.unlink()
+
+
+def _shared(plan: Plan, columns: list[str], capacity: int, about: dict[str, Any]) -> tuple[Ring, Desk]:
+    """The memory that the run's processes share, in the first folder that has room; InputError if none has."""
+    full = []
+    for folder in folders():
+        remove_left(folder)
+        path = folder / f"rds-{about['run']}.ring"
+        try:
+            ring = Ring.create(path, columns, capacity, **about)
+            try:
+                return ring, Desk.create(ring.desk_path, plan.channels())
+            except OSError:
+                ring.close()
+                path.unlink()
+                raise
+        except OSError as error:
+            full.append(f"{folder}: {error.strerror or error}")
+    size = 8 * capacity * len(columns) / 1e6
+    raise InputError(
+        f"the memory that the run's processes share ({size:.1f} MB) finds no room ({'; '.join(full)}); make some "
+        "there, or set TMPDIR to a folder that has it"
+    )
+
+
+def _dumped(plan: Plan) -> bytes:
+    """The plan as bytes; ContractError if the student's code holds what cannot be sent to another process."""
+    try:
+        return dump(plan)
+    except Exception as error:  # pickle raises whatever comes to hand
+        raise ContractError(
+            f"the controller or the model cannot be handed to the target process: {error}; keep open files, locks, "
+            f"threads and devices out of params, initial_state and the variables that its functions use"
+        ) from error
+
+
+@contextlib.contextmanager
+def _folder(directory: Path) -> Iterator[int]:
+    """The folder of a run, claimed for it (see `runtime.record.claim`), and taken away if nothing came into it."""
+    try:
+        is_new = not directory.is_dir()
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"this folder cannot be made: {error.strerror}; name another one", str(directory)) from error
+    lock = claim(directory)
+    try:
+        yield lock
+    finally:
+        for name in (PLAN, PROCESSES):
+            with contextlib.suppress(OSError):
+                (directory / name).unlink()
+        os.close(lock)
+        if is_new:
+            with contextlib.suppress(OSError):
+                directory.rmdir()
+
+
+def _follow(recorder: subprocess.Popen[bytes], ring: Ring, plan: Plan, progress: Progress | None) -> None:
+    """Wait for the end of the run; an interrupt asks it to end safely, and waits on."""
+    while recorder.poll() is None:
+        try:
+            if progress:
+                progress(ring.head, plan.samples)
+            wait_for_end(recorder, _POLL)
+        except KeyboardInterrupt:
+            if ring.stop_asked():
+                raise
+            ring.ask_to_stop()
+    if progress:
+        progress(ring.head, plan.samples)
+
+
+def _how_it_ended(code: int, said: IO[bytes]) -> str:
+    """What became of a recorder that did not end well, by its exit code and what it said on stderr."""
+    if code < 0:
+        how = f"was ended from outside, by signal {-code}"
+    else:
+        said.seek(0)
+        lines = said.read().decode(errors="replace").strip().splitlines()
+        how = f"failed with code {code}" + (f"; the last that it said: {lines[-1][:300]}" if lines else "")
+    return f"the recorder process {how}"
+
+
+def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
+    """The recorder died: ask the target for a safe end, copy what it still writes, and conclude."""
+    recorder = Recorder(directory, ring)
+    ring.ask_to_stop()
+    try:
+        target = int(json.loads((directory / PROCESSES).read_text())["target"])
+    except (OSError, ValueError, KeyError):
+        target = 0  # it died before it started one
+    deadline = time.monotonic() + max(HANG_AFTER, 20 * period)
+    while target and is_alive(target, str(ring.path)):
+        recorder.drain()
+        if time.monotonic() > deadline:
+            os.kill(target, signal.SIGKILL)
+            break
+        time.sleep(_POLL)
+    recorder.close()
+    kept = "; the samples up to then are kept" if ring.head else ", before the first sample"
+    finish(directory, ring, {"ending": Ending.KILLED, "reason": f"{reason}{kept}", "rows": ring.head})

@@ -1,0 +1,188 @@
+"""The recorder: between target and host, so that the end of either one loses nothing.
+
+    python -m rds.modes.process.recorder RUN_DIRECTORY RING TARGET_MODULE
+
+It starts the target, copies the rows of the ring to the record on disk while they come, notices a target that
+died or hangs, and writes how the run ended. It belongs to no terminal: the host may go, the run goes on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from rds.core.types import Ending
+from rds.modes.loop.changes import FILE as CHANGES
+from rds.modes.loop.changes import STOP, as_text, read_changes, timed
+from rds.modes.loop.live_values import Desk
+from rds.modes.loop.program import HOLD
+from rds.modes.process.processes import is_stopped, wait_for_end
+from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
+from rds.modes.process.ring import Ring
+
+DRAIN_EVERY = 0.05  # s
+HANG_AFTER = 5.0  # s without a new sample, or 20 periods if that is longer
+HELD_UP = 1.0  # s for one look: this process did not run
+READY_WITHIN = 60.0  # s from the start of the target to its first sample
+READY = 2  # heartbeats of the target when its loop begins
+PLAN, REPORT, LOG = "plan.pickle", "target.json", "target.log"
+
+
+class Recorder:
+    """Copies rows from a ring to the record in `directory`, which is made when the first one comes."""
+
+    def __init__(self, directory: Path, ring: Ring):
+        self.directory, self.ring = directory, ring
+        self.lost = 0  # rows that the ring had overwritten before they were copied
+        self._file: RecordFile | None = None
+        self._next = 0
+        self._desk = Desk.open(ring.desk_path)
+        self._noted = -1  # changes of live values that have been copied; -1: not known yet
+
+    def drain(self) -> int:
+        """Copy what is new; returns how many rows have been copied in all."""
+        if self._file is None:
+            if not self.ring.head:
+                return 0
+            self._file = RecordFile(self.directory, self.ring.about)
+            self._next = self._file.rows
+        first, rows = self.ring.read(self._next)
+        if rows:
+            self.lost += self._file.append(first, rows)
+            self._next = first + len(rows) // (8 * len(self.ring.columns))
+        self._drain_changes()
+        return self._next
+
+    def host_is_gone(self) -> None:
+        """A part program is not carried on without an operator: it comes to rest on its path, and ends."""
+        if HOLD in self._desk:
+            self._desk.set(STOP, 1.0)
+
+    def _drain_changes(self) -> None:
+        """After the rows: a record that begins has removed what an earlier run left."""
+        path = self.directory / CHANGES
+        if self._noted < 0:  # what an earlier writer of this run has copied, without the line that it was about to
+            before = read_changes(self.directory)
+            self._noted = len(before)
+            if before:
+                write_whole(path, as_text(before).encode())
+        first, notes = self._desk.notes(self._noted)
+        if notes:
+            with open(path, "a") as file:
+                file.write(as_text(timed(notes, self.ring.about["sample_period"]), headings=not file.tell()))
+            self._noted = first + len(notes)
+
+    def close(self) -> None:
+        """Copy the rest; the record is on the disk."""
+        self.drain()
+        if self._file is not None:
+            self._file.close()
+
+
+def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) -> tuple[Ending, str] | None:
+    """Record until the target ends; if it hangs, kill it and return what ending that is, and why.
+
+    Time in which this process was held up itself does not count: the target may have been, too.
+    """
+    hang_after = max(HANG_AFTER, 20 * period)
+    host = os.getppid()
+    seen, since = (-1, -1), time.monotonic()
+    while target.poll() is None:
+        looked = time.monotonic()
+        wait_for_end(target, DRAIN_EVERY)
+        if host and os.getppid() != host:
+            recorder.host_is_gone()
+            host = 0
+        now = (recorder.drain(), recorder.ring.heartbeat)
+        if now != seen:
+            seen, since = now, time.monotonic()
+        elif (took := time.monotonic() - looked) > HELD_UP:
+            since += took
+        quiet, rows = time.monotonic() - since, now[0]
+        is_running = recorder.ring.heartbeat >= recorder.ring.about["ready"]
+        if quiet > (hang_after if is_running else READY_WITHIN):
+            stopped = is_stopped(target.pid)
+            target.kill()
+            target.wait()
+            at = f"at t = {rows * period:.3f} s"
+            if stopped:
+                return Ending.KILLED, (
+                    f"the target process was stopped from outside (SIGSTOP, or a debugger) {at}, and did not go on for "
+                    f"{quiet:.0f} s. It was killed; the watchdogs cut the voltage"
+                )
+            if is_running:
+                return Ending.FAULT, (
+                    f"control() or the model did not return for {quiet:.0f} s {at}; "
+                    "look for a loop without an end in it. The target was killed; the watchdogs cut the voltage"
+                )
+            return Ending.FAULT, f"the target was not ready within {READY_WITHIN:.0f} s"
+    return None
+
+
+def conclude(directory: Path, rows: int, code: int | None, hung: tuple[Ending, str] | None) -> dict[str, Any]:
+    """How the run ended, from the target's own report or from the way it died."""
+    try:
+        report: dict[str, Any] = json.loads((directory / REPORT).read_text())
+    except (OSError, ValueError):
+        report = {"ending": Ending.KILLED, "reason": _death(directory, rows, code)}
+    if hung:
+        report |= {"ending": hung[0], "reason": hung[1]}
+    return report | {"rows": rows}
+
+
+def finish(directory: Path, ring: Ring, ending: dict[str, Any]) -> None:
+    """Write how the run ended, and remove what only its processes needed; of a run without a sample, all the rest."""
+    write_ending(directory, ending, ENDING if ring.head else UNSTARTED)
+    names = [PLAN, REPORT, PROCESSES]
+    with contextlib.suppress(OSError):
+        if not ring.head or not (directory / LOG).stat().st_size:
+            names.append(LOG)
+    for name in names:
+        with contextlib.suppress(OSError):
+            (directory / name).unlink()
+
+
+def _death(directory: Path, rows: int, code: int | None) -> str:
+    if code is not None and code < 0:
+        kept = "; its samples up to then are kept" if rows else ", before its first sample"
+        return f"the target process was ended by signal {-code}{kept}"
+    said = ""
+    with contextlib.suppress(OSError):
+        lines = (directory / LOG).read_text(errors="replace").strip().splitlines()
+        said = f"; the last that it said: {lines[-1][:300]}" if lines else ""
+    return f"the target process ended with code {code} by itself, as os._exit() does{said}"
+
+
+def main(arguments: list[str]) -> int:
+    """Start the target, record it, conclude."""
+    directory, ring = Path(arguments[0]), Ring.open(arguments[1])
+    recorder = Recorder(directory, ring)
+    with open(directory / LOG, "wb") as output:
+        target = subprocess.Popen(
+            [sys.executable, "-P", "-m", arguments[2], str(directory), arguments[1]],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+        )
+        # where a user in trouble finds them, and the host if the recorder is killed
+        processes = {"recorder": os.getpid(), "target": target.pid, "desk": str(ring.desk_path)}
+        processes["channel"] = ring.about.get("channel")  # of the built-in bus: where an emergency stop goes
+        (directory / PROCESSES).write_text(json.dumps(processes))
+        hung = watch(target, recorder, ring.about["sample_period"])
+    recorder.close()
+    finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
+    ring.close()
+    for path in (ring.path, ring.desk_path):
+        with contextlib.suppress(OSError):
+            path.unlink()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

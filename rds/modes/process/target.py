@@ -1,0 +1,151 @@
+"""The target: a process of its own, started fresh for each real-time run, that does nothing but the loop.
+
+    python -m rds.modes.process.target RUN_DIRECTORY RING
+
+It reads the plan from the run's directory, gets ready, rehearses, runs, and leaves `target.json`: how the run
+ended, and the environment that its timing was measured in. Whatever happens, the axes end at zero volts.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import sys
+import threading
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rds.core.clock import RealTimeClock
+from rds.core.contracts import Drivers
+from rds.core.errors import MachineError, RdsError
+from rds.core.types import Ending
+from rds.modes import load_mode
+from rds.modes.loop.live_values import Desk
+from rds.modes.loop.plan import Plan, load
+from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
+from rds.modes.process.blame import fault
+from rds.modes.process.environment import prepare, stolen_ticks, surroundings
+from rds.modes.process.record import write_whole
+from rds.modes.process.recorder import PLAN, READY, REPORT
+from rds.modes.process.ring import Ring
+
+log = logging.getLogger(__name__)
+
+
+def run(plan: Plan, ring: Ring, desk: Desk) -> dict[str, Any]:
+    """Take every sample of the plan; returns how it ended, why, and the environment."""
+    from rds.bus.hub.command import Command
+    from rds.bus.hub.run_watch import RunWatch
+    from rds.bus.modules.dialects import DEFAULT, open_drivers
+
+    mode = load_mode(plan.mode)
+    environment = surroundings() | prepare(plan.priority, plan.cpu)
+    clock = RealTimeClock(round(plan.T * 1e9), plan.late)
+    report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
+    stolen = stolen_ticks()
+    drivers = loop = watch = None
+    counted: dict[str, int] = {}  # by the drivers before the first sample
+    bus = dict(plan.bus)
+    faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
+    threads = threading.active_count()
+    stack = ExitStack()
+    try:
+        if bus["interface"] == "rds":
+            stack.enter_context(Command(bus["channel"]))
+        drivers = open_drivers(dialect, plan.machine, plan.names, plan.T, mode.drivers == "dry run", bus)
+        drivers.start()
+        if bus["interface"] == "rds":
+            watch = stack.enter_context(RunWatch(bus["channel"], faults))
+        ring.beat(1)
+        loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
+        assert loop.heed is not None
+        loop.heed.desk = desk
+        environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
+        counted = asdict(drivers.counters)
+        if watch is not None:
+            watch.start()
+        threads = threading.active_count()
+        ring.beat(READY)
+        with quiet_memory():
+            clock.start()
+            report["ending"] = loop.run()
+        report["reason"] = loop.heed.reason
+        if report["ending"] is Ending.DONE:
+            drivers.confirm()
+    except MachineError as error:
+        report |= {"ending": Ending.MACHINE_LOST, "reason": str(error)}
+    except BaseException as error:  # the student's code may raise anything, SystemExit included
+        if not isinstance(error, RdsError):
+            log.exception("the run ended by an exception")
+        report["reason"] = fault(plan, error, loop.k if loop else None)
+    finally:
+        environment["threads"] = threading.active_count() - threads  # that the student's code left running
+        if drivers is not None:
+            report["drivers"] = {name: n - counted.get(name, 0) for name, n in asdict(drivers.counters).items()}
+            drivers.close()
+            if watch is not None:
+                report["bus"] = watch.summary()
+        stack.close()
+        clock.close()
+    after = stolen_ticks()
+    environment["stolen_ticks"] = after - stolen if after is not None and stolen is not None else None
+    report["samples"] = ring.head
+    return report
+
+
+def main(arguments: list[str]) -> None:
+    """Run the plan in a run's directory."""
+    from rds.bus.tools.mf4 import put_off_asammdf
+
+    put_off_asammdf()
+    directory, ring_path = Path(arguments[0]), arguments[1]
+    ring = Ring.open(ring_path)
+    # The end of the terminal's session, or a polite kill, is a request to stop: the axes come to rest first.
+    for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        signal.signal(number, lambda *_: ring.ask_to_stop())
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
+    plan = load(directory / PLAN)
+    report = run(plan, ring, Desk.open(ring.desk_path))
+    write_whole(directory / REPORT, json.dumps(report, default=str).encode())
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Not by the usual way: a thread that the student's code started, or a lock that it holds, must not keep this alive.
+    os._exit(0)
+
+
+def rehearse(clock: RealTimeClock, drivers: Drivers | None, seconds: float) -> dict[str, Any]:
+    """Keep the period for `seconds`, exchanging zero volts with the machine, and report how well it went.
+
+    Returns the number of `samples`, the `stalls` (woken more than a period late), and the lateness and I/O time
+    at the median and at most, in µs.
+    """
+    samples = max(int(seconds * 1e9 / clock.period), 20)
+    late, io = [], []
+    clock.start()
+    for k in range(samples):
+        clock.wait(k)
+        started = clock.now()
+        if drivers is not None:
+            drivers.exchange()
+        late.append(clock.lateness(k, started))
+        io.append(clock.now() - started)
+        if clock.lateness(k, clock.now()) > clock.period:  # a backlog is not a stall
+            clock.start_at(k + 1)
+    late.sort()
+    io.sort()
+    return {
+        "samples": samples,
+        "stalls": sum(value > clock.period for value in late),
+        "lateness_p50": late[samples // 2] / 1e3,
+        "lateness_max": late[-1] / 1e3,
+        "io_p50": io[samples // 2] / 1e3,
+        "io_max": io[-1] / 1e3,
+    }
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

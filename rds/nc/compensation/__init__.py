@@ -1,0 +1,1 @@
+"""Cutter radius compensation, and the proof that the cutter's edge keeps to the programmed contour."""

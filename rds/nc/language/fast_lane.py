@@ -1,0 +1,102 @@
+"""The fast lane: plain lines (moves, feed rates) are read by compiled code, many at a time; others go the usual way.
+
+It gives the same items as the interpreter without it, bit for bit. Without numba (extra `fast`) it stays closed.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rds.nc.language.canon import MOTION
+from rds.nc.language.state import PER_MINUTE
+
+if TYPE_CHECKING:
+    from rds.nc.language.context import Context
+    from rds.nc.language.control import Control
+    from rds.nc.language.source import Source
+
+# Loading numba takes the time of some ten thousand lines in Python: it is done for programs that are certain to be
+# longer, and for others (of unknown length, or with loops) once they have turned out to be.
+LONG_PROGRAM = 1 << 21  # bytes
+OPENS_AFTER = 50_000  # lines
+ROWS = 16384  # at once
+FEW_LINES = 4  # less in one go are not worth the way
+LONGEST_PAUSE = 63  # lines until the next attempt
+NEVER = 1 << 62
+
+
+@cache
+def kernel() -> Callable[..., tuple[int, int, int]] | None:
+    """The compiled reader; None without numba."""
+    try:
+        from rds.nc.language.fast_lane_kernel import read_lines
+    except ImportError:
+        return None
+    return read_lines
+
+
+class FastLane:
+    """Of one run of a program. `take` may be called before any block is read, first after `wait` lines."""
+
+    def __init__(self, context: Context, source: Source):
+        self._context = context
+        if context.dialect.program_numbers:
+            self.wait = NEVER
+        elif "rds.nc.language.fast_lane_kernel" in sys.modules or source.size() >= LONG_PROGRAM:
+            self.wait = 0
+        else:
+            self.wait = OPENS_AFTER
+        self._pause = 0
+        self._rows: np.ndarray | None = None
+        self._columns: list[np.ndarray] = []
+        self._state = np.zeros(7)
+        self._modes = np.zeros(5, np.int64)
+
+    def take(self, control: Control) -> int:
+        """Read and execute the lines that come next, as far as they are plain and already in the source's buffer.
+
+        Returns how many lines to read the usual way before the next attempt, besides the one that was not plain.
+        """
+        read = kernel()
+        if read is None:
+            return NEVER
+        taken = self._read(read, control.source) if self._open(control) else 0
+        self._pause = 0 if taken >= FEW_LINES else min(2 * self._pause + 1, LONGEST_PAUSE)
+        return self._pause
+
+    def _open(self, control: Control) -> bool:
+        """Whether plain lines mean nothing but moves and feed rates now."""
+        m = self._context
+        state = m.state
+        return (
+            not control.skipping
+            and m.out.compensation is None
+            and m.leaving is None
+            and not state.comp_side
+            and state.feed_mode == PER_MINUTE
+            and state.arc_allowed == 1
+        )
+
+    def _read(self, read: Callable[..., Any], source: Source) -> int:
+        """Lines taken."""
+        state, out = self._context.state, self._context.out
+        if self._rows is None:
+            self._rows = np.zeros(ROWS, MOTION)
+            self._columns = [self._rows[name] for name in ("kind", "digits", "n", "line", "values")]
+        values, modes = self._state, self._modes
+        values[:] = state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate
+        modes[:] = state.motion, state.absolute, state.arc_absolute, state.plane, state.inches
+        data = np.frombuffer(source.buffer, np.uint8)
+        size, lines, rows = read(data, source.at, len(data), source.next_line, values, modes, *self._columns)
+        if lines:
+            state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate = values.tolist()
+            state.motion = int(modes[0])
+            out.file = source.name
+            out.rows(self._rows[:rows])
+            source.skip(size, lines)
+        return lines

@@ -1,0 +1,330 @@
+"""From the text of a part program to its canonical calls: block after block, in LinuxCNC's order of execution."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, NON_MODAL, STOP, Block, check, settle_motion
+from rds.nc.language.canon import Call, MotionBlock
+from rds.nc.language.context import Context
+from rds.nc.language.control import Control
+from rds.nc.language.dialect import Dialect
+from rds.nc.language.errors import ProgramError
+from rds.nc.language.expressions import Fault
+from rds.nc.language.fast_lane import FastLane
+from rds.nc.language.left_over import LeftOver
+from rds.nc.language.modes import execute
+from rds.nc.language.moves import move
+from rds.nc.language.names import known_names
+from rds.nc.language.offsets import start
+from rds.nc.language.parameters import Parameters, read_parameters
+from rds.nc.language.source import LONGEST, open_source
+from rds.nc.language.state import NO_MOTION, State
+from rds.nc.language.stream import Stream
+from rds.nc.language.tools import Tool, ToolTable, read_tools
+from rds.nc.language.words import column_of, fill, line_number, place_of, read_plain, read_words, recoded, tidy, word_at
+
+if TYPE_CHECKING:
+    from rds.nc.compensation.moves import Stretch
+
+_PROGRAM_NUMBER = re.compile(r"p[0-9]+")
+_MOTION_WORD = re.compile(r"(?:n[0-9]+)?(?!o).*?(g40(?![0-9])|[xyz]|m[0-9])")  # of a block that compensation refuses
+
+
+def interpret(
+    source: str | Path | IO[Any],
+    *,
+    tools: Path | Iterable[Tool] | None = None,
+    parameters: Path | Mapping[int, float] | None = None,
+    options: Dialect = Dialect(),  # noqa: B008 (frozen)
+    name: str = "",
+    stretches: list[Stretch] | None = None,
+    remark: Callable[[ProgramError], None] | None = None,
+) -> Iterator[MotionBlock | Call]:
+    """The canonical calls of a program, as it is read.
+
+    `source`: a Path is a file, a str is the program itself, a file object is read as it goes. Subroutine files are
+    looked for beside a file. `tools` and `parameters`: LinuxCNC's files, or what they hold, in the machine's units.
+    `name` stands for the program in messages. `stretches`, when given, gets what cutter compensation made of what;
+    `remark` is called with what is no fault and worth a look: blocks after the program's end.
+    Raises ProgramError at the first fault; what came before it has been handed out by then.
+    """
+    interpreter = Interpreter(
+        source, tools=tools, parameters=parameters, options=options, name=name, stretches=stretches, remark=remark
+    )
+    try:
+        yield from interpreter.run()
+    finally:
+        interpreter.close()
+
+
+class Interpreter:
+    """One run of one program. `context.state` is what the next block finds."""
+
+    def __init__(
+        self,
+        source: str | Path | IO[Any],
+        *,
+        tools: Path | Iterable[Tool] | None = None,
+        parameters: Path | Mapping[int, float] | None = None,
+        options: Dialect = Dialect(),  # noqa: B008 (frozen)
+        name: str = "",
+        stretches: list[Stretch] | None = None,
+        remark: Callable[[ProgramError], None] | None = None,
+    ):
+        table = ToolTable(read_tools(tools) if isinstance(tools, Path) else tools or ())
+        kept = read_parameters(parameters) if isinstance(parameters, Path) else parameters
+        self.options = options
+        self.source = open_source(source, name, semicolons=options.program_numbers)
+        self.out = Stream()
+        state = State()
+        self.context = Context(options, table, Parameters(state, kept), state, self.out, stretches)
+        self.control = Control(self.source, self.context.parameters, options)
+        self.context.parameters.known = known_names(self.context, self.control, lambda: self.control.source.line)
+        self.lane = FastLane(self.context, self.source)
+        self._remark = remark
+        self._percent = False
+        self._first = True  # no block has been executed
+        self._text = ""
+        self._places: dict[str, int] = {}
+        self._left_over: LeftOver | None = None  # what stands behind M2 or M30, once it has been met
+
+    def close(self) -> None:
+        self.control.close()
+
+    def run(self) -> Iterator[MotionBlock | Call]:
+        """The canonical calls. Raises ProgramError."""
+        out = self.out
+        out.file = self.source.name
+        start(self.context)
+        out.call("SET_FEED_REFERENCE", "CANON_XYZ")
+        out.call("ON_RESET")
+        try:
+            self._open()
+            ended, wait = False, self.lane.wait
+            while not ended:
+                wait -= 1
+                if wait < 0:
+                    wait = self.lane.take(self.control)
+                raw = self.control.source.read()
+                if not raw:
+                    self._file_ended()
+                ended = self._line(raw)
+                if out.items:
+                    yield from self._take()
+        except ProgramError:
+            out.flush()
+            yield from self._take()  # what was right before the fault
+            raise
+        self._look_behind()
+        out.line, out.digits = 0, 0
+        out.call("ON_RESET")
+        out.call("ON_RESET")
+        yield from self._take()
+
+    def _take(self) -> list[MotionBlock | Call]:
+        items, self.out.items = self.out.items, []
+        return items
+
+    # -- lines --------------------------------------------------------------------------------------------------------
+
+    def _open(self) -> None:
+        """See whether the program stands between % and %."""
+        self.source.fill()
+        first = self.source.following()
+        while raw := self.source.read():
+            if len(raw) > LONGEST + 1:
+                break
+            if stripped := raw.strip():
+                self._percent = stripped == b"%"
+                break
+        else:
+            raise ProgramError("the program is empty; write blocks and end with M2", file=self.source.name, line=1)
+        if not self._percent:
+            self.source.go_to(first)
+
+    def _file_ended(self) -> None:
+        source = self.control.source
+        try:
+            self.control.check_end()
+        except ProgramError as error:
+            raise error.at(source.name, source.line) from None
+        what = "%" if self._percent else "M2, M30 or % (then with % on the first line, too)"
+        raise ProgramError(
+            f"the program does not end; write {what} on its last line", file=source.name, line=source.line
+        )
+
+    def _line(self, raw: bytes) -> bool:
+        """Read and execute a block. True when the program ends by it."""
+        source, out = self.control.source, self.out
+        self._text = ""
+        self._places = {}
+        try:
+            if len(raw) > LONGEST + 1:
+                raise Fault(f"the line is longer than {LONGEST} characters; break it")
+            if source.name != out.file:
+                out.file = source.name
+            self._text = text = tidy(raw)
+            out.line = source.line
+            if self.options.program_numbers:
+                text = text.rstrip(";")
+            if not text or (text[0] == "/" and self.options.block_delete):
+                return False
+            return self._block(text)
+        except Fault as fault:
+            raise self._error(fault, raw) from None
+        except ProgramError as error:
+            if error.line:
+                raise
+            word = _MOTION_WORD.match(self._text)  # compensation knows moves, not words
+            raise self._error(Fault(error.reason, at=word.start(1) if word else -1), raw) from None
+
+    def _block(self, text: str) -> bool:
+        plain = None if self.control.skipping else read_plain(text)
+        if plain is None:
+            return self._other(text)
+        digits, words = plain
+        out = self.out
+        out.digits, out.n = len(digits), 0
+        if digits:
+            if out.digits > 9:
+                line_number(text)
+            out.n = int(digits)
+        if self.options.program_numbers and self._program_number(text):
+            return False
+        block = Block()
+        fill(block, words, text)
+        return self._execute(block)
+
+    def _other(self, text: str) -> bool:
+        """A block with more than plain words: %, comments, parameters, expressions, O words; or one passed over."""
+        control, out = self.control, self.out
+        if text == "%" and self._percent:
+            return self._percent_sign()
+        out.digits, out.n, at = line_number(text)
+        first = text[at : at + 1]
+        if first == "o" or (self.options.gr and text.startswith("gr", at)):
+            self._first = False
+            word = control.read(text, at) if first == "o" else control.read_gr(text, at)
+            control.execute(word)
+            return False
+        if control.skipping:
+            return False
+        block = Block()
+        self._places = read_words(text, at, block, self.context.parameters)
+        return self._execute(block)
+
+    def _execute(self, block: Block) -> bool:
+        context, words = self.context, block.words
+        self._first = False
+        state = context.state
+        if not block.g and not block.m and not block.comment and state.motion != NO_MOTION:
+            if AXIS_SET.isdisjoint(words):
+                settle_motion(block, state)
+            else:
+                block.motion = state.motion
+            if CHECKED.isdisjoint(words) and "s" not in words and "t" not in words:
+                if "f" in words and state.feed_mode != 1:
+                    state.feed_rate = words["f"]
+                    self.out.rate(words["f"])
+                context.parameters.settle()
+                if block.motion != -1:
+                    move(context, block)
+                return False
+        else:
+            settle_motion(block, state)
+        if block.g.get(NON_MODAL) is not None or not CHECKED.isdisjoint(words):
+            check(block, state)
+        context.parameters.settle()
+        ended = execute(context, block)
+        if ended:
+            self._after_end(f"M{block.m[STOP]}")
+        return ended
+
+    def _program_number(self, text: str) -> bool:
+        """The option's program number, P001, on the first block."""
+        if not _PROGRAM_NUMBER.fullmatch(text):
+            return False
+        if not self._first:
+            raise Fault("a program number stands on the first block; remove it here", "p")
+        self._first = False
+        self.out.comment(f"program {text.upper()}")
+        return True
+
+    def _percent_sign(self) -> bool:
+        """% ends a program that began with one; in a subroutine's file that is being searched it says nothing."""
+        if self.control.skipping:
+            if self.control.source is not self.source:
+                return False
+            self._file_ended()
+        self.out.digits = 0
+        if self.control.source is not self.source:
+            raise Fault("% inside a subroutine; end it with ENDSUB before", at=0)
+        compensation = self.out.compensation
+        if compensation is not None:
+            self.out.put(compensation.stop(self.out.line))
+        self.out.call("FINISH")
+        return True
+
+    def _look_behind(self) -> None:
+        """Remark on blocks behind the end; a program may also end in a subroutine's file."""
+        source = self.source
+        if self._remark is None or self.control.source is not source:
+            return
+        if self._left_over is None:
+            self._left_over = LeftOver("%", source.line)
+        while raw := source.read():
+            self._left_over.look(raw, source.line)
+        if found := self._left_over.remark(source.name):
+            self._remark(found)
+
+    def _after_end(self, word: str) -> None:
+        """A program that began with % ends with one, after M2."""
+        source = self.control.source
+        self._left_over = LeftOver(word, source.line)
+        if not self._percent:
+            return
+        last = b""
+        while raw := source.read():
+            self._left_over.look(raw, source.line)
+            if len(raw) <= LONGEST + 1:
+                if raw.strip() == b"%":
+                    return
+                last = raw
+        if last:
+            self.out.digits = 0
+            match = re.match(rb"[\t /]*[nN]([0-9]{1,9})", last)
+            if match:
+                self.out.digits, self.out.n = len(match[1]), int(match[1])
+        self.out.comment("interpreter: percent sign missing from end of file")
+
+    # -- faults -------------------------------------------------------------------------------------------------------
+
+    def _place(self, key: str) -> int:
+        """Where a word of the block stands in its text; -1 when it has none."""
+        place = self._places.get(key, -1)
+        if place >= 0:
+            return place
+        return self._text.find("(") if key == "(" else place_of(key, self._text)
+
+    def _error(self, fault: Fault, raw: bytes) -> ProgramError:
+        """The fault with file, line, column and word."""
+        source, text, at, message = self.control.source, self._text, fault.at, fault.message
+        word = ""
+        if fault.key:
+            at = self._place(fault.key)
+            motion = self.context.state.motion
+            if at < 0 and fault.key == f"g{motion}":  # of a motion that an earlier line has set
+                message = f"G{motion // 10} is still in force: {message}"
+                at = min((place for axis in AXES if (place := self._place(axis)) >= 0), default=-1)
+        column = 0
+        if at == -2:
+            column = len(raw[: raw.rfind(b"(")].decode("utf-8", "replace")) + 1 + source.column
+            word = "("
+        elif at >= 0 and text:
+            column = column_of(raw, at) + source.column
+            word = word_at(text, at).encode("latin-1").decode("utf-8", "replace")
+        return ProgramError(recoded(message), file=source.name, line=source.line, column=column, word=word)

@@ -1,0 +1,366 @@
+"""What a block does besides moving: modes, spindle, tools, coolant, stops, in the order in which it happens."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from rds.nc.compensation.compensation import LEFT, RIGHT, Compensation
+from rds.nc.language.arcs import AXES_OF
+from rds.nc.language.blocks import (
+    ARC_DISTANCE,
+    COMPENSATION,
+    CONTROL,
+    COOLANT,
+    COORDINATES,
+    DISTANCE,
+    FEED_MODE,
+    G92_SERIES,
+    NON_MODAL,
+    PLANE,
+    SPINDLE,
+    STOP,
+    TOOL_CHANGE,
+    TOOL_OFFSET,
+    UNITS,
+    Block,
+)
+from rds.nc.language.comment_values import expanded
+from rds.nc.language.context import Context, rotate
+from rds.nc.language.expressions import Fault, whole
+from rds.nc.language.moves import home, move
+from rds.nc.language.offsets import (
+    call_origin,
+    g92_mode,
+    keep_home,
+    minus,
+    plus,
+    select_system,
+    set_g92,
+    set_system,
+    set_tool_offset,
+    set_units,
+)
+from rds.nc.language.outside import active_comment
+from rds.nc.language.parameters import DEBUG_SHOWN, SYSTEM, SYSTEMS, TOOL
+from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES, XY, YZ
+
+_ACTIVE_COMMENTS = ("logopen,", "logappend,", "log,", "pyrun,", "py,", "abort,", "probeopen", "probeclose")
+_ACTIVE_ALONE = ("logclose", "pyreload")
+
+
+def execute(m: Context, block: Block) -> bool:
+    """Do what the block says, in the order that LinuxCNC documents. True when the program ends by it (M2, M30)."""
+    words, g = block.words, block.g
+    if block.comment:
+        comment(m, block.comment)
+    if FEED_MODE in g:
+        set_feed_mode(m, g[FEED_MODE])
+    if "f" in words and m.state.feed_mode != INVERSE_TIME:
+        m.state.feed_rate = words["f"]
+        m.out.rate(words["f"])
+    if "s" in words:
+        m.state.speed = words["s"]
+        m.out.call("SET_SPINDLE_SPEED", 0, words["s"])
+    if "t" in words:
+        select_tool(m, int(words["t"]))
+    if block.m:
+        _m_words(m, block.m)
+    if g:
+        _g_words(m, block)
+    if block.motion != -1:
+        move(m, block)
+    if TOOL_CHANGE in block.m and m.leaving is not None:
+        stand_by_the_contour(m, m.leaving)
+    if STOP in block.m:
+        return stop(m, block.m[STOP])
+    return False
+
+
+def _m_words(m: Context, groups: dict[int, int]) -> None:
+    if TOOL_CHANGE in groups:
+        change_tool(m)
+    if SPINDLE in groups:
+        name, turning = {
+            3: ("START_SPINDLE_CLOCKWISE", 1),
+            4: ("START_SPINDLE_COUNTERCLOCKWISE", -1),
+            5: ("STOP_SPINDLE_TURNING", 0),
+        }[groups[SPINDLE]]
+        m.out.call(name, 0)
+        m.state.spindle = turning
+    coolant = groups.get(COOLANT)
+    if coolant == 7:
+        m.out.call("MIST_ON")
+        m.state.mist = 1
+    elif coolant == 8:
+        m.out.call("FLOOD_ON")
+        m.state.flood = 1
+    elif coolant == 9:
+        m.out.call("MIST_OFF")
+        m.out.call("FLOOD_OFF")
+        m.state.mist = m.state.flood = 0
+
+
+def _g_words(m: Context, block: Block) -> None:
+    """All G words but those of motion."""
+    g, words = block.g, block.words
+    non_modal = g.get(NON_MODAL)
+    if non_modal == 40:
+        m.out.call("DWELL", words["p"])
+    if PLANE in g:
+        select_plane(m, g[PLANE])
+    if UNITS in g:
+        set_units(m, g[UNITS])
+    if COMPENSATION in g:
+        compensate(m, g[COMPENSATION], words)
+    if TOOL_OFFSET in g:
+        set_tool_offset(m, g[TOOL_OFFSET], block)
+    if COORDINATES in g:
+        select_system(m, g[COORDINATES])
+    if CONTROL in g:
+        control_path(m, g[CONTROL], words)
+    if DISTANCE in g:
+        _distance(m, g[DISTANCE] == 900)
+    if ARC_DISTANCE in g:
+        _arc_distance(m, g[ARC_DISTANCE] == 901)
+    if non_modal == 100:
+        set_system(m, block)
+    elif non_modal in (280, 300):
+        home(m, block, non_modal)
+    elif non_modal in (281, 301):
+        keep_home(m, non_modal)
+    elif non_modal == 920:
+        set_g92(m, block)
+    if G92_SERIES in g:
+        g92_mode(m, g[G92_SERIES])
+
+
+def comment(m: Context, text: str) -> None:
+    """A comment in parentheses; (MSG, ...) is a message for the operator, and (DEBUG, ...) one with values in it.
+
+    (PRINT, ...), with values too, is for whoever writes the program.
+    """
+    with suppress(UnicodeError):  # in another coding: its bytes as they are
+        text = text.encode("latin-1").decode("utf-8")
+    text = text.lstrip(" \t\r\n\x0b\x0c")
+    lower = text.lower()
+    if lower.startswith("msg,"):
+        m.out.call("MESSAGE", text[4:])
+        return
+    if lower.startswith("debug,"):
+        message = expanded(text[6:], m.parameters)
+        if m.parameters.numbers[DEBUG_SHOWN] > 0.0:
+            m.out.call("MESSAGE", message)
+        return
+    if lower.startswith("print,"):
+        m.out.call("PRINT", expanded(text[6:], m.parameters))
+        return
+    for name in (*_ACTIVE_COMMENTS, *_ACTIVE_ALONE):
+        if lower == name if name in _ACTIVE_ALONE else lower.startswith(name):
+            raise Fault(active_comment(name), "(")
+    m.out.comment(text)
+
+
+def set_feed_mode(m: Context, code: int) -> None:
+    """G93, G94, G95. The last two forget the feed rate, as in LinuxCNC."""
+    name, mode = {
+        930: ("inverse time", INVERSE_TIME),
+        940: ("units per minute", PER_MINUTE),
+        950: ("units per revolution", PER_REVOLUTION),
+    }[code]
+    m.out.comment(f"interpreter: feed mode set to {name}")
+    m.state.feed_mode = mode
+    m.out.call("SET_FEED_MODE", 0, int(mode == PER_REVOLUTION))
+    if mode != INVERSE_TIME:
+        m.state.feed_rate = 0.0
+        m.out.rate(0.0)
+
+
+def select_tool(m: Context, number: int) -> None:
+    """T."""
+    try:
+        m.tools.selected = m.tools.find(number)
+    except Fault as fault:
+        fault.key = "t"
+        raise
+    m.out.call("SELECT_TOOL", number)
+
+
+def change_tool(m: Context) -> None:
+    """M6: the selected tool into the spindle, which stands still for it."""
+    if m.tools.selected < 0:
+        raise Fault("no tool is selected; write T and its number on the line or before", "m6")
+    if m.state.comp_side:
+        raise Fault("the tool cannot change while the cutter is compensated; write it after G40", "m6")
+    m.out.call("START_CHANGE")
+    m.out.call("STOP_SPINDLE_TURNING", 0)
+    m.state.spindle = 0
+    m.out.call("CHANGE_TOOL", m.tools.selected)
+    m.tools.change()
+    tell_tool(m)
+
+
+def stand_by_the_contour(m: Context, compensation: Compensation) -> None:
+    """After G40 and M6 the program goes on from where the cutter is, beside the contour, as LinuxCNC does, which asks
+    the machine for its position after a change of tools: G0 Z5 alone then goes straight up.
+    """
+    beside = [0.0, 0.0, 0.0]
+    first, second, _ = AXES_OF[PLANES.index(compensation.plane)]
+    beside[first], beside[second] = compensation.beside()
+    rotate(beside, m.left_turned - m.state.rotation)
+    m.state.x, m.state.y, m.state.z = plus([m.state.x, m.state.y, m.state.z], beside)
+    m.leaving = None
+
+
+def tell_tool(m: Context) -> None:
+    """Parameters 5400 to 5413: the tool in the spindle."""
+    tool = m.tools.spindle
+    numbers = [float(tool.number), *tool.offset, 0.0, 0.0, 0.0]
+    numbers += [tool.diameter, tool.front, tool.back, float(tool.orientation)]
+    m.parameters.numbers[TOOL : TOOL + 14] = numbers
+
+
+def select_plane(m: Context, code: int) -> None:
+    """G17, G18, G19."""
+    plane = {170: 0, 180: 1, 190: 2}[code]
+    if m.state.comp_side and plane != m.state.plane:
+        raise Fault("the plane cannot change while the cutter is compensated; write it after G40", f"g{code}")
+    m.out.call("SELECT_PLANE", PLANES[plane])
+    m.state.plane = plane
+
+
+def compensate(m: Context, code: int, words: dict[str, float]) -> None:
+    """G40, G41, G42, G41.1, G42.1."""
+    out, state = m.out, m.state
+    if code == 400:
+        out.comment("interpreter: cutter radius compensation off")
+        compensation, out.compensation = out.compensation, None
+        if compensation is not None:
+            entered = compensation.entered
+            out.put(compensation.off(out.line, (out.digits, out.n)))
+            if entered:
+                m.leaving, m.left_turned = compensation, state.rotation
+                state.arc_allowed = 0
+        state.comp_side = 0
+        return
+    if state.plane == YZ:
+        raise Fault("cutter compensation works in the planes of G17 and G18 only; write one of them before", f"g{code}")
+    if state.comp_side:
+        raise Fault("the cutter is compensated already; write G40 before", f"g{code}")
+    side = LEFT if code in (410, 411) else RIGHT
+    radius, orientation = _cutter(m, code, words)
+    if radius < 0.0:
+        side, radius = -side, -radius
+    out.comment(f"interpreter: cutter radius compensation on {'left' if side == LEFT else 'right'}")
+    state.comp_side = side
+    m.leaving = None
+    if radius > 0.0:
+        start = (state.x, state.y, state.z) if state.plane == XY else (state.z, state.x, state.y)
+        units = "INCHES" if state.inches else "MM"
+        out.compensation = Compensation(
+            side, radius, PLANES[state.plane], start, units=units, orientation=orientation, record=m.stretches
+        )
+
+
+def _cutter(m: Context, code: int, words: dict[str, float]) -> tuple[float, int]:
+    """Radius in program units (negative: the other side) and orientation of the cutter to compensate."""
+    if code in (411, 421):
+        if "d" not in words:
+            raise Fault("D is missing; write the cutter's diameter, for example D6", f"g{code}")
+        if "l" in words and m.state.plane == XY:
+            raise Fault("L, the orientation of a lathe tool, goes with the plane of G18 only; leave it away", "l")
+        return words["d"] / 2.0, int(words.get("l", 0))
+    slot = 0
+    if "d" in words:
+        try:
+            number = whole(words["d"])
+            if number < 0:
+                raise Fault(f"D{number} is negative; write the number of a tool")
+            slot = m.tools.find(number)
+        except Fault as fault:
+            fault.key = "d"
+            raise
+    tool = m.tools.slots[slot]
+    if m.state.plane == XY and tool.orientation not in (0, 9):
+        raise Fault(f"tool {tool.number} is a lathe tool, which is compensated in the plane of G18 only", f"g{code}")
+    return m.from_machine(tool.diameter) / 2.0, tool.orientation
+
+
+def control_path(m: Context, code: int, words: dict[str, float]) -> None:
+    """G61 (exact path), G61.1 (exact stop), G64 (blending: within P of the path; Q: joins nearly straight lines)."""
+    if m.state.comp_side:
+        raise Fault("path control cannot change while the cutter is compensated; write it after G40", f"g{code}")
+    if code == 610:
+        m.out.call("SET_MOTION_CONTROL_MODE", "EXACT_PATH")
+    elif code == 611:
+        m.out.call("SET_MOTION_CONTROL_MODE", "EXACT_STOP")
+    else:
+        tolerance = words.get("p", 0.0)
+        m.out.call("SET_MOTION_CONTROL_MODE", "CONTINUOUS", tolerance)
+        m.out.call("SET_NAIVECAM_TOLERANCE", words.get("q", tolerance))
+
+
+def _distance(m: Context, absolute: bool) -> None:
+    if m.state.absolute != absolute:
+        m.out.comment(f"interpreter: distance mode changed to {'absolute' if absolute else 'incremental'}")
+        m.state.absolute = int(absolute)
+
+
+def _arc_distance(m: Context, absolute: bool) -> None:
+    if m.state.arc_absolute != absolute:
+        m.out.comment(f"interpreter: IJK distance mode changed to {'absolute' if absolute else 'incremental'}")
+        m.state.arc_absolute = int(absolute)
+
+
+def stop(m: Context, code: int) -> bool:
+    """M0, M1, M60 (the program pauses), M2, M30 (it ends: True)."""
+    out = m.out
+    if out.compensation is not None:
+        out.put(out.compensation.stop(out.line, (out.digits, out.n)))
+    if code == 1:
+        out.call("OPTIONAL_PROGRAM_STOP")
+    elif code in (0, 60):
+        if code == 60:
+            out.call("PALLET_SHUTTLE")
+        out.call("PROGRAM_STOP")
+    else:
+        _end(m, code)
+        return True
+    return False
+
+
+def _end(m: Context, code: int) -> None:
+    """The state after M2 and M30: G54, G17, G90, G94, F0, G40, spindle and coolant off, G1."""
+    state, out = m.state, m.out
+    out.compensation = None
+    position = state.position()
+    rotate(position, state.rotation)
+    position = plus(position, state.origin)
+    state.origin_index = 1
+    m.parameters.numbers[SYSTEM] = 1.0
+    state.origin = m.vector_from_machine(SYSTEMS + 21)
+    state.rotation = m.parameters.numbers[SYSTEMS + 30]
+    position = minus(position, state.origin)
+    rotate(position, -state.rotation)
+    state.move_to(position)
+    call_origin(m)
+    out.call("SET_XY_ROTATION", state.rotation)
+    if state.plane != XY:
+        out.call("SELECT_PLANE", PLANES[XY])
+        state.plane = XY
+    state.absolute = 1
+    state.feed_mode, state.feed_rate = PER_MINUTE, 0.0
+    out.call("SET_FEED_MODE", 0, 0)
+    out.rate(0.0)
+    state.comp_side, state.arc_allowed = 0, 1
+    out.call("STOP_SPINDLE_TURNING", 0)
+    out.call("SET_SPINDLE_MODE", 0, 0.0)
+    state.spindle = 0
+    state.motion = 10
+    if state.mist:
+        out.call("MIST_OFF")
+    if state.flood:
+        out.call("FLOOD_OFF")
+    state.mist = state.flood = 0
+    if code == 30:
+        out.call("PALLET_SHUTTLE")
+    out.call("PROGRAM_END")

@@ -1,0 +1,112 @@
+"""O words as they are read: their kind, what they name, and the values that they are given."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from rds.nc.language.expressions import Fault, Reader
+from rds.nc.language.parameters import ARGUMENTS, Parameters
+
+_KINDS = (
+    *("sub", "endsub", "call", "do", "while", "repeat", "if", "elseif", "else", "endif"),
+    *("break", "continue", "endwhile", "endrepeat", "return"),
+)
+_KIND = re.compile("|".join(sorted(_KINDS, key=len, reverse=True)))
+_GLOBAL = frozenset(("sub", "endsub", "call", "return"))
+_TESTS = frozenset(("while", "repeat", "if", "elseif"))
+
+
+@dataclass(slots=True)
+class Word:
+    """An O word that has been read. `kind` is "" when there is nothing to do; `name`, of labels inside subroutines, is
+    `sub#label`; `spelled` is for messages; `at` where it begins in its block.
+    """
+
+    kind: str = ""
+    name: str = ""
+    spelled: str = ""
+    at: int = 0
+    test: float = 0.0
+    arguments: list[float] = field(default_factory=list)
+    value: float | None = None  # that RETURN or ENDSUB gives back
+
+
+def read_word(text: str, at: int, parameters: Parameters, *, scope: str, defining: str, skipping: str) -> Word:
+    """The O word that begins at `at`. Raises Fault.
+
+    `scope`: the subroutine that labels belong to; `defining`: the one that is being defined; `skipping`: the label up
+    to which blocks are passed over, so that only what ends that is worked out ("": none).
+    """
+    reader = Reader(text, parameters, at + 1)
+    try:
+        label = reader.name() if reader.peek() == "<" else str(reader.integer())
+    except Fault:
+        if skipping:
+            return Word(at=at)  # worked out from parameters that have no value yet
+        raise
+    match = _KIND.match(text, reader.at)
+    word = Word(match[0] if match else "", at=at)
+    word.spelled = spelled(label)
+    word.name = label if word.kind in _GLOBAL else f"{scope}#{label}"
+    if match:
+        reader.at = match.end()
+    elif not defining:
+        alone = " stands alone (a program number elsewhere); leave it away or" if not reader.peek() else " is followed"
+        said = "" if not reader.peek() else " by no control word;"
+        raise Fault(f"{word.spelled}{alone}{said} write one of {', '.join(_KINDS).upper()} after it", at=at)
+    _read_values(word, reader, defining, skipping)
+    if not skipping:
+        while reader.peek() == "(":
+            reader.at = text.index(")", reader.at) + 1
+        if reader.peek() not in ("", ";"):
+            said = f"{word.spelled} {word.kind.upper()}"
+            raise reader.fault(f"only a comment can follow {said}; move the rest to a new line")
+    return word
+
+
+def spelled(label: str) -> str:
+    """An O word's number or name as programs write it: O100, O<pocket>."""
+    return f"O{label if label.lstrip('-').isdigit() else f'<{label}>'}"
+
+
+def _read_values(word: Word, reader: Reader, defining: str, skipping: str) -> None:
+    if word.kind == "sub":
+        if defining:
+            raise nested(defining, word)
+    elif word.kind in ("endsub", "return"):
+        if not skipping and reader.peek() == "[":
+            word.value = reader.expression()
+    elif defining or (word.kind == "call" and skipping):
+        word.kind = ""  # passed over now
+    elif word.kind == "call":
+        _read_arguments(word, reader)
+    elif word.kind in _TESTS and skipping in ("", word.name):
+        if reader.peek() != "[":
+            raise reader.fault(f"{word.kind.upper()} needs an expression in brackets; add [...]")
+        word.test = reader.expression()
+
+
+def nested(outer: str, word: Word) -> Fault:
+    return Fault(f"a subroutine inside the subroutine {outer!r}; end that one with ENDSUB first", at=word.at)
+
+
+def _read_arguments(word: Word, reader: Reader) -> None:
+    while reader.peek() in ("[", "("):
+        if reader.peek() == "(":
+            reader.at = reader.text.index(")", reader.at) + 1
+            continue
+        if len(word.arguments) >= ARGUMENTS:
+            raise reader.fault(f"more than {ARGUMENTS} arguments; hand the rest over in parameters from #31 on")
+        word.arguments.append(reader.expression())
+
+
+def read_gr(text: str, at: int, parameters: Parameters) -> Word:
+    """GR100 or GR<name>, with arguments in brackets: the same as O100 CALL (dcs-thesis, table 6.1)."""
+    reader = Reader(text, parameters, at + 2)
+    label = reader.name() if reader.peek() == "<" else str(reader.integer())
+    word = Word("call", label, f"GR{label}", at)
+    _read_arguments(word, reader)
+    if reader.peek() not in ("", ";"):
+        raise reader.fault("only arguments [...] and a comment can follow GR; move the rest to a new line")
+    return word

@@ -1,0 +1,130 @@
+"""What comes out of the interpreter: moves gathered into blocks, other calls in order between them."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rds.nc.language.canon import BLOCK_ROWS, MOTION, RATE, Call, MotionBlock
+
+if TYPE_CHECKING:
+    from rds.nc.compensation.compensation import Compensation
+
+_REST = (0.0,) * 3
+_ONLY = (0.0,) * 8
+FEW = 1024  # rows handed over that are worth no block of their own
+
+
+class Stream:
+    """Takes rows and calls in program order; `items` is what can be handed on.
+
+    `line`, `digits`, `n` and `file` say which block is being executed. While `compensation` is set, feed rates and
+    calls go through it to keep their place among the moves that it holds back.
+    """
+
+    def __init__(self) -> None:
+        self.items: list[MotionBlock | Call] = []
+        self.compensation: Compensation | None = None
+        self.line = self.digits = self.n = 0
+        self._file = ""
+        self._empty()
+
+    def _empty(self) -> None:
+        self._kinds = array("b")
+        self._digits = array("b")
+        self._ns = array("i")
+        self._lines = array("i")
+        self._values = array("d")
+
+    @property
+    def file(self) -> str:
+        return self._file
+
+    @file.setter
+    def file(self, name: str) -> None:
+        if name != self._file:
+            self.flush()
+            self._file = name
+
+    def straight(self, kind: int, end: tuple[float, float, float, float, float, float]) -> None:
+        """TRAVERSE or FEED to x, y, z, a, b, c."""
+        self._values.extend(end + _REST)
+        self._row(kind)
+
+    def row(self, kind: int, values: tuple[float, ...]) -> None:
+        """A row with all nine values."""
+        self._values.extend(values)
+        self._row(kind)
+
+    def _row(self, kind: int) -> None:
+        self._kinds.append(kind)
+        self._digits.append(self.digits)
+        self._ns.append(self.n)
+        self._lines.append(self.line)
+        if len(self._kinds) >= BLOCK_ROWS:
+            self.flush()
+
+    def rate(self, rate: float) -> None:
+        """SET_FEED_RATE."""
+        if self.compensation is None:
+            self.row(RATE, (rate, *_ONLY))
+        else:
+            self.put(self.compensation.other((RATE, self.digits, self.n, self.line, (rate, *_ONLY))))
+
+    def call(self, name: str, *args: Any) -> None:
+        """Any other canonical call."""
+        n = str(self.n).zfill(self.digits) if self.digits else ""
+        call = Call(name, args, self.line, n, self._file)
+        if self.compensation is None:
+            self.flush()
+            self.items.append(call)
+        else:
+            self.put(self.compensation.other(call))
+
+    def comment(self, text: str) -> None:
+        self.call("COMMENT", text)
+
+    def put(self, items: Iterable[Any]) -> None:
+        """Rows (tuples) and calls that compensation lets go."""
+        for item in items:
+            if isinstance(item, Call):
+                self.flush()
+                self.items.append(item)
+            else:
+                kind, digits, n, line, values = item
+                self._values.extend(values)
+                self._digits.append(digits)
+                self._ns.append(n)
+                self._lines.append(line)
+                self._kinds.append(kind)
+                if len(self._kinds) >= BLOCK_ROWS:
+                    self.flush()
+
+    def rows(self, rows: np.ndarray) -> None:
+        """A copy of rows of dtype MOTION from somewhere else, at most BLOCK_ROWS of them. Few are gathered, too."""
+        if len(rows) > FEW or len(rows) + len(self._kinds) > BLOCK_ROWS:
+            self.flush()
+        if len(rows) > FEW:
+            self.items.append(MotionBlock(rows.copy(), self._file))
+            return
+        self._kinds.frombytes(rows["kind"].tobytes())
+        self._digits.frombytes(rows["digits"].tobytes())
+        self._ns.frombytes(rows["n"].tobytes())
+        self._lines.frombytes(rows["line"].tobytes())
+        self._values.frombytes(rows["values"].tobytes())
+
+    def flush(self) -> None:
+        """What has been gathered becomes a block."""
+        if not self._kinds:
+            return
+        rows = np.zeros(len(self._kinds), MOTION)
+        rows["kind"] = np.frombuffer(self._kinds, np.int8)
+        rows["digits"] = np.frombuffer(self._digits, np.int8)
+        rows["n"] = np.frombuffer(self._ns, np.int32)
+        rows["line"] = np.frombuffer(self._lines, np.int32)
+        rows["values"] = np.frombuffer(self._values).reshape(-1, 9)
+        self._empty()
+        self.items.append(MotionBlock(rows, self._file))

@@ -1,0 +1,152 @@
+"""What was measured of a program's run, against the program: where each axis follows worst, and the contour error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rds.interpolators.motion.planner import TOLERANCE
+from rds.interpolators.motion.segments import AXES, BLEND
+from rds.modes.loop.execution import State
+from rds.nc.run.contour import contour_error
+from rds.nc.run.prepare import Prepared
+from rds.results import Result
+from rds.results.metrics import moving
+
+WAITS = {
+    State.HELD: "held_s",
+    State.STOP: "stops_s",
+    State.TOOL: "tool_changes_s",
+    State.SPINDLE: "spindle_s",
+    State.HOME: "homing_s",
+}
+_LINEAR = AXES[:3]
+
+
+def judged(result: Result, prepared: Prepared) -> Result:
+    """The result with the column `contour_error` (mm; 0 on the way home) and with `meta["program"]`."""
+    state = result["program_state"].astype(int)
+    error, line = contour(result, prepared, state)
+    columns = dict(result.columns)
+    units = dict(result.units)
+    columns["contour_error"], units["contour_error"] = error, "mm"
+    moves = moving(result)
+    on_path = moves & (state != State.HOME)
+
+    def worst(values: np.ndarray, line: np.ndarray, where: np.ndarray, unit: str) -> dict[str, Any] | None:
+        return _worst(values[where], line[where], result["time"][where], unit) if where.any() else None
+
+    about = {
+        "file": prepared.file.name,
+        **_times(result, prepared, state),
+        "certificate": prepared.certificate.to_dict() if prepared.certificate else None,
+        "waiting_samples": len(result) - int(moves.sum()),
+        "limit_shares": _limit_shares(result, prepared),
+        "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) else None,
+        "following_error": {
+            name: found
+            for name in prepared.program.axes
+            if (
+                found := worst(
+                    np.abs(result[f"{name}_reference"] - result[f"{name}_measured"]),
+                    result["program_line"].astype(int),
+                    moves,
+                    result.units[f"{name}_measured"],
+                )
+            )
+        },
+    }
+    meta = result.meta | {"program": about, "notes": [*result.meta.get("notes", []), *prepared.notes]}
+    return Result(columns, units, meta)
+
+
+def worst_lines(result: Result, column: np.ndarray, count: int = 5) -> list[tuple[int, float, float]]:
+    """The program lines with the largest values of a column: line, value and when it was, s."""
+    line, moves = result["program_line"].astype(int), moving(result)
+    found = []
+    for number in np.unique(line[moves]):
+        here = np.flatnonzero((line == number) & moves)
+        worst = here[np.argmax(column[here])]
+        found.append((int(number), float(column[worst]), float(result["time"][worst])))
+    return sorted(found, key=lambda entry: -entry[1])[:count]
+
+
+def contour(
+    result: Result | Mapping[str, np.ndarray], prepared: Prepared, state: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (mm) of each measured position to the path, and the program line that it is nearest to.
+
+    `result` may be some of a run's rows, as columns; `state` is its `program_state`, as integers.
+    """
+    path, axes = prepared.path, prepared.program.axes
+    line = result["program_line"].astype(int)
+    if not len(path):
+        return np.zeros(len(line)), line
+    points, wanted = np.zeros((len(line), 3)), np.zeros((len(line), 3))
+    for i, name in enumerate(_LINEAR):
+        if name in axes:
+            points[:, i], wanted[:, i] = result[f"{name}_measured"], result[f"{name}_reference"]
+        else:
+            points[:, i] = wanted[:, i] = path["start"][0, i]
+    row = np.clip(np.ceil(result["program_sample"]).astype(int), 0, len(prepared.segment) - 1)
+    blended = path["mode"] == BLEND
+    given = path["tolerance"][blended]
+    corner = float(np.where(np.isfinite(given), given, TOLERANCE).max(initial=0.0))
+    reach = np.linalg.norm(points - wanted, axis=1) + corner + 1e-3
+    on_path = state != State.HOME
+    error = np.zeros(len(line))
+    error[on_path], nearest = contour_error(points[on_path], path, prepared.segment[row][on_path], reach[on_path])
+    line = line.copy()
+    line[on_path] = path["line"][nearest]
+    return error, line
+
+
+def _times(result: Result, prepared: Prepared, state: np.ndarray) -> dict[str, Any]:
+    """Predicted and executed seconds, and what was waited for."""
+    # samples that were discarded belong to the state of the one after them
+    spent = np.diff(np.rint(result["time"] / prepared.T).astype(np.int64), prepend=-1)
+    waited = {name: int(spent[state == kind].sum()) for kind, name in WAITS.items()}
+    moving = int(spent.sum()) - sum(waited.values())
+    return {
+        "predicted_samples": prepared.program.samples,
+        "moving_samples": moving,
+        "predicted_s": prepared.seconds,
+        "executed_s": int(spent.sum()) * prepared.T,
+        "moving_s": moving * prepared.T,
+        **{name: samples * prepared.T for name, samples in waited.items()},
+        "last_line": int(result["program_line"][-1]),
+        "completed": result.meta.get("ending") == "done",
+        "done_percent": 100.0 * min(float(result["program_sample"].max() + 1.0) / prepared.program.samples, 1.0),
+    }
+
+
+def _limit_shares(result: Result, prepared: Prepared) -> dict[str, dict[str, float]]:
+    """Of each axis the largest velocity, acceleration and jerk that was sent, by differences, over its limit.
+
+    Where samples were discarded there are no differences.
+    """
+    program, T = prepared.program, prepared.T
+    whole = np.diff(np.rint(result["time"] / T)) == 1
+    shares: dict[str, dict[str, float]] = {name: {} for name in program.axes}
+    for order, kind in enumerate(("velocity", "acceleration", "jerk"), 1):
+        known = np.ones(max(len(result) - order, 0), dtype=bool)
+        for i in range(order):
+            known &= whole[i : i + len(known)]
+        for name, limit in zip(program.axes, program.limits[order - 1], strict=True):
+            sent = np.abs(np.diff(result[f"{name}_reference"], order))[known] / T**order
+            shares[name][kind] = float(sent.max(initial=0.0) / limit)
+    return shares
+
+
+def _worst(values: np.ndarray, line: np.ndarray, time: np.ndarray, unit: str) -> dict[str, Any]:
+    at = int(np.argmax(values))
+    return {
+        "unit": unit,
+        "max": float(values[at]),
+        "line": int(line[at]),
+        "time_s": float(time[at]),
+        "rms": float(np.sqrt(np.mean(values**2))),
+        "mean": float(np.mean(values)),
+    }

@@ -1,0 +1,152 @@
+"""Pictures of a program's run: the measured path with its contour error, and the errors along the program."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rds.core.figure import BLACK, CYCLE, GREY, ORANGE, SKY, VERMILLION, Picture, dress, legend
+from rds.modes.loop.execution import State
+from rds.nc.run.judge import worst_lines
+from rds.nc.run.prepare import Prepared
+from rds.results import Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_POINTS = 6000  # of a curve in a picture
+_VIEWS = (("XY", "X", "Y"), ("ZX", "X", "Z"), ("YZ", "Y", "Z"))
+_NAMED = 3  # of the worst lines
+_MARKERS = ("o", "s", "D")
+_WORST: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "color": VERMILLION, "zorder": 3}
+_CUT: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1, "label": "cut, as planned"}
+_RAPID: dict[str, Any] = {
+    "color": SKY,
+    "linewidth": 1.2,
+    "linestyle": (0, (5, 3)),
+    "zorder": 1,
+    "label": "rapid, as planned",
+}
+
+
+def path(result: Result, prepared: Prepared) -> Picture:
+    """The path from up to three sides: rapids dashed as planned, cuts as measured in the colour of their contour error.
+
+    The worst lines are marked, and named in the legend.
+    """
+    axes = prepared.program.axes
+    views = [view for view in _VIEWS if view[1] in axes and view[2] in axes]
+    error = result["contour_error"] * 1e3
+    rapid = prepared.path["rapid"][prepared.segment] if len(prepared.path) else np.zeros(len(prepared.segment), bool)
+    row = np.clip(np.ceil(result["program_sample"]).astype(int), 0, len(rapid) - 1)
+    at = _thinned(error, np.flatnonzero(~rapid[row] & (result["program_state"] != State.HOME)))
+    picture = Picture(4.6 if len(views) == 1 else 8.0)
+    places = picture.subplots(-(-len(views) // 2), min(len(views), 2) or 1, squeeze=False).ravel()
+    drawn: Any = None
+    for place, (title, across, up) in zip(places, views, strict=False):
+        x, y = result[f"{across}_measured"], result[f"{up}_measured"]
+        edges = _edges(len(rapid))
+        u, v = (prepared.program.position[edges, axes.index(name)] for name in (across, up))
+        for kind, style in ((False, _CUT), (True, _RAPID)):
+            place.plot(np.where(rapid[edges] == kind, u, np.nan), np.where(rapid[edges] == kind, v, np.nan), **style)
+        drawn = place.scatter(x[at], y[at], c=error[at], s=5.0, cmap="viridis", linewidths=0, zorder=2)
+        for (line, value, when), marker in zip(worst_lines(result, error, _NAMED), _MARKERS, strict=False):
+            k = int(np.searchsorted(result["time"], when))
+            label = f"line {line}: {value:.1f} µm"
+            place.plot(x[k], y[k], linestyle="none", marker=marker, label=label, **_WORST)
+        dress(place, f"{up} [mm]", f"{across} [mm]")
+        place.set_aspect("equal", adjustable="datalim")
+        place.set_title(title, loc="left", fontsize="medium")
+    for place in places[len(views) :]:
+        place.set_axis_off()
+    if drawn is not None:
+        picture.colorbar(drawn, ax=list(places), label="contour error of the cuts [µm]", shrink=0.8)
+        handles, texts = places[0].get_legend_handles_labels()
+        picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
+    return picture
+
+
+def along(result: Result, prepared: Prepared) -> Picture:
+    """Contour error, following errors and feed over time, with the program's lines above."""
+    time = result["time"]
+    picture = Picture(8.4)
+    top, middle, bottom = picture.subplots(3, 1, sharex=True)
+    edges = _edges(len(time))
+    top.plot(time[edges], _largest(result["contour_error"] * 1e3, edges), color=BLACK, linewidth=1.1)
+    dress(top, "contour error [µm]", None)
+    for i, name in enumerate(prepared.program.axes):
+        unit = result.units[f"{name}_measured"]
+        scale, unit = (1e3, "µm") if unit == "mm" else (1.0, unit)
+        off = np.abs(result[f"{name}_reference"] - result[f"{name}_measured"]) * scale
+        style = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))[i % 4]
+        values = _largest(off, edges)
+        middle.plot(time[edges], values, color=CYCLE[i % 6], linestyle=style, linewidth=1.1, label=f"{name} [{unit}]")
+    dress(middle, "|following error|", None)
+    legend(middle)
+    bottom.plot(time[edges], _feed(result, prepared.program.axes)[edges], color=CYCLE[0], linewidth=1.1)
+    dress(bottom, "feed [mm/min]")
+    _mark_waits(bottom, result)
+    _mark_lines(top, result)
+    return picture
+
+
+def _mark_waits(axes: Axes, result: Result) -> None:
+    """Grey where the program waits or is held, orange on the way home."""
+    state = result["program_state"].astype(int)
+    starts = np.flatnonzero(np.diff(state, prepend=-1))
+    ends = [*starts[1:], len(state) - 1]
+    named: set[str] = set()
+    for start, end in list(zip(starts, ends, strict=True))[:500]:
+        if state[start] != State.RUNS:
+            homes = state[start] == State.HOME
+            label = "moves home" if homes else "waits, dwells or is held"
+            axes.axvspan(
+                *result["time"][[start, end]],
+                color=ORANGE if homes else GREY,
+                alpha=0.25,
+                linewidth=0,
+                label=None if label in named else label,
+            )
+            named.add(label)
+    legend(axes)
+
+
+def _mark_lines(axes: Axes, result: Result) -> None:
+    """Program lines on top, as many as can be read."""
+    line, time = result["program_line"].astype(int), result["time"]
+    starts = np.flatnonzero(np.diff(line, prepend=line[0] - 1))
+    shown: list[int] = []
+    least = (time[-1] - time[0]) / 24
+    for k in starts:
+        if not shown or time[k] - time[shown[-1]] >= least:
+            shown.append(int(k))
+    above = axes.secondary_xaxis("top")
+    above.set_xticks([time[k] for k in shown], [str(line[k]) for k in shown], fontsize="x-small")
+    above.set_xlabel("program line", fontsize="small")
+
+
+def _edges(count: int) -> np.ndarray:
+    """Where the parts of a long curve begin of which the largest value is drawn."""
+    return np.arange(0, count, max(1, count // _POINTS))
+
+
+def _largest(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    largest: np.ndarray = np.maximum.reduceat(values, edges)
+    return largest
+
+
+def _thinned(error: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Those of the samples `shown` to draw, among them the worst; the worst last, on top."""
+    if not len(shown):
+        return shown
+    worst = np.argsort(error[shown])[-50:]
+    both = shown[np.union1d(_edges(len(shown)), worst)]
+    ordered: np.ndarray = both[np.argsort(error[both])]
+    return ordered
+
+
+def _feed(result: Result, axes: tuple[str, ...]) -> np.ndarray:
+    """Speed along the path, mm/min, of the reference in X, Y and Z."""
+    speeds = [result[f"{name}_reference_velocity"] for name in axes if name in "XYZ"]
+    return 60.0 * np.sqrt(sum(speed**2 for speed in speeds)) if speeds else np.zeros(len(result))

@@ -1,0 +1,114 @@
+"""A run while it goes on: the strip, the machine in motion, and the values that can be changed meanwhile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.machines import Machine
+from rds.panels.equipment.run import EquipmentRun
+from rds.panels.equipment.strip import StripChart
+from rds.panels.kit.field import FieldView
+from rds.panels.session.live_values import LiveValues
+from rds.results import html
+
+_HINT = "<p>Choose on the left what to try, then Run: the motion shows here, as it happens.</p>"
+
+
+class LiveView:
+    """`follow(run)`, then `look()` ten times a second until `ended()`."""
+
+    def __init__(self, shell: Any, machine: Machine):
+        self._shell, self._machine = shell, machine
+        self._run: EquipmentRun | None = None
+        self._traces: list[tuple[str, str]] = []
+        self._values: list[FieldView] = []
+        self._said = 0
+        self.strip = StripChart()
+        self.strip.layout.display = "none"
+        self.hint = widgets.HTML(_HINT)
+        self.show_machine = widgets.ToggleButton(
+            description="Show the machine", tooltip="Axes and spindle in motion, as the strip shows them"
+        )
+        self.show_machine.layout = {"width": "auto", "align_self": "flex-start"}
+        self.show_machine.observe(lambda change: self._toggle(change["new"]), "value")
+        self.picture = widgets.VBox([])
+        self._view: Any = None  # the machine's picture, once somebody wants it
+        self._live = widgets.VBox([])
+        self._live.add_class("rds-live-values")
+        self._changes = widgets.HTML()
+        self.widget = widgets.VBox([self.hint, self.strip, self._live, self._changes, self.show_machine, self.picture])
+
+    def follow(self, run: EquipmentRun) -> None:
+        """Show this run from its beginning."""
+        self._run, self._traces, self._said = run, [], 0
+        self.hint.value = "<p>The loop is being started; the first samples come in a moment.</p>"
+        self._changes.value = ""
+        self.strip.layout.display = "none"
+        self._clear_values()
+
+    def look(self) -> None:
+        """What has come since."""
+        run = self._run
+        if run is None:
+            return
+        if not self._traces and (traces := run.traces()):
+            self._traces = traces
+            self.hint.value = ""
+            self.strip.layout.display = ""
+            self.strip.begin(traces)
+            if self._view is not None:
+                self._view.begin(traces)
+        if self._traces and len(rows := run.new_rows()):
+            self.strip.add(rows)
+        if run.real_time and not self._values and run.live_values:
+            self._offer_values(run)
+        self._list_changes(run)
+        if self._view is not None and self.show_machine.value:
+            self._view.show(self.strip.at(self.strip.shown))
+
+    def ended(self) -> None:
+        """The run is over; its strip stays, to be scrubbed through."""
+        run, self._run = self._run, None
+        self._clear_values()
+        if run is not None:
+            self._list_changes(run)
+            if not self._traces:
+                self.hint.value = _HINT
+
+    def _offer_values(self, run: EquipmentRun) -> None:
+        choices = LiveValues(run)
+        self._values = [FieldView(choices, name) for name in choices.fields]
+        box = widgets.Box(self._values)
+        box.add_class("rds-fields")
+        box.add_class("rds-group")
+        self._live.children = [widgets.HTML("<h3>Change while it runs (Enter sends it)</h3>"), box]
+
+    def _clear_values(self) -> None:
+        for view in self._values:
+            view.close()
+        self._values = []
+        self._live.children = []
+
+    def _list_changes(self, run: EquipmentRun) -> None:
+        changes = run.changes
+        if len(changes) != self._said:
+            self._said = len(changes)
+            self._changes.value = changes_table(changes)
+
+    def _toggle(self, on: bool) -> None:
+        self.strip.tells = on
+        if on and self._view is None:
+            from rds.panels.equipment.machine_view import MachineView
+
+            self._view = MachineView(self._machine)
+            self._view.begin(self._traces)
+            self.strip.observe(lambda _: self._view.show(self.strip.at(self.strip.shown)), "shown")
+        self.picture.children = [self._view.widget] if on else []
+
+
+def changes_table(changes: Any) -> str:
+    """The changes of live values as a table, with the times at which the loop took them."""
+    rows = [[f"{time:.3f}", name, old, new] for time, name, old, new in changes]
+    return html.table(["at [s]", "value", "was", "became"], rows, "Changed while it ran") if rows else ""

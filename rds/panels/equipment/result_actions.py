@@ -1,0 +1,118 @@
+"""What can be done with a run's files: its report opened, its table saved elsewhere, both sent by e-mail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.core.errors import InputError
+from rds.panels.kit.button import button, follow
+from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import row
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.work_bar import WorkBar
+from rds.panels.session.email import check_address, mail_server, send_files
+from rds.panels.session.fields import Text
+from rds.panels.session.save_as import save_as
+from rds.panels.session.task import Task
+from rds.results import Result
+from rds.results.serve import server_of
+
+
+class ResultActions:
+    """`writing()` while the files are being written, `offer(result, folder, sent)` when they are there, `clear()`."""
+
+    def __init__(self, shell: Any):
+        self._session = shell.session
+        self._result: Result | None = None
+        self._folder: Path | None = None
+        self._sent: list[str] = []
+        self.where = widgets.HTML()
+        self.bar = WorkBar(shell.ticker)
+        self.notice = Notice()
+        self._rows = self._made()
+        self.widget = widgets.VBox([self.where, self._rows, self.bar, self.notice])
+        self.clear()
+
+    def writing(self) -> None:
+        """The run is over, and its files are still to come."""
+        self.clear()
+        self.where.value = "<p>its files are being written …</p>"
+
+    def offer(self, result: Result, folder: Path, sent: Sequence[str]) -> None:
+        """The files are in `folder`; those of the names `sent` go by e-mail, and the first of them is the report."""
+        self._result, self._folder, self._sent = result, folder, list(sent)
+        self.where.value = f"<p>Saved with its report in <code>{escape(str(folder))}</code>{self._link()}</p>"
+        self._rows.layout.display = ""
+
+    def clear(self) -> None:
+        """There is nothing to save or send."""
+        self._result = self._folder = None
+        self.where.value = ""
+        self._rows.layout.display = "none"
+        self.notice.clear()
+
+    def _link(self) -> str:
+        report = self._folder / self._sent[0] if self._folder is not None else None
+        if report is None or not report.is_file():  # of a run that was cut short
+            return ""
+        address = server_of(report.parent.parent).url(f"{report.parent.name}/{report.name}")
+        return f' · <a href="{escape(address)}" target="_blank" rel="noopener">Open the report</a>'
+
+    def _made(self) -> widgets.HBox:
+        choices = self._session.choices(
+            "results",
+            [
+                Text("save_as", "Save as", "a name that ends with .csv, .mat or .parquet", "", "e.g. first.csv"),
+                Text(
+                    "send_to", "E-mail to", "addresses, separated by commas", "", "e.g. me@example.edu", refuse=_refuse
+                ),
+            ],
+        )
+        saved = "Save the result's table under this name, with its units"
+        sent = "Send the report and the table (CSV) by e-mail"
+        actions = []
+        for name, press in (
+            ("save_as", button("Save", saved, lambda: self._save(str(choices["save_as"])), self.notice)),
+            ("send_to", button("Send", sent, lambda: self._send(str(choices["send_to"])), self.notice)),
+        ):
+            action = widgets.HBox([FieldView(choices, name), press])
+            action.add_class("rds-action")
+            actions.append(action)
+        return row(*actions)
+
+    def _save(self, name: str) -> None:
+        if (result := self._result) is None:
+            return
+
+        def work(_: Task[str]) -> str:
+            return f"saved as {save_as(result, self._session.folder, name)}"
+
+        follow(self.bar, self.notice, lambda: self._session.work("saving", work), self._succeeded)
+
+    def _send(self, to: str) -> None:
+        if self._folder is None:
+            return
+        files = [path for name in self._sent if (path := self._folder / name).is_file()]
+        if not files:
+            raise InputError(f"nothing is there to send: {', '.join(self._sent)} are gone from {self._folder}")
+        subject, folder = f"RDS: {self._folder.name}", self._session.folder
+        text = f"Results of {self._folder.name}, sent from RDS.\n"
+
+        def work(task: Task[str]) -> str:
+            task.note = "sending"
+            return send_files(mail_server(folder), to, subject, text, files, lambda: task.stopping)
+
+        follow(self.bar, self.notice, lambda: self._session.work("sending", work), self._succeeded)
+
+    def _succeeded(self, sentence: str) -> None:
+        self.notice.say(sentence, "good")
+
+
+def _refuse(text: str) -> None:
+    for each in text.split(","):
+        check_address(each)

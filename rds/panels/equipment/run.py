@@ -1,0 +1,216 @@
+"""A run that a panel started: it can be watched, changed and stopped, and leaves its files in the session's folder."""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.modes import load_mode
+from rds.modes.experiment.experiment import Experiment
+from rds.modes.experiment.report import save_with_report
+from rds.modes.experiment.run import Run
+from rds.modes.loop.plan import Plan
+from rds.panels.session.saving import saving
+from rds.panels.session.session import RUNS, Session
+from rds.panels.session.task import Stopped, Task
+from rds.results import Result
+
+_KINDS = ("reference", "measured", "modelled", "voltage")
+
+
+class EquipmentRun:
+    """One run of `table`, the words of an experiment. `start()` returns at once, whatever has to be loaded first.
+
+    It is work that a progress bar can follow: share, seconds_left, note, done, stop(). What goes wrong is in `error`
+    when it is over. `prepare(pulse)` is called first, beside the page (a check of the student's files); `pulse` is of
+    `Builds.check`.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        table: dict[str, Any],
+        title: str | None = None,
+        prepare: Callable[[Callable[[], None]], None] | None = None,
+    ):
+        mode = str(table.get("mode", "simulation"))
+        self.session, self.table = session, table
+        self.real_time = load_mode(mode).real_time
+        names = [str(table["axis"])] if "axis" in table else [str(name) for name in table.get("axes", [])]
+        self.folder: Path = session.folder / RUNS / _name(names, mode)
+        self.title = title or f"{', '.join(names)}, {mode}"
+        self.files: dict[str, Path] = {}
+        self.plan: Plan | None = None
+        self.result: Result | None = None  # as soon as the loop is over; its files come later
+        self._prepare = prepare
+        self._run: Run | None = None
+        self._task: Task[Result] | None = None
+        self._seen = 0
+
+    def start(self) -> EquipmentRun:
+        """Begin; InputError if the machine is in use."""
+        if self.real_time:
+            self._task = self.session.work_on_machine(self, self.title, self._work, self._stop_loop)
+        else:
+            self._task = self.session.work(self.title, self._work, self._stop_loop)
+        return self
+
+    def _work(self, task: Task[Result]) -> Result:
+        with contextlib.ExitStack() as held:
+            try:
+                if self._prepare is not None:
+                    self._prepare(lambda: self._tell(task, "checking your files"))
+                self._tell(task, "loading")
+                experiment = Experiment.from_table(self.table, self.session.folder)
+                self.plan = experiment.plan()
+                self._tell(task, "starting the loop" if self.real_time else "simulating")
+                held.enter_context(saving(self.folder))
+                run = experiment.start(out=self.folder)
+                self._run = run
+                if task.stopping:
+                    run.stop()
+                running = "running" if self.real_time else "simulating"
+                # before the first sample the loop is still being started, and its note stays; so does that of a stop
+                self.result = run.wait(
+                    lambda taken, of: task.advance(taken, of, running if taken and not task.stopping else "")
+                )
+            finally:
+                self.session.give_machine_back(self)
+            task.note = "saving tables, pictures and the report"
+            self.files = save_with_report(self.result, self.folder, self.title)
+            return self.result
+
+    def _tell(self, task: Task[Result], note: str) -> None:
+        if task.stopping:
+            raise Stopped
+        task.note = note
+
+    def _stop_loop(self) -> None:
+        if self._run is not None:
+            self._run.stop()
+
+    # what a progress bar follows
+
+    @property
+    def share(self) -> float | None:
+        """0 to 1."""
+        return self._task.share if self._task else None
+
+    @property
+    def seconds_left(self) -> float | None:
+        """s; of a loop against the clock what is planned, without the time that its start took. None while it saves."""
+        if self.result is not None:
+            return None
+        if self.real_time and self._run is not None and not self._run.done:
+            taken, of = self._run.progress
+            return (of - taken) * self._run.plan.T if taken else None
+        return self._task.seconds_left if self._task else None
+
+    @property
+    def note(self) -> str:
+        """What it does now."""
+        return self._task.note if self._task else ""
+
+    @property
+    def done(self) -> bool:
+        """Whether it is over, files and all."""
+        return self._task is not None and self._task.done
+
+    def stop(self) -> None:
+        """Ask for a safe end; what was recorded is kept."""
+        if self._task is not None:
+            self._task.stop()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for its end; false after `timeout` s."""
+        return self._task is None or self._task.wait(timeout)
+
+    @property
+    def error(self) -> BaseException | None:
+        """Why it failed; None where it was only stopped."""
+        return None if self._task is None or self._task.stopped else self._task.error
+
+    @property
+    def stopped_early(self) -> bool:
+        """Whether it was stopped before its loop began."""
+        return self._task is not None and self._task.stopped
+
+    # what happens meanwhile
+
+    def traces(self) -> list[tuple[str, str]]:
+        """The names and units of what `new_rows` gives beside the time; none before the loop has begun."""
+        columns, units = self._columns()
+        found = [(name, units.get(name, "")) for name in _shown(columns)]
+        return found + [(f"{axis}_error", units.get(f"{axis}_measured", "")) for axis in _followed(columns)]
+
+    def new_rows(self) -> np.ndarray:
+        """Rows recorded since it was last asked: time in s, then one column per trace."""
+        columns, _ = self._columns()
+        rows = self._new(columns)
+        if not len(rows):
+            return np.empty((0, 1 + len(self.traces())))
+        of = dict(zip(columns, rows.T, strict=True))
+        errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in _followed(columns)]
+        return np.column_stack([of["time"], *(of[name] for name in _shown(columns)), *errors])
+
+    def _columns(self) -> tuple[list[str], Mapping[str, str]]:
+        if self.result is not None:
+            return list(self.result.columns), self.result.units
+        if self._run is None or not self._run.columns:
+            return [], {}
+        return ["time", *self._run.columns[1:]], self._run.units
+
+    def _new(self, columns: Sequence[str]) -> np.ndarray:
+        """Rows of `columns` that were not asked for yet."""
+        if self.result is not None:
+            seen, self._seen = self._seen, len(self.result)
+            return np.column_stack([self.result[name][seen:] for name in columns])
+        if self._run is None or not columns:
+            return np.empty((0, 0))
+        first, rows = self._run.read(self._seen)
+        self._seen = first + len(rows)
+        # the record counts samples, in its first column
+        return np.column_stack([rows[:, 0] * self._run.plan.T, rows[:, 1:]])
+
+    @property
+    def live_values(self) -> dict[str, Any]:
+        """The controller's channels, whose values can be changed now, by name; none before and after the loop."""
+        if self._run is None or self._run.done or not self._run.columns:
+            return {}
+        return {name: channel for name, channel in self._run.desk.channels.items() if "." in name}
+
+    def change(self, name: str, value: float) -> None:
+        """Change a live value from the next sample on; InputError where that will not do, or when it is over."""
+        if self._run is None:
+            raise InputError("the run has not begun")
+        self._run.desk.set(name, value)
+
+    @property
+    def changes(self) -> list[Any]:
+        """The changes that the loop has taken: time in s, name, old value, new value each."""
+        return list(self._run.changes) if self._run is not None else []
+
+
+def _shown(columns: Sequence[str]) -> list[str]:
+    """The columns that a strip shows: of each axis its motion, and its voltage."""
+    return [name for kind in _KINDS for name in columns if name.endswith(f"_{kind}")]
+
+
+def _followed(columns: Sequence[str]) -> list[str]:
+    """The axes that follow a reference."""
+    return [
+        name.removesuffix("_reference")
+        for name in columns
+        if name.endswith("_reference") and f"{name.removesuffix('_reference')}_measured" in columns
+    ]
+
+
+def _name(axes: Sequence[str], mode: str) -> str:
+    return f"{time.strftime('%Y%m%d-%H%M%S')}-{'-'.join(axes)}-{mode}-{secrets.token_hex(2)}"

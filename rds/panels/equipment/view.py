@@ -1,0 +1,185 @@
+"""What equipment model and equipment control share: settings on the left; run, live strip and results on the right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.core.errors import InputError
+from rds.panels.equipment.build import Checked
+from rds.panels.equipment.earlier_runs import EarlierRuns
+from rds.panels.equipment.live_view import LiveView
+from rds.panels.equipment.result_view import ResultView
+from rds.panels.equipment.run import EquipmentRun
+from rds.panels.equipment.settings import EquipmentSettings
+from rds.panels.equipment.state import Equipment
+from rds.panels.equipment.what_runs import WhatRuns
+from rds.panels.kit.button import attempt, button, follow, run_order, say_error
+from rds.panels.kit.layout import row
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.work_bar import WorkBar
+from rds.results import Result, html
+
+TABS = ("Live", "Results", "Timing", "What runs", "Earlier runs")
+_STOPPED = "stopped; nothing was checked or loaded"
+LIVE, RESULTS, TIMING, WHAT, EARLIER = range(len(TABS))
+
+
+class EquipmentView:
+    """The widgets over one `Equipment`."""
+
+    def __init__(self, shell: Any, equipment: Equipment):
+        self.shell, self.equipment = shell, equipment
+        self.run: EquipmentRun | None = None
+        self.settings = EquipmentSettings(equipment)
+        self.bar = WorkBar(shell.ticker)
+        self.notice = Notice()
+        self.live = LiveView(shell, equipment.machine)
+        self.results = ResultView(shell)
+        self.what = WhatRuns(equipment)
+        self.earlier = EarlierRuns(shell, self._reopened)
+        say = self.notice
+        built = "Check your files in a process of their own; faults show at their lines"
+        viewed = "What will run, as a block diagram; your files; the experiment's file"
+        loaded = "Make everything ready and look for the machine, without running"
+        tip = "Run with these settings; files are checked first"
+        self.run_button = run_order(shell, tip, self.start, say, equipment.choices)
+        self.bar.locks = [
+            self.run_button,
+            button("Build", built, self.build, say),
+            button("View model", viewed, self.view, say),
+            button("Load", loaded, self.load, say),
+        ]
+        self.tabs = widgets.Tab(
+            [self.live.widget, self.results.widget, self.results.timing, self.what.widget, self.earlier.widget],
+            titles=TABS,
+        )
+        self.tabs.add_class("rds-tabs")
+        self.tabs.observe(self._turned, "selected_index")
+        main = widgets.VBox([row(*self.bar.locks), self.bar, self.notice, self.tabs])
+        main.add_class("rds-main")
+        self.widget = widgets.HBox([self.settings.widget, main])
+        self.widget.add_class("rds-columns")
+        equipment.choices.watch(self._chosen)
+        self._stale = False  # whether something was chosen since what runs was shown
+        shell.ticker.add(self._tick)
+        self._shown: Result | None = None
+        self._end_look: Callable[[], None] = lambda: None
+
+    def start(self) -> None:
+        """What the run button does."""
+        if self.bar.busy:
+            return
+        self._refuse()
+        self.notice.clear()
+        self.run = self.equipment.run().start()
+        self._shown = None
+        self.tabs.selected_index = LIVE
+        self.results.clear()
+        self.live.follow(self.run)
+        self._end_look = self.shell.ticker.add(self._look)
+        self.bar.follow(self.run, lambda: attempt("showing the run", self._ended, self.notice))
+
+    def build(self) -> None:
+        """What the build button does."""
+        self._refuse()
+        if self.equipment.files():
+            follow(self.bar, self.notice, self.equipment.build, self._built, _STOPPED)
+        else:
+            self.notice.say("nothing of yours is chosen: what will run is the library's own, and is built", "good")
+
+    def load(self) -> None:
+        """What the load button does."""
+        self._refuse()
+        follow(self.bar, self.notice, self.equipment.load, self._loaded, _STOPPED)
+
+    def view(self) -> None:
+        """What the view button does."""
+        self.tabs.selected_index = WHAT
+
+    def _refuse(self) -> None:
+        if refused := self.settings.refused:
+            raise InputError(f"first mend what is refused on the left: {', '.join(refused)}")
+
+    def _built(self, files: list[Checked]) -> None:
+        self.what.show_checked(files)
+        bad = [each for each in files if not each.ok]
+        self.notice.say("\n".join(each.sentence for each in bad or files), "error" if bad else "good")
+        self.tabs.selected_index = WHAT
+
+    def _loaded(self, said: str) -> None:
+        self.notice.say(said, "warning" if "; but" in said else "good")
+
+    def _look(self) -> None:
+        """Ten times a second while it runs."""
+        run = self.run
+        assert run is not None
+        self.live.look()
+        if run.result is not None and self._shown is None:
+            self._show(run.result)
+
+    def _ended(self) -> None:
+        try:
+            self._look()
+        finally:
+            self._end_look()
+            self.live.ended()
+        run = self.run
+        assert run is not None
+        if run.stopped_early:
+            self.notice.say("stopped before it began; nothing was recorded", "warning")
+        elif run.error is not None:
+            say_error("the run", run.error, self.notice)
+            if run.result is None:  # its file may be at fault
+                self.what.show_checked(self.equipment.builds.latest())
+        else:
+            self.results.saved(run.folder)
+        self.earlier.refresh()
+
+    def _show(self, result: Result) -> None:
+        """The loop is over; its files are still being written."""
+        self._shown = result
+        self.results.show(result)
+        self.notice.say(*_verdict(result))
+        if self.tabs.selected_index == LIVE:  # whoever looks at something else is left there
+            self.tabs.selected_index = RESULTS
+
+    def _reopened(self, results: list[Result], names: list[str], short: list[str]) -> None:
+        if len(results) == 1:
+            self.results.show(results[0])
+            self.results.saved(self.equipment.session.folder / "runs" / names[0])
+            self.notice.say(f"{names[0]}: {_verdict(results[0])[0]}", _verdict(results[0])[1])
+        else:
+            self.results.overlay(results, short)
+            self.notice.say(f"{len(results)} runs over each other")
+        self.tabs.selected_index = RESULTS
+
+    def _chosen(self, name: str) -> None:
+        self._stale = True
+
+    def _tick(self) -> None:
+        """What runs is shown as it is chosen now, while one looks at it."""
+        if self._stale and self.tabs.selected_index == WHAT:
+            self._stale = False
+            self.what.refresh()
+
+    def _turned(self, change: Any) -> None:
+        """Tabs that cost something are filled when they are looked at."""
+        if change["new"] == TIMING:
+            self.results.draw_timing()
+        elif change["new"] == WHAT:
+            self.what.refresh()
+        elif change["new"] == EARLIER:
+            self.earlier.refresh()
+
+
+def _verdict(result: Result) -> tuple[str, str]:
+    """What to say of a result in one line, and how."""
+    if result.meta.get("ending") not in (None, "done"):
+        return f"ended early: {html.ending(result)}", "warning"
+    if result.verdict:
+        kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
+        return f"timing {result.verdict}: {result.meta.get('verdict_reason')}", kind
+    return f"done: {len(result)} samples", "good"

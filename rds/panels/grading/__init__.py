@@ -1,0 +1,1 @@
+"""The grading panel: a batch's progress, its results, and gradebooks."""

@@ -1,0 +1,110 @@
+"""Grading, for instructors: a batch's progress, its results, and gradebooks."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.panels.grading.state import GradingDesk, rows
+from rds.panels.kit.button import attempt, button, follow, watch
+from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import columns, group, row
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.work_bar import WorkBar
+
+NAME = "grading"
+TITLE = "Grading"
+SUMMARY = "For instructors: grade a folder of submissions, see the class, export a gradebook"
+HELP = "grading"
+
+
+_FIRST = (
+    '<div class="rds-hint"><p>For instructors. To grade a class:</p><ol>'
+    "<li>Name the folder of the assignment, and the folder or zip with what was handed in.</li>"
+    "<li><i>Check assignment</i>: its solution gets full marks, an empty file none.</li>"
+    "<li>Name a new folder for the grades, then <i>Grade</i>. Stop when you like: <i>Go on</i> grades the rest.</li>"
+    "<li><i>Export</i> writes the gradebook of your platform.</li></ol>"
+    "<p>Help at the top says how an assignment is written. Students try their own file with "
+    "<code>rds grade self</code>.</p></div>"
+)
+
+
+def build(shell: Any) -> widgets.Widget:
+    """The panel."""
+    return GradingView(shell).widget
+
+
+class GradingView:
+    """Settings on the left, the class on the right."""
+
+    def __init__(self, shell: Any):
+        self.shell, self.desk = shell, GradingDesk(shell.session)
+        self.notice, self.bar = Notice(), WorkBar(shell.ticker)
+        self.table = widgets.HTML(_FIRST)
+        self._said = widgets.HTML()
+        say = self.notice
+        tip = "Grade all submissions, or go on with those that are left"
+        self._run = button("Grade", tip, self.grade, say, primary=True)
+        check = button("Check assignment", "Its solution gets full marks, an empty one none", self.check, say)
+        export = button("Export", "Write the gradebook into the folder of the grades", self.export, say)
+        batch = self._fields("assignment", "submissions", "out", "jobs", "scheduler")
+        side = [
+            group("Batch", *batch, row(check, self._run)),
+            group("Export", *self._fields("to", "gradebook"), row(export)),
+        ]
+        self.widget = columns(side, [self.bar, self.notice, self._said, self.table])
+        self.desk.choices.watch(lambda name: self._name_button())
+        self._name_button()
+        if self.desk.started():
+            attempt("the class as it stands", self.show, self.notice)
+        if (task := self.desk.going_on()) is not None:
+            watch(self.bar, self.notice, task, self._graded)
+            self.notice.say("a batch that was begun earlier goes on; Stop ends it after what is being graded")
+
+    def check(self) -> None:
+        """Try the assignment itself."""
+        self._said.value = ""
+        follow(self.bar, self.notice, self.desk.check, self._show_said)
+
+    def grade(self) -> None:
+        """Begin or go on."""
+        self._said.value = ""
+        follow(self.bar, self.notice, self.desk.grade, self._graded)
+
+    def _graded(self, count: int) -> None:
+        if left := self.show():
+            self.notice.say(f"{count} submissions are graded and kept, {left} are left: Go on grades them", "warning")
+        else:
+            self.notice.say(f"{count} submissions are graded", "good")
+
+    def show(self) -> int:
+        """The class as it stands; how many are not graded yet."""
+        from rds.results import html
+
+        finished = self.desk.finished()
+        left = len(finished.not_graded)
+        page = finished.folder / "index.html"
+        about = f"<h3>{escape(finished.title)}: {len(finished.grades)} graded, {left} left</h3>"
+        links = f"<p>feedback pages: {escape(str(finished.folder / 'students'))}; the class: {escape(str(page))}</p>"
+        self.table.value = about + html.table(["student", "status", "score", "why"], rows(finished.grades)) + links
+        self._name_button()
+        return left
+
+    def export(self) -> None:
+        """Write the chosen gradebook."""
+        written = self.desk.export(self.desk.choices["to"])
+        left = "".join(f"\nleft out: {student}: {reason}" for student, reason in written.left_out.items())
+        notes = "".join(f"\n{note}" for note in written.notes)
+        said = f"{written.students} students: {written.place}{notes}{left}"
+        self.notice.say(said, "warning" if written.left_out else "good")
+
+    def _show_said(self, text: str) -> None:
+        self._said.value = f"<pre>{escape(text)}</pre>"
+
+    def _name_button(self) -> None:
+        self._run.description = "Go on" if self.desk.started() else "Grade"
+
+    def _fields(self, *names: str) -> list[FieldView]:
+        return [FieldView(self.desk.choices, name) for name in names]

@@ -1,0 +1,122 @@
+"""The fields of the interpolator panel: path, methods with their options, feed, sample period, acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.core.geometry import PLANES
+from rds.interpolators import DEFAULT, interpolator_module, interpolator_names
+from rds.interpolators.segment_rows import FEED_UNITS, segments_of
+from rds.panels.session.fields import Choice, Field, Flag, Number, Text
+
+USER = "user"
+LINE, ARC = "line", "arc"
+SINGLE, SEVERAL, PROGRAM = "single", "several", "program"
+NONE = "none"
+ONLY = {LINE: "circular", ARC: "linear"}  # what a line's or an arc's method cannot be
+_STRAIGHT = {"kind": LINE, "end": [30.0, 0.0]}
+_HALF_CIRCLE = {"kind": ARC, "end": [30.0, 20.0], "centre": [30.0, 10.0]}
+ROWS = {  # to begin with, by what is interpolated
+    "linear": [_STRAIGHT, {"kind": LINE, "end": [30.0, 20.0]}],
+    "circular": [{"kind": ARC, "end": [30.0, 0.0], "centre": [20.0, 0.0]}, _HALF_CIRCLE],
+    "both": [_STRAIGHT, _HALF_CIRCLE],
+}
+
+
+@dataclass(frozen=True)
+class Rows(Field):
+    """The rows of a path, as `rds.interpolators.segment_rows` has them."""
+
+    start: tuple[float, ...] = (0.0, 0.0)
+
+    def check(self, value: Any) -> list[dict[str, Any]]:
+        """The rows; InputError naming the one that will not do. How many axes they have is seen with the start."""
+        if not isinstance(value, Sequence) or not all(isinstance(row, dict) for row in value) or isinstance(value, str):
+            raise InputError(f"{self.label} must be rows, each a line or an arc")
+        axes = {len(row["end"]) for row in value if isinstance(row.get("end"), list | tuple)}
+        segments_of([0.0] * (axes.pop() if len(axes) == 1 else len(self.start)), list(value), 1.0, "mm/s")
+        return [dict(row) for row in value]
+
+
+def fields() -> Iterable[Field]:
+    """All of them but the methods' own options."""
+    kinds = {"linear": "Linear", "circular": "Circular", "both": "Both"}
+    yield Choice("kind", "Interpolation", "what is interpolated: straight moves, arcs, or both", "circular", kinds)
+    given = {SINGLE: "Single segment", SEVERAL: "Several", PROGRAM: "G-code"}
+    yield Choice("given", "Path", "one segment, a table of them, or a part program", SINGLE, given)
+    yield Choice("segment", "Segment", "a straight move, or an arc", ARC, {LINE: "Line", ARC: "Arc"})
+    yield _point("start", "Start X, Y (, Z) [mm]", "where the path begins", "10, 0")
+    yield _point("end", "End X, Y (, Z) [mm]", "where it ends; an arc that ends at its start is a full circle", "0, 10")
+    yield _point("centre", "Centre X, Y (, Z) [mm]", "of the arc", "0, 0")
+    ways = {"ccw": "Counter-clockwise", "cw": "Clockwise"}
+    yield Choice("direction", "Direction", "of the arc, seen from the positive end of the third axis", "ccw", ways)
+    yield Choice("plane", "Plane", "in which the arc lies", "XY", {name: name for name in PLANES})
+    yield Rows("rows", "Segments", "each begins where the one before ends", [dict(row) for row in ROWS["circular"]])
+    yield Text("program", "Part program", "a file in your folder", "", "e.g. part.ngc")
+    yield Choice("feed_unit", "Unit of the feed rate", "", "mm/min", {unit: unit for unit in FEED_UNITS})
+    yield feed("mm/min", 600.0)
+    yield Number("period", "Sample period", "from one point to the next", 0.001, unit="s", low=1e-5, high=1.0)
+    yield _method(LINE)
+    yield Text("line_file", "File for lines", "a Python file with interpolate()", "", "e.g. my_interpolator.py")
+    yield _method(ARC)
+    yield Text("arc_file", "File for arcs", "a Python file with interpolate()", "", "e.g. my_interpolator.py")
+    filters = {NONE: "None", "linear": "Linear", "exponential": "Exponential", "s-shape": "S-shape"}
+    yield Choice("acceleration", "Acceleration", "a filter on top of the motion", NONE, filters)
+    yield Number("acceleration_time", "Time of it", "how long the velocity rises", 0.02, unit="s", above=0.0, high=10.0)
+    yield Flag("exact_stop", "Exact stop", "come to rest at the end of each segment", False)
+    yield Text("file", "Save as", "a name that ends with .csv, .mat or .parquet", "interpolation.csv")
+
+
+def feed(unit: str, value: float) -> Number:
+    """The feed rate in one of the units."""
+    return Number("feed", "Feed rate", "along the path", value, unit=unit, above=0.0, high=6e4 / 60 / FEED_UNITS[unit])
+
+
+def option_fields(role: str, method: str) -> Iterable[Field]:
+    """The options of a method of the library, for lines or for arcs; a user's file has its own."""
+    if method == USER:
+        return
+    module = interpolator_module(method)
+    for name, option in module.OPTIONS.items():
+        _, _, unit = option.meaning.rpartition(", ")
+        known = unit if unit == "mm" else ""
+        yield Number(
+            f"{role}.{name}",
+            f"{name} ({role}s)",
+            option.meaning,
+            module.DEFAULTS[name],
+            unit=known,
+            low=option.at_least,
+            above=option.more_than,
+            whole=name == "steps",
+        )
+
+
+def read_point(text: str) -> list[float]:
+    """mm per axis from "10, 0" or "10 0"; InputError for anything else."""
+    try:
+        values = [float(cell) for cell in text.replace(",", " ").split()]
+    except ValueError:
+        values = []
+    if not 2 <= len(values) <= 3 or not all(map(isfinite, values)) or "_" in text:
+        raise InputError(
+            f"write two or three positions in mm with a comma between them, such as 10, 0; not {text!r:.60}"
+        )
+    return values
+
+
+def _point(name: str, label: str, tip: str, default: str) -> Text:
+    def refuse(text: str) -> None:
+        read_point(text)
+
+    return Text(name, label, tip, default, default, refuse=refuse, longest=200, needed=True)
+
+
+def _method(role: str) -> Choice:
+    names = [name for name in interpolator_names() if name != ONLY[role]]
+    options = {name: name.replace("-", " ") for name in names} | {USER: "user-defined"}
+    return Choice(f"{role}_method", f"Method for {role}s", "of the library, or a file of your own", DEFAULT, options)

@@ -1,0 +1,183 @@
+"""Interpolator: a path through the library's methods or one's own; motion, path, errors beside what was promised."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import ipywidgets as widgets
+
+from rds.core.errors import InputError
+from rds.interpolators.result import Interpolation
+from rds.panels.equipment.build import Checked
+from rds.panels.equipment.what_runs import source_html
+from rds.panels.interpolator.segment_table import SegmentTable
+from rds.panels.interpolator.state import Interpolating
+from rds.panels.kit.button import button, follow
+from rds.panels.kit.field import FieldView
+from rds.panels.kit.figure import FigureView
+from rds.panels.kit.layout import row
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.work_bar import WorkBar
+from rds.panels.session.task import Task
+from rds.results.html import notes_list, table
+
+T = TypeVar("T")
+
+NAME = "interpolator"
+TITLE = "Interpolator"
+SUMMARY = "Turn lines, arcs or a part program into motion, by a method of the library or your own"
+HELP = "interpolation"
+_GROUPS = (
+    ("kind", "given", "segment", "start", "end", "centre", "direction", "plane", "program"),
+    ("feed", "feed_unit", "period"),
+    ("line_method", "line_file", "line.", "arc_method", "arc_file", "arc."),
+    ("acceleration", "acceleration_time", "exact_stop"),
+)
+_PICTURES = {
+    "motion": "Motion",
+    "path": "Path",
+    "magnified": "Errors magnified",
+    "errors": "Errors over time",
+    "steps": "Steps of the arc",
+    "generation-error": "Pulses",
+}
+
+
+def build(shell: Any) -> widgets.Widget:
+    """The panel."""
+    return InterpolatorView(shell, Interpolating(shell.session)).widget
+
+
+class InterpolatorView:
+    """The widgets over an `Interpolating`."""
+
+    def __init__(self, shell: Any, interpolating: Interpolating):
+        self.shell, self.work = shell, interpolating
+        self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView()
+        self.numbers, self.source = widgets.HTML(_FIRST), widgets.HTML()
+        self.done: Interpolation | None = None
+        self._views: dict[str, FieldView] = {}
+        self._side = widgets.VBox([])
+        self._side.add_class("rds-side")
+        self.segments = SegmentTable(interpolating.choices, "rows")
+        say = self.notice
+        self.run_button = button("Interpolate", "Work out the motion along the path", self.start, say, primary=True)
+        tip = "In a process of its own; faults show at their lines"
+        self.check_button = button("Check my file", tip, self.check, say)
+        self.bar.locks = [self.run_button, self.check_button]
+        self.picture = widgets.ToggleButtons(options=[("Motion", "motion")], tooltips=["which picture is shown"])
+        self.picture.observe(lambda change: self._draw(), "value")
+        self._save_row = self._saving()
+        self.results = widgets.VBox([self.picture, self.figure, self._save_row])
+        self.results.layout.display = "none"
+        main = widgets.VBox(
+            [
+                row(self.run_button, self.check_button),
+                self.bar,
+                self.notice,
+                self.segments,
+                self.source,
+                self.numbers,
+                self.results,
+            ]
+        )
+        main.add_class("rds-main")
+        self.widget = widgets.HBox([self._side, main])
+        self.widget.add_class("rds-columns")
+        interpolating.choices.watch(lambda name: self._arrange())
+        self._arrange()
+
+    def _saving(self) -> widgets.HBox:
+        return row(
+            FieldView(self.work.choices, "file"),
+            button("Save", "The samples of all axes, as a table", self.save, self.notice),
+        )
+
+    def _arrange(self) -> None:
+        """Show the fields that matter for what is chosen."""
+        shown = self.work.shown
+        for name in [name for name in self._views if name not in self.work.choices]:
+            self._views.pop(name).close()
+        groups = []
+        for names in _GROUPS:
+            of_group = [each for name in names for each in shown if each == name or (name[-1] == "." and name in each)]
+            if not of_group:
+                continue
+            group = widgets.Box([self._view(name) for name in of_group])
+            group.add_class("rds-group")
+            group.add_class("rds-fields")
+            groups.append(group)
+        self._side.children = groups
+        self.segments.layout.display = "" if "rows" in shown else "none"
+        self.check_button.layout.display = "" if {"line_file", "arc_file"} & set(shown) else "none"
+
+    def _view(self, name: str) -> FieldView:
+        if name not in self._views:
+            self._views[name] = FieldView(self.work.choices, name, buttons=False if name == "feed_unit" else None)
+        return self._views[name]
+
+    def start(self) -> None:
+        """What the first button does."""
+        self._follow(self.work.run, self._show, "stopped; nothing was made")
+
+    def check(self) -> None:
+        """What the second button does."""
+
+        def checked(files: list[Checked]) -> None:
+            self.source.value = "".join(map(source_html, files))
+            bad = [each for each in files if not each.ok]
+            self.notice.say("\n".join(each.sentence for each in bad or files), "error" if bad else "good")
+
+        self._follow(self.work.check, checked, "stopped; nothing was checked")
+
+    def save(self) -> None:
+        """What the save button does."""
+        if self.done is not None:
+            self.notice.say(f"saved as {self.work.save(self.done)}", "good")
+
+    def _follow(self, begin: Callable[[], Task[T]], show: Callable[[T], None], stopped: str) -> None:
+        refused = [view.field.label for name, view in self._views.items() if name in self.work.shown and view.refused]
+        if self.work.choices["given"] == "several":
+            refused += self.segments.refused
+        if refused:
+            raise InputError(f"first mend what is refused: {', '.join(refused)}")
+        follow(self.bar, self.notice, begin, show, stopped, self._show_faults)
+
+    def _show_faults(self) -> None:
+        bad = [each for each in self.work.builds.latest() if not each.ok]
+        self.source.value = "".join(map(source_html, bad))
+
+    def _show(self, done: Interpolation) -> None:
+        from rds.interpolators.plots import names_of
+        from rds.interpolators.summary import summary
+
+        self.done = done
+        self.source.value = ""
+        title, rows = summary(done)
+        half = -(-len(rows) // 2)
+        both = "".join(table(["quantity", "", "unit"], part) for part in (rows[:half], rows[half:]))
+        self.numbers.value = (
+            f'<h3>{title}</h3><div class="rds-side-by-side rds-compact">{both}</div>{notes_list(self.work.notes)}'
+        )
+        if done.within:
+            self.notice.say(f"done: {done.samples} samples, {done.duration:.4g} s", "good")
+        else:
+            self.notice.say("done, but further from the path than one BLU: see the numbers", "warning")
+        self.results.layout.display = ""
+        options = [(_PICTURES[name], name) for name in names_of(done)]
+        kept = self.picture.value if self.picture.value in names_of(done) else "motion"
+        with self.picture.hold_trait_notifications():
+            self.picture.options = options
+            self.picture.value = kept
+        self._draw()
+
+    def _draw(self) -> None:
+        from rds.interpolators.plots import picture
+
+        done, name = self.done, self.picture.value
+        if done is not None and name is not None:
+            self.figure.draw(self.shell.session, self.shell.ticker, lambda: picture(done, name))
+
+
+_FIRST = "<p>Choose a path on the left, then press Interpolate: motion, path and errors follow.</p>"

@@ -1,0 +1,1 @@
+"""The jog panel: axes moved by hand."""

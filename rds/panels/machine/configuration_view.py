@@ -1,0 +1,84 @@
+"""Configuration: modules put into their order from the tool to the work, checked, and written as a machine file."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.panels.kit.button import button
+from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import columns, group, row
+from rds.panels.kit.notice import Notice
+from rds.panels.machine.configuration import directions, faults, first_order, moved, write_machine
+from rds.panels.machine.state import MachineDesk
+from rds.panels.session.fields import Text
+from rds.results import html
+
+_FILE = Text("file", "Machine file", "A file of your folder, which every mode takes as its machine", "my-machine.toml")
+
+
+class ConfigurationView:
+    """The order, with buttons that change it."""
+
+    def __init__(self, shell: Any, desk: MachineDesk):
+        self.session, self.desk = shell.session, desk
+        self.notice = Notice()
+        self.choices = shell.session.choices("configuration", [_FILE])
+        self.order: list[int] = []
+        self._place, self._found = widgets.VBox([]), widgets.HTML()
+        self._write = button("Write machine", "Write the machine's file", self.write, self.notice, primary=True)
+        side = [group("The machine", FieldView(self.choices, "file"), row(self._write))]
+        head = widgets.HTML("<p>Number the modules as they are mounted: 1 holds the tool, the last one the work.</p>")
+        self.widget = columns(side, [self.notice, head, self._place, self._found])
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Other modules are known."""
+        if set(self.order) != set(self.desk.data):
+            self.order = first_order(self.desk.data)
+        self._show()
+
+    def write(self) -> None:
+        """Write the file."""
+        path = write_machine(self.session.folder, self.choices["file"], self.order, self.desk.data)
+        self.notice.say(
+            f"wrote {path.name}; add to it what no module knows, its axes' models and limits, then use it: "
+            f"rds app --machine {path.name}",
+            "good",
+        )
+
+    def _show(self) -> None:
+        self._place.children = [self._row(place, number) for place, number in enumerate(self.order, start=1)]
+        wrong = faults(self.order, self.desk.data)
+        self._write.disabled = bool(wrong)
+        if wrong:
+            kind = "warning" if not self.order else "error"
+            self.notice.say("\n".join(wrong), kind)
+            self._found.value = ""
+            return
+        self.notice.say("this order makes a machine that can move as its modules say", "good")
+        rows = [
+            [self._name(number), kind, *map(float, direction.round(6) + 0.0)]
+            for number, (kind, direction) in directions(self.order, self.desk.data).items()
+        ]
+        note = "Unit vectors, in the tool's directions, with all axes at zero."
+        self._found.value = html.table(["module", "does", "x", "y", "z"], rows, "What moves how", note)
+
+    def _row(self, place: int, number: int) -> widgets.HBox:
+        up = button("▲", "Nearer to the tool", lambda: self._move(number, -1), self.notice)
+        down = button("▼", "Nearer to the work", lambda: self._move(number, 1), self.notice)
+        up.disabled, down.disabled = place == 1, place == len(self.order)
+        for each in (up, down):
+            each.layout.min_width = each.layout.width = "44px"
+        text = widgets.HTML(f"<b>{place}</b> &nbsp; {escape(self._name(number))}")
+        return row(up, down, text)
+
+    def _name(self, number: int) -> str:
+        data = self.desk.data[number]
+        return f"{data['axis']}: {data['kind']} {data['type_text']} (module {number})"
+
+    def _move(self, number: int, by: int) -> None:
+        self.order = moved(self.order, number, by)
+        self._show()

@@ -1,0 +1,1 @@
+"""The page around the panels: title, navigation, emergency stop, colours."""

@@ -1,0 +1,1 @@
+"""The program panel: part programs written, checked, seen and run."""

@@ -1,0 +1,89 @@
+"""An operator's hand on a program: run, hold, resume, home, stop, and the override of the feed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.panels.kit.button import attempt, halt, order, run_order
+from rds.panels.kit.field import FieldView
+from rds.panels.kit.layout import row
+from rds.panels.kit.notice import Notice
+from rds.panels.kit.work_bar import WorkBar
+from rds.panels.program.override import OverrideSlider
+from rds.panels.program.run import ProgramWork
+from rds.panels.session.choices import Choices
+from rds.panels.session.expired_orders import refusal
+
+_OVERRIDE = "The override"
+
+
+class Operator:
+    """A row of buttons. `run()` is called for Run; `work` is what they act on, None when nothing runs."""
+
+    def __init__(self, shell: Any, choices: Choices, notice: Notice, run: Callable[[], None]):
+        self._choices, self._notice = choices, notice
+        self.work: ProgramWork | None = None
+        self.bar = WorkBar(shell.ticker)
+        tip = "Save the program and run it in the mode chosen"
+        self.run_button = run_order(shell, tip, run, notice, choices)
+        tip = "Come to rest on the path"
+        self.hold_button = halt("Hold", tip, partial(self._do, "Hold", ProgramWork.hold), notice)
+        self.resume_button, self.home_button = (
+            order(shell, text, tip, partial(self._do, text, act), notice)
+            for text, tip, act in (
+                ("Resume", "Go on after a hold, M0, M1 or a tool change", ProgramWork.resume),
+                ("Home", "End the program where it is, go up and move home", ProgramWork.home),
+            )
+        )
+        tip = f"{choices.fields['override'].tooltip} (0 to 200 %); arrow keys change it"
+        self._in_time = shell.presence.in_time
+        self.override = OverrideSlider(self._ask, value=choices["override"], tip=tip)
+        choices.watch(self._chosen)
+        buttons = [self.run_button, self.hold_button, self.resume_button, self.home_button]
+        self.mode = FieldView(choices, "mode")
+        self.mode.add_class("rds-program-mode")
+        self.widget = row(self.mode, *buttons, self.override, self.bar)
+        self.enable()
+
+    def enable(self) -> None:
+        """Only what has a sense now can be pressed."""
+        work = self.work
+        operable = work is not None and work.operable
+        self.run_button.disabled = work is not None
+        held = operable and work is not None and work.held
+        status = work.status() if operable and work is not None else None
+        waits = status is not None and status.state.name in ("STOP", "TOOL")
+        self.hold_button.disabled = not operable or held
+        self.resume_button.disabled = not (held or waits)
+        self.home_button.disabled = not operable
+        self.override.moves = operable
+        self.override.disabled = work is not None and not operable  # it begins with what was chosen
+
+    def _do(self, what: str, act: Callable[[ProgramWork], None]) -> None:
+        if (work := self.work) is not None:
+            attempt(what, lambda: act(work), self._notice)
+            self.enable()
+
+    def _chosen(self, name: str) -> None:
+        if name == "override":
+            self.override.value = self._choices["override"]
+
+    def _ask(self, percent: float, ordered: bool) -> None:
+        """So much feed: less at once, more only in time, as it would come unexpected later."""
+        attempt(_OVERRIDE, lambda: self._set_override(percent, ordered), self._notice)
+
+    def _set_override(self, percent: float, ordered: bool) -> None:
+        work = self.work
+        if work is not None:
+            if not work.operable:
+                raise InputError("the override of this run cannot be changed now: set it before the next one")
+            if percent > self._choices["override"]:
+                if not ordered:
+                    raise InputError(refusal(_OVERRIDE, math.inf, moved=True))
+                self._in_time(_OVERRIDE, moved=True)
+            work.override(percent / 100.0)
+        self._choices.set("override", percent)

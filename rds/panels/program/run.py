@@ -1,0 +1,158 @@
+"""A part program that a panel runs: an operator's hand on it, and what happens meanwhile."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.nc.check import Setup
+from rds.nc.run.judge import contour
+from rds.nc.run.prepare import Prepared
+from rds.nc.run.report import save_run
+from rds.nc.run.run import PartProgram, ProgramRun, Status
+from rds.panels.equipment.run import EquipmentRun
+from rds.panels.session.saving import saving
+from rds.panels.session.session import RUNS, Session
+from rds.panels.session.task import Task
+from rds.results import Result
+
+STRIP_RATE = 100.0  # rows a second that are looked at for the strip
+
+
+class ProgramWork(EquipmentRun):
+    """One run of the program in `file`, in the session's folder. `start()` returns at once.
+
+    While it runs: `status()`, `hold()`, `resume()`, `override(share)`, `home()`, `stop()`; `held` says whether it was
+    asked to hold. A simulation takes no longer than it must, and is only stopped.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        file: Path,
+        mode: str,
+        setup: Setup,
+        controller: str,
+        changes: list[tuple[float, str, float]],
+        prepare: Callable[[Callable[[], None]], None] | None = None,
+    ):
+        super().__init__(session, {"mode": mode}, f"{file.name}, {mode}", prepare)
+        self.file, self.mode = file, mode
+        self.folder = session.folder / RUNS / f"{time.strftime('%Y%m%d-%H%M%S')}-{file.stem}-{self.folder.name[-4:]}"
+        self.prepared: Prepared | None = None
+        self._setup, self._controller, self._changes = setup, controller, changes
+
+    def _work(self, task: Task[Result]) -> Result:
+        with contextlib.ExitStack() as held:
+            try:
+                if self._prepare is not None:
+                    self._prepare(lambda: self._tell(task, "checking the controller's file"))
+                self._tell(task, "planning the program")
+                part = PartProgram(
+                    self.file, self.session.machine, setup=self._setup, controller=self._controller, mode=self.mode
+                )
+                self.plan, self.prepared = part.plan(), part.prepared
+                self._tell(task, "starting the loop" if self.real_time else "simulating")
+                held.enter_context(saving(self.folder))
+                run = part.start(out=self.folder, changes=self._changes)
+                self._run = run
+                if task.stopping:
+                    run.stop()
+                note = "running" if self.real_time else "simulating"
+                self.result = run.wait(
+                    lambda taken, of: task.advance(taken, max(of, taken), "" if task.stopping else note)
+                )
+            finally:
+                self.session.give_machine_back(self)
+            task.note = "saving tables, pictures and the report"
+            self.files = save_run(self.result, part.prepared, self.folder)
+            return self.result
+
+    # what a progress bar follows: waiting is no progress
+
+    @property
+    def share(self) -> float | None:
+        """0 to 1 of the planned samples; before the first one as the work says."""
+        status = self.status()
+        return super().share if status is None else status.share
+
+    @property
+    def seconds_left(self) -> float | None:
+        """s, at the rate of now; None while it waits or rests."""
+        status = self.status()
+        if status is None or self.prepared is None:
+            return super().seconds_left
+        return self.prepared.seconds * (1.0 - status.share) / status.rate if status.rate > 0.01 else None
+
+    # an operator's hand
+
+    @property
+    def program_run(self) -> ProgramRun:
+        """The run that goes on; InputError before it begins and when it is over."""
+        run = self._run
+        if not isinstance(run, ProgramRun) or run.done:
+            raise InputError("no program runs now")
+        return run
+
+    @property
+    def operable(self) -> bool:
+        """Whether it can be held, resumed and so on now."""
+        run = self._run
+        return self.real_time and isinstance(run, ProgramRun) and not run.done and bool(run.columns)
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody has asked it to hold."""
+        try:
+            return bool(self.program_run.desk["hold"])
+        except InputError:
+            return False
+
+    def hold(self) -> None:
+        """Come to rest on the path."""
+        self.program_run.hold()
+
+    def resume(self) -> None:
+        """Go on after a hold, M0, M1 or a tool change."""
+        self.program_run.resume()
+
+    def override(self, share: float) -> None:
+        """Feed as a multiple of the programmed one, 0 to 2."""
+        self.program_run.override(share)
+
+    def home(self) -> None:
+        """End the program where it is, and move home."""
+        self.program_run.home()
+
+    def status(self) -> Status | None:
+        """Where it is; None before the first sample and when it is over."""
+        run = self._run
+        return run.status() if isinstance(run, ProgramRun) and not run.done else None
+
+    # the strip
+
+    def traces(self) -> list[tuple[str, str]]:
+        """The following error of each axis, and the contour error; none before the loop has begun."""
+        columns, units = self._columns()
+        if self.prepared is None or not columns:
+            return []
+        axes = self.prepared.program.axes
+        found = [(f"{axis}_error", units.get(f"{axis}_measured", "mm")) for axis in axes]
+        return [*found, ("contour_error", "mm")]
+
+    def new_rows(self) -> np.ndarray:
+        """Rows recorded since it was last asked: time in s, then one column per trace; thinned to STRIP_RATE."""
+        columns, _ = self._columns()
+        rows = self._new(columns)
+        prepared = self.prepared
+        if not len(rows) or prepared is None:
+            return np.empty((0, 1 + len(self.traces())))
+        of = dict(zip(columns, rows[:: max(round(1.0 / (STRIP_RATE * prepared.T)), 1)].T, strict=True))
+        errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in prepared.program.axes]
+        away, _ = contour(of, prepared, of["program_state"].astype(int))
+        return np.column_stack([of["time"], *errors, away])

@@ -1,0 +1,258 @@
+"""Part programs in a session: what is edited, looked at as one types, and run. Without widgets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rds.core.errors import InputError, RdsError
+from rds.machines import load_machine
+from rds.panels.equipment.build import Builds
+from rds.panels.program.text import ProgramText, check_name, programs
+from rds.panels.session.choices import Choices
+from rds.panels.session.fields import Choice, Field, Flag, Number, Text
+from rds.panels.session.latest import Latest
+from rds.panels.session.session import Session
+from rds.panels.session.task import Task
+
+if TYPE_CHECKING:
+    from rds.nc.check import Setup
+    from rds.panels.program.check import Look
+    from rds.panels.program.run import ProgramWork
+
+PANEL = "program"  # its name among the session's choices
+FIRST = "part.ngc"  # what is open in a folder without programs
+NO_TABLE = ""
+_MODES = {"simulation": "Simulation", "emulation": "Emulation", "implementation": "Implementation"}
+
+
+def program_choices(session: Session) -> Choices:
+    """The choices about part programs: which is open, and how it is read and run."""
+    return session.choices(PANEL, _fields(session.folder))
+
+
+def _fields(folder: Path) -> Iterable[Field]:
+    found = programs(folder)
+    yield Text("file", "Program", "the part program that is open", found[0] if found else FIRST, FIRST, 120, check_name)
+    yield Choice(
+        "mode", "Mode", "in virtual time; against the clock; or on the machine's modules", "simulation", _MODES
+    )
+    yield _table_field(folder)
+    yield Text(
+        "controller",
+        "Controller of the axes",
+        "a name (tracking, p, pid, modified-pid), or a Python file of yours; the spindle has PID",
+        "tracking",
+        "tracking or my_controller.py",
+        120,
+    )
+    yield Number(
+        "override",
+        "Feed override",
+        "of the programmed feed, for a run's start and while it runs; rapids only get slower",
+        100.0,
+        unit="%",
+        low=0.0,
+        high=200.0,
+    )
+    yield Flag("optional_stop", "Stop at M1", "whether M1 waits for Resume", True)
+    yield Flag("block_delete", "Leave out / blocks", "whether blocks that begin with / are left out", False)
+
+
+def _table_field(folder: Path) -> Choice:
+    try:
+        found = sorted(each.name for each in folder.iterdir() if each.suffix.lower() == ".tbl" and each.is_file())
+    except OSError:
+        found = []
+    options = {NO_TABLE: "none"} | {name: name for name in found}
+    return Choice(
+        "tools", "Tool table", "a .tbl file of your folder, as LinuxCNC keeps it, lengths in mm", NO_TABLE, options
+    )
+
+
+class Program:
+    """The program that is open. `latest` is what the last look found; `tick()` goes on with looking."""
+
+    def __init__(self, session: Session):
+        self.session = session
+        self.machine = load_machine(session.machine)
+        self.choices = program_choices(session)
+        self.builds = Builds()
+        self.latest: Look | None = None
+        self._looks = Latest(self._begin)
+        self._early: Look | None = None  # what is known while the motion is being planned
+        self.trouble = ""  # why the file that was chosen is not open
+        self.text = self._opened()
+        self.choices.watch(self._chosen)
+
+    def _opened(self) -> ProgramText:
+        """The file that was open, else the first one: what cannot be edited does not keep the panel away."""
+        name = str(self.choices["file"])
+        try:
+            return ProgramText(self.session.folder, name)
+        except InputError as error:
+            self.trouble = str(error)
+        number = 1
+        while (self.session.folder / f"new-{number}.ngc").exists():
+            number += 1
+        return ProgramText(self.session.folder, f"new-{number}.ngc")
+
+    def _chosen(self, name: str) -> None:
+        if name == "file" and self.choices["file"] != self.text.name:
+            try:
+                self.text = ProgramText(self.session.folder, str(self.choices["file"]))
+                self.trouble = ""
+            except InputError as error:
+                self.trouble = str(error)
+                self.choices.set("file", self.text.name)
+        if name in ("file", "tools", "block_delete"):
+            self.look_again()
+
+    # the text
+
+    def programs(self) -> list[str]:
+        """The part programs of the folder, and the one that is open."""
+        return sorted({*programs(self.session.folder), self.text.name})
+
+    def open(self, name: str) -> None:
+        """Open another one; InputError where that will not do. What is not saved of this one stays as a draft."""
+        check_name(name)
+        self.trouble = ""
+        if name == self.text.name:
+            self.text = ProgramText(self.session.folder, name)
+            self.look_again()
+            return
+        self.choices.set("file", name)
+        if self.trouble:
+            raise InputError(self.trouble)
+
+    def edit(self, text: str) -> None:
+        """What was typed; looked at again by `tick()`."""
+        if text != self.text.text:
+            self.text.edit(text)
+            self.look_again()
+
+    def save(self) -> None:
+        """Write the file; InputError where it was changed by somebody else, or cannot be written."""
+        self.text.save()
+        if self.looking:  # the draft that is being read has gone
+            self.look_again()
+
+    def discard(self) -> None:
+        """Give up what is not saved."""
+        self.text.discard()
+        self.look_again()
+
+    def save_as(self, name: str) -> None:
+        """Save under another name, which is open then; InputError if there is such a file."""
+        other = self.text.save_as(name.strip())
+        self.text.draft.unlink(missing_ok=True)
+        self.choices.set("file", other.name)
+
+    def follow_disk(self) -> bool:
+        """Read the file again where somebody else wrote it and nothing here is unsaved; whether that was so."""
+        if self.text.changed or not self.text.replaced:
+            return False
+        try:
+            self.text = ProgramText(self.session.folder, self.text.name)
+        except InputError as error:
+            self.text.accept()
+            self.session.say(f"{self.text.name} was replaced by what cannot be edited here: {error}", "warning")
+            return False
+        self.look_again()
+        return True
+
+    # looking at it
+
+    def look_again(self) -> None:
+        """Text or setting has changed: what was found does not hold any more."""
+        self._looks.again()
+        self._early = None
+
+    @property
+    def looking(self) -> bool:
+        """Whether `latest` is not yet of the text as it is."""
+        return self._looks.going_on
+
+    def tick(self) -> Look | None:
+        """Ten times a second: begin to look where something has changed; what was found, once, when it is there."""
+        task = self._looks.tick()
+        if task is None:
+            found, self._early = self._early, None
+            self.latest = found or self.latest
+            return found
+        self._early = None
+        if task.error is not None:
+            self.session.say(f"the check failed: {task.error}", "error")
+            return None
+        self.latest = task.result
+        return task.result
+
+    def _begin(self) -> Task[Look]:
+        text, setup, machine = self.text, self.setup(), self.machine
+
+        def work(task: Task[Look]) -> Look:
+            from rds.panels.program.check import look
+
+            def early(found: Look) -> None:
+                if not task.stopping:
+                    self._early = found
+
+            return look(task, text.on_disk(), text.name, machine, setup, early)
+
+        return self.session.work(f"check {text.name}", work)
+
+    def setup(self) -> Setup:
+        """What the program is read with."""
+        from rds.nc.check import Setup
+        from rds.nc.language.dialect import Dialect
+
+        table = str(self.choices["tools"])
+        options = Dialect(block_delete=bool(self.choices["block_delete"]))
+        return Setup(self.session.folder / table if table else None, options=options)
+
+    def refresh(self) -> None:
+        """Look for tool tables that have come or gone."""
+        self.choices.replace([_table_field(self.session.folder)])
+
+    # running it
+
+    def run(self) -> ProgramWork:
+        """The run of the program, saved first, to be started; InputError with the reason where it cannot run."""
+        from rds.panels.program.run import ProgramWork
+
+        if self.latest is not None and not self.looking and not self.latest.ok:
+            raise InputError(f"it cannot run yet: {self.latest.sentence}")
+        share = float(self.choices["override"]) / 100.0
+        if share == 0.0:
+            raise InputError("an override of 0 % never moves; begin with more, and hold while it runs")
+        controller, files = self._controller()
+        if self.session.bus:
+            raise InputError(
+                "this page has a bus of its own, which programs are not run on here; `rds nc run --controller "
+                "experiment.toml` with its [bus] does"
+            )
+        if self.text.changed:
+            self.save()
+        changes = [(0.0, "override", share)] if share != 1.0 else []
+        changes += [] if self.choices["optional_stop"] else [(0.0, "optional_stop", 0.0)]
+        T = self.machine.sample_period
+        prepare = (lambda pulse: self.builds.require(files, T, pulse)) if files else None
+        mode = str(self.choices["mode"])
+        return ProgramWork(self.session, self.text.path, mode, self.setup(), controller, changes, prepare)
+
+    def _controller(self) -> tuple[str, list[tuple[str, Path]]]:
+        name = str(self.choices["controller"]).strip() or "tracking"
+        if not name.endswith(".py"):
+            from rds.controllers import controller_module
+
+            try:
+                controller_module(name)
+            except RdsError as error:
+                raise InputError(str(error)) from error
+            return name, []
+        path = (self.session.folder / name).resolve()
+        if not path.is_file():
+            raise InputError(f"there is no file {name} in your folder; save your controller there, or name another")
+        return str(path), [("controller", path)]

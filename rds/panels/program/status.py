@@ -1,0 +1,87 @@
+"""Where a program is, as an operator wants to see it: positions and distances to the limits, modes, feed, spindle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+
+from rds.machines import Machine
+from rds.nc.active import Modes, modes_at
+from rds.nc.run.run import Status
+
+STATES = (
+    "runs",
+    "held",
+    "stops (M0 or M1): Resume goes on",
+    "waits for the tool: change it, then Resume",
+    "dwells",
+    "waits for the spindle",
+    "goes home",
+    "is over",
+)
+_NEAR = 0.05  # of the travel: nearer to a limit than this is said
+
+
+def status_html(status: Status | None, modes: Mapping[int, Modes], machine: Machine, override: float) -> str:
+    """The display; dashes where nothing is known. `override` in per cent."""
+    now = None if status is None else modes_at(modes, status.line)
+    return _head(status, override) + _positions(status, now, machine) + _modes(now)
+
+
+def _head(status: Status | None, override: float) -> str:
+    if status is None:
+        return '<p class="rds-state" role="status">Nothing runs. Positions show here as soon as a run has begun.</p>'
+    return (
+        f'<p class="rds-state" role="status"><b>Line {status.line}</b> {STATES[status.state]} · '
+        f"{status.time:.1f} s · {status.share:.0%} of the program</p>"
+        f'<p class="rds-state">Feed <b>{status.feed:.0f}</b> mm/min, override {override:.0f} %</p>'
+    )
+
+
+def _positions(status: Status | None, modes: Modes | None, machine: Machine) -> str:
+    work = modes.work(status.measured) if status is not None and modes is not None else {}
+    rows = []
+    for name, axis in machine.axes.items():
+        at = None if status is None else status.measured.get(name)
+        low, high = axis.travel
+        if axis.unit == "rev/min":
+            wanted = None if status is None else status.reference.get(name)
+            rows.append(
+                f"<tr><td>{escape(name.capitalize())}</td><td>{_number(at, 0)}</td>"
+                f'<td colspan="2">rev/min, {_number(wanted, 0)} wanted</td></tr>'
+            )
+            continue
+        digits = 3 if axis.unit == "mm" else 2
+        cells = [f"{escape(name)} [{escape(axis.unit)}]", _number(at, digits), _number(work.get(name), digits)]
+        cells.append(_bar(at, low, high, axis.unit))
+        rows.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
+    head = "<tr><th>Axis</th><th>Machine</th><th>Work</th><th>Within the travel; to the nearest limit</th></tr>"
+    return f'<table class="rds-positions">{head}{"".join(rows)}</table>'
+
+
+def _bar(at: float | None, low: float, high: float, unit: str) -> str:
+    if at is None:
+        return f"{low:g} to {high:g} {escape(unit)}"
+    share = min(max((at - low) / (high - low), 0.0), 1.0)
+    left = min(at - low, high - at)
+    near = left < _NEAR * (high - low)
+    sign = "⚠ " if near else ""
+    tip = f"from {low:g} to {high:g} {escape(unit)}"
+    return (
+        f'<span class="rds-travel" title="{tip}"><i style="left:{100 * share:.1f}%"></i></span> '
+        f"{sign}{left:.1f} to {'low' if at - low < high - at else 'high'}"
+    )
+
+
+def _modes(modes: Modes | None) -> str:
+    if modes is None:
+        return "<p>Active modes: –</p>"
+    words = " ".join(f"<code>{escape(word)}</code>" for word in modes.words)
+    tool = f"T{modes.tool}" if modes.tool else "no tool"
+    return (
+        f"<p>Active modes: {words} <code>F{modes.feed:g}</code> <code>S{modes.speed:g}</code> <code>{tool}</code></p>"
+    )
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,76 @@
+"""A tool table that is edited: a `.tbl` file of the session's folder, as LinuxCNC keeps it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rds.core.atomic import write_whole
+from rds.core.errors import InputError
+
+if TYPE_CHECKING:
+    from rds.nc.language.tools import Tool
+    from rds.panels.program.check import Mark
+
+LARGEST = 1 << 20  # bytes of a table that is edited here
+STARTER = "; T number, P pocket, D diameter and Z length in mm, then a comment\nT1 P1 D6 Z0 ;end mill 6 mm\n"
+_NAME = re.compile(r"[^\x00-\x1f/\\:*?\"<>|.][^\x00-\x1f/\\:*?\"<>|]{0,95}\.tbl", re.IGNORECASE)
+
+
+class ToolFile:
+    """One table. `text` is what is edited. InputError for a name that will not do, or a file that cannot be edited."""
+
+    def __init__(self, folder: Path, name: str):
+        """A file that is not there yet begins with one tool."""
+        if not _NAME.fullmatch(name):
+            raise InputError(f"{name!r:.60} is no name of a tool table in your folder; write one like tools.tbl")
+        self.name, self.path = name, folder / name
+        self._saved = self._read()
+        self.text = STARTER if self._saved is None else self._saved
+
+    @property
+    def changed(self) -> bool:
+        """Whether something is not saved."""
+        return self.text != self._saved
+
+    def tools(self) -> list[Tool]:
+        """The tools as they are written now; ProgramError with line and column of the first fault."""
+        from rds.nc.language.tools import tools_of
+
+        return tools_of(self.text, self.name)
+
+    def marks(self) -> list[Mark]:
+        """The first fault at its word, if there is one."""
+        from rds.nc.language.errors import ProgramError
+        from rds.panels.program.check import Mark
+
+        try:
+            self.tools()
+        except ProgramError as error:
+            text = f"{error.word}: {error.reason}" if error.word else error.reason
+            return [Mark(error.line, error.column, len(error.word), text)]
+        return []
+
+    def save(self) -> None:
+        """Write the file. InputError with the fault where it is no table, or where somebody else has changed it."""
+        self.tools()
+        if self._read() != self._saved:
+            raise InputError(
+                f"{self.name} was changed by somebody else meanwhile; Look again shows that, and gives up yours"
+            )
+        write_whole(self.path, self.text.encode("utf-8"))
+        self._saved = self.text
+
+    def _read(self) -> str | None:
+        """As it is on the disk; None where there is none."""
+        try:
+            with self.path.open("rb") as stream:
+                data = stream.read(LARGEST + 1)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}", str(self.path)) from error
+        if len(data) > LARGEST:
+            raise InputError(f"is larger than {LARGEST >> 20} MB; that is no tool table to edit here", str(self.path))
+        return data.decode("utf-8-sig", "replace").replace("\r\n", "\n")

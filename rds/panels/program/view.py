@@ -1,0 +1,198 @@
+"""The widgets over one `Program`: editor on the left; preview, run, result and settings on the right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ipywidgets as widgets
+
+from rds.panels.equipment.strip import StripChart
+from rds.panels.kit.button import attempt, say_error
+from rds.panels.kit.field import field_group
+from rds.panels.kit.notice import Notice
+from rds.panels.program.check import Look
+from rds.panels.program.editor import Editor
+from rds.panels.program.files import ProgramFiles
+from rds.panels.program.operator import Operator
+from rds.panels.program.preview import Preview
+from rds.panels.program.result import ProgramResult
+from rds.panels.program.run import ProgramWork
+from rds.panels.program.state import Program
+from rds.panels.program.status import status_html
+from rds.panels.program.tool_view import ToolView
+
+TABS = ("Preview", "Run", "Result", "Settings, tools")
+PREVIEW, RUN, RESULT, SETTINGS = range(len(TABS))
+
+
+class ProgramView:
+    """Everything of the program panel."""
+
+    def __init__(self, shell: Any):
+        self.shell = shell
+        self.program = Program(shell.session)
+        self.notice = Notice()
+        self.work: ProgramWork | None = None
+        self._traced = self._shown = False
+        self._ran: str | None = None  # the text whose run, or result, is shown
+        self.editor = Editor(lambda: self.files.save())
+        self.editor.text = self.program.text.text
+        self.editor.observe(self._typed, "text")
+        self.files = ProgramFiles(self.program, self.notice, self._opened)
+        self.operator = Operator(shell, self.program.choices, self.notice, self.start)
+        self.preview = Preview(self.program)
+        self.status = widgets.HTML()
+        self.strip = StripChart(height=170)
+        self.strip.layout.display = "none"
+        self.result = ProgramResult(shell, self.editor.go)
+        self.tools = ToolView(self.program)
+        self.program.choices.watch(self._chosen)
+        self.widget = self._arranged()
+        self._show_status()
+        if self.program.trouble:
+            self.notice.say(f"{self.program.trouble}; a new program is open instead", "warning")
+        shell.ticker.add(self._tick)
+
+    def _arranged(self) -> widgets.Widget:
+        choices = self.program.choices
+        settings = field_group(choices, ["controller", "optional_stop", "block_delete"])
+        more = widgets.VBox([settings, self.tools.widget])
+        run = widgets.VBox([self.status, self.strip])
+        self.tabs = widgets.Tab([self.preview.widget, run, self.result.widget, more], titles=TABS)
+        self.tabs.add_class("rds-tabs")
+        self.tabs.observe(self._turned, "selected_index")
+        left, right = widgets.VBox([self.editor]), widgets.VBox([self.tabs])
+        left.add_class("rds-program-left")
+        right.add_class("rds-main")
+        columns = self._columns = widgets.HBox([left, right])
+        columns.add_class("rds-columns")
+        view = widgets.VBox([self.files.widget, self.operator.widget, self.notice, columns])
+        view.add_class("rds-program")
+        return view
+
+    # the text
+
+    def _typed(self, change: Any) -> None:
+        attempt("the text", lambda: self.program.edit(change["new"]), self.notice)
+        self.files.refresh()
+
+    def _opened(self) -> None:
+        """Another text is open."""
+        self.editor.marks = []
+        self.editor.text = self.program.text.text
+        self.files.refresh()
+
+    def _chosen(self, name: str) -> None:
+        if name == "file":
+            if self.work is None and self._ran not in (None, self.program.text.text):
+                self._ran = None  # what came of it names lines of another text
+                self.notice.clear()
+                self.result.clear()
+                self.tabs.selected_index = PREVIEW
+            if self.editor.text != self.program.text.text:
+                self._opened()
+            self.files.refresh()
+        elif name == "tools":
+            self.tools.chosen()
+
+    def _turned(self, change: Any) -> None:
+        # pictures are wider than what else stands beside the text
+        (self._columns.add_class if change["new"] == RESULT else self._columns.remove_class)("rds-program-wide")
+        if change["new"] == SETTINGS:
+            self.tools.refresh()
+
+    # ten times a second
+
+    def _tick(self) -> None:
+        if self.work is None and self.program.follow_disk():
+            self._opened()
+        found = self.program.tick()
+        if found is not None:
+            self._found(found)
+        if self.work is not None:
+            self._look()
+
+    def _found(self, look: Look) -> None:
+        self.editor.mark(look.marks)
+        self.preview.show(look)
+
+    # running
+
+    def start(self) -> None:
+        """What the run button does."""
+        if self.work is not None:
+            return
+        self.notice.clear()
+        try:
+            work = self.program.run()
+            work.start()
+        finally:
+            self.files.refresh()
+        self.work = self.operator.work = work
+        self._ran = self.program.text.text
+        self._traced = self._shown = False
+        self.editor.locked = True
+        self.result.clear()
+        self.tabs.selected_index = RUN
+        self.operator.enable()
+        self.operator.bar.follow(work, lambda: attempt("showing the run", self._ended, self.notice))
+
+    def _look(self) -> None:
+        work = self.work
+        assert work is not None
+        self.operator.enable()
+        self._show_status()
+        if not self._traced and (traces := work.traces()):
+            self._traced = True
+            self.strip.layout.display = ""
+            self.strip.begin(traces)
+        if self._traced and len(rows := work.new_rows()):
+            self.strip.add(rows)
+        if work.result is not None and not self._shown:
+            self._show(work)
+
+    def _show_status(self) -> None:
+        status = self.work.status() if self.work is not None else None
+        if status is None and self.work is not None:
+            return  # between start and first sample, and after the last one
+        modes = self.program.latest.modes if self.program.latest is not None else {}
+        shown = status_html(status, modes, self.program.machine, float(self.program.choices["override"]))
+        if shown != self.status.value:
+            self.status.value = shown
+        if status is not None:
+            self.editor.running = status.line
+            self.preview.place([status.measured.get(name, 0.0) for name in "XYZ"])
+
+    def _show(self, work: ProgramWork) -> None:
+        """The loop is over; its files are still being written."""
+        self._shown = True
+        self.editor.running = 0
+        result = work.result
+        assert result is not None
+        ending = result.meta.get("ending")
+        if ending not in (None, "done"):
+            self.notice.say(f"ended early: {result.meta.get('ending_reason')}", "warning")
+        elif result.verdict:
+            kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
+            self.notice.say(f"done; timing {result.verdict}: {result.meta.get('verdict_reason')}", kind)
+        else:
+            self.notice.say(f"done: {len(result)} samples", "good")
+        self.result.show(work)
+        self.tabs.selected_index = RESULT
+
+    def _ended(self) -> None:
+        work = self.work
+        assert work is not None
+        try:
+            self._look()
+        finally:  # whatever its result does to the page, the next one can be run
+            self.work = self.operator.work = None
+            self.operator.enable()
+            self.editor.locked, self.editor.running = False, 0
+        if work.stopped_early:
+            self.notice.say("stopped before it began; nothing was recorded", "warning")
+        elif work.error is not None:
+            say_error("the run", work.error, self.notice)
+        else:
+            self.result.saved(work)
+        self.files.refresh()

@@ -1,0 +1,40 @@
+"""Values that can be changed while a run goes on, as choices: each is sent to the loop when it is set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rds.modes.loop.live_values import Channel
+from rds.panels.equipment.run import EquipmentRun
+from rds.panels.session.choices import Choices
+from rds.panels.session.fields import Number
+
+
+class LiveValues(Choices):
+    """The live values of a run. One that the loop will not take stays what it was, with InputError."""
+
+    def __init__(self, run: EquipmentRun):
+        channels: Mapping[str, Channel] = run.live_values
+        super().__init__(_field(channel) for channel in channels.values())
+        self._run = run
+
+    def set(self, name: str, value: Any) -> None:
+        """Set one from the loop's next sample on; InputError where it will not do, or when the run is over."""
+        self._run.change(name, float(self.fields[self._known(name)].check(value)))
+        super().set(name, value)
+
+
+def _field(channel: Channel) -> Number:
+    words = channel.meaning.partition(",")[0]
+    return Number(
+        channel.name,
+        f"{channel.name.partition('.')[2]}, {words}",
+        f"{channel.meaning}; holds from the next sample on, and is recorded with its time",
+        channel.value,
+        unit=channel.unit,
+        low=channel.low,
+        high=channel.high,
+        above=channel.above,
+        whole=channel.whole,
+    )

@@ -1,0 +1,65 @@
+"""Signals by kind: voltages for system tests, references for controllers."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from rds.core.errors import InputError
+from rds.core.options import check_known
+from rds.references.broadband import chirp, multisine
+from rds.references.periodic import constant, sinusoid, square, triangle
+from rds.references.signal import Signal, sample, sample_voltage
+from rds.references.staircase import staircase
+from rds.references.user import user
+
+__all__ = [
+    "Signal",
+    "chirp",
+    "constant",
+    "make_signal",
+    "multisine",
+    "sample",
+    "sample_voltage",
+    "signal_kinds",
+    "sinusoid",
+    "square",
+    "staircase",
+    "triangle",
+    "user",
+]
+
+_KINDS: Mapping[str, Callable[..., Signal]] = MappingProxyType(
+    {
+        "square": square,
+        "triangle": triangle,
+        "sinusoid": sinusoid,
+        "user": user,
+        "constant": constant,
+        "multisine": multisine,
+        "chirp": chirp,
+        "staircase": staircase,
+    }
+)
+
+
+def signal_kinds() -> list[str]:
+    """The kinds of signals there are."""
+    return list(_KINDS)
+
+
+def make_signal(kind: str, **options: Any) -> Signal:
+    """The signal of this `kind` with the options of its function, as words of a TOML table give them.
+
+    Raises InputError for an unknown kind or option, one that is missing, or a value that will not do.
+    """
+    if kind not in _KINDS:
+        raise InputError(f"there is no signal of kind {kind!r}; known kinds: {', '.join(_KINDS)}")
+    parameters = inspect.signature(_KINDS[kind]).parameters
+    check_known(options, parameters, f"signal of kind {kind!r}")
+    missing = [name for name, p in parameters.items() if p.default is p.empty and name not in options]
+    if missing:
+        raise InputError(f"signal of kind {kind!r} needs {' and '.join(missing)}; it has {', '.join(parameters)}")
+    return _KINDS[kind](**options)

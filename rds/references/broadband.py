@@ -1,0 +1,115 @@
+"""Signals that hold many frequencies at once, or one after the other: for measuring a frequency response.
+
+A multisine is a sum of sinusoids on whole multiples of its base frequency, all of one size. Schroeder's phases (1970)
+keep its peak at less than twice its root mean square times √2, where equal phases would pile up. It repeats after one
+base period, so that over whole periods nothing leaks from one frequency into another. With `lines = "odd"` only odd
+multiples are there: what friction, an odd function of the velocity, adds then falls on odd lines too, and the even ones
+show other nonlinearities. A chirp's frequency rises evenly, falls again, and so on.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from math import ceil, floor
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.core.options import Option
+from rds.references.signal import Motion, Signal
+
+LINES = ("all", "odd")
+_MOST_LINES = 2000
+_PER_PERIOD = 16  # points of the fastest sinusoid's period at which the peak is looked for
+_OPTIONS = {
+    "amplitude": Option("middle to peak, V or mm", at_least=0.0),
+    "frequency": Option("the base frequency, of which all others are multiples, Hz", more_than=0.0),
+    "lowest": Option("Hz", more_than=0.0),
+    "highest": Option("Hz", more_than=0.0),
+    "sweep": Option("time from the lowest to the highest frequency, s", more_than=0.0),
+    "offset": Option("middle of the signal, V or mm"),
+}
+
+
+def multisine(
+    amplitude: float, frequency: float, lowest: float, highest: float, lines: str = "all", offset: float = 0.0
+) -> Signal:
+    """Sinusoids of one size on the multiples of `frequency` from `lowest` to `highest`, `amplitude` at the peak.
+
+    V or mm, Hz. `lines` is "all" or "odd" multiples. Derivatives are exact. Raises InputError for a value that will
+    not do, or a band that holds no multiple.
+    """
+    settings = _checked(
+        "multisine", amplitude=amplitude, frequency=frequency, lowest=lowest, highest=highest, offset=offset
+    )
+    if lines not in LINES:
+        raise InputError(f"multisine: lines = {lines!r} is not known; known: {', '.join(LINES)}")
+    base = settings["frequency"]
+    multiples = np.arange(ceil(settings["lowest"] / base - 1e-9), floor(settings["highest"] / base + 1e-9) + 1)
+    if lines == "odd":
+        multiples = multiples[multiples % 2 == 1]
+    if not 1 <= len(multiples) <= _MOST_LINES:
+        raise InputError(
+            f"multisine: {len(multiples)} {lines if lines == 'odd' else ''} multiples of {base:g} Hz lie between "
+            f"{settings['lowest']:g} and {settings['highest']:g} Hz; it takes 1 to {_MOST_LINES}: change `frequency`"
+        )
+    phases = -np.pi * np.arange(len(multiples)) * np.arange(1, len(multiples) + 1) / len(multiples)
+    t = np.arange(_PER_PERIOD * int(multiples[-1])) / (_PER_PERIOD * multiples[-1] * base)
+    peak = float(np.abs(_sum(t, 2.0 * np.pi * base * multiples, phases, 0)).max())
+    motion = partial(
+        _multisine,
+        size=settings["amplitude"] / peak,
+        omegas=2.0 * np.pi * base * multiples,
+        phases=phases,
+        offset=settings["offset"],
+    )
+    return Signal("multisine", motion, 1.0 / base, {**settings, "lines": lines}, fastest=float(multiples[-1] * base))
+
+
+def chirp(amplitude: float, lowest: float, highest: float, sweep: float, offset: float = 0.0) -> Signal:
+    """A sinusoid whose frequency rises evenly from `lowest` to `highest` in `sweep` s, falls again, and so on.
+
+    V or mm, Hz, s. Starts at the middle, upward; phase, and with it the derivatives' angle, never jumps. Raises
+    InputError for a value that will not do.
+    """
+    settings = _checked("chirp", amplitude=amplitude, lowest=lowest, highest=highest, sweep=sweep, offset=offset)
+    motion: Any = _chirp
+    return Signal("chirp", partial(motion, **settings), None, settings, fastest=settings["highest"])
+
+
+def _checked(kind: str, **given: Any) -> dict[str, float]:
+    settings = {name: _OPTIONS[name].check(value, name, kind) for name, value in given.items()}
+    if not settings["lowest"] <= settings["highest"]:
+        raise InputError(
+            f"{kind}: lowest = {settings['lowest']:g} Hz is above highest = {settings['highest']:g} Hz; exchange them"
+        )
+    return settings
+
+
+def _sum(t: np.ndarray, omegas: np.ndarray, phases: np.ndarray, derivative: int) -> np.ndarray:
+    total = np.zeros_like(t)
+    for omega, phase in zip(omegas, phases, strict=True):  # not one table of all: samples times lines may be 10^8
+        total += omega**derivative * np.sin(omega * t + phase + 0.5 * np.pi * derivative)
+    return total
+
+
+def _multisine(t: np.ndarray, size: float, omegas: np.ndarray, phases: np.ndarray, offset: float) -> Motion:
+    position, velocity, acceleration = (size * _sum(t, omegas, phases, k) for k in range(3))
+    return offset + position, velocity, acceleration
+
+
+def _chirp(t: np.ndarray, amplitude: float, lowest: float, highest: float, sweep: float, offset: float) -> Motion:
+    rate = (highest - lowest) / sweep  # Hz/s
+    both = np.floor(t / (2.0 * sweep))
+    since = t - 2.0 * sweep * both
+    rising = since < sweep
+    back = np.where(rising, 0.0, since - sweep)
+    up = np.where(rising, since, sweep)
+    frequency = lowest + rate * (up - back)
+    cycles = both * (lowest + highest) * sweep
+    cycles += lowest * up + 0.5 * rate * up**2 + highest * back - 0.5 * rate * back**2
+    angle, omega = 2.0 * np.pi * cycles, 2.0 * np.pi * frequency
+    slope = np.where(rising, 2.0 * np.pi * rate, -2.0 * np.pi * rate)
+    swing = amplitude * np.sin(angle)
+    return offset + swing, amplitude * omega * np.cos(angle), amplitude * slope * np.cos(angle) - omega**2 * swing

@@ -1,0 +1,56 @@
+"""Reports of what was measured on a machine: accuracy, moves, response times, currents, vibration, reconfiguration.
+
+One door: a kind of report, data files and options in; tables, pictures and findings out. Light to import: matplotlib
+and python-can are imported by what needs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from rds.core.errors import InputError
+from rds.core.registry import Registry
+from rds.results.reports.content import Report, Table
+from rds.results.reports.settings import Setting, read_settings, settings_rows
+from rds.results.reports.write import write
+
+KINDS = Registry(
+    "report",
+    {
+        "accuracy": "rds.results.reports.accuracy",
+        "moves": "rds.results.reports.moves",
+        "response": "rds.results.reports.response",
+        "current": "rds.results.reports.current",
+        "vibration": "rds.results.reports.vibration",
+        "reconfiguration": "rds.results.reports.reconfiguration",
+    },
+    own=False,
+)
+
+__all__ = ["KINDS", "Report", "Setting", "Table", "make_report", "option_table", "options_of", "write"]
+
+
+def make_report(kind: str, files: Sequence[str | Path], options: Mapping[str, str | float] | None = None) -> Report:
+    """The report of this kind from data files.
+
+    `options` are those of `options_of(kind)`, as text or numbers. Raises InputError for an unknown kind or option, a
+    value out of bounds, or data that can't be read: with the file, the line and the column, the value and the remedy.
+    """
+    module = KINDS.module(kind)
+    if not files:
+        raise InputError(f"a report on {kind} needs data; name at least one file")
+    settings = read_settings(options or {}, module.SETTINGS, f"report {kind}")
+    made: Report = module.report([Path(file) for file in files], settings)
+    return made
+
+
+def options_of(kind: str) -> dict[str, Setting]:
+    """The options of a kind of report, by name: unit, default, meaning. InputError for an unknown kind."""
+    return dict(KINDS.module(kind).SETTINGS)
+
+
+def option_table(kind: str) -> Table:
+    """The options of a kind of report as a table, for a help text."""
+    columns, rows = settings_rows(KINDS.module(kind).SETTINGS)
+    return Table(f"Options of report {kind}", columns, rows)

@@ -1,5 +1,0 @@
-"""One sitting without widgets: choices, long work, runs, the machine. Panels are thin over it."""
-
-from rds.session.session import Session
-
-__all__ = ["Session"]
