@@ -1,7 +1,7 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
 python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [identification]
-                     [robustness] [grading] [panels] [--json]
+                     [robustness] [grading] [panels] [install] [--json]
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from benchmarks import (
     grading,
     identification,
     imports,
+    install,
     machine,
     nc,
     panels,
@@ -45,6 +46,7 @@ SUBJECTS = {
     "robustness": "10,000 closed loops with drawn parameters",
     "grading": "Submissions graded in the sandbox: five criteria of a 10 s run",
     "panels": "The page of rds app in a browser",
+    "install": "What an installation takes",
 }
 
 
@@ -101,6 +103,7 @@ def main() -> int:
         "robustness": robustness.run,
         "grading": lambda: grading.run(peer_python=options.peer_python),
         "panels": panels.run,
+        "install": install.run,
         "nc": lambda: nc.run(peer_python=options.peer_python),
     }
     report: dict[str, Any] = {"machine": machine.machine(), "versions": machine.versions(), "subjects": {}}

@@ -169,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def versions() -> str:
     """What the numbers were measured with."""
-    packages = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("rds", "python-can"))
+    packages = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in ("mini-cnc-rds", "python-can"))
     return f"{packages}, Python {platform.python_version()}, {platform.system()} {platform.release()}"
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks import c_program, cyclictest, nc_peers
 from rds.modes.process.environment import surroundings
 
-PACKAGES = ("rds", "numpy", "numba", "llvmlite", "scipy", "control", "bdsim", "python-can", "canopen")
+PACKAGES = ("mini-cnc-rds", "numpy", "numba", "llvmlite", "scipy", "control", "bdsim", "python-can", "canopen")
 
 
 def versions() -> dict[str, str]:

@@ -13,7 +13,7 @@ import faulthandler
 import json
 import os
 import sys
-from typing import Any, TextIO
+from typing import IO, Any
 
 from rds.checks import clauses
 from rds.checks.controller import check_controller
@@ -23,6 +23,7 @@ from rds.checks.report import CheckReport, Fault
 from rds.core.blame import student_error
 from rds.core.errors import ContractError, InputError
 from rds.core.load import load_student
+from rds.core.private_files import keep_process_private, open_private
 from rds.core.signature import form
 
 _PASSES = 20  # the time limit holds this many passes over a run, and some
@@ -38,7 +39,7 @@ def check_loaded(interface: str, file: Any, request: dict[str, Any]) -> CheckRep
     return check(file, T, budget=budget)
 
 
-def run(request: dict[str, Any], result: TextIO) -> None:
+def run(request: dict[str, Any], result: IO[str]) -> None:
     """Load the file and check each interface that it fills; every step is on disk before the next begins."""
 
     def say(event: dict[str, Any]) -> None:
@@ -84,7 +85,10 @@ def main() -> None:
     """Do what the command line's request says, and end without waiting for threads that the student left."""
     request = json.loads(sys.argv[1])
     sys.argv[:] = [request["file"]]
-    with open(request["trace"], "w") as trace, open(request["result"], "w", encoding="utf-8") as result:
+    with (
+        open_private(request["trace"], "w", is_own=True) as trace,
+        open_private(request["result"], "w", is_own=True, encoding="utf-8") as result,
+    ):
         faulthandler.enable(trace)
         faulthandler.dump_traceback_later(request["time_limit"], exit=True, file=trace)
         limit_memory(request["memory_limit"])
@@ -95,4 +99,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     main()

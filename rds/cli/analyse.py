@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, refusals
+from rds.cli.common import Json, print_json, refusals, writes_files
 
 
+@writes_files
 def analyse(
     machine: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
     bitrate: Annotated[int, typer.Option(help="Bit rate, bit/s.", min=1)] = 1_000_000,
@@ -46,8 +47,10 @@ def analyse(
         )
         if plot is not None:
             from rds.bus.analysis.analysis_plot import plot as draw
+            from rds.core.atomic import write_files
 
-            draw(analysis).savefig(plot)
+            picture, kind = draw(analysis), plot.suffix.removeprefix(".") or "png"
+            write_files({plot: lambda stream: picture.savefig(stream, format=kind)})
     if json:
         print_json(analysis.to_json())
     else:

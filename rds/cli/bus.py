@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rds.cli.buses import BUILTIN, Channel, ChosenBus, Experiment, Interface, chosen_bus
-from rds.cli.common import Json, print_json, refusals, stdout_kept, until_ctrl_c
+from rds.cli.common import Json, print_json, refusals, stdout_kept, until_ctrl_c, writes_files
 
 app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
 
@@ -23,7 +23,7 @@ Identifiers = Annotated[
     typer.Option("--id", help="Only this identifier or range, as in 0x020-0x07F; may be given more than once."),
 ]
 WithCommands = Annotated[
-    bool, typer.Option("--with-commands", help="Let frames through that can move a machine on this bus.")
+    bool, typer.Option("--with-commands", help="Let all frames through, those that move a machine on this bus, too.")
 ]
 
 
@@ -77,6 +77,7 @@ def monitor(
 
 
 @app.command()
+@writes_files
 def record(
     file: Annotated[
         Path, typer.Argument(help="The log: .asc .blf .log (candump) .trc .csv .db .mf4, or text with .gz.")
@@ -188,7 +189,11 @@ def serve_socketcand(
     port: Annotated[int, typer.Option(help="TCP port; 0 takes a free one.")] = 29536,
     with_commands: WithCommands = False,
 ) -> None:
-    """Offer a bus to other programs of this computer by socketcand's protocol, until Ctrl-C."""
+    """Offer a bus to your other programs on this computer by socketcand's protocol, until Ctrl-C.
+
+    They open the bus by the name that is written here, which ends in a word that is new with each start: whoever knows
+    it sees the bus, and with --with-commands moves the machine. Without that, only frames pass that no machine heeds.
+    """
     with refusals():
         from rds.bus.tools.socketcand import Server
 
@@ -202,6 +207,8 @@ def serve_socketcand(
             Server(opener, name, host=host, port=port, with_commands=with_commands) as server,
         ):
             _say(f"{place.name} on {server.address[0]} port {server.address[1]}; Ctrl-C ends")
+            power = "moves the machine" if with_commands else "sees the bus"
+            _say(f"programs open it as {server.opens} (keep it to yourself: whoever knows this name {power})")
             while server.alive() and not stop.wait(0.2):
                 pass
             alive = server.alive()

@@ -5,19 +5,44 @@ Exit codes: 0 done; 1 ran, and a verdict or check failed; 2 bad input, explained
 
 from __future__ import annotations
 
+import inspect
 import json as json_text
 import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from rds.core.private_files import keep_process_private, share
+
 Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
+_Shared = Annotated[bool, typer.Option("--shared", help="Let your group read what is written; else only you can.")]
+
+
+def writes_files(command: Callable[..., None]) -> Callable[..., None]:
+    """The same command with the option --shared: every command that writes files has it."""
+
+    @wraps(command)
+    def with_option(*words: Any, shared: bool = False, **options: Any) -> None:
+        if shared:
+            share()
+            keep_process_private()  # again: for the group's umask
+        command(*words, **options)
+
+    hints = get_type_hints(command, include_extras=True)  # words, until now: typer would miss what options are called
+    of = inspect.signature(command).parameters.values()
+    option = inspect.Parameter("shared", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_Shared)
+    parameters = [*(each.replace(annotation=hints[each.name]) for each in of), option]
+    with_option.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    with_option.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_option
 
 
 @contextmanager
@@ -41,6 +66,21 @@ def refusals() -> Iterator[None]:
             raise
         typer.echo(f"rds: {student_error(error)}", err=True)
         raise typer.Exit(2) from error
+
+
+def say_notices() -> None:
+    """Notices of the library as notes on stderr, instead of as warnings with a line of code."""
+    from rds.core.errors import Notice
+
+    shown = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if issubclass(category, Notice):
+            typer.echo(f"rds: note: {message}", err=True)
+        else:
+            shown(message, category, *where, **more)
+
+    warnings.showwarning = show
 
 
 def say_what_is_replaced(folder: Path | None) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 
 if TYPE_CHECKING:
     from rds.identification.logs.describe import Description
@@ -21,6 +21,7 @@ def _data() -> None:
 
 
 @app.command()
+@writes_files
 def describe(
     file: Annotated[Path, typer.Argument(help="CSV, MAT, Parquet, a bus log, or a result of rds.")],
     map_: Annotated[

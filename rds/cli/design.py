@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, refusals
+from rds.cli.common import Json, print_json, refusals, writes_files
 
 if TYPE_CHECKING:
     from rds.identification.fit.design import Linear
@@ -20,6 +20,7 @@ Model = Annotated[Path, typer.Argument(help="A model file, as `rds fit -o` write
 
 
 @app.command()
+@writes_files
 def tracking(
     out: Annotated[Path, typer.Option("--out", "-o", help="The controller's file, FILE.py.")],
     model: Annotated[Path | None, typer.Argument(help="A model file, as `rds fit -o` writes it.")] = None,
@@ -87,6 +88,7 @@ def _poles(text: str) -> list[complex]:
         raise InputError(f"--poles {text!r} must be two poles, as in -32+24j,-32-24j or -40,-50 (1/s)") from error
 
 
+@writes_files
 def machine_from(
     model: Model,
     axis: Annotated[str, typer.Option(help="Which axis it is a model of.")],

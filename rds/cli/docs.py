@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, refusals
+from rds.cli.common import Json, print_json, refusals, writes_files
 
 
+@writes_files
 def docs(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the pages; default: the cache.")] = None,
     browser: Annotated[bool, typer.Option("--open", help="Open them in the browser.")] = False,

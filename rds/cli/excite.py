@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 
 if TYPE_CHECKING:
     from rds.identification.fit.excitation import Design, Prediction, Task
     from rds.machines.machine import Machine
 
 
+@writes_files
 def excite(
     machine: Annotated[str, typer.Argument(help="A machine's name, or its TOML file.")],
     axis: Annotated[str | None, typer.Option(help="The axis; by default the machine's first.")] = None,

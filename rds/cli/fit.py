@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.logs import read_logs
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 FITTED_SHARE = 0.6  # of each log, with --split; the rest validates
 
 
+@writes_files
 def fit(
     logs: Annotated[list[Path], typer.Argument(help="Logs, fitted together: CSV, MAT, Parquet, bus logs, results.")],
     structure: Annotated[
@@ -94,7 +95,10 @@ def _say_if_slow(made: Structure) -> None:
     from rds.core.compiling import COMPILED
 
     if not COMPILED and not made.name.endswith(".py"):
-        typer.echo("rds: note: numba is missing, so this fit may take minutes: pip install 'rds[fast]'", err=True)
+        from rds.core.extras import remedy
+
+        note = f"numba is missing, so this fit may take minutes; install it with: {remedy('fast')}"
+        typer.echo(f"rds: note: {note}", err=True)
 
 
 def _options(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 
 if TYPE_CHECKING:
     from rds.grading.assignment.check_assignment import AssignmentCheck
@@ -67,6 +67,7 @@ def check(
 
 
 @app.command("hand-out")
+@writes_files
 def hand_out_(
     assignment: Folder,
     out: Annotated[Path, typer.Option("--out", "-o", help="The new folder.")],

@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, refusals
+from rds.cli.common import Json, print_json, refusals, writes_files
 
 
+@writes_files
 def export(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `rds grade run -o` made.")],
     to: Annotated[str, typer.Option(help="nbgrader, moodle, canvas, gradescope or prairielearn.")],

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, stdout_kept
+from rds.cli import cluster_options
+from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, stdout_kept, writes_files
 
 if TYPE_CHECKING:
     from rds.grading.batch import BatchOutcome
@@ -15,12 +16,17 @@ if TYPE_CHECKING:
 _INTERRUPTED = 130  # by the shell's custom
 
 
+@writes_files
 def run(
     assignment: Annotated[Path, typer.Argument(help="The assignment's folder.")],
     submissions: Annotated[Path, typer.Argument(help="Folder of submissions, or a zip as the platform exports it.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for grades and feedback; a new one.")],
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Local processes; default: all.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="A dask scheduler, as tcp://host:8786.")] = None,
+    scheduler: cluster_options.Address = None,
+    tls_ca: cluster_options.Ca = None,
+    tls_cert: cluster_options.Cert = None,
+    tls_key: cluster_options.Key = None,
+    insecure_cluster: cluster_options.Insecure = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the batch in that folder.")] = False,
     json: Json = False,
 ) -> None:
@@ -32,13 +38,14 @@ def run(
         with refusals(), stdout_kept(json), ends_as_ctrl_c():
             from rds.grading.batch import run_batch
 
+            cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)
             with progress_bars() as bar:
                 found = run_batch(
                     assignment,
                     submissions,
                     out,
                     jobs=jobs,
-                    scheduler=scheduler,
+                    scheduler=cluster,
                     resume=resume,
                     progress=bar("submissions"),
                     announce=lambda text: typer.echo(f"rds: {text}", err=True),

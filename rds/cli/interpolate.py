@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, BinaryIO, NoReturn
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, Tools, With, setup
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ _FOLDER = Path("interpolation")
 _METHOD = "constant-velocity"
 
 
+@writes_files
 def interpolate(
     file: Annotated[
         Path | None, typer.Argument(help="A part program, or a .toml of segments; instead of it, --line or --arc.")

@@ -41,10 +41,14 @@ from rds.cli.common import (
     print_json,
     progress_bars,
     refusals,
+    say_notices,
     say_what_is_replaced,
     stdout_kept,
+    writes_files,
 )
 from rds.cli.guard import guarded
+from rds.core.errors import InputError
+from rds.core.private_files import keep_process_private
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -52,6 +56,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Rapid development system for machine-tool axes: one controller file in simulation, emulation and "
     "implementation.",
+    epilog="RDS_FILE_LIMITS=4 before a command makes the limits on files four times as large, for one that you trust.",
 )
 machine_app = typer.Typer(no_args_is_help=True, help="Machines: list them, or serve one on a CAN bus.")
 app.add_typer(machine_app, name="machine")
@@ -83,6 +88,7 @@ Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the re
 
 
 @app.command()
+@writes_files
 def demo(out: Out = None, json: Json = False) -> None:
     """Track a sine on X, Y and Z in all three modes, and show the published numbers beside ours."""
     with refusals(), stdout_kept(json), ends_as_ctrl_c():
@@ -102,6 +108,7 @@ def demo(out: Out = None, json: Json = False) -> None:
 
 
 @app.command()
+@writes_files
 def run(
     experiment: Annotated[Path, typer.Argument(help="The experiment, a TOML file.")],
     mode: Annotated[
@@ -238,6 +245,12 @@ def machine_serve(
 
 def main() -> None:
     """The console command `rds`. What runs a student's code in this process does so in a child of it."""
+    try:
+        keep_process_private()
+    except InputError as error:
+        typer.echo(f"rds: {error}", err=True)
+        sys.exit(2)
+    say_notices()
     # a program in a terminal takes keys, which a process group in the background may not
     own = sys.argv[1:2] == ["fit"] and any(word.endswith(".py") for word in sys.argv)
     if own or sys.argv[1:2] in (["run"], ["robustness"]) or (sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()):

@@ -13,7 +13,7 @@ import typer
 
 from rds.bus.modules.oacs.pid import MEANINGS
 from rds.cli.buses import Channel, Experiment, Interface, chosen_bus
-from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals
+from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, writes_files
 from rds.cli.console import cell, show_table
 
 module_app = typer.Typer(
@@ -23,6 +23,7 @@ module_app = typer.Typer(
 Place = tuple[str | None, str | None, Path | None]  # --interface, --channel, --experiment
 
 
+@writes_files
 def scan(
     watching: Annotated[
         bool, typer.Option("--watch", help="Go on, and say which distributed modules come and go, until Ctrl-C.")
@@ -301,6 +302,7 @@ def reset(
 
 
 @module_app.command()
+@writes_files
 def step(
     context: typer.Context,
     by: Annotated[float, typer.Option(help="Step of the set point, mm or degrees.")] = 5.0,

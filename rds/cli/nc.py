@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rds.cli import nc_make, nc_run
-from rds.cli.common import Json, print_json, progress_bars, refusals
+from rds.cli.common import Json, print_json, progress_bars, refusals, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ PICTURES = ("png", "svg", "pdf")
 
 
 @app.command()
+@writes_files
 def check(
     file: Program,
     machine: MachineName = "mini-cnc",
@@ -148,6 +149,7 @@ def _print_when_whole(pieces: Iterator[str]) -> None:
 
 
 @app.command()
+@writes_files
 def plot(
     file: Program,
     machine: MachineName = "mini-cnc",

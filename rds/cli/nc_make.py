@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from rds.cli.common import Json, print_json, refusals
+from rds.cli.common import Json, print_json, refusals, writes_files
 from rds.cli.option_names import named_by_options
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def maker(make: Callable[..., Made]) -> Callable[..., None]:
     parameters = [p.replace(kind=p.KEYWORD_ONLY, annotation=hints[p.name]) for p in (*own.values(), *shared.values())]
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {p.name: p.annotation for p in parameters}
-    return app.command()(command)
+    return app.command()(writes_files(command))
 
 
 @maker

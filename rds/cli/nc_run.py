@@ -18,6 +18,7 @@ from rds.cli.common import (
     refusals,
     say_what_is_replaced,
     stdout_kept,
+    writes_files,
 )
 from rds.cli.nc_options import MaxJumps, Parameters, Program, Tools, With, setup
 
@@ -33,6 +34,7 @@ _LEAST_OVERRIDE = 0.1  # per cent: an hour becomes six weeks
 _STATES = ("runs", "held", "stops", "waits for the tool", "dwells", "waits for the spindle", "goes home", "is over")
 
 
+@writes_files
 def run(
     file: Program,
     mode: Annotated[

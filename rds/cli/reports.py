@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, refusals
+from rds.cli.common import Json, print_json, refusals, writes_files
 
 
+@writes_files
 def report(
     kind: Annotated[str, typer.Argument(help="accuracy, moves, response, current, vibration or reconfiguration.")],
     data: Annotated[list[Path] | None, typer.Argument(help="Data files: CSV tables or bus logs.")] = None,

@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli import cluster_options
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 
 
+@writes_files
 def robustness(
     experiment: Annotated[Path, typer.Argument(help="The experiment, a TOML file.")],
     runs: Annotated[int, typer.Option("--runs", "-n", help="How many draws.")] = 1000,
@@ -18,7 +20,11 @@ def robustness(
     ranges: Annotated[Path | None, typer.Option(help="TOML file of [AXIS] tables: PARAMETER = [low, high].")] = None,
     level: Annotated[float, typer.Option(help="Of the confidence region that is drawn from.")] = 0.95,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Local processes; default: all.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="A dask scheduler, as tcp://host:8786.")] = None,
+    scheduler: cluster_options.Address = None,
+    tls_ca: cluster_options.Ca = None,
+    tls_cert: cluster_options.Cert = None,
+    tls_key: cluster_options.Key = None,
+    insecure_cluster: cluster_options.Insecure = False,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for a page, pictures and draws.csv.")] = None,
     json: Json = False,
 ) -> None:
@@ -31,6 +37,7 @@ def robustness(
         from rds.identification.robustness.report import write_study
         from rds.identification.robustness.summary import to_json
 
+        cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)
         with progress_bars() as bar:
             found = study(
                 experiment,
@@ -40,7 +47,7 @@ def robustness(
                 ranges=ranges,
                 level=level,
                 jobs=jobs,
-                scheduler=scheduler,
+                scheduler=cluster,
                 progress=bar("runs"),
                 announce=lambda text: typer.echo(f"rds: {text}", err=True),
             )

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept
+from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.logs import read_logs
 
 if TYPE_CHECKING:
     from rds.identification.validate.validate import Validation
 
 
+@writes_files
 def validate(
     model: Annotated[Path, typer.Argument(help="A model file (.toml), or a student's file (.py) with its params.")],
     logs: Annotated[list[Path], typer.Argument(help="Logs, other than the fit's: CSV, MAT, Parquet, results.")],

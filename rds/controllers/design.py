@@ -14,6 +14,7 @@ import numpy as np
 
 from rds.controllers import observer
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.core.options import Option
 
 
@@ -56,7 +57,8 @@ def _place(A: np.ndarray, B: np.ndarray, poles: Sequence[complex]) -> np.ndarray
     # of the tracking controller would otherwise wait seconds for python-control to be imported.
     if B.shape[1] == 1 and (len(poles) <= 2 or len(set(poles)) < len(poles)):
         return _ackermann(A, B, poles)
-    import control
+    with needed_for("this design"):
+        import control
 
     try:
         gains = control.place(A, B, poles)
@@ -118,7 +120,8 @@ def tracking_controller_system(tau: float, K: float, poles: Any, observer_pole: 
     saturation; state `z` (mm/s). Continuous without `T`, else the realization for a loop sampled every `T` s, with
     dt = T.
     """
-    import control
+    with needed_for("this design"):
+        import control
 
     g1, g2 = tracking_gains(tau, poles)
     if T is None:
@@ -151,7 +154,8 @@ def reduced_order_observer(sys: Any, poles: Any) -> Any:
     With R completing C to a basis, w = R x is what is not measured: ŵ = z + L y, where
     ż = (A₂₂ - L A₁₂) ŵ + (A₂₁ - L A₁₁) y + (B₂ - L B₁) u.
     """
-    import control
+    with needed_for("this design"):
+        import control
 
     A, B, C, D = (np.asarray(part, dtype=float) for part in (sys.A, sys.B, sys.C, sys.D))
     n, p = A.shape[0], C.shape[0]

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there."""
+"""Files that are either whole or not there, and that only their user can read (see `core.private_files`)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import os
 import secrets
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from rds.core.errors import InputError
+from rds.core.private_files import make_folder, open_private
 
 
 def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
@@ -22,9 +23,9 @@ def write_files(writers: Mapping[Path, Callable[[BinaryIO], None]]) -> None:
     path = Path()
     try:
         for path, write in writers.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(path.parent)
             temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
-            with open(temporary, "xb") as stream:
+            with cast(BinaryIO, open_private(temporary, "xb")) as stream:
                 staged[path] = temporary
                 write(stream)
                 stream.flush()

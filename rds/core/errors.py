@@ -20,5 +20,9 @@ class ContractError(InputError):
     """A student's model, controller or interpolator does not keep its fixed interface."""
 
 
+class Notice(UserWarning):
+    """What a user should know, though nothing fails by it. The command line says it as a note."""
+
+
 class MachineError(RdsError):
     """The machine or its bus does not do its part: no answer, a lost node, a fault in its status."""

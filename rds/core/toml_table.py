@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.toml_file import read_toml
 
 
 class Words:
@@ -26,9 +26,11 @@ class Words:
         name: str = "",
         general: Words | None = None,
         shared: Sequence[str] = (),
+        lines_before: int = 0,
     ):
         self.table, self.path, self.name = table, path, name
         self._text, self._general, self._shared = text, general, shared
+        self.lines_before = lines_before  # of the file, above `text`, for the lines in errors
         self._asked: list[str] = []
 
     def over_written(self, table: dict[str, Any]) -> Words:
@@ -43,17 +45,8 @@ class Words:
     @classmethod
     def read(cls, path: str | Path) -> Words:
         """The top table of a TOML file; InputError if it cannot be read or is not TOML."""
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-            return cls(tomllib.loads(text), text, str(path))
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}; check the path", str(path)) from error
-        except UnicodeDecodeError as error:
-            raise InputError("is not UTF-8 text; save it as UTF-8", str(path)) from error
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"is not valid TOML: {error}", str(path)) from error
-        except RecursionError as error:
-            raise InputError("has brackets within brackets a thousand deep; write it flatter", str(path)) from error
+        table, text = read_toml(path)
+        return cls(table, text, str(path))
 
     def place(self, key: str | None = None) -> str:
         """File and line of a key of this table, as far as they are known."""
@@ -61,6 +54,7 @@ class Words:
         if owner is not self:
             return owner.place(key)
         line = _line_of(self._text, self.name, key)
+        line = None if line is None else line + self.lines_before
         inside = f"[{self.name}]" if self.name else ""
         where = ", ".join(part for part in (self.path, f"line {line}" if line else inside) if part)
         return where or "experiment"
@@ -83,7 +77,7 @@ class Words:
 
     def over(self, general: Words, shared: Sequence[str]) -> Words:
         """This table, and `general` behind it for the keys in `shared`."""
-        return Words(self.table, self._text, self.path, self.name, general, shared)
+        return Words(self.table, self._text, self.path, self.name, general, shared, self.lines_before)
 
     def _owner(self, key: str | None) -> Words:
         """The table in which `key` stands."""
@@ -158,12 +152,16 @@ class Words:
         owner = self._owner(key)
         name = f"{owner.name}.{key}" if owner.name else key
         texts = _texts_of(owner._text, name, len(values))
-        return [Words(value, text, owner.path, name) for value, text in zip(values, texts, strict=True)]
+        return [
+            Words(value, text, owner.path, name, lines_before=owner.lines_before + before)
+            for value, (text, before) in zip(values, texts, strict=True)
+        ]
 
     def table_of(self, key: str, table: dict[str, Any]) -> Words:
         """A table that stands for the value of `key`."""
         owner = self._owner(key)
-        return Words(table, owner._text, owner.path, f"{owner.name}.{key}" if owner.name else key)
+        name = f"{owner.name}.{key}" if owner.name else key
+        return Words(table, owner._text, owner.path, name, lines_before=owner.lines_before)
 
     def done(self) -> None:
         """Refuse keys that have not been asked for."""
@@ -182,15 +180,15 @@ def _near(word: Any, known: Sequence[str]) -> str:
     return f"; did you mean '{close[0]}'?" if close else ""
 
 
-def _texts_of(text: str, name: str, count: int) -> list[str]:
-    """For each table of a list, the text with the lines of the others blank: a key is then found in its own table."""
+def _texts_of(text: str, name: str, count: int) -> list[tuple[str, int]]:
+    """For each table of a list its own lines, in which its keys are found, and how many lines are above them."""
     lines = text.splitlines()
     header = re.compile(rf"\s*\[\[\s*{re.escape(name)}\s*\]\]")
     starts = [number for number, line in enumerate(lines) if header.match(line)]
     if not starts or len(starts) != count:
-        return [text] * count  # written as an array in one line
+        return [(text, 0)] * count  # written as an array in one line
     ends = [*starts[1:], len(lines)]
-    return ["\n" * start + "\n".join(lines[start:end]) for start, end in zip(starts, ends, strict=True)]
+    return [("\n".join(lines[start:end]), start) for start, end in zip(starts, ends, strict=True)]
 
 
 def _line_of(text: str, table: str, key: str | None) -> int | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, field
 from importlib.resources import files
 from math import isfinite
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.toml_file import read_toml
 from rds.machines.module_table import module_table
 
 
@@ -83,10 +83,7 @@ def load_machine(name: str) -> Machine:
         raise InputError(
             f"there is no machine {name!r}; known machines: {', '.join(machine_names())}, or the path of a .toml file"
         )
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"not valid TOML: {error}", str(path)) from error
+    data, _ = read_toml(path)
     return _machine(data, str(path))
 
 
@@ -103,7 +100,7 @@ def _machine(data: dict[str, Any], path: str) -> Machine:
         _known(table, _AXIS, path, f"axis.{name}.")
         travel = table.get("travel", [])
         if not _rises(travel):
-            raise InputError(f"travel = {travel!r} must be [lowest, highest]", place)
+            raise InputError(f"travel = {travel!r:.200} must be [lowest, highest]", place)
         resolution = _number(table, "resolution", place)
         if not (isfinite(resolution) and resolution > 0):
             raise InputError(f"resolution = {resolution!r} must be more than 0 (unit per encoder count)", place)
@@ -141,7 +138,7 @@ def _machine(data: dict[str, Any], path: str) -> Machine:
 def _limits(table: Any, path: str, name: str) -> AxisLimits:
     place = f"{path}, [axis.{name}.limits]"
     if not isinstance(table, dict):
-        raise InputError(f"limits = {table!r} must be a table", place)
+        raise InputError(f"limits = {table!r:.200} must be a table", place)
     _known(table, _LIMITS, path, f"axis.{name}.limits.")
     values = {key: _number(table, key, place) for key in sorted(_LIMITS)}
     for key, value in values.items():
@@ -165,7 +162,7 @@ def _rises(travel: Any) -> bool:
 
 def _must_be_table(table: Any, name: str, path: str) -> None:
     if not isinstance(table, dict):
-        raise InputError(f"{name} = {table!r} must be a table; write [{name}]", path)
+        raise InputError(f"{name} = {table!r:.200} must be a table; write [{name}]", path)
 
 
 def _known(table: Any, known: set[str], path: str, prefix: str) -> None:
@@ -178,5 +175,5 @@ def _known(table: Any, known: set[str], path: str, prefix: str) -> None:
 def _number(table: dict[str, Any], key: str, where: str) -> float:
     value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{key} = {value!r} must be a number", where)
+        raise InputError(f"{key} = {value!r:.200} must be a number", where)
     return value

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
 from rds.core.atomic import write_files
 from rds.core.errors import InputError
+from rds.core.installed import version
 from rds.machines import Machine
 from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_compiled, write_compiled
 from rds.nc.language.canon import Call, MotionBlock
@@ -122,7 +122,7 @@ def compiled_if_current(program: Path, machine: Machine, setup: Setup) -> Compil
 def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:
     """Everything that the motion depends on, with its SHA-256: the header of the compiled form."""
     return {
-        "rds": version("rds"),
+        "rds": version(),
         "program": program.name,
         "sources": {path.name: file_sha256(path) for path in sources(program)},
         "machine": machine.name,

@@ -18,10 +18,13 @@ def main(
     """The page with all panels, on the files of `folder`; the last expression of a notebook cell shows it.
 
     `bus` holds what the `[bus]` table of an experiment does; by default the machine is on the built-in bus.
-    InputError for a panel that does not exist, ImportError naming the extra `lab` where ipywidgets is missing.
+    InputError for a panel that does not exist, and where a package of the extra `lab` is missing.
     """
-    from rds.panels.page.shell import Shell
-    from rds.panels.session import Session
+    from rds.core.extras import needed_for
+
+    with needed_for("a panel"):
+        from rds.panels.page.shell import Shell
+        from rds.panels.session import Session
 
     PANELS.module(panel)
     return Shell(Session(folder, machine, bus), panel).widget

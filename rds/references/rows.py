@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.limits import TABLE, read_limited
 
 COLUMNS = {2: "time,value", 4: "time,position,velocity,acceleration"}
+_LONGEST = 10_000  # characters of a line
 _ROUNDING = 1e-5  # of the largest value of a column: what five printed digits lose
 
 
@@ -45,13 +47,15 @@ def read_rows(file: str | Path) -> np.ndarray:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_limited(path, TABLE, "a signal", "give a part of it").decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}; check the file's name", str(path)) from error
     except UnicodeDecodeError as error:
         raise InputError("it is not UTF-8 text; save it as CSV", str(path)) from error
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
+        if len(line) > _LONGEST:
+            raise InputError(f"it has {len(line)} characters; a row is 2 or 4 numbers", f"{path}, line {number}")
         if line.strip() and not line.lstrip().startswith("#"):
             lines.append((number, [cell.strip() for cell in next(csv.reader([line]))]))
     return lines

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.references.rows import read_rows
 from rds.references.signal import Motion, Signal
 
@@ -76,7 +77,8 @@ def _between(interpolation: str, times: np.ndarray, values: np.ndarray) -> Calla
         return partial(_hold, times=times, values=values)
     if interpolation == "linear":
         return partial(_linear, times=times, values=values)
-    from scipy.interpolate import CubicSpline
+    with needed_for("a spline through rows", 'say interpolation = "linear" or "hold"'):
+        from scipy.interpolate import CubicSpline
 
     return partial(_polynomial, pieces=CubicSpline(times, values))
 
@@ -97,7 +99,8 @@ def _linear(t: np.ndarray, times: np.ndarray, values: np.ndarray) -> Motion:
 
 
 def _quintic(rows: np.ndarray) -> Any:
-    from scipy.interpolate import BPoly
+    with needed_for("joining rows of time,position,velocity,acceleration"):
+        from scipy.interpolate import BPoly
 
     return BPoly.from_derivatives(rows[:, 0], rows[:, 1:])
 

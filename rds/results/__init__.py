@@ -1,6 +1,6 @@
 """What a run leaves: its table with units, its metrics, files, comparisons, plots and report.
 
-Light to import: pandas, pyarrow, scipy and matplotlib are imported by the functions that need them.
+Light to import: pandas, pyarrow and matplotlib are imported by the functions that need them.
 """
 
 from rds.results.compare import AxisComparison, Comparison, compare

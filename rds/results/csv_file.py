@@ -14,12 +14,16 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import there
+from rds.core.limits import DESCRIPTION, read_limited
 from rds.results.arrow import to_arrow, to_numpy
 from rds.results.header import FORMAT, describe, parse
 from rds.results.units import heading
 
 if TYPE_CHECKING:
     from rds.results.result import Result
+
+_BLOCK = 10_000  # rows that are written at a time
 
 
 def sidecar(path: Path) -> Path:
@@ -51,7 +55,7 @@ def writers(result: Result, path: Path) -> dict[Path, Callable[[BinaryIO], None]
 def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any] | None]:
     """The columns, and the description where there is one (else None, and the columns are called as headed)."""
     beside = sidecar(path)
-    text = beside.read_bytes() if beside.is_file() else None
+    text = read_limited(beside, DESCRIPTION, "a description of a table", "move it away") if beside.is_file() else None
     if text is None or not _is_description(text):
         return _read_table(path, None), None
     header = parse(text)
@@ -89,21 +93,22 @@ class _Tee(io.RawIOBase):
 
 
 def _write_table(result: Result, stream: _Tee) -> None:
-    import pyarrow as pa
-    from pyarrow import csv as arrow_csv
-
     line = io.StringIO()
     csv.writer(line, lineterminator="\n").writerow([heading(name, result.units[name]) for name in result.columns])
     stream.write(line.getvalue().encode("utf-8"))
-    if len(result):
+    if not there("pyarrow"):
+        for begin in range(0, len(result), _BLOCK):
+            cells = [values[begin : begin + _BLOCK].tolist() for values in result.columns.values()]
+            stream.write("".join(f"{','.join(map(repr, row))}\n" for row in zip(*cells, strict=True)).encode())
+    elif len(result):
+        import pyarrow as pa
+        from pyarrow import csv as arrow_csv
+
         table = pa.table([to_arrow(values) for values in result.columns.values()], names=[*result.columns])
         arrow_csv.write_csv(table, stream, arrow_csv.WriteOptions(include_header=False))
 
 
 def _read_table(path: Path, described: list[dict[str, Any]] | None) -> dict[str, np.ndarray]:
-    import pyarrow as pa
-    from pyarrow import csv as arrow_csv
-
     names, delimiter, decimal, empty = _layout(path)
     if described is not None:
         if len(names) != len(described):
@@ -116,6 +121,11 @@ def _read_table(path: Path, described: list[dict[str, Any]] | None) -> dict[str,
         raise InputError("two columns have the same heading; rename one")
     if empty:
         return {name: np.empty(0, dtype=types[name]) for name in names}
+    if not there("pyarrow"):
+        return _read_by_numpy(path, types, delimiter, decimal)
+    import pyarrow as pa
+    from pyarrow import csv as arrow_csv
+
     try:
         table = arrow_csv.read_csv(
             str(path),
@@ -128,6 +138,20 @@ def _read_table(path: Path, described: list[dict[str, Any]] | None) -> dict[str,
     except pa.ArrowInvalid as error:
         raise InputError(f"its table cannot be read: {error}; every cell must be a number") from error
     return {name: to_numpy(table.column(name)) for name in names}
+
+
+def _read_by_numpy(path: Path, types: dict[str, str], delimiter: str, decimal: str) -> dict[str, np.ndarray]:
+    """The rows without Arrow: the same numbers, in ten times its time."""
+    dtype = [(f"f{i}", kind) for i, kind in enumerate(types.values())]
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            lines = (line.replace(decimal, ".") for line in file) if decimal != "." else file
+            rows = np.loadtxt(lines, dtype, comments=None, delimiter=delimiter, skiprows=1, quotechar='"', ndmin=1)
+    except ValueError as error:  # numpy's advice after the ; is about its own options
+        raise InputError(
+            f"its table cannot be read: {str(error).partition(';')[0]}; every cell must be a number"
+        ) from error
+    return {name: np.ascontiguousarray(rows[f"f{i}"]) for i, name in enumerate(types)}
 
 
 def _layout(path: Path) -> tuple[list[str], str, str, bool]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rds.core.atomic import write_files
 from rds.core.errors import InputError
+from rds.core.extras import there
 from rds.results.foreign import from_table
 from rds.results.header import Contents, assemble
 
@@ -42,21 +43,24 @@ def save_result(result: Result, path: str | Path) -> Path:
 def save_all(result: Result, directory: str | Path) -> dict[str, Path]:
     """Save as result.csv, result.json, result.mat and result.parquet in `directory`; their paths by kind.
 
-    Either all appear, complete, or none. Raises InputError if the directory cannot be written.
+    Parquet is left out where pyarrow is not installed. Either all appear, complete, or none. Raises InputError if the
+    directory cannot be written.
     """
     directory = Path(directory)
     writers: dict[Path, Any] = {}
-    for suffix in _FORMATS:
+    for suffix in _usable():
         path = directory / f"{_STEM}{suffix}"
         writers.update(_format(path).writers(result, path))
     write_files(writers)
+    for suffix in _FORMATS.keys() - set(_usable()):  # an earlier run's, which would be opened in place of this one
+        (directory / f"{_STEM}{suffix}").unlink(missing_ok=True)
     return {path.suffix.removeprefix("."): path for path in writers}
 
 
 def saved_files(directory: str | Path) -> dict[str, Path]:
     """What `save_all` has left in `directory`: the paths by kind."""
     directory = Path(directory)
-    return {suffix.removeprefix("."): directory / f"{_STEM}{suffix}" for suffix in (*_FORMATS, ".json")}
+    return {suffix.removeprefix("."): directory / f"{_STEM}{suffix}" for suffix in (*_usable(), ".json")}
 
 
 def read_saved(path: str | Path, make: Callable[..., Made]) -> Made:
@@ -89,6 +93,11 @@ def _format(path: Path) -> Any:
     return import_module(module)
 
 
+def _usable() -> list[str]:
+    """The formats that can be written and read here."""
+    return [suffix for suffix in _FORMATS if suffix != ".parquet" or there("pyarrow")]
+
+
 def _choose(directory: Path) -> Path:
     """The one result in `directory`; InputError lists them if there are several or none."""
     known = [
@@ -100,7 +109,10 @@ def _choose(directory: Path) -> Path:
     stem = _STEM if _STEM in stems else stems[0] if len(stems) == 1 else None
     if stem is not None:
         return next(
-            directory / f.name for suffix in _FORMATS for f in known if (f.stem, f.suffix.lower()) == (stem, suffix)
+            directory / f.name
+            for suffix in dict.fromkeys((*_usable(), *_FORMATS))
+            for f in known
+            if (f.stem, f.suffix.lower()) == (stem, suffix)
         )
     if stems:
         raise InputError(f"holds several results ({_some([file.name for file in known])}); name one of the files")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.limits import DESCRIPTION, allow
 
 if TYPE_CHECKING:
     from rds.results.result import Result
@@ -42,6 +43,7 @@ def describe(result: Result) -> dict[str, Any]:
 
 def parse(text: str | bytes) -> dict[str, Any]:
     """The header in a JSON text; InputError says what is wrong with it."""
+    allow(len(text), DESCRIPTION, f"its description has {len(text)} characters", "save the result again")
     try:
         header = json.loads(text)
     except (ValueError, RecursionError) as error:

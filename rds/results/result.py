@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.results.files import read_saved, save_all, save_result
 from rds.results.plain import plain
 from rds.results.units import default_unit
@@ -121,8 +122,9 @@ class Result:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """The columns as a pandas DataFrame; its `attrs["units"]` holds the units."""
-        import pandas as pd
+        """The columns as a pandas DataFrame; its `attrs["units"]` holds the units. InputError without pandas."""
+        with needed_for("a DataFrame", "take the columns as arrays, as in result['time']"):
+            import pandas as pd
 
         table = pd.DataFrame(dict(self.columns))
         table.attrs["units"] = dict(self.units)

@@ -94,8 +94,8 @@ def test_record_until_ctrl_c_and_replay(
     assert recorder.stderr is not None and "recording rds:test" in recorder.stderr.readline()
     bus = open_bus()
     for k in range(50):
-        bus.send(frame(0x700, bytes([k])))
-    wait_for(lambda: path.read_bytes().count(b" 700 ") == 50)
+        bus.send(frame(0x790, bytes([k])))
+    wait_for(lambda: path.read_bytes().count(b" 790 ") == 50)
     recorder.send_signal(signal.SIGINT)
     result = json.loads(end(recorder)[0])
     assert result["frames"] == 50 and result["complete"] and result["lost"] == 0
@@ -152,9 +152,11 @@ def test_a_socketcand_server_until_ctrl_c(rds: Callable[..., subprocess.Popen[st
     server = rds("serve-socketcand", "--port", "0")
     assert server.stderr is not None
     port = int(server.stderr.readline().split("port ")[1].split(";")[0])
+    name = server.stderr.readline().split("open it as ")[1].split()[0]
+    assert name.startswith("test.")
     bus = open_bus()
-    with can.Bus(interface="socketcand", channel="test", host="127.0.0.1", port=port, tcp_tune=True) as tool:
-        tool.send(frame(0x700, b"\x05"))
+    with can.Bus(interface="socketcand", channel=name, host="127.0.0.1", port=port, tcp_tune=True) as tool:
+        tool.send(frame(0x790, b"\x05"))
         found = bus.recv(10.0)
         assert found is not None and found.data == b"\x05"
     server.send_signal(signal.SIGINT)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis.strategies import booleans, floats, sampled_from
 
 import rds
+from rds.core.extras import remedy
 from rds.modes.experiment.outcome import bus_note
 
 numba = pytest.importorskip("numba")
@@ -99,7 +100,7 @@ def test_it_falls_back_with_a_note(alone: Path, monkeypatch: pytest.MonkeyPatch)
         assert all((result[name] == python[name]).all() for name in python.columns)
     monkeypatch.setitem(sys.modules, "numba", None)
     (note,) = rds.Experiment(**good, compiled=True).run().meta["notes"]
-    assert note == "not compiled: numba is not installed (pip install 'rds[fast]')"
+    assert note == f"not compiled: numba is not installed; install it with: {remedy('fast')}"
 
 
 @pytest.mark.realtime

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rds.core import limits
 from rds.core.errors import InputError
 from rds.identification.logs import mf4_channels, tables
 from rds.identification.logs.mf4_channels import rasters_here
@@ -73,8 +74,8 @@ def test_cut_and_hollow_files_are_refused(tmp_path: Path, monkeypatch: pytest.Mo
     t = np.arange(2000) * 1e-3
     path = save(tmp_path / "bench.mf4", {"u": (t, np.sin(t), "V")})
     with monkeypatch.context() as small:
-        small.setattr(mf4_channels, "_MOST_VALUES", 100)
-        with pytest.raises(InputError, match=r"its channels hold 4e\+03 values"):
+        small.setattr(limits, "UNPACKED", 800)
+        with pytest.raises(InputError, match=r"takes 32000 bytes .* the limit is 800: .*LIMITS=40"):
             rasters_here(path)
     other = tmp_path / "other.mdf"
     other.write_bytes(b"something else")

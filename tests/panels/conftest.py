@@ -48,7 +48,7 @@ def start_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[...
     """Start `rds app` on a folder; ended with the tests."""
     if CHROMIUM is None:
         pytest.skip(HOW)
-    pytest.importorskip("voila", reason="Voilà is not installed: pip install 'rds[lab]'")
+    pytest.importorskip("voila", reason="Voilà is not installed: it is in the extra lab")
     runtime = tempfile.mkdtemp(prefix="rds", dir="/tmp")  # short, because a socket's path is
     started: list[App] = []
 
@@ -102,7 +102,7 @@ def browser() -> Iterator[Any]:
     """
     if CHROMIUM is None:
         pytest.skip(HOW)
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install 'rds[dev]'")
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: it is in the extra dev")
     with sync_api.sync_playwright() as playwright, tempfile.TemporaryDirectory(prefix="rds-chromium-") as profile:
         context = playwright.chromium.launch_persistent_context(
             profile, executable_path=CHROMIUM, args=["--no-sandbox"]

@@ -74,7 +74,7 @@ def test_cells_are_filled_with_the_keys(open_page: Callable[..., Any]) -> None:
 
 
 def test_a_picture_of_the_folder_is_traced(open_page: Callable[..., Any], app: App) -> None:
-    image = pytest.importorskip("PIL.Image", reason="pillow is not installed: pip install 'rds[drawing]'")
+    image = pytest.importorskip("PIL.Image", reason="pillow is not installed: it is in the extra drawing")
     across, up = np.meshgrid(np.arange(60), np.arange(60))
     disc = np.hypot(across - 30, up - 30) < 20
     path = app.folder.parent / "disc.png"

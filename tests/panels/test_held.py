@@ -134,7 +134,7 @@ def test_a_process_says_its_line_while_compiled_code_holds_it(tmp_path: Path) ->
 def test_the_page_tells_its_server_of_the_channels_it_started_and_hears_what_failed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("jupyter_server", reason="jupyter_server is not installed: pip install 'rds[lab]'")
+    pytest.importorskip("jupyter_server", reason="jupyter_server is not installed: it is in the extra lab")
     from rds.panels.app.page import BUS, FOLDER, MACHINE
     from rds.panels.app.rescue import emergency_stop
 

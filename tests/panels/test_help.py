@@ -15,7 +15,7 @@ import pytest
 from rds.core.errors import InputError
 from rds.panels.help.build import _local, help_pages, page_file, sources
 from rds.panels.registry import PANELS
-from rds.results.serve import FolderServer
+from rds.results.serve import OWN_SCRIPT, FolderServer
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def server(pages: Path) -> Iterator[FolderServer]:
-    server = FolderServer(pages)
+    server = FolderServer(pages, OWN_SCRIPT)
     yield server
     server.close()
 

@@ -24,22 +24,25 @@ OFFLINE = (
     "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate",
     "--LabApp.extension_manager=readonly",
 )
+# as docs/panels.md says for a computer that others use as well
+PRIVATE = "--KernelManager.transport=ipc"
 
 
 @pytest.fixture
-def lab(tmp_path: Path) -> Iterator[tuple[str, Path]]:
-    """A JupyterLab with settings of its own, on a folder with the notebook: the notebook's address, the folder."""
-    pytest.importorskip("jupyterlab", reason="JupyterLab is not installed: pip install 'rds[lab]'")
+def lab(tmp_path: Path) -> Iterator[tuple[str, Path, Path]]:
+    """A JupyterLab with settings of its own, on a folder with the notebook: its address, both folders."""
+    pytest.importorskip("jupyterlab", reason="JupyterLab is not installed: it is in the extra lab")
     runtime = tempfile.mkdtemp(prefix="rds", dir="/tmp")  # short, because a socket's path is
     folder = tmp_path / "student"
     folder.mkdir()
     shutil.copy(NOTEBOOK, folder)
     token = secrets.token_hex(16)
-    own = {"JUPYTER_CONFIG_DIR": "config", "JUPYTER_DATA_DIR": "data", "JUPYTER_RUNTIME_DIR": "runtime"}
+    own = {"JUPYTER_CONFIG_DIR": "config", "JUPYTER_DATA_DIR": "data", "JUPYTER_RUNTIME_DIR": f"{runtime}/jupyter"}
     own |= {"JUPYTERLAB_SETTINGS_DIR": "settings", "JUPYTERLAB_WORKSPACES_DIR": "workspaces", "IPYTHONDIR": "ipython"}
     env = {name: str(tmp_path / place) for name, place in own.items()}
+    options = ["--no-browser", "--allow-root", "--ip=127.0.0.1", *OFFLINE, PRIVATE]
     server = subprocess.Popen(
-        [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--ip=127.0.0.1", *OFFLINE, str(folder)],
+        [sys.executable, "-m", "jupyterlab", *options, str(folder)],
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
@@ -51,7 +54,7 @@ def lab(tmp_path: Path) -> Iterator[tuple[str, Path]]:
         for line in server.stderr:
             said.append(line)
             if found := re.search(r"http://127\.0\.0\.1:\d+/", line):
-                yield f"{found.group(0)}lab/tree/{NOTEBOOK.name}?token={token}", folder
+                yield f"{found.group(0)}lab/tree/{NOTEBOOK.name}?token={token}", folder, Path(runtime)
                 break
         else:
             raise AssertionError("JupyterLab did not start:\n" + "".join(said))
@@ -62,9 +65,9 @@ def lab(tmp_path: Path) -> Iterator[tuple[str, Path]]:
 
 
 def test_a_notebook_cell_shows_the_panels_and_tracks_a_sine(
-    lab: tuple[str, Path], new_page: Callable[[int, int], Any]
+    lab: tuple[str, Path, Path], new_page: Callable[[int, int], Any]
 ) -> None:
-    url, folder = lab
+    url, folder, runtime = lab
     page = new_page(1280, 800)
     page.goto(url)
     page.wait_for_selector('.jp-StatusBar-TextItem:has-text("| Idle")')
@@ -76,6 +79,8 @@ def test_a_notebook_cell_shows_the_panels_and_tracks_a_sine(
     page.wait_for_selector(".rds-app .rds-figure canvas:visible")
     page.wait_for_selector('.rds-app :text("Saved with its report in")')
     assert len(list((folder / "runs").iterdir())) == 1
+    sockets = [path for path in runtime.glob("jupyter/kernel-*") if path.is_socket()]
+    assert len(sockets) == 5 and (runtime / "jupyter").stat().st_mode & 0o077 == 0  # nobody else connects to them
     # the emergency stop stays in sight while one scrolls, and nothing lies over it: not the tools of the figure either
     covered = page.evaluate("""() => {
         const stop = document.querySelector("button.rds-stop").getBoundingClientRect();

@@ -11,7 +11,7 @@ from datetime import timedelta
 
 import pytest
 
-pytest.importorskip("jupyter_server", reason="Voilà is not installed: pip install 'rds[lab]'")
+pytest.importorskip("jupyter_server", reason="Voilà is not installed: it is in the extra lab")
 
 from jupyter_server._tz import utcnow
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import subprocess
@@ -13,11 +14,14 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("ipykernel", reason="ipykernel is not installed: pip install 'rds[lab]'")
+pytest.importorskip("ipykernel", reason="ipykernel is not installed: it is in the extra lab")
+pytest.importorskip("jupyter_server", reason="Voilà is not installed: it is in the extra lab")
 
 from jupyter_client import KernelManager
 
+from rds.bus.hub.address import runtime_directory
 from rds.panels.app import serve
+from rds.panels.app.kernels import PageKernel
 from rds.panels.app.provisioner import offer
 from rds.panels.app.ready_kernels import LAUNCHER, ForkedKernel, ReadyKernels
 
@@ -71,6 +75,49 @@ def test_jupyter_takes_all_kernels_of_the_page_from_there(
             manager.shutdown_kernel(now=number == 0)
     assert len(drawn) == 2  # each draws its own random numbers
     assert [process.poll() for process in ended] == [0, 0]
+
+
+FORK = """import os
+if os.fork() == 0:
+    print("from a forked process", flush=True)
+    os._exit(0)
+os.wait()"""
+
+
+def test_what_a_forked_process_prints_comes_by_a_private_socket_as_all_else(
+    ready: ReadyKernels, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("JUPYTER_PATH", str(APP / "share" / "jupyter"))
+    offer(ready)
+    folder = runtime_directory()
+
+    async def life() -> tuple[str, list[str]]:
+        manager = PageKernel(kernel_name="rds", connection_file=str(folder / "kernel-0123456789ab.json"))
+        await manager.start_kernel(cwd=str(APP), env=os.environ | {"SAID": "", "APP": ""})
+        client = manager.client()
+        said = ""
+        try:
+            client.start_channels()
+            await client.wait_for_ready(timeout=60)
+            client.execute(FORK)
+            while "forked" not in said:
+                said += (await client.get_iopub_msg(timeout=60))["content"].get("text", "")
+            return said, sorted(path.name for path in folder.iterdir() if path.is_socket())
+        finally:
+            client.stop_channels()
+            await manager.shutdown_kernel(now=True)
+
+    with ThreadPoolExecutor(1) as thread:  # in this one the browser of other tests has a loop
+        said, sockets = thread.submit(asyncio.run, life()).result()
+    assert said.startswith("from a forked process")
+    assert sockets == [f"01234567-{number}" for number in range(1, 7)]
+
+
+def test_the_sockets_of_kernels_have_room_in_the_longest_runtime_directory() -> None:
+    # 65 bytes are the most that runtime_directory takes; then come serve's folder and Voilà's in it, with random ends
+    folder = Path("/" + "r" * 64) / "app12345678" / "voila_12345678"
+    manager = PageKernel(connection_file=str(folder / "kernel-01234567-89ab-cdef-0123-456789abcdef.json"))
+    assert manager.transport == "ipc" and len(f"{manager.ip}-6") <= 103
 
 
 def test_a_kernel_that_is_not_of_this_kind_is_started_as_always(ready: ReadyKernels, alone: Path) -> None:

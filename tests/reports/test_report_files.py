@@ -123,7 +123,7 @@ BAD = [
     ("accuracy", "cw_counts\n1\n2\n", r"distance = -1.0 must be more than 0", {**MOVE, "distance": "-1"}),
     ("accuracy", "cw_counts\n1\n2\n", r"distance = 'far' must be a number", {**MOVE, "distance": "far"}),
     ("accuracy", "cw_counts\n1\n2\n", r"no option 'lenght'; it has distance", {**MOVE, "lenght": "1"}),
-    ("accuracy", "cw_counts\n1\n2\n", "cannot read", {**MOVE, "about": "nowhere.toml"}),
+    ("accuracy", "cw_counts\n1\n2\n", "cannot be read", {**MOVE, "about": "nowhere.toml"}),
     ("moves", "x_cw_mm\n1\n2\n", "times of moves are in s", {}),
     ("moves", "x_cw_s\n1\n0\n", "line 3, column 'x_cw_s': '0' is no duration", {}),
     ("moves", "x_cw_s\n1\n2\n", "no axis 'y'", {"distances": "y=80 mm"}),

@@ -17,8 +17,9 @@ from rds.core.errors import InputError, MachineError
 from rds.panels.session.email import Server, check_address, mail_server, send_files
 
 aiosmtpd_controller = pytest.importorskip(
-    "aiosmtpd.controller", reason="aiosmtpd is not installed: pip install rds[dev]"
+    "aiosmtpd.controller", reason="aiosmtpd is not installed: it is in the extra dev"
 )
+AuthResult = pytest.importorskip("aiosmtpd.smtp").AuthResult
 
 
 class Box:
@@ -96,11 +97,89 @@ def test_an_address_that_is_none_is_refused(to: str) -> None:
 
 
 def test_the_server_comes_from_the_folder_and_the_environment(tmp_path: Path) -> None:
-    (tmp_path / "email.toml").write_text(
-        'host = "a.edu"\nsender = "lab@a.edu"\nport = 2525\nsecurity = "none"\nuser = "lab"\n'
-    )
+    (tmp_path / "email.toml").write_text('host = "a.edu"\nsender = "lab@a.edu"\nport = 2525\nsecurity = "none"\n')
     server = mail_server(tmp_path, {"RDS_SMTP_HOST": "b.edu", "RDS_SMTP_PASSWORD": "secret"})
-    assert server == Server("b.edu", 2525, "lab@a.edu", "none", "lab", "secret")
+    assert server == Server("b.edu", 2525, "lab@a.edu", "none")  # nobody to log in, so the password stays here
+    assert mail_server(tmp_path, {}) == Server("a.edu", 2525, "lab@a.edu", "none")
+
+
+@pytest.mark.parametrize(
+    ("text", "environment", "server"),
+    [
+        ("", {"USER": "lab"}, Server("b.edu", 587, "lab@a.edu", "starttls", "lab", "secret")),
+        ('user = "lab"', {}, Server("b.edu", 587, "lab@a.edu", "starttls", "lab", "secret")),
+        ('user = "lab"\nhost = "B.edu"\nport = 587\nsecurity = "starttls"', {},
+         Server("b.edu", 587, "lab@a.edu", "starttls", "lab", "secret")),
+        ('user = "lab"\nhost = "b.edu"\nport = 465', {"SECURITY": "tls"},
+         Server("b.edu", 465, "lab@a.edu", "tls", "lab", "secret")),
+    ],
+)  # fmt: skip
+def test_a_password_goes_to_the_server_that_the_environment_names(
+    tmp_path: Path, text: str, environment: dict[str, str], server: Server
+) -> None:
+    (tmp_path / "email.toml").write_text(f'sender = "lab@a.edu"\n{text}\n')
+    named = {"HOST": "b.edu", "PASSWORD": "secret"} | environment
+    assert mail_server(tmp_path, {f"RDS_SMTP_{key}": value for key, value in named.items()}) == server
+
+
+def test_a_folder_that_names_another_server_is_sent_nothing(
+    tmp_path: Path, box: tuple[Box, Server], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handler, own = box
+    for key, value in {
+        "HOST": own.host, "PORT": str(own.port), "SECURITY": "none", "USER": "lab", "PASSWORD": "secret"
+    }.items():  # fmt: skip
+        monkeypatch.setenv(f"RDS_SMTP_{key}", value)
+    with socket.create_server(("127.0.0.1", 0)) as others:  # of another user, on the same computer
+        others.setblocking(False)
+        port = others.getsockname()[1]
+        for text in (f'host = "localhost"\nport = {port}', f"port = {port}", 'host = "mail.others.example"'):
+            (tmp_path / "email.toml").write_text(f'sender = "lab@a.edu"\nsecurity = "none"\n{text}\n')
+            with pytest.raises(InputError, match="is not where the password in RDS_SMTP_PASSWORD goes"):
+                send_files(mail_server(tmp_path), "me@example.edu", "s", "t", [])
+        with pytest.raises(BlockingIOError):
+            others.accept()
+    monkeypatch.delenv("RDS_SMTP_HOST")
+    with pytest.raises(InputError, match="set RDS_SMTP_HOST to your mail server"):
+        mail_server(tmp_path)
+    assert handler.mails == []
+
+
+def test_a_password_that_is_sent_arrives(tmp_path: Path) -> None:
+    told: list[Any] = []
+
+    def authenticate(server: Any, session: Any, envelope: Any, mechanism: str, data: Any) -> Any:
+        told.append((data.login, data.password))
+        return AuthResult(success=data.password == b"secret")
+
+    handler = Box()
+    options = {"authenticator": authenticate, "auth_require_tls": False, "auth_required": True}
+    controller = aiosmtpd_controller.Controller(handler, hostname="127.0.0.1", port=free_port(), **options)
+    controller.start()
+    try:
+        (tmp_path / "email.toml").write_text('sender = "lab@a.edu"\n')
+        named = {"HOST": "127.0.0.1", "PORT": str(controller.port), "SECURITY": "none", "USER": "lab"}
+        environment = {f"RDS_SMTP_{key}": value for key, value in named.items()}
+        server = mail_server(tmp_path, environment | {"RDS_SMTP_PASSWORD": "secret"})
+        send_files(server, "me@example.edu", "s", "t", [])
+        with pytest.raises(MachineError, match="not sent") as refused:
+            send_files(
+                mail_server(tmp_path, environment | {"RDS_SMTP_PASSWORD": "wrong"}), "me@example.edu", "s", "t", []
+            )
+    finally:
+        controller.stop()
+    assert told == [(b"lab", b"secret"), (b"lab", b"wrong")] and len(handler.mails) == 1
+    assert "wrong" not in str(refused.value)
+
+
+def test_a_password_is_never_shown_and_never_sent_for_others_to_read() -> None:
+    assert "secret" not in repr(Server("b.edu", 587, "lab@a.edu", "starttls", "lab", "secret"))
+    for host in ("b.edu", "10.0.0.1", "localhost.b.edu", "0.0.0.0"):
+        with pytest.raises(InputError, match=r'would send the password to .* use "starttls" or "tls"') as refused:
+            Server(host, 25, "lab@a.edu", "none", "lab", "secret")
+        assert "secret" not in str(refused.value)
+    for host in ("localhost", "127.0.0.1", "127.0.1.1", "::1"):
+        Server(host, 25, "lab@a.edu", "none", "lab", "secret")
 
 
 @pytest.mark.parametrize(

@@ -177,7 +177,7 @@ def test_nothing_to_do() -> None:
         ({"retries": -1}, "retries = -1"),
         ({"jobs": 1, "scheduler": "tcp://127.0.0.1:1"}, "give one of them"),
         ({"scheduler": "tcp://127.0.0.1:1"}, "no dask scheduler answers within 0.3 s"),
-        ({"scheduler": "nowhere at all"}, "no dask scheduler answers"),
+        ({"scheduler": "nowhere at all"}, "is no address of a dask scheduler; give tls://HOST:PORT"),
     ],
 )
 def test_what_will_not_do_is_said_at_once(
@@ -219,7 +219,7 @@ def test_a_scheduler_that_was_refused_leaves_nothing_behind() -> None:
 
     before = left()
     with pytest.raises(InputError, match="no dask scheduler answers"):
-        spread(spread_functions.square, [1], scheduler="nowhere at all")
+        spread(spread_functions.square, [1], scheduler="tcp://127.0.0.1:1")
     assert left() == before
 
 

@@ -1,6 +1,7 @@
 """Where the nodes of a channel meet: the user's runtime directory, its sockets and locks.
 
-Nobody but the user may enter the directory (mode 0700, checked), so whoever can connect is the same user. Where
+Nobody but the user may enter the directory (mode 0700, checked) or use the sockets in it (0600), and where the system
+tells, each end asks it whose process the other end is. So both are the same user's. Where
 there are no Unix sockets (Windows; or RDS_BUS_TRANSPORT=tcp) the hub listens on loopback TCP instead, and a file in
 that directory holds its port and a random token.
 """
@@ -11,12 +12,14 @@ import contextlib
 import os
 import re
 import socket
-import stat
-from pathlib import Path
+from struct import Struct
+
+from rds.bus.hub.runtime_folder import runtime_directory
+from rds.core.private_files import write_private
 
 _CHANNEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,31}", re.ASCII)
-_LONGEST_PATH = 104  # bytes of a Unix socket's path: 108 on Linux, 104 on macOS, with the final zero
 _SUFFIXES = (".sock", ".tcp")
+_CREDENTIALS = Struct("3i")  # process, user, group
 
 
 class Address:
@@ -45,13 +48,14 @@ class Address:
         if self.unix:
             server = socket.socket(socket.AF_UNIX)
             server.bind(str(self.path))
+            self.path.chmod(0o600)
         else:
             import secrets  # here and below: imports of some ms that a hub's start can do without
 
             server = socket.create_server(("127.0.0.1", 0))
             self.token = secrets.token_hex(16).encode()
             draft = self.path.with_suffix(".new")
-            draft.write_bytes(b"%d %s" % (server.getsockname()[1], self.token))
+            write_private(draft, b"%d %s" % (server.getsockname()[1], self.token), is_own=True)
             draft.replace(self.path)
         server.listen(128)
         return server
@@ -69,6 +73,8 @@ class Address:
         try:
             client.settimeout(timeout)
             client.connect(target)
+            if self.unix and (other := foreign_user(client)) is not None:
+                raise PermissionError(f"the hub of channel {self.channel!r} is a process of another user ({other})")
         except BaseException:
             client.close()
             raise
@@ -112,6 +118,15 @@ class Address:
             self.lock_path.unlink(missing_ok=True)
 
 
+def foreign_user(sock: socket.socket) -> int | None:
+    """The user at the other end of a Unix socket, if it is not this process's own; None also where nobody can tell."""
+    option = getattr(socket, "SO_PEERCRED", None)  # Linux
+    if option is None:
+        return None
+    _, uid, _ = _CREDENTIALS.unpack(sock.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size))
+    return None if uid == os.geteuid() else int(uid)
+
+
 def lock_file(descriptor: int) -> None:
     """Lock the whole file, or raise OSError at once."""
     try:
@@ -124,38 +139,6 @@ def lock_file(descriptor: int) -> None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def runtime_directory() -> Path:
-    """The user's own directory for sockets: XDG_RUNTIME_DIR/rds, else rds-UID in the temporary directory.
-
-    It is made if missing. PermissionError if somebody else could have put something there; OSError if its path
-    leaves no room for a socket's name.
-    """
-    uid = os.getuid() if hasattr(os, "getuid") else 0
-    base = os.environ.get("XDG_RUNTIME_DIR", "")
-    # after `su` the variable may still name the directory of another user
-    if base and os.path.isdir(base) and _owner(base) == uid and len(base) < 60:
-        directory = Path(base, "rds")
-    else:
-        import tempfile
-
-        directory = Path(tempfile.gettempdir(), f"rds-{uid}")
-    directory.mkdir(mode=0o700, exist_ok=True)
-    status = directory.lstat()
-    if hasattr(os, "getuid") and (
-        not stat.S_ISDIR(status.st_mode) or status.st_uid != uid or stat.S_IMODE(status.st_mode) & 0o077
-    ):
-        raise PermissionError(
-            f"{directory} must be a directory that only you can enter (mode 0700); remove it or set XDG_RUNTIME_DIR"
-        )
-    if len(os.fsencode(directory)) + 1 + 32 + 5 >= _LONGEST_PATH:
-        raise OSError(f"the path {directory} is too long for a socket in it; set XDG_RUNTIME_DIR to a shorter one")
-    return directory
-
-
 def channels() -> list[str]:
     """Names of the channels that have a hub, or had one that was killed."""
     return sorted(path.stem for path in runtime_directory().iterdir() if path.suffix in _SUFFIXES)
-
-
-def _owner(path: str) -> int:
-    return os.stat(path).st_uid

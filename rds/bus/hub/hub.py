@@ -17,6 +17,7 @@ from types import FrameType
 
 from rds.bus.hub.address import Address
 from rds.bus.hub.hub_loop import LINGER, QUEUE, STALL, Hub, log
+from rds.core.private_files import keep_process_private
 
 PRIORITY = 70  # below the target's 80, above the modules' 60
 
@@ -93,4 +94,5 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     sys.exit(main())

@@ -8,7 +8,7 @@ import sys
 import time
 
 from rds.bus.hub import wire
-from rds.bus.hub.address import Address
+from rds.bus.hub.address import Address, foreign_user
 from rds.bus.hub.error_states import SEATS, Board
 from rds.bus.hub.hub_node import Node, State
 from rds.bus.hub.hub_requests import Desk
@@ -17,6 +17,7 @@ from rds.bus.medium.medium import Medium, UntimedMedium
 from rds.bus.medium.station import Station
 
 SECOND = 1_000_000_000  # ns
+STRANGERS = 64  # connections that have not said who they are, where anybody may connect
 
 
 class HubNodes:
@@ -51,8 +52,15 @@ class HubNodes:
         except OSError as error:  # it hung up again, or there are no descriptors left
             log(f"could not accept a connection: {error}")
             return
+        if self._address.unix and (other := foreign_user(sock)) is not None:
+            self._note(f"a process of another user ({other}) was turned away; look who may enter {self._address.path}")
+            sock.close()
+            return
         sock.setblocking(False)
         if not self._address.unix:
+            strangers = [node for node in self._nodes.values() if node.state is State.GREETING]
+            if len(strangers) >= STRANGERS:
+                self._expel(strangers[0], f"no hello came, and {STRANGERS} others wait")
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         node = Node(sock, time.monotonic_ns())
         self._nodes[node.fd] = node

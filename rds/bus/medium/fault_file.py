@@ -10,25 +10,17 @@ for = 1.0       # s
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from rds.bus.medium.fault_kinds import Fault
 from rds.core.errors import InputError
+from rds.core.toml_file import read_toml
 
 
 def read_faults(path: str | Path) -> tuple[Fault, ...]:
     """The faults of a file, in the order of their times. InputError names file and line, and what is known."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-        content = tomllib.loads(text)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}; check the path", str(path)) from error
-    except UnicodeDecodeError as error:
-        raise InputError("is not UTF-8 text; save it as UTF-8", str(path)) from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", str(path)) from error
+    content, text = read_toml(path)
     for key in content:
         if key != "fault":
             raise InputError(f"unknown key {key!r}; a schedule consists of [[fault]] tables", str(path))

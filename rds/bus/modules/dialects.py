@@ -19,6 +19,11 @@ _SERVERS = {
     "oacs": "rds.bus.modules.oacs.server",
     "cia402": "rds.bus.modules.cia402.server",
 }
+_IDENTIFIERS = {
+    "rds": "rds.bus.modules.rds.frames",
+    "oacs": "rds.bus.modules.oacs.messages",
+    "cia402": "rds.bus.modules.cia402.codes",
+}
 DEFAULT = "rds"
 
 
@@ -36,6 +41,12 @@ def check_dialect(dialect: str) -> None:
 def server_module(dialect: str) -> str:
     """The module that serves a machine in this dialect, for `python -m`."""
     return _SERVERS[dialect]
+
+
+def identifiers(dialect: str) -> tuple[tuple[int, int, str], ...]:
+    """The standard identifiers that a dialect uses, first and last, and what a frame with one does to a machine."""
+    table: tuple[tuple[int, int, str], ...] = import_module(_IDENTIFIERS[dialect]).IDENTIFIERS
+    return table
 
 
 def open_drivers(

@@ -7,12 +7,14 @@ import zlib
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.core.limits import allow
 
 _HEADER = struct.Struct("<4sL")  # signature, size of the header
 _OBJECT = struct.Struct("<4sHHLL")  # signature, header size and version, size, type
 _CONTAINER = struct.Struct("<H6xL4x")  # compression, size of the content
 _WHOLE_HEADER = 72  # bytes of a header that are used
 _LOG_CONTAINER, _DEFLATE = 10, 2
+_LARGEST = 64 << 20  # bytes in a container; recorders make them of some 100 kB
 
 
 def check_containers(path: Path) -> None:
@@ -50,12 +52,14 @@ def _check_content(path: Path, at: int, body: bytes) -> None:
     method, announced = _CONTAINER.unpack_from(body)
     if method != _DEFLATE:
         return
+    allow(announced, _LARGEST, f"a container announces {announced} bytes", "record it again", f"{path}, byte {at}")
     try:
-        content = zlib.decompress(body[_CONTAINER.size :])
+        content = zlib.decompressobj().decompress(body[_CONTAINER.size :], announced + 1)  # no more: it may be a bomb
     except zlib.error as error:
         raise _fault(path, at, f"the container is damaged ({error})") from error
     if len(content) != announced:
-        raise _fault(path, at, f"the container holds {len(content)} bytes instead of {announced}")
+        held = f"more than {announced}" if len(content) > announced else f"{len(content)}"
+        raise _fault(path, at, f"the container holds {held} bytes instead of {announced}")
 
 
 def _fault(path: Path, at: int, problem: str) -> InputError:

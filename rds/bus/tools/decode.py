@@ -13,9 +13,12 @@ import can
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Kind, Status
 from rds.core.errors import InputError, MachineError
+from rds.core.extras import needed_for
+from rds.core.limits import allow
 
 OWN_DBC = "oacs.dbc"  # in rds/bus/modules/oacs
 _LONGEST_REASON = 300  # characters
+_LARGEST = 16 << 20  # bytes of a DBC file; a truck's has two million
 
 
 class Decoded(NamedTuple):
@@ -96,12 +99,12 @@ def own_dbc() -> Path | None:
 
 def load_dbc(path: Path) -> Any:
     """cantools' database of a DBC file; InputError if it is none, or where cantools is missing."""
-    try:
+    with needed_for("reading a DBC file", where=str(path)):
         import cantools.database
-    except ImportError as error:
-        raise InputError("DBC files need the package cantools: pip install cantools", str(path)) from error
     if not path.is_file():
         raise InputError("there is no such DBC file; check the name", str(path))
+    size = path.stat().st_size
+    allow(size, _LARGEST, f"it has {size} bytes", "give a part of it", path)
     try:
         return cantools.database.load_file(path, strict=False)
     # cantools raises errors of its parsers, of textparser and plain ones

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rds.bus.tools.beyond import OPTION, refuse_network
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 
@@ -41,12 +42,15 @@ def open_bus(
     """An open bus that receives the standard frames whose identifier, masked, is one of `identifiers` (None: all).
 
     `node` is what the built-in bus calls this node; `options` go to the interface as they are (bitrate, fd...).
-    Raises MachineError if the bus can't be opened.
+    Raises MachineError if the bus can't be opened, InputError for one that leaves this computer (beyond.py) unless the
+    option `beyond_this_computer` is true.
     """
     import can
 
     if node is not None and interface == BUILTIN:
         options.setdefault("name", node)
+    if interface != BUILTIN:
+        refuse_network(interface, channel, options, options.pop(OPTION, False))
     filters = None
     if identifiers is not None:
         filters = standard_filters(identifiers, mask)

@@ -11,6 +11,10 @@ from collections.abc import Callable, Iterator
 from typing import TextIO
 
 from rds.core.errors import InputError
+from rds.core.limits import allow_unpacked, lifted, refusal
+
+_LONGEST = 1 << 16  # characters of a line: a frame of 64 bytes takes some hundred
+_FEW = 1 << 28  # characters that a compressed log may hold in any case
 
 _CANDUMP = re.compile(
     r"\(\d+\.\d+\)\s+\S+\s+([0-9A-F]{3}|[0-9A-F]{8})#"
@@ -35,8 +39,11 @@ class Lines:
     `number` is that of the last line, from 1. Raises InputError, with the file and the line, at a damaged one.
     """
 
-    def __init__(self, file: TextIO, path: str, suffix: str):
+    def __init__(self, file: TextIO, path: str, suffix: str, packed: int = 0):
         self._file = file
+        self._packed = packed  # bytes of a compressed file
+        self._characters = 0
+        self._longest = int(_LONGEST * lifted())
         self._path = path
         self._check, self._is_frame = _RULES[suffix]
         self._line = ""
@@ -51,7 +58,7 @@ class Lines:
     def __next__(self) -> str:
         self._look_back()
         while True:
-            self._line = next(self._file)
+            self._line = self._next()
             self.number += 1
             self.frames = 0
             if self._line.strip():
@@ -60,6 +67,19 @@ class Lines:
         if problem:
             raise self.fault(problem)
         return self._line
+
+    def _next(self) -> str:
+        line = self._file.readline(self._longest)
+        if not line:
+            raise StopIteration
+        if len(line) == self._longest and not line.endswith("\n"):
+            where = f"{self._path}:{self.number + 1}"
+            what = f"it has a line of more than {self._longest} characters"
+            raise refusal(what, _LONGEST, "take another copy", where=where)
+        self._characters += len(line)
+        if self._packed and self._characters > _FEW:
+            allow_unpacked(self._characters, self._packed, self._path, counting=True)
+        return line
 
     def _look_back(self) -> None:
         if self.number and not self.frames:

@@ -10,6 +10,7 @@ from typing import Any, Protocol, TextIO, cast
 import can
 
 from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf
+from rds.core.private_files import open_private
 
 _LEAST_EPOCH = 631152000.0  # s; BLF keeps no start before 1990
 
@@ -117,6 +118,7 @@ class DatabaseWriter:
 
     def __init__(self, path: Path):
         path.unlink(missing_ok=True)
+        open_private(path, "xb").close()  # SQLite leaves the mode of a file as it is, and so of its journal
         self._connection: sqlite3.Connection | None = sqlite3.connect(path)
         self._rows: list[tuple[object, ...]] = []
         self._execute(self._TABLE)

@@ -32,9 +32,11 @@ from can.io.blf import BLFParseError
 from can.util import dlc2len
 
 from rds.bus.tools import log_lock, log_writers
+from rds.bus.tools.log_bombs import check_mf4, check_table
 from rds.bus.tools.log_lines import TEXT, Lines
 from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf, close_unopened
 from rds.core.errors import InputError
+from rds.core.private_files import open_private
 
 ENDINGS = (".asc", ".blf", ".log", ".trc", ".csv", ".db", ".mf4")
 _READERS = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader, ".csv": can.CSVReader}
@@ -92,7 +94,7 @@ class LogFile:
 
     def _lines(self) -> Iterator[can.Message]:
         with self._open() as file:
-            lines = Lines(file, str(self.path), self._ending)
+            lines = Lines(file, str(self.path), self._ending, self.path.stat().st_size if self._packed else 0)
             found = False
             try:
                 for message in _READERS[self._ending](cast(TextIO, lines)):
@@ -120,7 +122,10 @@ class LogFile:
             from rds.bus.tools.blf import check_containers
 
             check_containers(self.path)
+        elif self._ending == ".db":
+            check_table(self.path)
         elif self._ending == ".mf4":
+            check_mf4(self.path)
             bring_asammdf()
             damage = (Exception,)  # asammdf raises whatever its decoder trips over
         number = 0
@@ -185,13 +190,15 @@ class LogWriter:
         self._last = 0.0
         if not force:
             try:
-                path.open("xb").close()
+                open_private(path, "xb").close()
             except FileExistsError:
                 raise InputError(
                     "it exists already; choose another name, or overwrite it with --force", str(path)
                 ) from None
         else:
             log_lock.release(log_lock.hold(path))  # not while another one writes it
+            if path.is_file() or not path.exists():  # no device and no pipe
+                open_private(path, "ab").close()  # as private as a new one
         self._writer = log_writers.open_writer(path, self._ending, packed)
         try:
             self._lock = log_lock.hold(path)

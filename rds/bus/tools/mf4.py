@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.extras import missing
 
 _WHAT, _WHILE = "asammdf", "can"
 
@@ -56,10 +57,7 @@ def bring_asammdf() -> None:
 
 def asammdf_missing(path: Path) -> InputError:
     """What to say where MDF can't be read or written."""
-    return InputError(
-        "MDF files need the package asammdf: pip install asammdf (or rds with its extra mdf), or use .blf",
-        str(path),
-    )
+    return missing("asammdf", "an MDF file", "use .blf", str(path))
 
 
 def close_unopened(error: BaseException | None) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import can
 
 from rds.bus.modules.rds import frames
-from rds.bus.tools.live_machine import acts_on_machine, live_modules, refusal
+from rds.bus.tools.live_machine import acts_on_machine, heard_now, live_modules, refusal
 from rds.bus.tools.selection import Selection
 from rds.core.errors import InputError, MachineError
 
@@ -52,8 +52,9 @@ def replay(
     are left out, counted. A loop follows the one before at the log's mean distance of frames.
 
     Raises InputError for a value that makes no sense, a log without frames to send, a damaged one, a frame that this
-    bus can't carry, and for frames that act on a machine that lives on the bus, unless `with_commands`; then zero
-    volts are sent at the end. MachineError if the bus fails.
+    bus can't carry, and unless `with_commands` for frames that are not harmless (live_machine.py) where a machine
+    lives on the bus, or comes to it meanwhile. After commands zero volts are sent at the end. MachineError if the bus
+    fails.
     """
     if not speed > 0.0:
         raise InputError(f"speed {speed!r} must be more than 0: 1 is the recorded speed, inf as fast as possible")
@@ -69,10 +70,10 @@ def replay(
     if part.acts is not None and not with_commands:
         modules = live_modules(bus)
         if modules:
-            raise refusal(part.acts, modules)
+            raise refusal(part.acts, part.acting - 1, modules)
     result = Replay(skipped=part.skipped)
     try:
-        _send_all(part, bus, result, speed, loops, stop or threading.Event(), progress)
+        _send_all(part, bus, result, speed, loops, stop or threading.Event(), progress, with_commands)
     finally:
         if part.commands:
             rest = can.Message(arbitration_id=frames.COMMAND, is_extended_id=False, data=frames.encode_voltages(()))
@@ -88,6 +89,7 @@ class _Part:
         self.frames = self.seen = 0
         self.skipped: dict[str, int] = {}
         self.acts: can.Message | None = None  # the first frame that acts on a machine
+        self.acting = 0  # how many do
         self.commands = False
         self.first = self.last = 0.0  # s in the log
         for at, message in self:
@@ -96,7 +98,9 @@ class _Part:
             self.frames += 1
             if acts_on_machine(message) is not None:
                 self.acts = self.acts or message
-                self.commands |= message.arbitration_id == frames.COMMAND
+                self.acting += 1
+                plain = not (message.is_extended_id or message.is_remote_frame)
+                self.commands |= plain and message.arbitration_id == frames.COMMAND
         left_out = self.seen - self.frames - sum(self.skipped.values())
         if left_out:
             self.skipped["not selected"] = left_out
@@ -135,13 +139,14 @@ def _send_all(
     loops: int,
     stop: threading.Event,
     progress: Callable[[Replay], Any] | None,
+    with_commands: bool,
 ) -> None:
     began = looked = time.monotonic()
     for loop in range(loops):
         start = began + loop * part.duration / speed
         for at, message in part:
             due = start + (at - part.first) / speed
-            now = _wait(due, stop)
+            now = _wait(due, stop, lambda: _listen(part, bus, with_commands))
             if stop.is_set():
                 result.stopped = True
                 return
@@ -149,16 +154,29 @@ def _send_all(
             result.sent += 1
             result.latest = max(result.latest, now - due)
             result.seconds = now - began
-            if progress is not None and now - looked >= _LOOK:
+            if now - looked >= _LOOK:
                 looked = now
-                progress(result)
+                _listen(part, bus, with_commands)
+                if progress is not None:
+                    progress(result)
         result.loops += 1
 
 
-def _wait(due: float, stop: threading.Event) -> float:
-    """Wait until the due time or the stop; return the time."""
+def _listen(part: _Part, bus: can.BusABC, with_commands: bool) -> None:
+    """Take what others send, so that nobody waits for it to be read; refuse to go on where a machine has come."""
+    try:
+        modules = heard_now(bus)
+    except (can.CanError, OSError) as error:
+        raise MachineError(f"the bus failed: {error}") from error
+    if modules and part.acts is not None and not with_commands:
+        raise refusal(part.acts, part.acting - 1, modules)
+
+
+def _wait(due: float, stop: threading.Event, look: Callable[[], None]) -> float:
+    """Wait until the due time or the stop, and `look` every now and then; return the time."""
     while (left := due - (now := time.monotonic())) > 0.0:
         if left > _LOOK:
+            look()
             stop.wait(_LOOK)
             if stop.is_set():
                 return time.monotonic()

@@ -5,15 +5,24 @@ One node on the bus serves all clients; what one client sends, the others see. O
 frames, remote frames (`rtr`) and error frames told. CAN FD frames have no words there: they are left out, which the
 log says once for each client.
 
-A client that does not read is disconnected when `BACKLOG` bytes wait for it; the bus never waits for a client. What is
-no word of the protocol is answered by an error or, in a `send`, left out with a line in the log, as socketcand does.
-Whoever may use this machine may connect: unlike the built-in bus, TCP tells no user from another.
+TCP tells no user of a computer from another, and a web page may send to any of its ports. So the name by which
+clients open the bus ends in a word that is new with each server and that only its user knows; every client can say it,
+for every client says a bus's name. Nothing is shown, and nothing taken, before that. A client is disconnected at the
+first byte that is not the protocol's, when it does not open the bus in `GREETING` s, and when it is told nothing
+(`bcmmode`) and says nothing for `SILENCE` s. While as many as can be are connected, a new one gets the place of the
+first that has not opened the bus.
+
+A client that does not read is disconnected when `BACKLOG` bytes wait for it; the bus never waits for a client. An
+element that is not understood is answered by an error or, in a `send`, left out with a line in the log, as socketcand
+does.
 """
 
 from __future__ import annotations
 
-import ipaddress
+import hmac
 import logging
+import math
+import secrets
 import selectors
 import socket
 import threading
@@ -25,6 +34,7 @@ from typing import Any
 import can
 
 from rds.bus.tools import socketcand_words as words
+from rds.bus.tools.beyond import is_loopback
 from rds.bus.tools.live_machine import acts_on_machine
 from rds.bus.tools.receiver import Fault, Receiver
 from rds.core.errors import InputError
@@ -34,6 +44,9 @@ LOG = logging.getLogger(__name__)
 PORT = 29536
 BACKLOG = 1 << 20  # bytes: some 20,000 frames, a second of the busiest bus
 CLIENTS = 32
+GREETING = 5.0  # s for a client to open the bus
+SILENCE = 600.0  # s that a client may say nothing while it is told nothing
+_WORD = 16  # bytes of chance in the word: nobody guesses it
 _LOOK = 0.2  # s
 _SEND = 0.05  # s that the bus may take for a frame; the other clients wait meanwhile
 _HOLD = 0.05  # s from the answer to `rawmode` to the first frame: python-can's client takes both for one, and fails
@@ -44,8 +57,9 @@ _SAID = 20  # complaints about one client that go to the log
 class Server:
     """Serves the bus that `open_bus` opens as `channel` from start() (or `with`) to stop().
 
-    `on_error` gets the bus's faults; it is opened again after them. Frames that act on a machine (commands, answers,
-    CANopen's likewise) are not taken from clients unless `with_commands`. `port` 0 takes a free one: see `address`.
+    `on_error` gets the bus's faults; it is opened again after them. Unless `with_commands`, only frames that certainly
+    do nothing to a machine are taken from clients (live_machine.py). `port` 0 takes a free one: see `address`. Clients
+    open the bus by the name `opens`, which is `channel` and a secret word.
 
     Raises InputError for an address that is not this machine's loopback, OSError if the port is taken, and what
     `open_bus` raises.
@@ -64,7 +78,8 @@ class Server:
         _check_loopback(host)
         if not 0 <= port <= 65535:
             raise InputError(f"port {port} must be from 0 (any that is free) to 65535")
-        self._channel = channel
+        self._channel = " ".join(channel.split())
+        self.opens = f"{self._channel}.{secrets.token_hex(_WORD)}"
         self._host, self._port = host, port
         self._with_commands = with_commands
         self._receiver = Receiver(open_bus, on_error, name=f"bus {channel}")
@@ -127,9 +142,12 @@ class Server:
                 for key, events in self._selector.select(self._patience()):
                     key.data(events)
                 self._spread(0)
-                for client in [client for client in self._clients.values() if client.held and not client.is_held()]:
-                    client.held = 0.0
-                    self._flush(client)
+                for client in list(self._clients.values()):
+                    if client.held and not client.is_held():
+                        client.held = 0.0
+                        self._flush(client)
+                    if time.monotonic() > client.due:
+                        self._drop(client, "it has not opened the bus" if not client.open else "it says nothing")
         except BaseException:
             LOG.exception("the socketcand server ended by an exception")
         finally:
@@ -156,12 +174,16 @@ class Server:
         except OSError as error:
             LOG.warning("a client could not be accepted: %s", error)
             return
+        strangers = [client for client in self._clients.values() if not client.open]
+        if len(self._clients) >= CLIENTS and strangers:
+            self._drop(strangers[0], f"it has not opened the bus, and {CLIENTS} are connected")
         if len(self._clients) >= CLIENTS:
             LOG.warning("client %s turned away: %d are connected", peer[1], CLIENTS)
             sock.close()
             return
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         client = _Client(sock, f"client {peer[1]}")
         self._clients[sock] = client
         self._selector.register(sock, selectors.EVENT_READ, lambda events: self._serve(client, events))
@@ -238,15 +260,17 @@ class Server:
         if not received:
             self._drop(client, "it has left")
             return
-        elements, client.rest, stray = words.split(client.rest + received)
-        if stray:
-            self._complain(client, f"{stray} bytes are no words of socketcand's protocol")
+        elements, client.rest, wrong = words.split(client.rest + received)
         for element in elements:
             if client.sock in self._clients:
                 self._obey(client, element)
+        if wrong:
+            self._drop(client, wrong)
 
     def _obey(self, client: _Client, element: list[str]) -> None:
         verb = element[0] if element else ""
+        if client.is_silent:
+            client.due = time.monotonic() + SILENCE
         if verb == "echo" and len(element) == 1:
             self._say(client, b"< echo >")
         elif not client.open:
@@ -254,7 +278,10 @@ class Server:
         elif verb in ("rawmode", "bcmmode") and len(element) == 1:
             self._say(client, b"< ok >")
             client.raw = verb == "rawmode"
-            client.held = time.monotonic() + _HOLD if client.raw else 0.0
+            client.is_silent = not client.raw
+            client.due = math.inf if client.raw else time.monotonic() + SILENCE
+            if client.raw:
+                client.held = time.monotonic() + _HOLD
         elif verb in ("send", "sendrtr"):
             self._send(client, element)
         else:
@@ -262,15 +289,20 @@ class Server:
             self._say(client, b"< error unknown command >")
 
     def _open(self, client: _Client, element: list[str]) -> None:
-        if element == ["open", self._channel]:
-            client.open = True
-            self._say(client, b"< ok >")
-        elif element[:1] == ["open"]:
-            self._say(client, b"< error could not open bus >")
-            self._drop(client, f"there is no bus {' '.join(element[1:])[:60]!r}, but {self._channel!r}")
-        else:
+        name = " ".join(element[1:])
+        if element[:1] != ["open"]:
             self._complain(client, f"{' '.join(element)[:60]!r} before a bus was opened")
             self._say(client, b"< error unknown command >")
+        elif hmac.compare_digest(name.encode(), self.opens.encode()):
+            client.open = client.is_silent = True  # the protocol's mode at first is BCM
+            client.due = time.monotonic() + SILENCE
+            self._say(client, b"< ok >")
+        elif name == self._channel or name.startswith(f"{self._channel}."):
+            self._say(client, b"< error could not open bus: open it by the name that the server said at its start >")
+            self._drop(client, f"it does not know the word that belongs to bus {self._channel!r}")
+        else:
+            self._say(client, b"< error could not open bus >")
+            self._drop(client, f"there is no bus {name[:60]!r}, but {self._channel!r}")
 
     def _send(self, client: _Client, element: list[str]) -> None:
         try:
@@ -308,7 +340,9 @@ class _Client:
     def __init__(self, sock: socket.socket, name: str):
         self.sock = sock
         self.name = name
-        self.open = False  # it has opened the bus
+        self.open = False  # it has opened the bus, so its user is the server's
+        self.due = time.monotonic() + GREETING  # s, monotonic: when it is disconnected unless it says more
+        self.is_silent = False  # it is told nothing; it may say something
         self.raw = False  # it wants all frames
         self.left = False
         self.rest = b""  # the beginning of an element
@@ -324,12 +358,8 @@ class _Client:
 
 
 def _check_loopback(host: str) -> None:
-    try:
-        is_loopback = host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        is_loopback = False
-    if not is_loopback:
+    if not is_loopback(host):
         raise InputError(
-            f"address {host!r} is not this machine's loopback; the protocol has no password, so serve 127.0.0.1 and "
-            "reach it from elsewhere by an SSH tunnel (ssh -L)"
+            f"address {host!r} is not this machine's loopback; the protocol encrypts nothing, its word neither, so "
+            "serve 127.0.0.1 and reach it from elsewhere by an SSH tunnel (ssh -L)"
         )

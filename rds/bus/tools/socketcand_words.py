@@ -13,27 +13,36 @@ import can
 from rds.core.errors import InputError
 
 LONGEST = 256  # characters of one element; a send of eight bytes has 50
-_ELEMENT = re.compile(rb"<([^<>]*)>")
+_INSIDE = rb"[ \t\x21-\x3b=\x3f-\x7e]{0,%d}" % (LONGEST - 2)  # what may stand between '<' and '>'
+_ELEMENT = re.compile(rb"[ \t\r\n]*<(" + _INSIDE + rb")>")
+_BEGUN = re.compile(rb"[ \t\r\n]*(<" + _INSIDE + rb")?")
+_HTTP = re.compile(rb"(GET|HEAD|POST|PUT|DELETE|CONNECT|OPTIONS|TRACE|PATCH|PRI) ")
 _BYTE = re.compile(r"[0-9A-Fa-f]{1,2}")
 _IDENTIFIER = re.compile(r"[0-9A-Fa-f]{1,8}")
 
 
-def split(received: bytes) -> tuple[list[list[str]], bytes, int]:
-    """The complete elements in `received` as lists of words, the beginning of the next one, and how much was rubbish.
+def split(received: bytes) -> tuple[list[list[str]], bytes, str]:
+    """The complete elements in `received` as lists of words, the beginning of the next one, and what is wrong.
 
-    Rubbish is thrown away: bytes outside '<' and '>' other than blanks, and an element longer than `LONGEST`.
+    Elements end at the first byte that is not the protocol's: one outside '<' and '>' other than blanks and ends of
+    lines, one that is not printable ASCII, and one that makes an element longer than `LONGEST`. The last answer says
+    which, and is "" where all is well; whoever sends such a byte speaks another protocol and can't be understood.
     """
     elements = []
-    end = rubbish = 0
-    for match in _ELEMENT.finditer(received):
-        rubbish += len(received[end : match.start()].strip())
+    end = 0
+    while match := _ELEMENT.match(received, end):
         end = match.end()
-        elements.append(match[1].decode("ascii", "replace").split())
-    begin = max(received.rfind(b"<", end), end)
-    rest = received[begin:]
-    if not rest.startswith(b"<") or len(rest) > LONGEST:
-        begin, rest = len(received), b""
-    return elements, rest, rubbish + len(received[end:begin].strip())
+        elements.append(match[1].decode("ascii").split())
+    begun = _BEGUN.match(received, end)
+    assert begun is not None  # it matches nothing, too
+    if begun.end() == len(received):
+        return elements, begun[1] or b"", ""
+    if _HTTP.match(received, end):
+        return elements, b"", "this is a web page's request (HTTP), not socketcand's protocol"
+    if len(begun[1] or b"") == LONGEST - 1:
+        return elements, b"", f"an element has more than {LONGEST} characters"
+    stray = received[begun.end() : begun.end() + 1]
+    return elements, b"", f"byte {stray!r} does not belong to socketcand's protocol"
 
 
 def to_text(message: can.Message) -> bytes | None:

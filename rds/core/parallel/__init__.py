@@ -2,6 +2,7 @@
 
 from rds.core.parallel.local import worker_number
 from rds.core.parallel.outcome import Outcome
+from rds.core.parallel.scheduler import Scheduler
 from rds.core.parallel.spread import processors, spread
 
-__all__ = ["Outcome", "processors", "spread", "worker_number"]
+__all__ = ["Outcome", "Scheduler", "processors", "spread", "worker_number"]

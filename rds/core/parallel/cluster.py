@@ -20,9 +20,11 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from rds.core.errors import InputError, MachineError
+from rds.core.extras import needed_for
 from rds.core.parallel.local import following
 from rds.core.parallel.outcome import Failure, Outcome, reason_of
 from rds.core.parallel.process import Reply, Work
+from rds.core.parallel.scheduler import Scheduler, refused
 from rds.core.portable import portable
 
 CONNECT = 5.0  # s that a scheduler may take to answer
@@ -32,13 +34,13 @@ _LOOK = 1.0  # s between two looks at the workers
 _GOODBYE = 5.0  # s that workers may take to hear that the work is over
 
 
-def on_cluster(work: Work, items: Sequence[Any], scheduler: str) -> Iterator[Outcome]:
+def on_cluster(work: Work, items: Sequence[Any], scheduler: str | Scheduler) -> Iterator[Outcome]:
     """The outcomes as they come; see `spread`. Connects at once, so that a wrong address is refused at once."""
-    try:
+    scheduler = Scheduler.of(scheduler)
+    scheduler.check()
+    with needed_for("a scheduler"):
         import distributed  # noqa: F401 - whether it is there
-    except ImportError as error:
-        raise InputError("a scheduler needs dask.distributed (pip install 'rds[cluster]')") from error
-    session = _Session(work, items, scheduler)
+    session = _Session(work, items, scheduler, scheduler.security())
     session.start()
     return _outcomes(session, len(items))
 
@@ -54,7 +56,8 @@ def _outcomes(session: _Session, count: int) -> Iterator[Outcome]:
 class _Session:
     """The thread with the loop. `found` gets None once it is connected, then outcomes, or an exception at any time."""
 
-    def __init__(self, work: Work, items: Sequence[Any], scheduler: str):
+    def __init__(self, work: Work, items: Sequence[Any], scheduler: Scheduler, security: Any):
+        self._security = security
         self._work, self._items, self._scheduler = work, items, scheduler
         self.found: queue.SimpleQueue[Outcome | BaseException | None] = queue.SimpleQueue()
         self._loop = asyncio.new_event_loop()
@@ -84,7 +87,10 @@ class _Session:
                 self.found.put(error)
 
     async def _main(self) -> None:
-        async with _client(self._scheduler) as client, _desk(client, self._work, self._scheduler) as desk:
+        async with (
+            _client(self._scheduler, self._security) as client,
+            _desk(client, self._work, self._scheduler) as desk,
+        ):
             self.found.put(None)
             parts = (self._all(client, desk), self._watch(client), self._is_over.wait())
             tasks: list[asyncio.Task[Any]] = [asyncio.create_task(part) for part in parts]
@@ -155,24 +161,28 @@ class _Session:
 
 
 @asynccontextmanager
-async def _client(scheduler: str) -> AsyncIterator[Any]:
+async def _client(scheduler: Scheduler, security: Any) -> AsyncIterator[Any]:
     """A connection; InputError if nobody answers, or there are no workers."""
     from distributed import Client
 
-    client: Any = Client(scheduler, timeout=CONNECT, set_as_default=False, asynchronous=True)
+    client: Any = Client(scheduler.address, timeout=CONNECT, set_as_default=False, asynchronous=True, security=security)
     try:
         with _silence():  # what dask would log of a failed connection is said here
             try:
                 await asyncio.wait_for(client, 2.0 * CONNECT)  # something else may listen there, and say nothing
                 has_workers = await _has_workers(client)
             except Exception as error:  # what else listens there may answer anything, and dask believes it
+                if reason := refused(error):
+                    raise InputError(f"scheduler {scheduler!r} is refused, or refuses: {reason}") from error
                 raise InputError(
                     f"scheduler {scheduler!r}: no dask scheduler answers within {CONNECT:g} s "
                     f"({str(error) or 'silence'}); start one with `dask scheduler`, and give its address, such as "
-                    "tcp://192.168.0.10:8786"
+                    "tls://192.168.0.10:8786"
                 ) from error
         if not has_workers:
-            raise InputError(f"scheduler {scheduler!r} has no workers; start some with `dask worker {scheduler}`")
+            raise InputError(
+                f"scheduler {scheduler!r} has no workers; start some with `dask worker {scheduler.address}`"
+            )
         yield client
     finally:
         with contextlib.suppress(TimeoutError):
@@ -189,7 +199,7 @@ async def _has_workers(client: Any) -> bool:
 
 
 @asynccontextmanager
-async def _desk(client: Any, work: Work, scheduler: str) -> AsyncIterator[str]:
+async def _desk(client: Any, work: Work, scheduler: Scheduler) -> AsyncIterator[str]:
     """The name of a desk for this work on all workers; InputError if they cannot have one."""
     from rds.core.parallel.remote import Desk
 

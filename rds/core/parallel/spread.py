@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from rds.core.errors import InputError
 from rds.core.parallel.outcome import Outcome
 from rds.core.parallel.process import Work
+from rds.core.parallel.scheduler import Scheduler
 
 Item = TypeVar("Item")
 Progress = Callable[[int, int], None]  # items done, items in all
@@ -28,7 +29,7 @@ def spread(
     items: Iterable[Item],
     *,
     jobs: int | None = None,
-    scheduler: str | None = None,
+    scheduler: str | Scheduler | None = None,
     retries: int = RETRIES,
     time_limit: float | None = None,
     progress: Progress | None = None,
@@ -37,9 +38,9 @@ def spread(
     """The outcomes of `function(item)` as they become known: by rising index, or as they come if not `in_order`.
 
     Runs in `jobs` fresh local processes (default: one for each processor), or on the workers of the dask `scheduler`
-    ("tcp://host:8786"), which need the same rds installed. The function and the items are pickled (by cloudpickle:
-    lambdas and notebook functions will do); the function must not depend on the process it runs in, so that the
-    values are the same wherever that is.
+    (a `Scheduler`, or its address: "tls://host:8786"; plain TCP only on this computer, unless it is `insecure`), which
+    need the same rds installed. The function and the items are pickled (by cloudpickle: lambdas and notebook functions
+    will do); the function must not depend on the process it runs in, so that the values are the same wherever that is.
 
     An exception becomes an outcome with its reason. Each item is at work in a process of its own, one at a time, also
     on a cluster: one that dies is replaced, and its item tried again `retries` times; so it is after `time_limit` s.

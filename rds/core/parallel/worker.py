@@ -15,6 +15,7 @@ from rds.core.errors import RdsError
 from rds.core.parallel.outcome import reason_of
 from rds.core.parallel.pipe import receive, send
 from rds.core.portable import portable
+from rds.core.private_files import keep_process_private
 from rds.core.scheduling import end_with_parent
 
 
@@ -56,4 +57,5 @@ def _answer(function: Any, data: bytes) -> bytes:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     main()

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.private_files import write_private
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.batch.grade_one import Opener, grade, grade_with_runs
 from rds.grading.batch.scratch import scratch
@@ -159,11 +160,12 @@ def _idle(assignment: Assignment, pool: Opener, reference: Grade, found: _Found)
     """The grade of doing nothing; an empty file and the template must not earn anything either."""
     with scratch("check") as folder:
         path = folder / "submission.py"
-        path.write_text("")
+        write_private(path, b"", is_own=True)
         empty = grade(assignment, path, reference.student, pool)
         if empty.score:
             found.faults.append(f"an empty file earns {empty.score:g} points")
-        path.write_text(f"params = {_params(assignment)!r}\n{IDLE[assignment.kind]}")
+        idle_code = f"params = {_params(assignment)!r}\n{IDLE[assignment.kind]}"
+        write_private(path, idle_code.encode(), is_own=True)
         idle = grade(assignment, path, reference.student, pool)
     template = assignment.path(assignment.template)
     if template is not None and template.suffix == ".py":

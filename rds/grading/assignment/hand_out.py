@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import secrets
 import shutil
-import tomllib
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.private_files import make_folder, write_private
+from rds.core.toml_file import read_toml
 from rds.core.toml_text import toml_text
 from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
 
@@ -24,12 +25,12 @@ def hand_out(assignment: Assignment, out: Path) -> list[Path]:
         raise InputError("is there already; name a new folder, or empty it", str(out))
     staged = out.with_name(f".{out.name}.{secrets.token_hex(6)}.part")
     try:
-        staged.mkdir(parents=True)
-        (staged / FILE).write_text(toml_text(_table(assignment), _COMMENT), encoding="utf-8")
+        make_folder(staged)
+        write_private(staged / FILE, toml_text(_table(assignment), _COMMENT).encode())
         for name in _files(assignment):
             target = staged / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(assignment.folder / name, target)
+            make_folder(target.parent)
+            write_private(target, (assignment.folder / name).read_bytes())
         read_assignment(staged)  # it is an assignment itself, or something here is wrong
         if out.exists():
             out.rmdir()
@@ -65,7 +66,7 @@ def _table(assignment: Assignment) -> dict[str, Any]:
             "no criterion can be shown: each is hidden, or measured on a hidden case; make one visible",
             str(assignment.folder),
         )
-    table = _plain(tomllib.loads((assignment.folder / FILE).read_text(encoding="utf-8")))
+    table = _plain(read_toml(assignment.folder / FILE)[0])
     cases = {case for name in shown for case in _criterion(assignment, name).cases}
     table.pop("solution", None)
     hidden = [criterion for criterion in assignment.criteria if criterion.name not in shown]

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.private_files import make_folder, open_descriptor
 
 FILE = "journal.jsonl"
 _CHECK = 16  # hex digits
@@ -32,8 +33,8 @@ class Journal:
         self.path = path
         self.was_torn = False
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+            make_folder(path.parent)
+            self._fd = open_descriptor(path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         except OSError as error:
             raise InputError(f"cannot be written: {error.strerror}; choose another place", str(path)) from error
         try:

@@ -11,6 +11,7 @@ from typing import Any
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
+from rds.core.installed import version as own_version
 from rds.grading.assignment.assignment import Assignment
 
 FILE = "batch.json"
@@ -43,7 +44,7 @@ def record_of(assignment: Assignment, handed_in: Mapping[str, str], times: Mappi
     """What a batch that begins now is begun with."""
     from importlib.metadata import version
 
-    versions = {"rds": version("rds"), "Python": platform.python_version(), "numpy": version("numpy")}
+    versions = {"rds": own_version(), "Python": platform.python_version(), "numpy": version("numpy")}
     due = None if assignment.due is None else assignment.due.isoformat()
     folder = str(assignment.folder.resolve())
     return Record(assignment.title, folder, assignment.sha256, versions, handed_in, times, layout, due)

@@ -11,7 +11,7 @@ from typing import Any
 
 from rds.core.atomic import write_files, write_whole
 from rds.core.errors import InputError
-from rds.core.parallel import Outcome, processors, spread
+from rds.core.parallel import Outcome, Scheduler, processors, spread
 from rds.core.parallel.spread import Progress
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.batch.journal import FILE as JOURNAL
@@ -30,6 +30,7 @@ from rds.grading.sandbox import available
 
 STUDENTS, SIMILARITY = "students", "similarity.json"
 _PATIENCE = 600.0  # s for one submission beyond all that it may take: then it is the grader that hangs
+Address = str | Scheduler | None
 _LONGEST = 2.0 * (1.0 + 10.0)  # times the limits: where all is visible and where it is hidden, run and counted
 
 
@@ -39,7 +40,7 @@ def run_batch(
     out: str | Path,
     *,
     jobs: int | None = None,
-    scheduler: str | None = None,
+    scheduler: Address = None,
     resume: bool = False,
     progress: Progress | None = None,
     announce: Callable[[str], None] | None = None,
@@ -90,7 +91,7 @@ def run_batch(
     return outcome
 
 
-def _check_sandbox(jobs: int | None, scheduler: str | None) -> None:
+def _check_sandbox(jobs: int | None, scheduler: Address) -> None:
     """InputError where submissions cannot be run, before anything is written."""
     if scheduler is None:
         if fault := available():
@@ -152,7 +153,7 @@ class _Batch:
         """By student, in the order of their names."""
         return {student: self._grades[student] for student in sorted(self._rows)}
 
-    def go(self, todo: Sequence[Queued], jobs: int | None, scheduler: str | None, progress: Progress | None) -> None:
+    def go(self, todo: Sequence[Queued], jobs: int | None, scheduler: Address, progress: Progress | None) -> None:
         """Grade all of `todo`; what fails by our fault once more, and then it is listed."""
         for each in todo:
             if each.grade is not None:
@@ -168,7 +169,7 @@ class _Batch:
         return grade is not None and grade.status is not Status.GRADER_ERROR
 
     def _round(
-        self, rows: Sequence[Queued], jobs: int | None, scheduler: str | None, progress: Progress | None
+        self, rows: Sequence[Queued], jobs: int | None, scheduler: Address, progress: Progress | None
     ) -> list[tuple[Queued, str]]:
         """One try for each of `rows`; those that failed, with the reason."""
         if not rows:

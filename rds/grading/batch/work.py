@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.core.parallel import worker_number
+from rds.core.private_files import make_folder, write_private
 from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
 from rds.grading.batch.grade_one import grade_with_runs
 from rds.grading.batch.scratch import scratch
@@ -82,7 +84,7 @@ def graded(setup: Setup, task: Task) -> Answer:
     else:
         with scratch("submission") as folder:
             path = folder / CODE
-            path.write_bytes(task.code)
+            write_private(path, task.code, is_own=True)
             found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
     grade, seconds = found.grade, time.monotonic() - began
     grade = replace(grade, notes=(*task.notes, *grade.notes), details={**grade.details, **task.about})
@@ -96,8 +98,9 @@ def graded(setup: Setup, task: Task) -> Answer:
 
 def columns_of(runs: tuple[CaseRun, ...]) -> bytes:
     """All runs as one Parquet table: case, run, and the columns of each; null where a run has no such column."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    with needed_for("a batch"):
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
     tables = []
     for run in runs:
@@ -125,8 +128,8 @@ def _assignment(setup: Setup) -> tuple[Assignment, bytes]:
         with scratch("assignment") as own:
             for name, data in setup.files:
                 path = own / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(data)
+                make_folder(path.parent)
+                write_private(path, data, is_own=True)
             read, code = _with_solution(own)
     if read.sha256 != setup.sha256:
         raise InputError("the assignment's files were changed while it was graded; put them back and resume")
@@ -145,7 +148,7 @@ def _expected(setup: Setup) -> tuple[CaseRun, ...]:
     assignment, code = _assignment(setup)
     with scratch("solution") as folder:
         path = folder / CODE
-        path.write_bytes(code)
+        write_private(path, code, is_own=True)
         return grade_with_runs(assignment, path, _SOLUTION, _pool(setup.jobs)).runs
 
 

@@ -33,7 +33,7 @@ def as_own_file(words: Words, defaults: dict[str, Any]) -> Words:
         "" if re.match(rf"\s*\[\[\s*{re.escape(words.name)}\s*\]\]", line) else re.sub(rf"^{prefix}", r"\1", line)
         for line in words.source.split("\n")
     ]
-    return Words(defaults | words.table, "\n".join(lines), words.path)
+    return Words(defaults | words.table, "\n".join(lines), words.path, lines_before=words.lines_before)
 
 
 def read_common(words: Words) -> Common:

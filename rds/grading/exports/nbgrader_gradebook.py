@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.installed import pip_install
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import criteria_of
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
@@ -32,8 +33,8 @@ def into_gradebook(finished: Finished, wanted: Wanted) -> Exported:
         from nbgrader.api import Gradebook  # type: ignore[import-not-found]
     except ImportError as error:
         raise InputError(
-            "--gradebook needs nbgrader in the same Python as rds: pip install nbgrader there; or leave --gradebook "
-            "out, and get a table"
+            "--gradebook needs nbgrader in the same Python as rds; install it with: "
+            f"{pip_install('nbgrader')}; or leave --gradebook out, and get a table"
         ) from error
     path = Path(str(wanted.gradebook)).resolve()
     if not path.is_file():

@@ -21,6 +21,7 @@ from typing import Any
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError, RdsError
+from rds.core.private_files import keep_process_private, open_private
 from rds.grading.batch import run_batch
 from rds.grading.batch.scratch import scratch
 from rds.grading.exports import GRADEBOOKS
@@ -72,6 +73,7 @@ def grade_in(platform: str, root: Path) -> Path:
         _grade(CONTAINERS[platform], platform, root, target)
     except (RdsError, OSError, shutil.Error, ValueError, TypeError, AttributeError) as error:
         _answer_failure(platform, target, str(error))
+    target.chmod(0o644)  # for the platform, which may be another user outside of the container; inside there is none
     return target
 
 
@@ -83,7 +85,7 @@ def _grade(container: Container, platform: str, root: Path, target: Path) -> Non
         folder = work / "submissions" / student
         shutil.copytree(root / container.submission, folder, symlinks=True, copy_function=_copied)
         if time:
-            with open(work / "submissions" / TIMES, "w", newline="", encoding="utf-8") as stream:
+            with open_private(work / "submissions" / TIMES, "w", newline="", encoding="utf-8") as stream:
                 csv.writer(stream).writerows([["student", "timestamp"], [student, time]])
         run_batch(root / container.assignment, work / "submissions", work / "out", jobs=1)
         export(work / "out", platform, target, Wanted())
@@ -114,4 +116,5 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     raise SystemExit(main(sys.argv[1:]))

@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.grading.intake.names import shown
 
 METADATA = "submission_metadata.yml"
@@ -25,10 +26,8 @@ class Submitter:
 
 def read_metadata(data: bytes) -> dict[str, Submitter]:
     """Of each folder of an export its submitter. InputError if it is not what Gradescope writes."""
-    try:
+    with needed_for("reading it", where=METADATA):
         yaml = import_module("yaml")  # which has no types of its own
-    except ImportError as error:
-        raise InputError("reading it needs PyYAML (pip install pyyaml)", METADATA) from error
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
         whole = yaml.load(data, Loader=loader)  # a safe loader: plain values only

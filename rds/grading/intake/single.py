@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.core.private_files import write_private
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.intake.folders import read_regular
 from rds.grading.intake.items import Refusal
@@ -29,7 +30,7 @@ def as_python(assignment: Assignment, file: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="rds-notebook-") as folder:
         path = Path(folder) / "submission.py"
         try:
-            path.write_bytes(converted(read_regular(file, LARGEST), wanted(assignment)).code)
+            write_private(path, converted(read_regular(file, LARGEST), wanted(assignment)).code, is_own=True)
         except Refusal as error:
             raise InputError(f"{error}", str(file)) from error
         yield path

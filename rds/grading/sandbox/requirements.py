@@ -9,6 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rds.core.extras import remedy
 from rds.grading.sandbox.errors import SandboxError, SubmissionError
 from rds.grading.sandbox.limits import Limits
 
@@ -45,7 +46,7 @@ def missing() -> str | None:
     except (ImportError, RuntimeError, OSError):
         return (
             "pyseccomp or libseccomp is missing, without which a sandbox would leave holes; install them, as in "
-            "`pip install 'rds[grading]'` and `sudo apt install libseccomp2`"
+            f"`{remedy('grading')}` and `sudo apt install libseccomp2`"
         )
     if not hasattr(os, "pidfd_open") or not Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").exists():
         return (

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.core.options import Option, check_known
 from rds.identification.fit.estimate import UNUSABLE, Estimate
 from rds.identification.fit.frequency_response import FrequencyResponse, frequency_response, model_response, output_rate
@@ -97,7 +98,8 @@ def _fit(
     responses: Sequence[FrequencyResponse], names: Sequence[str], is_rate: bool
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Values, their covariance, and the mean square of misfit over standard error (1 if the model is right)."""
-    from scipy.optimize import least_squares
+    with needed_for("a fit to frequency responses"):
+        from scipy.optimize import least_squares
 
     T = max(response.sample_period for response in responses)
     weights = [1.0 / np.maximum(r.std_error, _FLOOR * np.abs(r.response)) for r in responses]

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.identification.logs.log import Log
 
 _REPEATS = 1e-6  # of the command's range: how exactly a period comes back
@@ -165,7 +166,8 @@ def _smooth(values: np.ndarray) -> np.ndarray:
 
 
 def _welch(u: np.ndarray, y: np.ndarray, T: float) -> FrequencyResponse:
-    from scipy.signal import csd, welch
+    with needed_for("a frequency response"):
+        from scipy.signal import csd, welch
 
     length = len(u) // _SEGMENTS
     if length < 32:

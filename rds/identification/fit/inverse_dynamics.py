@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.core.options import Option, check_known
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.made_estimate import made_estimate
@@ -179,7 +180,8 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
 
 def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[np.ndarray, np.ndarray]:
     """The target and the columns of one log, decimated, (rows, 1 + coefficients); and which rows are at rest."""
-    from scipy.signal import butter, decimate, filtfilt
+    with needed_for("a fit by inverse dynamics"):
+        from scipy.signal import butter, decimate, filtfilt
 
     T = log.sample_period
     off = np.abs(log.time - log.time[0] - T * np.arange(len(log)))
@@ -217,7 +219,8 @@ def _rows(log: Log, form: MotionForm, settings: Settings, gain: float) -> tuple[
 
 def _at_rest(log: Log, settings: Settings) -> np.ndarray:
     """Whether at each sample the position stays within one step of the encoder, over some rows' time."""
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+    with needed_for("a fit by inverse dynamics"):
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     width = max(_REST * settings.decimation, 3)
     reach = maximum_filter1d(log.position, width) - minimum_filter1d(log.position, width)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
+from rds.core.toml_file import read_toml
 from rds.core.toml_text import toml_text
 from rds.identification.fit.model_file import ModelFile, read_model
 from rds.identification.fit.run_model import checked_structure, library_table, run_model
@@ -42,7 +41,7 @@ def write_machine(path: str | Path, model: ModelFile | str | Path, base: str, ax
             'model file in experiments ([model] file = "...")',
             file.path,
         )
-    data: dict[str, Any] = tomllib.loads(Path(machine.path).read_text(encoding="utf-8"))
+    data, _ = read_toml(machine.path)
     data["name"] = path.stem
     data["axis"][axis] |= {"model": table, "machine": {key: v for key, v in table.items() if key in known}}
     header = f"{machine.name} with axis {axis} as estimated: {Path(file.path).name}, SHA-256 {file.sha256[:16]}..."

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
 from rds.identification.fit.free_run_doubts import held_doubts, other_doubts
 from rds.identification.fit.initial_state import estimate_start
@@ -103,7 +104,8 @@ def made_estimate(
 
 def t_quantile(freedom: float, share: float = 0.95) -> float:
     """Half the width of the interval with this share, in standard errors (Student's t)."""
-    from scipy.special import stdtrit
+    with needed_for("a fit"):
+        from scipy.special import stdtrit
 
     return float(stdtrit(max(freedom, 1.0), 0.5 + 0.5 * share))
 

@@ -15,7 +15,6 @@ import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ import numpy as np
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
+from rds.core.installed import version
 from rds.core.toml_table import Words
 from rds.core.toml_text import toml_text
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
@@ -115,7 +115,7 @@ def model_text(estimate: Estimate, path: Path) -> str:
             for name, p in estimate.parameters.items()
         },
         "covariance": {"order": list(estimate.parameters), "rows": np.asarray(estimate.covariance, float).tolist()},
-        "versions": {"rds": version("rds"), "numpy": np.__version__, "python": platform.python_version()},
+        "versions": {"rds": version(), "numpy": np.__version__, "python": platform.python_version()},
         "logs": [_log_table(log, estimate) for log in estimate.logs],
     }
     return toml_text(table, _HEADER)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rds.core.extras import needed_for
 from rds.identification.logs.log import Log
 from rds.identification.structures.structure import PLAY, Structure
 
@@ -147,7 +148,8 @@ def _steady(structure: Structure, values: Mapping[str, float], voltage: float, i
 
 def smoothed_velocity(log: Log, window: int, is_rate: bool) -> np.ndarray:
     """The log's velocity at each sample by local quadratics over about `window` samples; a speed is its own."""
-    from scipy.signal import savgol_filter
+    with needed_for("a velocity from a log"):
+        from scipy.signal import savgol_filter
 
     if is_rate:
         return log.position

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.identification.fit.problem import Problem
 from rds.identification.logs.log import Log
 from rds.identification.structures.structure import Structure
@@ -46,7 +47,8 @@ def least_squares(problem: Problem, start: np.ndarray, most: int | None = None) 
 
     InputError if the free run there is not finite.
     """
-    from scipy.optimize import least_squares as minimize
+    with needed_for("a fit"):
+        from scipy.optimize import least_squares as minimize
 
     low, high = problem.bounds()
     start = np.clip(start, low, high)

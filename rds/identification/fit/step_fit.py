@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.core.options import check_known
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.made_estimate import made_estimate
@@ -110,7 +111,8 @@ def _solve(
     windows: Windows, names: Sequence[str], readings: Sequence[Reading], is_rate: bool
 ) -> tuple[dict[str, float], np.ndarray, np.ndarray, list[int]]:
     """Values, residuals, their derivatives by the values (with the sign of the model's), and the windows' lengths."""
-    from scipy.optimize import least_squares
+    with needed_for("a fit to steps"):
+        from scipy.optimize import least_squares
 
     shortest = min(log.sample_period for log, _ in windows)
     longest = max(float(log.time[w.end - 1] - log.time[w.first]) for log, w in windows)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rds.core.compiling import COMPILED
+from rds.core.extras import needed_for
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_motion import MINUS, PLUS, POSITION, STRIBECK_VELOCITY, TAU, move
 from rds.identification.structures.axis_motion import K as GAIN
@@ -80,7 +81,8 @@ def _places(parts: Sequence[Log], sign: float) -> list[_Place]:
 
 def _walked(parts: Sequence[Log], place: _Place) -> tuple[np.ndarray, float]:
     """From a place down to the lowest nearby, by Nelder and Mead's simplex, which minds no kinks."""
-    from scipy.optimize import minimize
+    with needed_for("a fit"):
+        from scipy.optimize import minimize
 
     def cost(scaled: np.ndarray) -> float:
         tau, plus, minus = np.exp(scaled) * place.numbers

@@ -18,11 +18,13 @@ from rds.bus.modules.rds import frames
 from rds.bus.tools.decode import load_dbc, own_dbc
 from rds.bus.tools.logs import LogFile
 from rds.core.errors import InputError, MachineError
+from rds.core.limits import UNPACKED, allow
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.logs.table import Column, Table
 
 Progress = Callable[[int, int], None]
 Signal = tuple[str, str | None, float]
+_LOOK = 1 << 16  # frames between two looks at how much memory they take
 _LINES = (".asc", ".log", ".trc", ".csv")  # formats of lines, uncompressed
 
 
@@ -51,6 +53,9 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
             progress(
                 min(number * 40, size), size
             )  # a frame takes about 40 bytes: the readers do not tell where they are
+        if number % _LOOK == 0:
+            size_now = 16 * sum(map(len, times.values()))
+            allow(size_now, UNPACKED, f"its signals take {size_now} bytes and more", "give a part of it", path)
         if message.is_error_frame or message.is_remote_frame:
             continue
         start = message.timestamp if start is None else start

@@ -13,6 +13,7 @@ from math import inf, sqrt
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 
 _LEAST_CORRELATION = 0.6
 _RIVAL = 0.8  # of the peak: another as high, apart from it, and the offset is not told
@@ -91,7 +92,8 @@ def _slope(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _coarse(t1: np.ndarray, x1: np.ndarray, t2: np.ndarray, x2: np.ndarray, window: float) -> float:
     """The offset at which the two correlate most, s, to a step of the coarser of the two."""
-    from scipy.signal import correlate, find_peaks
+    with needed_for("aligning two recorders"):
+        from scipy.signal import correlate, find_peaks
 
     longest = max(t1[-1] - t1[0], t2[-1] - t2[0])
     step = max(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))), longest / _MOST)
@@ -135,7 +137,8 @@ def _grid(time: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
 
 def _fine(t1: np.ndarray, x1: np.ndarray, t2: np.ndarray, x2: np.ndarray, lag: float) -> Alignment:
     """Gauss-Newton on offset, drift, gain and bias, from a coarse offset."""
-    from scipy.interpolate import CubicSpline
+    with needed_for("aligning two recorders"):
+        from scipy.interpolate import CubicSpline
 
     curve = CubicSpline(t2, x2)
     centre = 0.5 * (max(t1[0] - lag, t2[0]) + min(t1[-1] - lag, t2[-1]))

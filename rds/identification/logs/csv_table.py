@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
+from rds.core.limits import LINE, lifted, refusal
 from rds.identification.logs.csv_layout import BLANKS, Layout, is_number, sniff, split
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.logs.table import Column, Table, since_first
@@ -100,8 +102,9 @@ def _read(
     path: Path, layout: Layout, words: set[int], end: int, progress: Progress | None
 ) -> tuple[dict[int, np.ndarray], dict[int, tuple[int, str]], int]:
     """Numbers by column; of columns of words the first word with its row; how many remarks were passed over."""
-    import pyarrow as pa
-    from pyarrow import csv as arrow_csv
+    with needed_for("a log in a text file", where=str(path)):
+        import pyarrow as pa
+        from pyarrow import csv as arrow_csv
 
     keys = [str(i) for i in range(len(layout.names))]
     types = {key: pa.string() if int(key) in words else pa.float64() for key in keys}
@@ -146,6 +149,8 @@ def _read(
         raise _NotNumber(int(found_column[1])) from error
     finally:
         stream.close()
+        if stream.problem is not None:
+            raise stream.problem
     joined = {}
     for i in list(values):
         column = np.concatenate(values.pop(i) or [np.empty(0, dtype="datetime64[ns]" if i in dates else np.float64)])
@@ -157,10 +162,11 @@ class _Rows:
     """The rows of the file as Arrow wants them: no lines above the data, no remarks, one blank where there are many."""
 
     def __init__(self, path: Path, layout: Layout, end: int):
-        self._file = open(path, "rb")  # noqa: SIM115 (closed by close())
+        self._file, self._path = open(path, "rb"), path  # noqa: SIM115 (closed by close())
+        self.problem: InputError | None = None  # Arrow passes on no error that is raised here
         self._end, self._spaces = end, layout.delimiter == " "
         for _ in range(layout.first):
-            self._file.readline()
+            self._file.readline()  # within what the layout was found in
         self.remarks, self.closed = 0, False
 
     @property
@@ -175,12 +181,22 @@ class _Rows:
             if room <= 0:
                 return b""
             data = self._file.read(min(size, room))
-            data += self._file.readline(max(self._end - self._file.tell(), 0))
+            data += self._rest_of_line()
             data, remarks = _REMARK.subn(b"", data)
             self.remarks += remarks
             if self._spaces:
                 data = re.sub(rb"[ \t]+", b" ", _SPACES.sub(b"", data))
         return data
+
+    def _rest_of_line(self) -> bytes:
+        most = int(LINE * lifted())
+        rest = self._file.readline(min(max(self._end - self._file.tell(), 0), most))
+        if len(rest) == most and not rest.endswith(b"\n"):
+            number = _lines_before(self._path, self._file.tell()) + 1
+            where = f"{self._path}, line {number}"
+            self.problem = refusal(f"it has a line of more than {most} bytes", LINE, "take another copy", where=where)
+            raise self.problem
+        return rest
 
     def close(self) -> None:
         self._file.close()
@@ -191,6 +207,15 @@ class _Rows:
 
     def seekable(self) -> bool:
         return False
+
+
+def _lines_before(path: Path, offset: int) -> int:
+    """How many line breaks are before a byte of a file."""
+    count = 0
+    with open(path, "rb") as file:
+        while offset > 0 and (data := file.read(min(offset, _BLOCK))):
+            count, offset = count + data.count(b"\n"), offset - len(data)
+    return count
 
 
 def _numbers(cells: Any) -> np.ndarray:
@@ -214,7 +239,7 @@ def _line_fault(path: Path, layout: Layout, text: str, found: int) -> InputError
     cells = split(text, layout.delimiter)
     where = str(path)
     with open(path, encoding=layout.encoding, errors="replace") as file:
-        for number, line in enumerate(file, 1):
+        for number, line in enumerate(iter(lambda: file.readline(LINE), ""), 1):
             if number > layout.first and split(line.rstrip("\r\n"), layout.delimiter) == cells:
                 where = f"{path}, line {number}"
                 break

@@ -18,12 +18,13 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
+from rds.core.limits import allow_unpacked
+from rds.core.parallel.reader_process import read_apart
 from rds.identification.logs.mat_parts import Part, numbers
-from rds.identification.logs.reader_process import read_apart
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _OFFSETS = (0, 512)  # 512: behind the header by which MATLAB knows its files
-_MOST_VALUES = 2**27  # of all arrays together: 1 GB of float64
 _MOST_VARIABLES = 10_000
 _DEEPEST = 20  # structs in structs
 _MOST_PACKED = 1200  # deflate makes nothing smaller than 1/1032
@@ -38,13 +39,8 @@ def is_hdf5(path: Path) -> bool:
 
 def parts(path: Path) -> list[Part]:
     """The variables of the file, structs taken apart. InputError for one that is damaged, a bomb, or not to be read."""
-    try:
+    with needed_for("a MAT file of version 7.3 (HDF5)", "save it in MATLAB with -v7"):
         import h5py  # noqa: F401 - whether it is there
-    except ImportError as error:
-        raise InputError(
-            "it is a MAT file of version 7.3 (HDF5), which needs the package h5py: pip install h5py (or rds with its "
-            "extra hdf5); or save it in MATLAB with -v7"
-        ) from error
     return read_apart(parts_here, path)
 
 
@@ -55,12 +51,7 @@ def parts_here(path: Path) -> list[Part]:
     try:
         with h5py.File(path, "r") as file:
             leaves = list(_leaves(h5py, file, "", set()))
-            claimed = sum(node.size for _, node, _ in leaves if node is not None)
-            if claimed > _MOST_VALUES:
-                raise InputError(
-                    f"its arrays claim {claimed:.3g} values, and {_MOST_VALUES:.3g} are the most that are read; save "
-                    "time, command and position only"
-                )
+            allow_unpacked(8 * sum(node.size for _, node, _ in leaves if node is not None), path.stat().st_size)
             found: list[Part] = []
             for name, node, of_class in leaves:
                 if node is None:
@@ -68,10 +59,8 @@ def parts_here(path: Path) -> list[Part]:
                 else:
                     found += numbers(name, _read(node, name))
             return found
-    except InputError:
+    except (InputError, MemoryError):
         raise
-    except MemoryError as error:
-        raise InputError("its arrays need more memory than there is; save time, command and position only") from error
     except Exception as error:  # h5py raises half a dozen types on bad bytes
         reason = str(error) or type(error).__name__
         raise InputError(

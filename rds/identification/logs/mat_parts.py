@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -49,11 +50,12 @@ def parts_of(name: str, values: Any, depth: int = 0) -> Iterator[Part]:
 
 def _class_of(values: Any) -> str:
     """The class of an object that MATLAB saved without saying how (a timetable, a timeseries); "" for others."""
-    from scipy.io.matlab import MatlabObject, MatlabOpaque
-
-    if isinstance(values, MatlabObject):
+    matlab: Any = sys.modules.get("scipy.io.matlab")
+    if matlab is None:  # the file held nothing that scipy was needed for
+        return ""
+    if isinstance(values, matlab.MatlabObject):
         return str(values.classname)
-    if isinstance(values, MatlabOpaque) and values.size and "s2" in (values.dtype.names or ()):
+    if isinstance(values, matlab.MatlabOpaque) and values.size and "s2" in (values.dtype.names or ()):
         name = values.reshape(-1)[0]["s2"]
         text = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
         return text[:60] if text.isprintable() else "unknown"

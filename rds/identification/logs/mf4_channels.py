@@ -16,12 +16,12 @@ import numpy as np
 
 from rds.bus.tools.mf4 import asammdf_missing, close_unopened
 from rds.core.errors import InputError
+from rds.core.limits import allow_unpacked
+from rds.core.parallel.reader_process import read_apart
 from rds.identification.logs.log import Finding
-from rds.identification.logs.reader_process import read_apart
 from rds.identification.logs.table import Column, Table
 
 _FRAMES = (b"CAN_DataFrame", b"CAN_RemoteFrame", b"CAN_ErrorFrame")  # channels of a bus log
-_MOST_VALUES = 2**27  # of all channels together: 1 GB
 _TIME = "time"
 
 
@@ -79,11 +79,7 @@ def rasters_here(path: Path) -> tuple[list[Raster], list[str]]:
 
         with MDF(path) as file:
             groups = [group.channel_group.cycles_nr * max(len(group.channels), 1) for group in file.groups]
-            if sum(groups) > _MOST_VALUES:
-                raise InputError(
-                    f"its channels hold {sum(groups):.3g} values, and {_MOST_VALUES:.3g} are the most that are read; "
-                    "export time, command and position only"
-                )
+            allow_unpacked(8 * sum(groups), path.stat().st_size)
             return _rasters(file)
     except (InputError, MemoryError):
         raise

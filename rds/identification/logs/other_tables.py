@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.limits import allow_unpacked
 from rds.identification.logs.log import Finding
 from rds.identification.logs.mat_parts import Part, parts_of
 from rds.identification.logs.table import Column, Table, since_first
@@ -64,11 +65,19 @@ def _parts(path: Path) -> list[Part]:
 
     if hdf5_mat.is_hdf5(path):
         return hdf5_mat.parts(path)
+    from rds.results.mat_file import confined
+
+    return confined(_parts_here, path)
+
+
+def _parts_here(path: Path) -> list[Part]:
+    """The variables of a file up to version 7.2, in this process."""
     from rds.results.mat_file import variables
 
-    return [
-        part for name, values in variables(path).items() if not name.startswith("__") for part in parts_of(name, values)
-    ]
+    found = variables(path)
+    parts = [part for name, values in found.items() if not name.startswith("__") for part in parts_of(name, values)]
+    allow_unpacked(8 * sum(part.values.size for part in parts if part.values is not None), path.stat().st_size)
+    return parts
 
 
 def _as_vectors(of_class: str, name: str) -> str:
@@ -87,11 +96,17 @@ def read_parquet(path: Path) -> Table:
 
     Dates are s from the first one, durations s.
     """
+    from rds.results.parquet_file import confined
+
+    return confined(_read_parquet_here, path)
+
+
+def _read_parquet_here(path: Path) -> Table:
+    from rds.results.parquet_file import read_here
+
+    values, _ = read_here(path)
     from pyarrow import parquet
 
-    from rds.results.parquet_file import read
-
-    values, _ = read(path)
     schema = parquet.read_schema(path)
     dates = _dates(path)
     columns = {name: Column(name, "s", array) for name, array in dates.items()}

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.limits import DESCRIPTION, read_limited
 from rds.identification.logs.log import Clock, Finding, Gravity, Log
 from rds.identification.logs.time_base import time_base
 from rds.identification.logs.units import dimension, factor
+from rds.results import mat5
 from rds.results.header import FORMAT
 from rds.results.result import Result
 
@@ -28,16 +30,14 @@ def is_result(path: Path) -> bool:
     try:
         if ending == ".csv":
             beside = path.with_suffix(".json")
-            about = json.loads(beside.read_text(encoding="utf-8")) if beside.is_file() else None
+            about = json.loads(read_limited(beside, DESCRIPTION, "it", "")) if beside.is_file() else None
             return isinstance(about, dict) and about.get("format") == FORMAT
         if ending == ".parquet":
             from pyarrow import parquet
 
             return b"rds_result" in (parquet.read_schema(path).metadata or {})
         if ending == ".mat":
-            from scipy.io import whosmat
-
-            return any(name == "rds_result" for name, _, _ in whosmat(path))
+            return "rds_result" in mat5.names(path)
     except Exception:  # damaged: whoever reads it says how
         return False
     return False

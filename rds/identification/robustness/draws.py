@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 
 LEVEL = 0.95  # of the confidence region
 _TRIES = 1000  # to fall within what is possible
@@ -59,7 +60,8 @@ def _generator(seed: int, k: int) -> np.random.Generator:
 
 def _factor(spread: Spread) -> tuple[np.ndarray, float]:
     """F with Σ = F Fᵀ, one column for each direction that has a variance, and the region's square radius."""
-    from scipy.special import gammaincinv
+    with needed_for("drawing from a model's region"):
+        from scipy.special import gammaincinv
 
     covariance = spread.covariance
     assert covariance is not None

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.parallel import processors, spread
+from rds.core.parallel import Scheduler, processors, spread
 from rds.core.types import Model
 from rds.identification.robustness.draws import LEVEL, draws
 from rds.identification.robustness.figures import FIGURES
@@ -75,7 +75,7 @@ def study(
     ranges: Ranges | str | Path | None = None,
     level: float = LEVEL,
     jobs: int | None = None,
-    scheduler: str | None = None,
+    scheduler: str | Scheduler | None = None,
     progress: Progress | None = None,
     announce: Callable[[str], None] | None = None,
 ) -> Study:
@@ -177,7 +177,7 @@ def _threads(task: Task, stretches: list[tuple[int, int]]) -> Iterator[tuple[tup
             pool.shutdown(cancel_futures=True)
 
 
-def _spread(jobs: int | None, scheduler: str | None) -> Run:
+def _spread(jobs: int | None, scheduler: str | Scheduler | None) -> Run:
     def run(task: Task, stretches: list[tuple[int, int]]) -> Iterator[tuple[tuple[int, int], Any]]:
         for outcome in spread(task.simulate, stretches, jobs=jobs, scheduler=scheduler):
             yield stretches[outcome.index], outcome.value if outcome.ok else outcome.reason

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.extras import needed_for
 from rds.identification.robustness.figures import FIGURES
 from rds.identification.robustness.study import Study
 
@@ -150,7 +151,8 @@ def _finite(value: float) -> float | None:
 
 def _rank_correlation(a: np.ndarray, b: np.ndarray) -> float | None:
     """Spearman's, from -1 to 1; None where one of them is constant."""
-    from scipy.stats import rankdata
+    with needed_for("a robustness study"):
+        from scipy.stats import rankdata
 
     if len(a) < 3 or np.ptp(a) == 0.0 or (b == b[0]).all():
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rds.core.private_files import open_private
 from rds.interpolators.motion.segments import AXES
 
 if TYPE_CHECKING:
@@ -45,5 +46,6 @@ def plot_certificate(certificate: Certificate, path: str | Path | None = None) -
     legend(grid[3])
     drawn.align_ylabels()
     if path is not None:
-        drawn.savefig(path)
+        with open_private(path, "wb") as stream:
+            drawn.savefig(stream, format=Path(path).suffix.removeprefix(".") or "png")
     return drawn

@@ -12,7 +12,8 @@ from math import ceil
 
 import numpy as np
 
-from rds.core.errors import InputError, RdsError
+from rds.core.errors import InputError
+from rds.core.extras import needed_for
 
 
 @dataclass(frozen=True)
@@ -40,12 +41,10 @@ def point_to_point(
     """From `start` to rest at `end`, within velocity, acceleration and jerk of each axis (mm/s, mm/s², mm/s³).
 
     The last sample is at rest on the end. Raises InputError for limits that are not more than 0 or states that cannot
-    be, and RdsError where ruckig is not installed.
+    be, and where ruckig is not installed.
     """
-    try:
+    with needed_for("a jerk-limited move in the least time"):
         import ruckig
-    except ImportError as error:
-        raise RdsError("jerk-limited moves in the least time need ruckig: pip install 'rds[motion]'") from error
     n = len(start)
     if not T > 0.0:
         raise InputError(f"T = {T!r} must be more than 0 s")

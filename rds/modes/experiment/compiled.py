@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.extras import remedy
 from rds.core.types import Ending
 from rds.models.linear_axis import LinearAxisMotion, coefficients, respond
 from rds.modes.loop.plan import AxisPlan, Plan
@@ -23,7 +24,7 @@ def obstacle(plan: Plan) -> str | None:
     try:
         import_module("numba")
     except ImportError:
-        return "numba is not installed (pip install 'rds[fast]')"
+        return f"numba is not installed; install it with: {remedy('fast')}"
     if plan.program is not None:
         return "a part program drives the axes"
     if plan.changes:

@@ -6,6 +6,7 @@ import datetime
 import platform
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.installed import version as own_version
 from rds.core.types import Ending, Model, Source
 from rds.core.values import shown
 from rds.modes import load_mode
@@ -126,13 +128,11 @@ def _plain(value: Any) -> Any:
 
 
 def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version()}
-    for name in ("rds", "numpy", "python-can", "numba"):
-        if name in ("rds", "numpy") or name.replace("python-", "") in sys.modules:
-            try:
+    versions = {"python": platform.python_version(), "rds": own_version(), "numpy": np.__version__}
+    for name in ("python-can", "numba"):
+        if name.replace("python-", "") in sys.modules:
+            with suppress(PackageNotFoundError):
                 versions[name] = version(name)
-            except PackageNotFoundError:
-                continue
     return versions
 
 

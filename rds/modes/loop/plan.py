@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.clock import LatePolicy
+from rds.core.errors import InputError
 from rds.core.portable import portable
 from rds.core.types import Controller, Model
 from rds.machines import Axis, Machine
@@ -183,10 +185,16 @@ def dump(plan: Plan) -> bytes:
 
 
 def load(path: Path) -> Plan:
-    """The plan that `dump` wrote to a file; its folders come last in `sys.path`."""
+    """The plan that `dump` wrote to a file; its folders come last in `sys.path`.
+
+    InputError for a file that somebody else could have written: reading a plan runs code that is in it.
+    """
     import pickle
 
     with open(path, "rb") as file:
+        about = os.fstat(file.fileno())
+        if hasattr(os, "geteuid") and (about.st_uid != os.geteuid() or about.st_mode & 0o022):
+            raise InputError("was not written by this run alone; choose a folder that only you can write to", str(path))
         folders = [str(Path(folder).resolve()) for folder in pickle.load(file)]
         sys.path += [folder for folder in dict.fromkeys(folders) if folder not in sys.path]
         plan = pickle.load(file)

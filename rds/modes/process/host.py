@@ -22,6 +22,7 @@ import numpy as np
 from rds.core.blame import STUDENT_ERRORS
 from rds.core.errors import ContractError, InputError
 from rds.core.interrupt import Endless, interruptible
+from rds.core.private_files import make_folder
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.loop.changes import Change, read_changes, timed
@@ -119,7 +120,7 @@ def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None
     columns, units = plan.columns(load_mode(plan.mode).followed)
     columns[1:1] = TIMING_COLUMNS
     units |= dict.fromkeys(TIMING_COLUMNS, "ns")
-    write_whole(directory / PLAN, _dumped(plan))
+    write_whole(directory / PLAN, _dumped(plan), is_own=True)
     has_rows = _recorded(plan, directory, columns, units, lock, progress, live)
     report = read_ending(directory, ENDING if has_rows else UNSTARTED)
     ending, reason = Ending(report["ending"]), report.get("reason", "")
@@ -214,7 +215,7 @@ def _folder(directory: Path) -> Iterator[int]:
     """The folder of a run, claimed for it (see `runtime.record.claim`), and taken away if nothing came into it."""
     try:
         is_new = not directory.is_dir()
-        directory.mkdir(parents=True, exist_ok=True)
+        make_folder(directory)
     except OSError as error:
         raise InputError(f"this folder cannot be made: {error.strerror}; name another one", str(directory)) from error
     lock = claim(directory)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.private_files import open_descriptor, open_private
 from rds.core.types import Ending
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import read_changes
@@ -73,7 +74,7 @@ def claim(directory: str | Path) -> int:
     """
     path = Path(directory) / PROCESSES
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        descriptor = open_descriptor(path, os.O_RDWR | os.O_CREAT)
         if not _lock(descriptor):
             os.close(descriptor)
             raise InputError("another run is being recorded there; wait for it or choose another folder", str(path))
@@ -112,11 +113,11 @@ def _lock(descriptor: int) -> bool:
     return True
 
 
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
+def write_whole(path: Path, data: bytes, is_own: bool = False) -> None:
+    """Write a file so that it is there whole or not at all; with `is_own` nobody else ever reads it."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        with open(temporary, "wb") as file:
+        with open_private(temporary, "wb", is_own) as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from rds.core.private_files import keep_process_private, open_private, write_private
 from rds.core.types import Ending
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import STOP, as_text, read_changes, timed
@@ -74,7 +75,7 @@ class Recorder:
                 write_whole(path, as_text(before).encode())
         first, notes = self._desk.notes(self._noted)
         if notes:
-            with open(path, "a") as file:
+            with open_private(path, "a") as file:
                 file.write(as_text(timed(notes, self.ring.about["sample_period"]), headings=not file.tell()))
             self._noted = first + len(notes)
 
@@ -163,7 +164,7 @@ def main(arguments: list[str]) -> int:
     """Start the target, record it, conclude."""
     directory, ring = Path(arguments[0]), Ring.open(arguments[1])
     recorder = Recorder(directory, ring)
-    with open(directory / LOG, "wb") as output:
+    with open_private(directory / LOG, "wb") as output:
         target = subprocess.Popen(
             [sys.executable, "-P", "-m", arguments[2], str(directory), arguments[1]],
             stdin=subprocess.DEVNULL,
@@ -173,7 +174,7 @@ def main(arguments: list[str]) -> int:
         # where a user in trouble finds them, and the host if the recorder is killed
         processes = {"recorder": os.getpid(), "target": target.pid, "desk": str(ring.desk_path)}
         processes["channel"] = ring.about.get("channel")  # of the built-in bus: where an emergency stop goes
-        (directory / PROCESSES).write_text(json.dumps(processes))
+        write_private(directory / PROCESSES, json.dumps(processes).encode())
         hung = watch(target, recorder, ring.about["sample_period"])
     recorder.close()
     finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
@@ -185,4 +186,5 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     sys.exit(main(sys.argv[1:]))

@@ -14,6 +14,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
+from rds.core.private_files import open_private
+
 _YOUNG = 60.0  # s: a ring may just have been made, and its lock not yet taken
 
 
@@ -24,17 +26,21 @@ def folders() -> list[Path]:
 
 
 def make(path: str | Path, size: int) -> None:
-    """A new file of `size` bytes that are really there, of zeros. OSError where there is no room; then it is no file.
+    """A new file of `size` bytes that are really there, of zeros, which only its user can open or map.
+
+    OSError where there is no room, and then it is no file; FileExistsError where there is one, which stays.
 
     Of one that is only said to be so long, the kernel would look for the room when a process writes, and kill the
     process if there is none.
     """
     try:
-        with open(path, "wb") as new:
+        with open_private(path, "xb", is_own=True) as new:
             if hasattr(os, "posix_fallocate"):
                 os.posix_fallocate(new.fileno(), 0, size)
             else:
                 new.truncate(size)
+    except FileExistsError:
+        raise
     except OSError:
         Path(path).unlink(missing_ok=True)
         raise

@@ -22,6 +22,7 @@ from typing import Any
 from rds.core.clock import RealTimeClock
 from rds.core.contracts import Drivers
 from rds.core.errors import MachineError, RdsError
+from rds.core.private_files import keep_process_private
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.loop.live_values import Desk
@@ -148,4 +149,5 @@ def rehearse(clock: RealTimeClock, drivers: Drivers | None, seconds: float) -> d
 
 
 if __name__ == "__main__":
+    keep_process_private()
     main(sys.argv[1:])

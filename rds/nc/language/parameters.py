@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rds.core.limits import read_limited
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 
@@ -27,6 +28,7 @@ _SETTING = re.compile(  # what int() and float() take and LinuxCNC does not, lik
     re.ASCII | re.IGNORECASE,
 )
 _REMARK = re.compile(r"\s*(?:[;#(].*)?", re.DOTALL)
+_LARGEST = 4 << 20  # bytes; a line for each of 5601 parameters has far less
 _SHOWN = 40  # characters of a line that is no setting
 _DIGITS_MOST = 18  # of a number; more would be out of range all the same
 SYSTEMS = 5200  # + 20 * system + 1...: origin X Y Z A B C U V W, rotation
@@ -129,7 +131,11 @@ def read_parameters(path: Path) -> dict[int, float]:
     values: dict[int, float] = {}
     last = 0
     try:
-        lines = path.read_bytes().decode("utf-8-sig", "replace").split("\n")  # as editors count them
+        lines = (
+            read_limited(path, _LARGEST, "a parameter file", "check its path")
+            .decode("utf-8-sig", "replace")
+            .split("\n")
+        )  # as editors count them
     except OSError as error:
         raise ProgramError(
             f"the parameter file cannot be read ({error.strerror}); check its path", file=str(path)

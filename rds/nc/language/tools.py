@@ -7,12 +7,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rds.core.limits import read_limited
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 
 _WORD = re.compile(r"([A-Za-z])([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 _WHOLE = "TPQ"
 _LETTERS = "TPDXYZABCUVWIJQ"
+_LARGEST = 4 << 20  # bytes
 _MOST = 1000  # tools in a table, as in LinuxCNC
 
 
@@ -75,7 +77,7 @@ def read_tools(path: Path) -> list[Tool]:
     passes over the first and misreads the second), or a tool that comes twice.
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig", "replace")
+        text = read_limited(path, _LARGEST, "a tool table", "check its path").decode("utf-8-sig", "replace")
     except OSError as error:
         raise ProgramError(
             f"the tool table cannot be read ({error.strerror}); check its path", file=str(path)

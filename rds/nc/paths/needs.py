@@ -5,16 +5,10 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-from rds.core.errors import InputError
-
-INSTALL = "pip install 'rds[drawing]'"
-_PACKAGES = {"shapely": "shapely", "skimage": "scikit-image", "PIL": "pillow"}
+from rds.core.extras import needed_for
 
 
 def needed(module: str) -> ModuleType:
     """A module of the extra `drawing`; InputError with the command that installs it where it is missing."""
-    try:
+    with needed_for("tracing a drawing"):
         return import_module(module)
-    except ImportError as error:
-        package = _PACKAGES[module.partition(".")[0]]
-        raise InputError(f"tracing a drawing needs {package} ({error}); install it with: {INSTALL}") from error

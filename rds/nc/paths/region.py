@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 
 Holes = Literal["refuse", "cut", "fill"]
 HOLES: tuple[Holes, ...] = ("refuse", "cut", "fill")
@@ -71,7 +72,8 @@ def _check_border(cells: np.ndarray, name: str) -> None:
 
 
 def _without_holes(cells: np.ndarray, holes: Holes, name: str) -> np.ndarray:
-    from scipy.ndimage import binary_fill_holes
+    with needed_for("filling the holes of a drawing"):
+        from scipy.ndimage import binary_fill_holes
 
     filled = binary_fill_holes(cells)
     inside = filled & ~cells
@@ -137,7 +139,8 @@ def _passages(cells: np.ndarray) -> np.ndarray:
 
 
 def _label(cells: np.ndarray, structure: np.ndarray | None = None) -> tuple[np.ndarray, int]:
-    from scipy.ndimage import label
+    with needed_for("filling the holes of a drawing"):
+        from scipy.ndimage import label
 
     labels, count = label(cells, structure=structure)
     return labels, int(count)

@@ -1,17 +1,44 @@
-"""The server's kernels: one that no browser shows ends after a time (`serve.LEFT`), counted from when the last left."""
+"""The server's kernels: one that no browser shows ends after a time (`serve.LEFT`), counted from when the last left.
+
+Server and kernel speak by Unix sockets in a folder that only this user may enter. Jupyter's TCP ports are open to every
+user of the computer, and who connects to one of them is sent all that the page shows, without a password.
+"""
 
 from __future__ import annotations
 
+import socket
+from pathlib import Path
 from typing import Any
 
 from jupyter_server._tz import utcnow
-from jupyter_server.services.kernels.kernelmanager import AsyncMappingKernelManager
+from jupyter_server.services.kernels.kernelmanager import AsyncMappingKernelManager, ServerKernelManager
+from traitlets import default
+
+
+class PageKernel(ServerKernelManager):
+    """The server's end of one kernel."""
+
+    @default("transport")
+    def _default_transport(self) -> str:
+        return "ipc" if hasattr(socket, "AF_UNIX") else "tcp"  # Windows has none that pyzmq could use
+
+    @default("ip")
+    def _default_ip(self) -> str:
+        """How the names of its sockets begin: short, because the path of a Unix socket has 103 bytes at most."""
+        if self.transport != "ipc":
+            return "127.0.0.1"
+        file = Path(self.connection_file)
+        return str(file.parent / file.stem.removeprefix("kernel-")[:8])
 
 
 class PageKernels(AsyncMappingKernelManager):
     """Jupyter counts from a kernel's last word, however long ago: a page's connection that breaks for a moment, or a
     page that was just given the kernel that had been waiting for it and is not connected yet, would lose it.
     """
+
+    @default("kernel_manager_class")
+    def _own_kind(self) -> str:
+        return f"{__name__}.{PageKernel.__name__}"
 
     def __init__(self, **traits: Any):
         super().__init__(**traits)

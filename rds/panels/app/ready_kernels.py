@@ -23,7 +23,7 @@ from typing import Any
 
 from rds.core.scheduling import end_with_parent
 
-LAUNCHER = ["-m", "ipykernel_launcher"]  # after the interpreter: how Jupyter starts such a kernel otherwise
+LAUNCHER = ["-m", "rds.panels.app.kernel"]  # after the interpreter: how Jupyter starts such a kernel otherwise
 _LONGEST = 64  # bytes of a process's number
 _PATIENCE = 60.0  # s for the imports, on a busy computer
 
@@ -127,7 +127,7 @@ def main() -> None:
     del sys.path[0]  # the folder of this file; a kernel puts the one that it works in there
     channel = socket.socket(fileno=int(sys.argv[1]))
     try:
-        from ipykernel.kernelapp import IPKernelApp
+        from rds.panels.app.kernel import launch
     except ImportError:  # the server says what is not installed
         return
     with contextlib.suppress(Exception):  # whatever it is, the page says so
@@ -144,8 +144,7 @@ def main() -> None:
         return
     end_with_parent()  # whatever a user's code holds; ipykernel looks now and then, in Python
     if os.getppid() == parent:
-        options = [*told["arguments"], f"--IPKernelApp.parent_handle={parent}"]
-        IPKernelApp.launch_instance(argv=options)
+        launch([*told["arguments"], f"--IPKernelApp.parent_handle={parent}"])
 
 
 def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:

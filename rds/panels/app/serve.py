@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from rds.bus.hub.address import runtime_directory
 from rds.core.errors import InputError
+from rds.core.extras import missing
 from rds.machines import load_machine
 from rds.panels.app.page import BUS, FOLDER, MACHINE, PANEL, WHEREABOUTS
 from rds.panels.app.ready_kernels import ReadyKernels
@@ -26,14 +29,14 @@ def serve(
     panel: str,
     port: int | None,
     browser: bool,
-    address: str = "127.0.0.1",
     bus: Mapping[str, Any] | None = None,
 ) -> None:
     """Serve until Ctrl-C. InputError for a folder, machine or panel that is not there, or where Voilà is missing.
 
     `bus` is as for `rds.panels.main`, but for faults, which are for a run by itself.
 
-    Only who has the address with its token gets in: a kernel runs whatever its page asks for.
+    Only who has the address with its token gets in: a kernel runs whatever its page asks for. All that passes between
+    browser, server and kernels passes by loopback, or lies in a folder that only this user may enter.
     """
     if not folder.is_dir():
         raise InputError("is no folder; give the one with your files, or make it first", str(folder))
@@ -49,12 +52,13 @@ def serve(
         PANEL: panel,
         BUS: json.dumps(dict(bus or {}), default=str),  # a date is no JSON
     }
-    with tempfile.TemporaryDirectory(prefix="rds-app-") as whereabouts:
-        os.environ[WHEREABOUTS] = whereabouts
+    # of a short name, for the sockets in it; a kernel that is just ending may still write there
+    with tempfile.TemporaryDirectory(prefix="app", dir=runtime_directory(), ignore_cleanup_errors=True) as private:
+        os.environ[WHEREABOUTS] = private
         ready = ReadyKernels()  # imports while this process does
         try:
             launch = _server(ready)
-            launch(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, address)])
+            launch(argv=[str(_HERE / "page.ipynb"), *_options(port, browser, private)])
         finally:
             ready.close()
 
@@ -67,16 +71,19 @@ def _server(ready: ReadyKernels) -> Callable[..., None]:
         from rds.panels.app.provisioner import offer
         from rds.panels.app.server import PanelsServer
     except ImportError as error:
-        raise InputError(f"the page needs {error.name}, which is not installed: pip install 'rds[lab]'") from error
+        raise missing(error.name or "Voilà", "the page", extra="lab") from error
     offer(ready)
     launch: Callable[..., None] = PanelsServer.launch_instance
     return launch
 
 
-def _options(port: int | None, browser: bool, address: str) -> list[str]:
+def _options(port: int | None, browser: bool, private: str) -> list[str]:
     settings: dict[str, Any] = {
-        "Voila.ip": address,
+        "Voila.ip": "127.0.0.1",
         "Voila.auto_token": True,
+        # a browser sends a cookie to all ports of a host, so to the servers of other users, but only under its path
+        "Voila.base_url": f"/{secrets.token_hex(8)}/",
+        "Voila.connection_dir_root": private,
         "Voila.open_browser": browser,
         "VoilaConfiguration.template": "rds",
         "VoilaConfiguration.preheat_kernel": True,  # the first page opens on a kernel that has loaded everything

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
+from rds.core.private_files import open_descriptor, open_private
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Number, Text
 from rds.panels.session.session import Session
@@ -122,7 +123,7 @@ class _Batch:
     def begin(self, words: list[str], out: Path, task: Task[int]) -> int:
         """Start it, and follow it to its end."""
         self._out = out
-        with self._claimed() as lock, self._log.open("wb") as log:
+        with self._claimed() as lock, open_private(self._log, "wb") as log:
             self._child = subprocess.Popen(
                 [sys.executable, "-m", "rds", "grade", *words],
                 stdin=subprocess.DEVNULL,
@@ -179,7 +180,7 @@ class _Batch:
     def _claimed(self) -> Iterator[int]:
         """The lock's file, empty; InputError where a batch holds it, or it cannot be written."""
         try:
-            descriptor = os.open(self._lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            descriptor = open_descriptor(self._lock, os.O_RDWR | os.O_CREAT, is_own=True)
         except OSError as error:
             raise InputError(f"cannot be written: {error.strerror}", str(self._lock)) from error
         try:
@@ -250,7 +251,7 @@ def _fields() -> Iterable[Field]:
         "out", "Grades", "a new folder for grades and feedback, or that of a batch to go on with", "", "e.g. grades"
     )
     yield Number("jobs", "Jobs", "processes side by side", None, low=1, high=256, whole=True, optional=True)
-    yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tcp://host:8786")
+    yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tls://host:8786")
     yield Choice("to", "Gradebook", "what grades are exported to", "nbgrader", GRADEBOOKS)
     yield Text("gradebook", "Your gradebook", "as downloaded from Canvas or Moodle; nbgrader's gradebook.db", "", "")
 

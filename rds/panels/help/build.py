@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.core.extras import missing
+from rds.core.private_files import make_folder, umask, write_private
 
 _HERE = Path(__file__).parent
 FIRST = "index"
@@ -54,7 +56,7 @@ def help_pages(out: Path | None = None, pulse: Callable[[], None] = lambda: None
     if out is not None and place.exists():
         _check_replaceable(place)
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(place.parent)
         with tempfile.TemporaryDirectory(prefix=".rds-help-", dir=place.parent) as work:
             built = _built(documents, Path(work), pulse)
             if out is not None and place.exists():
@@ -73,13 +75,15 @@ def page_file(name: str) -> str:
 
 
 def _built(documents: dict[str, Path], work: Path, pulse: Callable[[], None]) -> Path:
-    if importlib.util.find_spec("sphinx") is None or importlib.util.find_spec("myst_parser") is None:
-        raise InputError("help needs sphinx and myst-parser, which are not installed: pip install 'rds[lab]'")
+    for package in ("sphinx", "myst_parser"):
+        if importlib.util.find_spec(package) is None:
+            raise missing(package, "building the help")
     source, target = work / "source", work / "html"
-    source.mkdir()
+    make_folder(source)
+    make_folder(target)
     for name, path in documents.items():
-        (source / f"{name}.md").write_text(_local(path.read_text(encoding="utf-8"), set(documents)), encoding="utf-8")
-    (source / f"{FIRST}.md").write_text(_contents(documents), encoding="utf-8")
+        write_private(source / f"{name}.md", _local(path.read_text(encoding="utf-8"), set(documents)).encode())
+    write_private(source / f"{FIRST}.md", _contents(documents).encode())
     # in a process of its own: sphinx changes docutils for the whole process
     command = [sys.executable, "-m", "sphinx", "-q", "-b", "html", "-c", str(_HERE), "-d", str(work / "doctrees")]
     code, said = _run([*command, str(source), str(target)], pulse)
@@ -92,7 +96,12 @@ def _built(documents: dict[str, Path], work: Path, pulse: Callable[[], None]) ->
 def _run(command: list[str], pulse: Callable[[], None]) -> tuple[int, str]:
     """Exit code and stderr of a command, which ends with this call and with this process."""
     process = subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        umask=umask() if os.name == "posix" else -1,
     )
 
     def end() -> None:

@@ -11,7 +11,7 @@ import ipywidgets as widgets
 from rds.panels.kit.button import watch
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
-from rds.results.serve import FolderServer, server_of
+from rds.results.serve import OWN_SCRIPT, FolderServer, server_of
 
 NAME = "help"
 TITLE = "Help"
@@ -69,4 +69,4 @@ def help_server(pulse: Callable[[], None] = lambda: None) -> FolderServer:
     """The one server of this process; builds the pages where that is still to do (some seconds; see `help_pages`)."""
     from rds.panels.help.build import help_pages
 
-    return server_of(help_pages(pulse=pulse))
+    return server_of(help_pages(pulse=pulse), OWN_SCRIPT)

@@ -25,6 +25,7 @@ from typing import Any
 from rds.bus.hub.command import Command
 from rds.bus.tools.link import BUILTIN, default_channel
 from rds.core.errors import RdsError
+from rds.core.private_files import keep_process_private
 from rds.core.scheduling import raise_priority
 from rds.interpolators.motion.jog import advance
 from rds.machines import load_machine
@@ -172,4 +173,5 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     sys.exit(main(sys.argv[1:]))

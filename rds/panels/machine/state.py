@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from rds.bus.modules.dialects import DEFAULT
 from rds.bus.tools.link import BUILTIN, bus_name, default_channel
 from rds.core.errors import InputError, MachineError, RdsError
+from rds.core.toml_file import read_toml
 from rds.machines import Machine, load_machine, machine_names
 from rds.panels.machine.fields import SERVED, STEP, TUNING, tuning_values
 from rds.panels.session.fields import Choice
@@ -216,13 +217,8 @@ class MachineDesk:
 
     def read_tuning(self, name: str) -> None:
         """Put a saved tuning into the fields; InputError for a file that holds none. Nothing is set half."""
-        import tomllib
-
         path = self._file(name)
-        try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"cannot be read as a saved tuning: {error}", str(path)) from error
+        table, _ = read_toml(path)
         values = {key: value for key, value in table.items() if key not in ("module", "type")}
         unknown = sorted(set(values) ^ set(self.tuning.fields))
         if unknown:

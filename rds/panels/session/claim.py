@@ -11,6 +11,7 @@ from types import TracebackType
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
+from rds.core.private_files import open_descriptor
 
 try:
     from fcntl import LOCK_EX, LOCK_NB, LOCK_UN, flock
@@ -26,7 +27,7 @@ class Claim:
         self._note = folder / ".machine.json"
         lock = folder / ".machine.lock"
         try:
-            self._descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            self._descriptor = open_descriptor(lock, os.O_RDWR | os.O_CREAT, is_own=True)
         except OSError as error:
             raise InputError(
                 f"cannot be written ({error.strerror}), and what uses the machine writes here; free some space, or "

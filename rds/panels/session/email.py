@@ -4,12 +4,16 @@ host = "mail.example.edu"
 port = 587
 security = "starttls"      # "tls", "starttls" or "none"
 sender = "lab@example.edu"
-user = "lab"               # optional; the password comes from RDS_SMTP_PASSWORD only
+user = "lab"               # optional; for a server that asks for a password
+
+A password comes from RDS_SMTP_PASSWORD only, and goes to the server that the environment names beside it
+(RDS_SMTP_HOST, _PORT, _SECURITY): whoever wrote the folder's file could be anybody.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ipaddress
 import mimetypes
 import os
 import re
@@ -19,7 +23,7 @@ import ssl
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from email.message import EmailMessage
 from email.utils import make_msgid
 from pathlib import Path
@@ -36,47 +40,94 @@ LARGEST = 20 << 20  # bytes of all attachments: what most servers take
 _WORD = r"[A-Za-z0-9!#$%&'*+/=?^_`{|}~-]+"  # RFC 5321's atom: what no mail program takes for something else
 _ADDRESS = re.compile(rf"{_WORD}(\.{_WORD})*@(?=.{{1,253}}\Z)[A-Za-z0-9-]+(\.[A-Za-z0-9-]+)*")
 _KEYS = ("host", "port", "security", "sender", "user")
+_WHERE = ("host", "port", "security")  # which decide who can read a password
 
 
 @dataclass(frozen=True)
 class Server:
-    """Where mail is handed in, and as whom."""
+    """Where mail is handed in, and as whom. InputError for a password that others could read on its way."""
 
     host: str
     port: int
     sender: str
     security: str = "starttls"
     user: str | None = None
-    password: str | None = None
+    password: str | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.password is not None and self.security == "none" and not _is_this_computer(self.host):
+            raise InputError(
+                f'security = "none" would send the password to {self.host} for all to read on its way; '
+                'use "starttls" or "tls"'
+            )
 
 
 def mail_server(folder: Path, environment: Mapping[str, str] = os.environ) -> Server:
     """The server of `folder`/email.toml, over which RDS_SMTP_HOST, _PORT, _SECURITY, _SENDER, _USER have precedence.
 
-    InputError that says what is missing or will not do.
+    InputError that says what is missing or will not do, and for a file that names another server than the environment
+    where a password would be sent.
     """
     path = folder / FILE
-    given = dict(Words.read(path).table) if path.is_file() else {}
-    if unknown := [key for key in given if key not in _KEYS]:
+    of_file = dict(Words.read(path).table) if path.is_file() else {}
+    if unknown := [key for key in of_file if key not in _KEYS]:
         raise InputError(f"there is no key {unknown[0]!r}; there are {', '.join(_KEYS)}", str(path))
-    given |= {key: environment[f"RDS_SMTP_{key.upper()}"] for key in _KEYS if f"RDS_SMTP_{key.upper()}" in environment}
+    of_user = {key: environment[_variable(key)] for key in _KEYS if _variable(key) in environment}
+    given = of_file | of_user
     for key in ("host", "sender"):
         if not given.get(key) or not isinstance(given[key], str):
             raise InputError(f"no mail server is set up: {key} is missing; write it into {path}, or set RDS_SMTP_HOST")
     security = given.get("security", "starttls")
     if security not in SECURITY:
         raise InputError(f"security = {security!r} must be one of {', '.join(SECURITY)}", str(path))
-    said = str(given.get("port", 465 if security == "tls" else 587))
+    said = str(given.get("port", _port(security)))
     port = int(said) if said.isascii() and said.isdigit() else 0
     if not 0 < port < 65536:
         raise InputError(f"port = {given.get('port')!r} must be a whole number from 1 to 65535", str(path))
     user = given.get("user")
     if user is not None and not isinstance(user, str):
         raise InputError(f"user = {user!r} must be text", str(path))
-    password = environment.get("RDS_SMTP_PASSWORD")
-    if user is not None and password is None:
-        raise InputError("the mail server has a user but no password; set RDS_SMTP_PASSWORD", str(path))
+    password = environment.get("RDS_SMTP_PASSWORD") if user is not None else None
+    if user is not None:
+        if password is None:
+            raise InputError("the mail server has a user but no password; set RDS_SMTP_PASSWORD", str(path))
+        _check_where(of_file, of_user, path)
     return Server(given["host"], port, check_address(given["sender"]), security, user, password)
+
+
+def _check_where(of_file: Mapping[str, object], of_user: Mapping[str, str], path: Path) -> None:
+    """InputError unless the environment alone says where the password goes."""
+    if "host" not in of_user:
+        raise InputError(
+            "the password in RDS_SMTP_PASSWORD goes only to the server that the environment names beside it: "
+            f"set RDS_SMTP_HOST to your mail server; {path} may be anybody's"
+        )
+    meant = {"security": SECURITY[0], **of_user}
+    meant.setdefault("port", _port(meant["security"]))
+    for key in _WHERE:
+        if key in of_file and str(of_file[key]).casefold() != meant[key].casefold():
+            raise InputError(
+                f"{key} = {of_file[key]!r} is not where the password in RDS_SMTP_PASSWORD goes: in the environment it "
+                f"is {meant[key]!r}. Take {key} out of the file; or if you know that server, set {_variable(key)}",
+                str(path),
+            )
+
+
+def _port(security: object) -> str:
+    return "465" if security == "tls" else "587"
+
+
+def _variable(key: str) -> str:
+    return f"RDS_SMTP_{key.upper()}"
+
+
+def _is_this_computer(host: str) -> bool:
+    if host.casefold() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def check_address(text: str) -> str:

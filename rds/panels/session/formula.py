@@ -19,6 +19,7 @@ import numpy as np
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
+from rds.core.private_files import make_folder
 
 FOLDER = "signals"  # of the files made from formulas
 LONGEST = 500  # characters
@@ -89,7 +90,7 @@ def formula_file(folder: Path, text: str, duration: float, T: float) -> str:
     path = folder / name
     if not path.is_file() or path.read_bytes() != content:
         try:
-            path.parent.mkdir(exist_ok=True)
+            make_folder(path.parent)
         except OSError as error:
             raise InputError(f"cannot be made: {error.strerror}", str(path.parent)) from error
         write_whole(path, content)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.core.private_files import make_folder
 from rds.results import Result
 
 KINDS = (".csv", ".mat", ".parquet")
@@ -23,7 +24,7 @@ def save_as(result: Result, folder: Path, name: str) -> Path:
     if path.exists():
         raise InputError("there is such a file already; choose another name", str(path))
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
     except OSError as error:
         raise InputError(f"cannot be made: {error.strerror}", str(path.parent)) from error
     return result.save(path)

@@ -7,6 +7,8 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from rds.core.private_files import make_folder, open_descriptor
+
 try:
     from fcntl import LOCK_EX, LOCK_NB, flock
 except ImportError:  # Windows: a run that is being saved looks as if it had been cut short
@@ -23,8 +25,8 @@ def saving(folder: Path) -> Iterator[None]:
     """
     descriptor = -1
     with contextlib.suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(folder / NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        make_folder(folder)
+        descriptor = open_descriptor(folder / NAME, os.O_RDWR | os.O_CREAT, is_own=True)
         if flock is not None:
             flock(descriptor, LOCK_EX)
     try:

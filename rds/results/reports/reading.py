@@ -7,15 +7,17 @@ semicolons or tabs; where they are not separated by commas, a decimal comma is r
 from __future__ import annotations
 
 import csv
+import io
 import re
-import tomllib
 from collections.abc import Collection
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from rds.core import toml_file
 from rds.core.errors import InputError
+from rds.core.limits import TABLE, read_limited
 from rds.results.units import split_heading
 
 ENDINGS = ("counts", "adc", "mm", "deg", "min", "ms", "us", "mA", "A", "mV", "V", "g", "s")
@@ -69,7 +71,8 @@ class Column:
 def read_text(path: Path) -> str:
     """The text of a file in UTF-8, with or without its mark. InputError if it isn't there or is not text."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        data = read_limited(path, TABLE, "a table of readings", "give a part of it")
+        text = io.StringIO(data.decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError as error:
         raise InputError(f"it is not a text file in UTF-8 ({error}); save it as CSV (UTF-8)", str(path)) from error
     except OSError as error:
@@ -155,7 +158,5 @@ def without_readings_of(columns: Collection[Column], ending: str) -> list[Column
 
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file; InputError with its line where it is none."""
-    try:
-        return tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{error}; correct the file", str(path)) from error
+    table, _ = toml_file.read_toml(path)
+    return table

@@ -7,6 +7,27 @@ from enum import IntEnum, StrEnum
 # --- CiA 301
 
 
+# Table 41: identifiers that no configurable object (PDO, SYNC, emergency) may be given.
+RESTRICTED = (range(0x080), range(0x101, 0x181), range(0x581, 0x600), range(0x601, 0x680), range(0x6E0, 0x800))
+
+# Standard identifiers of CANopen, first and last, and what a frame with one does to a machine. The predefined ones come
+# first; then those that a host may have given to a process data object or to SYNC, which is all that is not restricted.
+IDENTIFIERS = (
+    (0x000, 0x000, "starts, stops or resets drives (CANopen NMT)"),
+    (0x080, 0x080, "makes drives take over their set points (CANopen SYNC)"),
+    (0x081, 0x0FF, "would pass for a drive's emergency message (CANopen)"),
+    (0x581, 0x5FF, "would pass for a drive's answer (CANopen SDO)"),
+    (0x601, 0x67F, "sets a drive's parameters (CANopen SDO)"),
+    (0x6E0, 0x6FF, "manages nodes (CANopen)"),
+    (0x700, 0x77F, "would pass for a heartbeat (CANopen)"),
+    (0x7E4, 0x7E5, "sets node-IDs and bit rates (CANopen LSS)"),
+    (0x100, 0x100, "sets clocks (CANopen TIME), or commands a drive"),
+    (0x181, 0x580, "commands a drive, or would pass for its measured values (CANopen process data)"),
+    (0x600, 0x600, "may command a drive (CANopen process data)"),
+    (0x680, 0x6DF, "may command a drive (CANopen process data)"),
+)
+
+
 class Nmt(IntEnum):
     """NMT states as a heartbeat reports them (CiA 301, 7.2.8.3.2)."""
 

@@ -322,11 +322,12 @@ class Drive:
     # --- what is written to communication objects
 
     def _check_sync_identifier(self, value: int) -> None:
-        if value & ~0x7FF or not value:  # producing SYNC and 29-bit identifiers aren't for us
+        # producing SYNC and 29-bit identifiers aren't for us
+        if value & ~0x7FF or any(value in taken for taken in codes.RESTRICTED):
             raise SdoAbortedError(Abort.VALUE)
 
     def _check_emergency_identifier(self, value: int) -> None:
-        if value & 0x7FFFF800 or not 0x80 < value & 0x7FF < 0x700:
+        if value & 0x7FFFF800 or value & 0x7FF == 0x80 or any(value & 0x7FF in taken for taken in codes.RESTRICTED):
             raise SdoAbortedError(Abort.VALUE)
 
     def _check_sync_counter(self, value: int) -> None:

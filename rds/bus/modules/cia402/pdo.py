@@ -15,7 +15,7 @@ from typing import Any
 from canopen.objectdictionary.datatypes import REAL32, SIGNED_TYPES
 from canopen.sdo import SdoAbortedError
 
-from rds.bus.modules.cia402.codes import Abort
+from rds.bus.modules.cia402.codes import RESTRICTED, Abort
 from rds.bus.modules.cia402.dictionary import Dictionary, Key
 
 COUNT = 4  # PDOs in each direction
@@ -24,14 +24,6 @@ HIGHEST_SYNCHRONOUS = 240
 _EVENT_DRIVEN = (254, 255)
 _LONGEST = 64  # bits
 _LETTERS = {8: "B", 16: "H", 32: "I"}
-# CiA 301, table 41: what no PDO may use
-_RESTRICTED = (
-    range(0x080),
-    range(0x101, 0x181),
-    range(0x581, 0x600),
-    range(0x601, 0x680),
-    range(0x6E0, 0x800),
-)
 
 
 class Pdo:
@@ -102,7 +94,7 @@ class Pdo:
         if not value & INVALID:
             if self.exists and (value ^ self._values[self.communication, 1]) & 0x3FFFFFFF:
                 raise SdoAbortedError(Abort.DEVICE_STATE)
-            if any(value & 0x7FF in taken for taken in _RESTRICTED):
+            if any(value & 0x7FF in taken for taken in RESTRICTED):
                 raise SdoAbortedError(Abort.VALUE)
 
     def _set_transmission(self, value: int) -> None:

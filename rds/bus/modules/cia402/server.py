@@ -25,6 +25,7 @@ from rds.bus.modules.cia402.drive import Drive
 from rds.bus.modules.cia402.node import DriveNode
 from rds.bus.modules.serve_loop import Opener, serve_nodes
 from rds.bus.tools.link import BUILTIN
+from rds.core.private_files import keep_process_private
 from rds.machines import Machine
 from rds.machines.machine import Axis
 
@@ -63,4 +64,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     sys.exit(main())

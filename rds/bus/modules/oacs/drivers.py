@@ -17,6 +17,8 @@ from rds.bus.tools.link import BUILTIN, default_channel, open_bus
 from rds.core.errors import MachineError
 from rds.machines.machine import Machine
 
+_OF_DRIVERS = ("sample_period", "dry_run", "timeout")  # options that are not the interface's
+
 
 class OacsDrivers(AxisDrivers):
     """As AxisDrivers, for the modules of the oacs dialect. A `bus` that is handed in must not filter frames."""
@@ -35,13 +37,14 @@ class OacsDrivers(AxisDrivers):
         self._shared = bus
         self._numbers = {machine.axis(name).node: name for name in (axes if axes is not None else machine.axes)}
         self._where = (interface, default_channel(machine, interface, channel))
+        self._options = {key: value for key, value in options.items() if key not in _OF_DRIVERS}
 
     def start(self) -> None:
         """Look who is there, then as AxisDrivers.start.
 
         Raises MachineError for numbers used twice, an emergency stop that is latched, and modules that don't answer.
         """
-        bus = self._shared if self._shared is not None else open_bus(*self._where)
+        bus = self._shared if self._shared is not None else open_bus(*self._where, **self._options)
         try:
             found = survey(bus)
         finally:

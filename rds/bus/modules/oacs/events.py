@@ -18,7 +18,7 @@ import csv
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import NamedTuple
 
 import can
 
@@ -26,6 +26,7 @@ from rds.bus.modules.oacs.host import ModuleInfo
 from rds.bus.modules.oacs.remote import Module
 from rds.bus.modules.oacs.watch import Change, Watch
 from rds.core.errors import InputError, MachineError
+from rds.core.private_files import open_private
 
 COLUMNS = ("time_s", "event", "module")
 _PATIENCE = 0.5  # s for a download
@@ -104,7 +105,7 @@ class EventFile:
 
     def __init__(self, path: Path, force: bool = False):
         try:
-            self._file: TextIO = path.open("w" if force else "x", encoding="utf-8", newline="")
+            self._file = open_private(path, "w" if force else "x", encoding="utf-8", newline="")
         except FileExistsError as error:
             raise InputError("the file exists; choose another name, or give --force", str(path)) from error
         self._writer = csv.writer(self._file, lineterminator="\n")

@@ -31,6 +31,19 @@ PER_NODE = {
     "Current": words.CURRENT,
 }
 TO_ALL = {"Reply": words.HOST, "GeneralCall": words.GENERAL}
+FROM_HOST = {
+    "GeneralCall": "calls or stops all modules (oacs)",
+    "Command": "commands a module (oacs)",
+    "Flow": "takes part in a module's data download (oacs)",
+}
+# Standard identifiers of this dialect, first and last, and what a frame with one does to a machine.
+IDENTIFIERS = (
+    *((i, i, FROM_HOST.get(kind, "speaks for a module (oacs)")) for kind, i in TO_ALL.items()),
+    *(
+        (base + words.NODES[0], base + words.NODES[-1], FROM_HOST.get(kind, "speaks for a module (oacs)"))
+        for kind, base in PER_NODE.items()
+    ),
+)
 TEMPLATE = "X"  # the module whose messages in the DBC stand for those of all
 
 

@@ -28,6 +28,7 @@ from rds.bus.modules.oacs.node import OacsNode
 from rds.bus.modules.serve_loop import Opener, serve_nodes
 from rds.bus.tools.link import BUILTIN
 from rds.core.errors import InputError
+from rds.core.private_files import keep_process_private
 from rds.machines import Machine
 from rds.machines.machine import Axis
 
@@ -118,4 +119,5 @@ def handle(line: str, nodes: Iterable[OacsNode]) -> None:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     sys.exit(main())

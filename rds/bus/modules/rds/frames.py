@@ -50,6 +50,16 @@ HIGHEST_VOLTAGE = 10.0  # V; sent as 10 V less one unit, for an int16 ends there
 NUMBERS = 255  # of commands, 1 to 255; they count half sample periods
 COUNT_TURNS = 1 << 16  # the tick count starts again at 0
 
+# Standard identifiers of this dialect, first and last, and what a frame with one does to a machine.
+IDENTIFIERS = (
+    (GENERAL, GENERAL, "stops every module"),
+    (COMMAND, COMMAND, "sets voltages"),
+    (DRY_COMMAND, DRY_COMMAND, "is a command's tick"),
+    (SETUP, SETUP, "sets the sample period"),
+    (CALL, CALL, "calls modules, or resets their emergency stop"),
+    (ANSWER + NODES[0], ANSWER + NODES[-1], "would pass for a module's measured position"),
+)
+
 _VOLTAGES = Struct(f"<{SLOTS}h")
 _NUMBER_BITS = 0x0003_0003_0003_0003
 _SETUP = Struct("<II")

@@ -42,8 +42,8 @@ class ModuleNode(BusNode):
         return self.module.identity.node
 
     def receive(self, message: can.Message, at: float) -> list[Outgoing]:
-        """To the module; extended frames mean nothing to it."""
-        if message.is_extended_id:
+        """To the module; extended and remote frames mean nothing to it."""
+        if message.is_extended_id or message.is_remote_frame:
             return []
         answers = self._answers(self.module.receive(message.arbitration_id, message.data, at))
         if message.arbitration_id == frames.CALL and message.data == frames.WHO:

@@ -24,6 +24,7 @@ from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.module_node import ModuleNode
 from rds.bus.modules.serve_loop import Opener, serve_nodes
 from rds.bus.tools.link import BUILTIN
+from rds.core.private_files import keep_process_private
 from rds.machines import Machine
 from rds.machines.machine import Axis
 
@@ -55,4 +56,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    keep_process_private()
     sys.exit(main())
