@@ -32,14 +32,14 @@ ALLOWED: dict[str, set[str]] = {
     "results.reports": {"core", "results", "bus"},  # see ONLY
     "identification": {
         *("core", "machines", "models", "references", "results", "bus"),  # see ONLY
-        *("controllers", "checks"),  # what a model file is for: a design, a check
+        *("controllers", "checks", "modes"),  # what a model file is for: a design, a check
     },
     "modes.experiment": {
         *("core", "controllers", "models", "references", "machines", "modes", "results", "bus"),  # see ONLY
         "identification",  # model files, and what a validation proves
     },
     "identification.robustness": {
-        *("core", "controllers", "models", "results", "identification", "modes", "modes.experiment"),
+        *("core", "controllers", "models", "machines", "results", "identification", "modes", "modes.experiment"),
     },
     "nc.run": {
         *("core", "machines", "interpolators", "nc", "modes", "modes.experiment", "results", "results.reports"),
@@ -66,9 +66,12 @@ ONLY = {
         *("rds.bus.modules.rds.frames", "rds.bus.tools.decode", "rds.bus.tools.logs", "rds.bus.tools.mf4"),
     },
     ("identification", "controllers"): {"rds.controllers.tracking", "rds.controllers.design"},
-    ("results", "modes"): {"rds.modes.process.record"},  # a killed run reopens from its record
+    # a killed run reopens from its record; how a mode's response is drawn
+    ("results", "modes"): {"rds.modes", "rds.modes.process.record"},
+    ("identification", "modes"): {"rds.modes", "rds.modes.loop.mode"},  # what the mode of a result says of its data
 }
-LAZY = [("results", "modes"), ("modes", "bus"), ("results.reports", "bus")]  # inside functions only
+# inside functions only
+LAZY = [("results", "modes"), ("identification", "modes"), ("modes", "bus"), ("results.reports", "bus")]
 TOP = {"__main__", "cli", "panels"}
 
 

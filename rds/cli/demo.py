@@ -11,6 +11,7 @@ import numpy as np
 
 from rds.core.types import Verdict
 from rds.machines import load_machine
+from rds.modes import SIMULATION, mode_names
 from rds.modes.experiment import Experiment
 from rds.modes.experiment.report import exit_code, run_json
 from rds.results import Result
@@ -18,7 +19,6 @@ from rds.results.files import save_all
 from rds.results.report import write_report
 
 AXES = ("X", "Y", "Z")
-MODES = ("simulation", "emulation", "implementation")
 FREQUENCY = 0.2  # Hz, of the sine
 DURATION = 10.0  # s: two periods, of which the metrics leave out the first
 OBSERVER_POLE = 320.0  # 1/s
@@ -66,10 +66,10 @@ def run_demo(folder: Path, bar: Callable[[str], Callable[[int, int], None]], dur
     )
     results = {}
     files: dict[str, Path] = {}
-    for mode in MODES:
+    for mode in mode_names("controller"):
         results[mode] = experiment.run(mode, out=folder / mode, progress=bar(mode))
         files |= {f"{mode}_{kind}": path for kind, path in save_all(results[mode], folder / mode).items()}
-    tables = [design_table(), error_table(results), steady_table(results["simulation"]), timing_table(results)]
+    tables = [design_table(), error_table(results), steady_table(results[SIMULATION]), timing_table(results)]
     notes = [
         "Tang, Landers, Sheng, Hall: Development and Initial Analysis of a Mini CNC Rapid Development System, 2010."
     ]

@@ -97,6 +97,7 @@ def _task(machine: Machine, axis: str, model: Path | None, duration: float, nois
 def _experiment(found: Design, machine: str) -> str:
     """The experiment in system-test mode with the best signal."""
     from rds.core.toml_text import toml_text
+    from rds.modes import SYSTEM_TEST
 
     task, best = found.task, found.best
     errors = ", ".join(f"{name} {value:.2g} %" for name, value in best.percent.items())
@@ -105,7 +106,7 @@ def _experiment(found: Design, machine: str) -> str:
         "title": f"Excitation of {task.axis.name}: {best.signal.kind}",
         "machine": place,
         "axis": task.axis.name,
-        "mode": "system-test",
+        "mode": SYSTEM_TEST,
         "duration": task.duration,
         "signal": best.table,
     }

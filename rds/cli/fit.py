@@ -9,6 +9,7 @@ import typer
 
 from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.logs import read_logs
+from rds.identification.structures import SIMULATION_ERROR
 
 if TYPE_CHECKING:
     from rds.identification.fit.estimate import Estimate
@@ -72,7 +73,7 @@ def fit(
         with progress_bars() as bar:
             found = read_logs(logs, map_, axis, bar)
             fitted, rest = _split(found) if split else (found, [])
-            if (method or made.default_method) == "simulation":
+            if (method or made.default_method) == SIMULATION_ERROR:
                 options["progress"] = bar("fitting")
                 _say_if_slow(made)
             estimate = with_hint(fit_model(fitted, made, method, options), fitted)
@@ -112,7 +113,7 @@ def _options(
         fixed |= _others(made, free, fixed)
     options: dict[str, Any] = dict(_values(set_, "--set"))
     begun = _values(start, "--start")
-    if (method or made.default_method) != "simulation":
+    if (method or made.default_method) != SIMULATION_ERROR:
         for word, given in (("--fix or --free", fixed), ("--start", begun)):
             if given:
                 raise InputError(f"{word} is for --method simulation; the others estimate every parameter at once")

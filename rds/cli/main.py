@@ -49,6 +49,7 @@ from rds.cli.common import (
 from rds.cli.guard import guarded
 from rds.core.errors import InputError
 from rds.core.private_files import keep_process_private
+from rds.modes import mode_names
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -112,7 +113,8 @@ def demo(out: Out = None, json: Json = False) -> None:
 def run(
     experiment: Annotated[Path, typer.Argument(help="The experiment, a TOML file.")],
     mode: Annotated[
-        str | None, typer.Option("--mode", "-m", help="Run in this mode instead of the file's own.")
+        str | None,
+        typer.Option("--mode", "-m", help=f"Run in this mode instead of the file's own: {', '.join(mode_names())}."),
     ] = None,
     out: Out = None,
     json: Json = False,

@@ -21,6 +21,7 @@ from rds.cli.common import (
     writes_files,
 )
 from rds.cli.nc_options import MaxJumps, Parameters, Program, Tools, With, setup
+from rds.modes import DEFAULT, mode_names
 
 if TYPE_CHECKING:
     from rds.cli.keys import Keys
@@ -38,7 +39,12 @@ _STATES = ("runs", "held", "stops", "waits for the tool", "dwells", "waits for t
 def run(
     file: Program,
     mode: Annotated[
-        str | None, typer.Option("--mode", "-m", help="simulation (default), emulation or implementation.")
+        str | None,
+        typer.Option(
+            "--mode",
+            "-m",
+            help=f"One of {', '.join(mode_names())} (default {DEFAULT}); controllers must drive the axes in it.",
+        ),
     ] = None,
     machine: Annotated[
         str | None, typer.Option("--machine", help="A machine's name, or the path of its TOML file (default mini-cnc).")

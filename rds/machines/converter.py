@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
+from functools import lru_cache
+from math import inf, isfinite
 from numbers import Real
 from typing import Any
 
 from rds.core.errors import ContractError
+from rds.machines.encoder import counted
+
+Limits = tuple[float, float, float]  # lowest and highest output, and step between levels, V; 0 for no levels
 
 
 def as_voltage(value: Any) -> float:
@@ -66,3 +70,25 @@ def converter(
     if saturation:
         return both if quantization else saturate
     return quantize if quantization else as_voltage
+
+
+def limits(full_scale: float, bits: int, *, saturation: bool = True, quantization: bool = True) -> Limits:
+    """What `converted` needs to do as `converter` does."""
+    step = 2.0 * full_scale / 2**bits if quantization else 0.0
+    return (-full_scale, full_scale - step, step) if saturation else (-inf, inf, step)
+
+
+def converted(u: float, low: float, high: float, step: float) -> float:
+    """What `converter` makes of a finite command, on plain numbers: numba compiles it as it stands."""
+    u = min(max(u, low), high)
+    if step > 0.0 and abs(u) < step * 2.0**52:
+        u = round(u / step) * step
+    return u
+
+
+@lru_cache
+def compiled() -> tuple[Callable[[float, float], float], Callable[[float, float, float, float], float]]:
+    """Encoder and converter in machine code, for every compiled loop: `counted` and `converted`. Needs numba."""
+    from numba import njit
+
+    return njit(counted), njit(converted)

@@ -25,6 +25,11 @@ def encoder(resolution: float, *, quantization: bool = True) -> Callable[[float]
     return measure
 
 
+def counted(position: float, resolution: float) -> float:
+    """What the encoder reads of a finite position, on plain numbers: numba compiles it. Resolution 0: as it is."""
+    return round(position / resolution) * resolution if resolution > 0.0 else position
+
+
 def diverged(position: float) -> ContractError:
     """The error that a model's position is no finite number."""
     return ContractError(

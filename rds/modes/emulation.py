@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
+from rds.core.colours import GREEN
 from rds.core.contracts import Drivers
+from rds.modes import EMULATION
 from rds.modes.loop.loop import Loop
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import Plan
@@ -29,4 +31,13 @@ def build(plan: Plan, drivers: Drivers | None) -> Loop:
 
 
 # Every period is processed, late or not, so that emulation repeats simulation sample for sample.
-MODE = Mode("emulation", build, drivers="dry run", drives=("controller", "signal"))
+MODE = Mode(
+    EMULATION,
+    "Emulation",
+    "the same against the clock, with the drivers",
+    build,
+    drivers="dry run",
+    drives=("controller", "signal"),
+    line={"color": GREEN, "linewidth": 1.5, "linestyle": (0, (4, 3))},
+    layer=2,
+)

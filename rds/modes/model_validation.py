@@ -6,6 +6,8 @@ from rds.modes.loop.mode import Mode
 
 MODE = Mode(
     "model-validation",
+    "Model validation",
+    "machine and models, on the same voltage",
     build,
     drivers="live",
     drives=("signal",),

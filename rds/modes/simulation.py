@@ -1,6 +1,8 @@
 """Simulation: models behind converters and encoders, in virtual time."""
 
+from rds.core.colours import ORANGE
 from rds.core.contracts import Drivers
+from rds.modes import SIMULATION
 from rds.modes.loop.loop import Loop
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import Plan
@@ -13,4 +15,13 @@ def build(plan: Plan, drivers: Drivers | None) -> Loop:
     return loop(plan, axes.measure, at_once, axes.follow)
 
 
-MODE = Mode("simulation", build, drivers="none", drives=("controller", "signal"))
+MODE = Mode(
+    SIMULATION,
+    "Simulation",
+    "the models, as fast as it goes",
+    build,
+    drivers="none",
+    drives=("controller", "signal"),
+    line={"color": ORANGE, "linewidth": 3.0, "alpha": 0.7},
+    layer=1,
+)

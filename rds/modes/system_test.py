@@ -2,6 +2,7 @@
 
 from rds.core.clock import LatePolicy
 from rds.core.contracts import Drivers
+from rds.modes import SYSTEM_TEST
 from rds.modes.loop.loop import Loop
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import Plan
@@ -14,4 +15,13 @@ def build(plan: Plan, drivers: Drivers | None) -> Loop:
     return loop(plan, drivers.exchange, drivers.write, nothing)
 
 
-MODE = Mode("system-test", build, drivers="live", drives=("signal",), late=LatePolicy(discard=True))
+MODE = Mode(
+    SYSTEM_TEST,
+    "System test",
+    "the machine alone",
+    build,
+    drivers="live",
+    drives=("signal",),
+    late=LatePolicy(discard=True),
+    modelled=False,
+)

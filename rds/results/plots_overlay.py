@@ -6,19 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
-from rds.core.figure import BLUE, CYCLE, GREEN, GREY, ORANGE, RESPONSES, VERMILLION, Picture, dress, legend, quantity
+from rds.core.figure import BLUE, CYCLE, GREY, ORANGE, RESPONSES, VERMILLION, Picture, dress, legend, quantity
 from rds.results.metrics import error_metrics, settled, tracking_error
 
 if TYPE_CHECKING:
     from rds.results.compare import Comparison
     from rds.results.result import Result
 
-# a later one is drawn over an earlier one: narrower and dashed, so that equal lines show as two colours
-_MODES: dict[str, dict[str, Any]] = {
-    "implementation": {"color": BLUE, "linewidth": 1.0},
-    "simulation": {"color": ORANGE, "linewidth": 3.0, "alpha": 0.7},
-    "emulation": {"color": GREEN, "linewidth": 1.5, "linestyle": (0, (4, 3))},
-}
 _ROW_HEIGHT = 2.7  # inches
 _NARROWEST = 7.4  # inches that a legend has, also where the picture is made narrower to fit beside settings
 
@@ -100,13 +94,24 @@ def _reference(axes: Any, results: Sequence[Result], axis: str) -> None:
             return
 
 
+def _styles() -> dict[str, dict[str, Any]]:
+    """How responses of the modes are drawn, by mode, in order.
+
+    A later one is drawn over an earlier one: narrower and dashed, so that equal lines show as two colours.
+    """
+    from rds.modes import load_mode, mode_names
+
+    modes = sorted((load_mode(name) for name in mode_names()), key=lambda mode: mode.layer)
+    return {mode.name: dict(mode.line) for mode in modes if mode.line is not None}
+
+
 def _ordered(results: Sequence[Result], names: Sequence[str]) -> list[tuple[Result, str, dict[str, Any]]]:
     """Results with their styles, in the order in which they are to be drawn."""
-    known = [*_MODES]
+    known = _styles()
     several = len({result.mode for result in results}) < len(results)
     drawn = []
     for i, (result, name) in enumerate(zip(results, names, strict=True)):
-        style = {"color": CYCLE[i % len(CYCLE)], "linewidth": 1.2} if several else _MODES.get(result.mode or "")
-        rank = i if several or result.mode not in known else known.index(result.mode)
+        style = {"color": CYCLE[i % len(CYCLE)], "linewidth": 1.2} if several else known.get(result.mode or "")
+        rank = i if several or result.mode not in known else [*known].index(result.mode)
         drawn.append((rank, i, result, name, style or {"color": CYCLE[i % len(CYCLE)], "linewidth": 1.2}))
     return [(result, name, style) for _, _, result, name, style in sorted(drawn, key=lambda entry: entry[:2])]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
-from rds.panels.equipment.fields import MODES
+from rds.modes import mode_names
 from rds.panels.jog.hold import HoldButtons
 from rds.panels.jog.panel import JogView
 from rds.panels.jog.state import Jog
@@ -104,7 +104,7 @@ def test_an_order_that_the_kernel_comes_to_late_is_refused_and_the_next_one_is_n
 
 
 def test_a_late_run_is_refused_only_where_something_moves(tmp_path: Path) -> None:
-    modes = MODES["control"] | MODES["model"]
+    modes = {name: name for name in mode_names()}
     choices, said = Choices([Choice("mode", "Mode", "what runs", "simulation", modes)]), Notice()
     begun: list[str] = []
     shell = Shell(Session(tmp_path))

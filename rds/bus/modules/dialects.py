@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from rds.core.contracts import Drivers
 from rds.core.errors import InputError
 from rds.machines.machine import Machine
+
+if TYPE_CHECKING:  # where the type checker proves that every dialect keeps the contract
+    from rds.bus.modules.cia402.host import Cia402Drivers
+    from rds.bus.modules.oacs.drivers import OacsDrivers
+    from rds.bus.modules.rds.drivers import AxisDrivers
+
+    _CHECKED: tuple[type[Drivers], ...] = (AxisDrivers, OacsDrivers, Cia402Drivers)
 
 _DRIVERS = {
     "rds": ("rds.bus.modules.rds.drivers", "AxisDrivers"),
@@ -51,11 +59,11 @@ def identifiers(dialect: str) -> tuple[tuple[int, int, str], ...]:
 
 def open_drivers(
     dialect: str, machine: Machine, axes: Sequence[str], sample_period: float, dry_run: bool, bus: dict[str, Any]
-) -> Any:
-    """The host's drivers (`rds.core.contracts.Drivers`) of a machine's axes; `bus` goes to them as it is."""
+) -> Drivers:
+    """The host's drivers of a machine's axes; `bus` goes to them as it is."""
     module, name = _DRIVERS[dialect]
-    drivers: Any = getattr(import_module(module), name)
-    return drivers(machine, axes, sample_period=sample_period, dry_run=dry_run, **bus)
+    adapter: Callable[..., Drivers] = getattr(import_module(module), name)
+    return adapter(machine, axes, sample_period=sample_period, dry_run=dry_run, **bus)
 
 
 def is_served(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from rds.core.errors import ContractError
 from rds.core.types import Controller, Ending, Model, Source
 from rds.grading.cases.case import Answers
-from rds.modes import load_mode
+from rds.modes import SIMULATION, load_mode
 from rds.modes.loop.plan import Plan
 from rds.modes.process.record import table
 from rds.results import Result
@@ -52,7 +52,7 @@ def with_parts(
 
 def run_loop(plan: Plan, meta: dict[str, Any]) -> LoopRun:
     """Run a plan in virtual time. SubmissionError comes through; an axis that runs away ends the run."""
-    mode = load_mode("simulation")
+    mode = load_mode(SIMULATION)
     columns, units = plan.columns(mode.followed)
     recorded = array("d")
     loop = replace(mode.build(plan, None), record=recorded.extend)
@@ -65,5 +65,5 @@ def run_loop(plan: Plan, meta: dict[str, Any]) -> LoopRun:
         fault = f"at t = {loop.k * plan.T:.3f} s {str(error).partition(';')[0]}: the loop is not stable"
     values = np.frombuffer(recorded).reshape(-1, len(columns))
     made, of = table(columns, units, values, plan.T)
-    about = {"axes": plan.names, "sample_period": plan.T, "mode": "simulation", "ending": str(ending), **meta}
+    about = {"axes": plan.names, "sample_period": plan.T, "mode": mode.name, "ending": str(ending), **meta}
     return LoopRun(Result(made, of, about), fault)

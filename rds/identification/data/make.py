@@ -17,6 +17,7 @@ import numpy as np
 
 import rds
 from rds.core.atomic import write_whole
+from rds.modes import SYSTEM_TEST
 from rds.results.files import save_result
 from rds.results.result import Result
 
@@ -47,7 +48,7 @@ def make(folder: Path) -> list[Path]:
 
 def _run(overrides: dict[str, Any]) -> Result:
     """A system test in which every sample was taken in time."""
-    experiment = rds.Experiment(axis=tuple(AXES), mode="system-test", duration=DURATION, overrides=overrides)
+    experiment = rds.Experiment(axis=tuple(AXES), mode=SYSTEM_TEST, duration=DURATION, overrides=overrides)
     for _ in range(TRIES):
         result = experiment.run()
         if result.meta["ending"] == "done" and result.verdict == "met":

@@ -13,12 +13,13 @@ from rds.core.errors import InputError
 from rds.core.registry import Registry
 from rds.identification.fit.estimate import Estimate
 from rds.identification.logs.log import Log
+from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import SPEED, Structure
 
 METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Estimate`
     "method",
     {
-        "simulation": "rds.identification.fit.simulation_error",
+        SIMULATION_ERROR: "rds.identification.fit.simulation_error",
         "inverse-dynamics": "rds.identification.fit.inverse_dynamics",
         "step": "rds.identification.fit.step_fit",
         "frequency": "rds.identification.fit.frequency",

@@ -17,6 +17,7 @@ from rds.identification.fit.problem import Problem
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.solve import least_squares
 from rds.identification.logs.log import Log
+from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import LIBRARY, structure
 
@@ -40,7 +41,7 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
 
     `logs` are those that were fitted.
     """
-    if estimate.method != "simulation" or estimate.structure not in LIBRARY.names():
+    if estimate.method != SIMULATION_ERROR or estimate.structure not in LIBRARY.names():
         return None
     if all(estimate.free_run[log.name].rmse <= MISSED * motion_of(log).noise for log in logs):
         return None

@@ -30,6 +30,7 @@ from rds.identification.fit.suspicions import suspicions
 from rds.identification.fit.uncertainty import Uncertainty, uncertainty_of
 from rds.identification.fit.unidentifiable import untold_by
 from rds.identification.logs.log import Log
+from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Start, Structure
 
 OPTIONS = ("fixed", "start", "progress")
@@ -79,7 +80,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         covariance[order.index(name), order.index(name)] = np.inf
     return made_estimate(
         structure,
-        "simulation",
+        SIMULATION_ERROR,
         logs,
         values,
         covariance,

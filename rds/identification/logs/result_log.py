@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from rds.results import mat5
 from rds.results.header import FORMAT
 from rds.results.result import Result
 
+if TYPE_CHECKING:
+    from rds.modes.loop.mode import Mode
+
 RECORD = "record.rds"
-_OPEN = ("system-test", "model-validation")  # a voltage over time: no controller sees the position
 
 
 def is_result(path: Path) -> bool:
@@ -72,7 +74,7 @@ def _log(result: Result, axis: str, name: str, source: str, sha256: str) -> Log:
         extra["reference"] = _floats(result, f"{axis}_reference")
         units["reference"] = result.units.get(f"{axis}_reference") or unit
     reach = meta.get("voltage_range")
-    mode = meta.get("mode")
+    mode = _mode(meta)
     is_driven = not meta.get("controller", True) and not extra  # by a voltage over time, in whatever mode
     return Log(
         name=f"{name}:{axis}" if len(result.axes) > 1 else name,
@@ -83,12 +85,19 @@ def _log(result: Result, axis: str, name: str, source: str, sha256: str) -> Log:
         units=units,
         resolution=_resolution(meta, axis, unit),
         voltage_range=(-float(reach), float(reach)) if isinstance(reach, int | float) and reach else None,
-        closed_loop=None if mode is None else mode not in _OPEN and not is_driven,
+        closed_loop=None if meta.get("mode") is None else not is_driven and not (mode is not None and mode.open_loop),
         source=source,
         sha256=sha256,
         findings=tuple(_findings(result, command)),
         clocks=(Clock(("command", "position", *extra), "the loop's due times k T, as recorded", _lateness(result)),),
     )
+
+
+def _mode(meta: dict[str, Any]) -> Mode | None:
+    """The mode that a result names; None where it names none, or one that is not known here."""
+    from rds.modes import load_mode, mode_names
+
+    return load_mode(meta["mode"]) if meta.get("mode") in mode_names() else None
 
 
 def _floats(result: Result, column: str) -> np.ndarray:
@@ -99,7 +108,7 @@ def _resolution(meta: dict[str, Any], axis: str, unit: str) -> float | None:
     """From the machine that the result names, where that machine is known here and the encoder was not left out."""
     from rds.machines import load_machine
 
-    if meta.get("quantization") is False and meta.get("mode") == "simulation":
+    if meta.get("quantization") is False and (mode := _mode(meta)) is not None and not mode.real_time:
         return None
     try:
         found = load_machine(str(meta.get("machine"))).axes.get(axis)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.machines.converter import Limits, limits
 from rds.results.metrics import error_metrics
 
 # name: (meaning, unit ("" for that of the axis), whether more is worse)
@@ -33,17 +34,13 @@ def first_counted(period: float | None, T: float, samples: int) -> int:
     return first if first < samples else 0
 
 
-def voltage_limits(plan: Any) -> tuple[float, float, float]:
+def voltage_limits(plan: Any) -> Limits:
     """The converter's lowest and highest voltage, and its step (0 without quantization), V."""
     board = plan.machine.converter
-    step = 2.0 * board.range / 2**board.bits if plan.quantization else 0.0
-    low, high = (-board.range, board.range - step) if plan.saturation else (-np.inf, np.inf)
-    return low, high, step
+    return limits(board.range, board.bits, saturation=plan.saturation, quantization=plan.quantization)
 
 
-def tracking_row(
-    error: np.ndarray, command: np.ndarray, first: int, limits: tuple[float, float, float], T: float
-) -> Any:
+def tracking_row(error: np.ndarray, command: np.ndarray, first: int, limits: Limits, T: float) -> Any:
     """The figures of `TRACKING` from a run's samples: reference - measured, and the command voltage."""
     found = error_metrics(error[first:])
     low, high, _ = limits

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
+from rds.machines import converter
+
 LIMIT = 1e9  # of a position, in the axis's unit: what is beyond has diverged
 
 
@@ -27,6 +29,7 @@ def sweep(law: Callable[..., Any], motion: str) -> Callable[..., None]:
     from rds.models.machine_motion import moved, pull_of
 
     law = njit(law)
+    counted, converted = converter.compiled()
     if motion == "linear-axis":
         step_linear = njit(respond)
 
@@ -57,7 +60,7 @@ def sweep(law: Callable[..., Any], motion: str) -> Callable[..., None]:
             worst, squares, peak, saturated = 0.0, 0.0, 0.0, 0
             diverged = False
             for k in range(len(p)):
-                y = round(x / resolution) * resolution if resolution > 0.0 else x
+                y = counted(x, resolution)
                 u, state = law(p[k], v[k], a[k], y, state, coefficients)
                 e = p[k] - y
                 if k >= first:
@@ -66,9 +69,7 @@ def sweep(law: Callable[..., Any], motion: str) -> Callable[..., None]:
                 peak = max(peak, abs(u))
                 if u <= low or u >= high:
                     saturated += 1
-                u = min(max(u, low), high)
-                if step > 0.0 and abs(u) < step * 2.0**52:
-                    u = round(u / step) * step
+                u = converted(u, low, high, step)
                 if whole == 0:
                     before, now = waiting[0], u
                     waiting[0] = u

@@ -18,6 +18,7 @@ from rds.identification.robustness.draws import LEVEL, draws
 from rds.identification.robustness.figures import FIGURES
 from rds.identification.robustness.loops import Task, not_compiled
 from rds.identification.robustness.uncertain import Ranges, read_ranges, uncertain
+from rds.modes import SIMULATION
 from rds.modes.experiment import Experiment
 
 MOST_RUNS = 10_000_000
@@ -110,7 +111,7 @@ def study(
 
 
 def _task(experiment: Experiment, seed: int, ranges: Ranges | str | Path | None, level: float) -> Task:
-    plan = experiment.plan("simulation")
+    plan = experiment.plan(SIMULATION)
     if not plan.controlled:
         raise InputError("it has no controller: robustness is that of a closed loop; give [reference] and [controller]")
     given = read_ranges(ranges) if isinstance(ranges, str | Path) else dict(ranges or {})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from rds.core.options import Option
+from rds.identification.structures import SIMULATION_ERROR
 
 if TYPE_CHECKING:
     from rds.identification.logs.log import Log
@@ -64,7 +65,7 @@ class Structure:
     held: Callable[[frozenset[str]], Mapping[str, tuple[float, str]]] | None = None
     # parameters that the logs state and no fit can tell (a force per volt), held at these values, with 0 std error
     given: Callable[[Sequence[Log]], Mapping[str, float]] | None = None
-    default_method: str = "simulation"  # the method where the user names none
+    default_method: str = SIMULATION_ERROR  # the method where the user names none
     # parameters that these logs have little occasion to tell (friction of a direction in which the axis hardly moves),
     # given values to begin with
     idle: Callable[[Sequence[Log], Mapping[str, float]], Mapping[str, Idle]] | None = None

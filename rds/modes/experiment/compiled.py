@@ -14,7 +14,10 @@ import numpy as np
 
 from rds.core.extras import remedy
 from rds.core.types import Ending
+from rds.machines import converter
+from rds.machines.converter import limits
 from rds.models.linear_axis import LinearAxisMotion, coefficients, respond
+from rds.modes import load_mode
 from rds.modes.loop.plan import AxisPlan, Plan
 from rds.modes.process.host import Rows
 
@@ -29,7 +32,7 @@ def obstacle(plan: Plan) -> str | None:
         return "a part program drives the axes"
     if plan.changes:
         return "live values change while it runs"
-    if plan.mode != "simulation":
+    if load_mode(plan.mode).real_time:
         return f"{plan.mode} runs in real time; only simulations can be compiled"
     for axis in plan.axes:
         name = axis.axis.name
@@ -46,8 +49,7 @@ def run_compiled(plan: Plan) -> Rows:
     rows = np.empty((plan.samples, len(columns)))
     rows[:, 0] = np.arange(plan.samples)
     board = plan.machine.converter
-    step = 2.0 * board.range / 2**board.bits if plan.quantization else 0.0
-    low, high = (-board.range, board.range - step) if plan.saturation else (-np.inf, np.inf)
+    output = limits(board.range, board.bits, saturation=plan.saturation, quantization=plan.quantization)
     for axis in plan.axes:
         name = axis.axis.name
         resolution = axis.axis.resolution if plan.quantization else 0.0
@@ -55,7 +57,7 @@ def run_compiled(plan: Plan) -> Rows:
         voltage = rows[:, columns.index(f"{name}_voltage")]
         first = columns.index(f"{name}_reference" if axis.controller else f"{name}_measured")
         table = rows[:, first : columns.index(f"{name}_command") + 1]
-        interface = (step, low, high, resolution)
+        interface = (*output, resolution)
         constants = coefficients(axis.model.params, plan.T)
         if axis.controller is None:
             playing()(np.asarray(axis.signal, dtype=float), constants, start, interface, table, voltage)
@@ -83,23 +85,22 @@ def controlled(law: Callable[..., Any]) -> Callable[..., None]:
     from numba import njit
 
     law, move = njit(law), njit(respond)
+    counted, converted = converter.compiled()
 
     @njit
     def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage):
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
-        step, low, high, resolution = interface
+        low, high, step, resolution = interface
         for k in range(len(p)):
-            y = round(x / resolution) * resolution if resolution > 0.0 else x
+            y = counted(x, resolution)
             u, state = law(p[k], v[k], a[k], y, state, coefficients)
             table[k, 0] = p[k]
             table[k, 1] = v[k]
             table[k, 2] = a[k]
             table[k, 3] = y
             table[k, 4] = u
-            u = min(max(u, low), high)
-            if step > 0.0 and abs(u) < step * 2.0**52:
-                u = round(u / step) * step
+            u = converted(u, low, high, step)
             voltage[k] = u
             x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
 
@@ -113,18 +114,17 @@ def playing() -> Callable[..., None]:
     from numba import njit
 
     move = njit(respond)
+    counted, converted = converter.compiled()
 
     @njit
     def simulate(command, constants, start, interface, table, voltage):
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
-        step, low, high, resolution = interface
+        low, high, step, resolution = interface
         for k in range(len(command)):
-            table[k, 0] = round(x / resolution) * resolution if resolution > 0.0 else x
+            table[k, 0] = counted(x, resolution)
             table[k, 1] = command[k]
-            u = min(max(command[k], low), high)
-            if step > 0.0 and abs(u) < step * 2.0**52:
-                u = round(u / step) * step
+            u = converted(command[k], low, high, step)
             voltage[k] = u
             x, w = move(x, w, u, T, decay, reach, tau, K, plus, minus)
 

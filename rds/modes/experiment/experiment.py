@@ -12,7 +12,7 @@ from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.folder_kept import folder_kept
 from rds.core.toml_table import Words
 from rds.core.types import Ending
-from rds.modes import load_mode
+from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.folder import new_folder, require_writable
 from rds.modes.experiment.outcome import outcome
 from rds.modes.experiment.resolve import resolve
@@ -46,7 +46,7 @@ class Experiment:
         self,
         machine: str = "mini-cnc",
         axis: str | Sequence[str] = "X",
-        mode: str = "simulation",
+        mode: str = DEFAULT,
         duration: float = 10.0,
         sample_period: float | None = None,
         *,
@@ -108,7 +108,7 @@ class Experiment:
     @property
     def mode(self) -> str:
         """The mode that `run()` takes unless it is told another."""
-        return str(self._words.table.get("mode", "simulation"))
+        return str(self._words.table.get("mode", DEFAULT))
 
     @property
     def title(self) -> str | None:

@@ -17,7 +17,7 @@ import numpy as np
 from rds.core.installed import version as own_version
 from rds.core.types import Ending, Model, Source
 from rds.core.values import shown
-from rds.modes import load_mode
+from rds.modes import SIMULATION, load_mode
 from rds.modes.loop.plan import Plan
 from rds.modes.loop.stopwatch import TIMING_COLUMNS
 from rds.modes.process.environment import sentence
@@ -48,7 +48,7 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
 
 def _simulated(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, np.ndarray]:
     """Each axis's response in a closed loop of its own: the same plan, simulated, for as long as the run lasted."""
-    same = replace(as_recorded(plan, rows), mode="simulation", samples=int(sample[-1]) + 1)
+    same = replace(as_recorded(plan, rows), mode=SIMULATION, samples=int(sample[-1]) + 1)
     simulated = run_plan(same, None)
     of = dict(zip(simulated.columns, simulated.values.T, strict=True))
     return {f"{name}_simulated": of[f"{name}_measured"][sample] for name in plan.names}

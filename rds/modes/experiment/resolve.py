@@ -18,6 +18,7 @@ from rds.core.errors import InputError
 from rds.core.folder_kept import folder_kept
 from rds.core.toml_table import Words
 from rds.machines import Axis, Machine, load_machine
+from rds.modes import DEFAULT as DEFAULT_MODE
 from rds.modes import load_mode, mode_names
 from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model
 from rds.modes.loop.laws import ReferenceSamples
@@ -42,7 +43,7 @@ def resolve(
     """
     words.text("title")
     machine = _machine(words, folder)
-    written = words.choice("mode", "simulation", mode_names())
+    written = words.choice("mode", DEFAULT_MODE, mode_names())
     mode = load_mode(written if mode_name is None else mode_name)
     T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
     samples = _samples(words, T) if program is None else program.samples

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
 from rds.identification.logs.tables import TEXTS
+from rds.identification.structures import SIMULATION_ERROR
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Several, Text
 from rds.panels.session.session import Session
@@ -28,7 +29,7 @@ STRUCTURES = {
 }
 METHODS = {
     "": "The structure's own",
-    "simulation": "Simulation error",
+    SIMULATION_ERROR: "Simulation error",
     "inverse-dynamics": "Inverse dynamics",
     "step": "Step response",
     "frequency": "Frequency response",
@@ -121,7 +122,7 @@ class DataDesk:
             task.note = "reading"
             logs = read_log(path, mapping)
             given: dict[str, Any] = {}
-            if (method or made.default_method) == "simulation":
+            if (method or made.default_method) == SIMULATION_ERROR:
                 given["progress"] = lambda done, of: task.advance(done, of, "fitting")
             task.note = "fitting"
             self.estimate = with_hint(fit(logs, made, method, given), logs)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rds.machines import Axis, Machine
+from rds.modes import load_mode
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Diagram:
 
 def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]) -> Diagram:
     """The diagram of an experiment's `table`; `words` names what was chosen ("controller", "model") for people."""
-    axis, mode = machine.axes[table["axis"]], str(table["mode"])
+    axis, mode = machine.axes[table["axis"]], load_mode(str(table["mode"]))
     controlled = "reference" in table
     blocks = [_source(table, axis, controlled)]
     links = []
@@ -54,26 +55,25 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
     column = len(blocks)
     board = machine.converter
     converter = (f"± {board.range:g} V", f"{board.bits} bit")
-    live = mode in ("implementation", "system-test", "model-validation")
     model = Block("model", f"Model of {axis.name}", _model(table, axis, words), column + 1)
     encoder = Block("encoder", "Encoder", (f"{axis.resolution:g} {axis.unit} per count",), column + 2)
     measured = f"y [{axis.unit}]"
-    if live:
+    if mode.moves_machine:
         blocks += [
             Block("converter", "CAN command", (f"node {axis.node}", *converter), column),
             Block("machine", f"Machine, {_name(axis)}", _travel(axis), column + 1),
             encoder,
         ]
         links += [Link(acting, "converter", "u [V]"), Link("converter", "machine", "V"), Link("machine", "encoder", "")]
-        if mode != "system-test":
+        if mode.modelled:
             blocks.append(Block("model", model.title, model.lines, column + 1, row=1))
             links.append(Link("converter", "model", "same voltage [V]"))
-            blocks.append(Block("beside", "Recorded beside", (f"modelled [{axis.unit}]",), column + 2, row=1))
+            blocks.append(Block("beside", "Recorded beside", (f"{mode.followed} [{axis.unit}]",), column + 2, row=1))
             links.append(Link("model", "beside", ""))
     else:
         blocks += [Block("converter", "Converter", converter, column), model, encoder]
         links += [Link(acting, "converter", "u [V]"), Link("converter", "model", "V"), Link("model", "encoder", "")]
-        if mode == "emulation":
+        if mode.real_time:
             blocks.append(
                 Block("drivers", "CAN drivers", ("run and timed,", "data not used"), column + 1, row=1, quiet=True)
             )
@@ -83,7 +83,7 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
     else:
         blocks.append(Block("record", "Record", (measured,), column + 3))
         links.append(Link("encoder", "record", ""))
-    return Diagram(tuple(blocks), tuple(links), _sentence(blocks, mode, table["sample_period"]))
+    return Diagram(tuple(blocks), tuple(links), _sentence(blocks, mode.name, table["sample_period"]))
 
 
 def _source(table: Mapping[str, Any], axis: Axis, controlled: bool) -> Block:

@@ -10,7 +10,8 @@ from rds.controllers import controller_module
 from rds.controllers.tracking import OBSERVER_POLE, POLES
 from rds.core.options import Option
 from rds.machines import Axis, Machine
-from rds.panels.session.fields import Choice, Field, Number, Text
+from rds.modes.loop.mode import Drive
+from rds.panels.session.fields import Choice, Field, Number, Text, mode_choice
 from rds.panels.session.file_params import file_params
 from rds.panels.session.formula import check_formula
 
@@ -18,14 +19,7 @@ USER = "user"  # the choice of something that the student wrote
 PREFIX = "controller."  # of the fields of a controller's parameters
 OF_MODEL = "model."  # of those of a student's model
 SPINDLE = "rev/min"
-MODES = {
-    "model": {
-        "simulation": "Simulation",
-        "system-test": "System test",
-        "model-validation": "Model validation",
-    },
-    "control": {"simulation": "Simulation", "emulation": "Emulation", "implementation": "Implementation"},
-}
+DRIVEN_BY: dict[str, Drive] = {"model": "signal", "control": "controller"}  # what drives the axes, by panel
 SHAPES = {"square": "Square", "triangle": "Triangle", "sinusoid": "Sinusoid", USER: "User-defined"}
 CONTROLLERS = {
     "p": "Proportional",
@@ -51,7 +45,7 @@ def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[F
     axis = machine.axes[kept if isinstance(kept, str) and kept in systems else first]
     what = "voltage signal" if kind == "model" else "reference"
     yield Choice("system", "System", "which axis of the machine, or its spindle", first, systems)
-    yield Choice("mode", "Mode", _MODE_TIPS[kind], "simulation", MODES[kind])
+    yield mode_choice(DRIVEN_BY[kind])
     yield Choice("shape", what.capitalize(), f"the form of the {what} over time", "sinusoid", SHAPES)
     yield Text(
         "shape_file",
@@ -182,9 +176,3 @@ def _parameter(name: str, option: Option, unit: str) -> Number:
 def _refuse_signal(text: str) -> None:
     if not text.strip().lower().endswith(".csv"):
         check_formula(text)
-
-
-_MODE_TIPS = {
-    "model": "simulation: the model alone; system test: the machine alone; model validation: both, same voltage",
-    "control": "simulation: as fast as it goes; emulation: the same against the clock; implementation: the machine",
-}

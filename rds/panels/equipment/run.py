@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.modes import load_mode
+from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.experiment.report import save_with_report
 from rds.modes.experiment.run import Run
@@ -40,7 +40,7 @@ class EquipmentRun:
         title: str | None = None,
         prepare: Callable[[Callable[[], None]], None] | None = None,
     ):
-        mode = str(table.get("mode", "simulation"))
+        mode = str(table.get("mode", DEFAULT))
         self.session, self.table = session, table
         self.real_time = load_mode(mode).real_time
         names = [str(table["axis"])] if "axis" in table else [str(name) for name in table.get("axes", [])]

@@ -12,6 +12,7 @@ from typing import Any
 
 from rds.core.errors import InputError, RdsError
 from rds.machines import Axis, Machine, load_machine
+from rds.modes import SIMULATION, load_mode
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.loop.plan import Plan
 from rds.modes.process.machine import BUILTIN
@@ -35,7 +36,7 @@ from rds.panels.session.formula import formula_file
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
 
-FIRST_SINE = {"system": "X", "mode": "simulation", "shape": "sinusoid", "model": "default", "controller": "tracking"}
+FIRST_SINE = {"system": "X", "mode": SIMULATION, "shape": "sinusoid", "model": "default", "controller": "tracking"}
 
 
 @dataclass
@@ -78,7 +79,7 @@ class Equipment:
         idle = {name for name, owner in _FILES.items() if owner in chosen and chosen[owner] != USER}
         if chosen["shape"] == USER:
             idle |= {"amplitude", "frequency", "offset"}
-        if chosen["mode"] == "system-test":  # the machine alone
+        if not load_mode(str(chosen["mode"])).modelled:  # the machine alone
             idle |= {"model", "model_file"}
         return [name for name in chosen.fields if name not in idle]
 
@@ -256,12 +257,9 @@ def _option(field: Field, value: str) -> str:
     return field.options.get(value, "") if isinstance(field, Choice) else ""
 
 
-_MACHINE = ("emulation", "implementation", "system-test", "model-validation")  # modes that have a bus
-
-
 def machine_sentence(plan: Plan) -> str:
     """What a run of `plan` will find on its bus. Sends nothing that moves anything."""
-    if plan.mode not in _MACHINE:
+    if not load_mode(plan.mode).real_time:
         return "no machine is needed"
     from rds.bus.hub.address import channels
     from rds.bus.modules.dialects import DEFAULT, is_served

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -12,6 +12,7 @@ from rds.bus.modules.rds import frames
 from rds.bus.tools.link import default_channel
 from rds.controllers import library_controller
 from rds.controllers.axis_data import SPINDLE_UNIT
+from rds.core.contracts import Drivers, Watch
 from rds.core.errors import MachineError
 from rds.core.types import Controller, Reference
 from rds.machines.machine import Axis, Machine
@@ -20,7 +21,6 @@ from rds.panels.jog.axes import JogAxis, JogSpindle, jog_axes, jog_spindles
 _COUNTS = 5.0  # of error at rest over which friction is made up for
 _ANSWERS_IN = 0.5  # s in which a spindle's module has to say that it is there
 _FROM_SWITCHES = 1e-3  # of the travel, which is left between an axis and its limit switch: to touch one is a fault
-Watch = Callable[[str, float], object]  # hears the axis that is homed, and where it is
 
 
 class Hand(Protocol):
@@ -220,7 +220,7 @@ class DriveHand:
         nodes = {device.node for device in scan(timeout=_ANSWERS_IN, **options) if device.is_drive}
         return {drive.axis.name for drive in settings.drives if drive.node in nodes}
 
-    def _open(self, methods: Mapping[str, int]) -> Any:
+    def _open(self, methods: Mapping[str, int]) -> Drivers:
         table = _drive_table(self._bus.get("cia402", {}), self._machine, self.spindles, methods)
         bus = self._bus | {"cia402": table}
         return open_drivers("cia402", self._machine, self._names, self.period, False, bus)

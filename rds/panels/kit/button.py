@@ -9,10 +9,10 @@ from typing import Any, Protocol, TypeVar
 import ipywidgets as widgets
 
 from rds.core.errors import RdsError
+from rds.modes import load_mode
 from rds.panels.kit.notice import Notice as Line
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.session.choices import Choices
-from rds.panels.session.expired_orders import STILL
 from rds.panels.session.task import Task
 
 T = TypeVar("T")
@@ -55,7 +55,7 @@ def run_order(shell: Any, tip: str, act: Callable[[], Any], notice: Notice, choi
 
     def follow_mode(name: str) -> None:
         if name == "mode":
-            (made.remove_class if choices["mode"] in STILL else made.add_class)(_ORDER)
+            (made.remove_class if not load_mode(str(choices["mode"])).moves_machine else made.add_class)(_ORDER)
 
     made = order(shell, "Run", tip, act, notice, primary=True)
     follow_mode("mode")

@@ -11,7 +11,7 @@ from rds.machines import load_machine
 from rds.panels.equipment.build import Builds
 from rds.panels.program.text import ProgramText, check_name, programs
 from rds.panels.session.choices import Choices
-from rds.panels.session.fields import Choice, Field, Flag, Number, Text
+from rds.panels.session.fields import Choice, Field, Flag, Number, Text, mode_choice
 from rds.panels.session.latest import Latest
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 PANEL = "program"  # its name among the session's choices
 FIRST = "part.ngc"  # what is open in a folder without programs
 NO_TABLE = ""
-_MODES = {"simulation": "Simulation", "emulation": "Emulation", "implementation": "Implementation"}
 
 
 def program_choices(session: Session) -> Choices:
@@ -35,9 +34,7 @@ def program_choices(session: Session) -> Choices:
 def _fields(folder: Path) -> Iterable[Field]:
     found = programs(folder)
     yield Text("file", "Program", "the part program that is open", found[0] if found else FIRST, FIRST, 120, check_name)
-    yield Choice(
-        "mode", "Mode", "in virtual time; against the clock; or on the machine's modules", "simulation", _MODES
-    )
+    yield mode_choice("controller")
     yield _table_field(folder)
     yield Text(
         "controller",

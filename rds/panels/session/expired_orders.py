@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import isfinite
 
 LATE = 3.0  # s from the press of a button to the motion
-STILL = ("simulation", "emulation")  # modes of a run in which nothing moves: it may begin late
 
 
 def refusal(what: str, age: float, moved: bool = False) -> str:

@@ -9,6 +9,8 @@ from math import inf, isfinite
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.modes import DEFAULT, load_mode, mode_names
+from rds.modes.loop.mode import Drive
 
 _LONGEST_NAME = 255  # bytes of one part of a path, on every common file system
 
@@ -152,3 +154,10 @@ class Several(Field):
         if len(set(value)) < self.least:
             raise InputError(f"{self.label} needs {self.least} or more of {', '.join(self.options)}")
         return [key for key in self.options if key in value]
+
+
+def mode_choice(drives: Drive) -> Choice:
+    """The choice among the modes in which a controller, or a voltage signal, may drive the axes."""
+    modes = [load_mode(name) for name in mode_names(drives)]
+    tip = "; ".join(f"{mode.label.lower()}: {mode.about}" for mode in modes)
+    return Choice("mode", "Mode", tip, DEFAULT, {mode.name: mode.label for mode in modes})

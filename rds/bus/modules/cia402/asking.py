@@ -41,7 +41,7 @@ def ask(bus: can.BusABC, drive: Remote) -> int | None:
                 code = code or int.from_bytes(data[4:6], "little")
             elif identifier == 0x180 + drive.node and len(data) >= 6:
                 before = drive.status, drive.state
-                drive.take_status(data)
+                drive.take_status(message)
                 if drive.state not in _FAULTS:  # what stop() has made of it isn't what was wrong
                     drive.status, drive.state = before
     return code

@@ -22,6 +22,7 @@ from rds.bus.modules.cia402.codes import Mode, NmtCommand, State, error_text, st
 from rds.bus.modules.cia402.presence import refuse_clashes
 from rds.bus.modules.cia402.settings import DriveSettings, Settings
 from rds.bus.tools.listening import pause
+from rds.core.contracts import Limits, Watch, unwatched
 from rds.core.errors import InputError, MachineError
 
 LOG = logging.getLogger(__name__)
@@ -36,8 +37,6 @@ _CHANGE = 2.0  # s for a drive to change its state or mode
 _LOST_AFTER = 3  # heartbeats that may be missing
 _PROFILE = 402
 _HALF = 1 << 31
-Watch = Callable[[str, float], object]  # hears the axis that is homed, and the drive's position in axis units
-Limits = tuple[float, float]  # the lowest and highest position, axis units; infinite where there is none
 _DEVICE_TYPE = b"\x00\x10\x00"  # object 0x1000:00 in an SDO frame
 
 
@@ -62,10 +61,6 @@ def library(bus: can.BusABC) -> Iterator[canopen.Network]:
         yield network
     finally:
         network.notifier.stop()
-
-
-def unwatched(axis: str, position: float) -> None:
-    """Nobody looks at the homing."""
 
 
 def prepare(network: canopen.Network, settings: Settings, period: float, watch: Watch = unwatched) -> list[Limits]:

@@ -7,55 +7,48 @@ SYNC, take effect at SYNC in all drives at once, and the positions that come bac
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import Any
 
 import can
 
+from rds.bus.modules.can_drivers import CanDrivers, Handler
 from rds.bus.modules.cia402 import codes
 from rds.bus.modules.cia402.asking import ask, frame
 from rds.bus.modules.cia402.codes import Nmt, NmtCommand, State, error_text, status_text
-from rds.bus.modules.cia402.configure import Limits, Watch, library, prepare, unwatched
+from rds.bus.modules.cia402.configure import library, prepare
 from rds.bus.modules.cia402.remote import Remote
 from rds.bus.modules.cia402.settings import read_settings
 from rds.bus.modules.rds.identity import WAIT as LISTENING
-from rds.bus.tools.link import BUILTIN, bus_name, default_channel, open_bus
+from rds.bus.tools.link import BUILTIN
 from rds.bus.tools.listening import frames_within
+from rds.core import contracts
+from rds.core.contracts import Watch, unwatched
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
 
 LOG = logging.getLogger(__name__)
 
-_NMT, _SYNC = 0x000, 0x080
-HOST = "host"  # what the built-in bus calls this node
+_NMT, _SYNC, _EMERGENCY, _TPDO, _RPDO, _ANSWER, _HEARTBEAT = 0x000, 0x080, 0x080, 0x180, 0x200, 0x580, 0x700
 LOST_AFTER = 10  # periods in a row without an answer
 _HEARTBEATS = 3  # heartbeats that may be missing
 _SWITCHING = 1.0  # s for all drives to change their state
 _STOPPING = 5.0  # s for a quick stop; a spindle takes the longest
-_STANDSTILL = 20  # cycles in which no encoder moves until the axes count as standing
-_LONGEST_COAST = 3.0  # s until then
-_MOST_WAITING = 64  # frames taken before a cycle, whatever babbles
-_TPDO, _EMERGENCY, _HEARTBEAT, _OTHER = range(4)
 
 
 @dataclass
-class Counters:
-    """What went over the bus beside the expected answers."""
+class Counters(contracts.Counters):
+    """What drives tell besides. A tick is a SYNC."""
 
-    ticks: int = 0  # SYNCs sent
-    missing: int = 0  # answers that did not come in their period
-    silent: int = 0  # periods in which a drive gave no answer at all, not even a late one
-    late: int = 0  # answers that came after it
     emergencies: int = 0  # emergency messages with an error
-    foreign: int = 0  # frames that no drive of ours sent
 
 
-class Cia402Drivers:
+class Cia402Drivers(CanDrivers[Remote]):
     """Implements `rds.core.contracts.Drivers` for the `axes` (names; default all) of `machine`.
 
     Takes an open `bus`, which stays the caller's, or opens one: `interface`, `channel` (default on the built-in bus:
@@ -66,6 +59,9 @@ class Cia402Drivers:
     and commanded, are relative to where the axis stood at start(), or with `positions = "drive"` the drive's own.
     Power comes on with the first write() after start(); with `dry_run` never.
     """
+
+    noun = "drives"
+    counters: Counters
 
     def __init__(
         self,
@@ -82,25 +78,31 @@ class Cia402Drivers:
         **options: Any,
     ):
         self.settings = read_settings(cia402 or {}, machine, axes)
-        self.drives = [Remote(drive) for drive in self.settings.drives]
-        self._period = machine.sample_period if sample_period is None else sample_period
-        self._timeout = self._period if timeout is None else timeout
-        self._dry_run = dry_run
-        self._table: dict[int, tuple[int, Remote]] = {}
+        self.drives = [Remote(drive, self.settings.absolute) for drive in self.settings.drives]
+        handlers: dict[int, Handler[Remote]] = {}
         for drive in self.drives:
-            for base, kind in ((0x180, _TPDO), (0x080, _EMERGENCY), (0x700, _HEARTBEAT), (0x580, _OTHER)):
-                self._table[base + drive.node] = kind, drive
-        self._hosts = {_SYNC, *(0x200 + drive.node for drive in self.drives)}  # what only a host sends
-        self._owns_bus = bus is None
-        if bus is None:
-            channel = default_channel(machine, interface, channel)
-            bus = open_bus(interface, channel, [_NMT, *sorted({*self._table, *self._hosts})], node=HOST, **options)
-            self._bus_name = bus_name(interface, channel)
-        else:
-            self._bus_name = bus.channel_info
-        self._bus = bus
+            handlers[_TPDO + drive.node] = drive.take_status
+            handlers[_EMERGENCY + drive.node] = partial(self._take_emergency, drive)
+            handlers[_HEARTBEAT + drive.node] = partial(self._take_heartbeat, drive)
+            handlers[_ANSWER + drive.node] = _pass_over
+        super().__init__(
+            machine,
+            self.drives,
+            handlers,
+            hosts=(_SYNC, *(_RPDO + drive.node for drive in self.drives)),
+            also=(_NMT,),
+            bus=bus,
+            interface=interface,
+            channel=channel,
+            options=options,
+            period=machine.sample_period if sample_period is None else sample_period,
+            timeout=timeout,
+            lost_after=LOST_AFTER,
+        )
+        self._dry_run = dry_run
+        self._send_timeout = self._timeout * LOST_AFTER
         self._sync = frame(_SYNC, b"")
-        self._beat = frame(0x700 + self.settings.host, bytes([Nmt.OPERATIONAL]))
+        self._beat = frame(_HEARTBEAT + self.settings.host, bytes([Nmt.OPERATIONAL]))
         self._next_beat = self._check_beats_at = inf
         # with SYNC, targets are sent as soon as they are known, and wait in the drives; else just before SYNC
         self._early = self.settings.transmission <= 240
@@ -109,10 +111,10 @@ class Cia402Drivers:
         self._armed_at = 0.0
         self._commanded = (0.0,) * len(self.drives)  # what the next SYNC makes act
         self._acting = self._commanded
-        self._unheard: set[int] = set()  # nodes of the drives that have been silent since the last SYNC
         self._stopping = False  # after stop()
-        self._started = self._closed = False
-        self.limits: list[Limits] = []  # software limits 0x607D since start(), axis units, from the drives' own zero
+        self._configured = False  # from then on the drives take process data
+
+    def _count_anew(self) -> None:
         self.counters = Counters()
 
     # --- start
@@ -122,50 +124,26 @@ class Cia402Drivers:
 
         The axes stand when this returns, without power. `watch(axis, position)` is called while an axis is homed, with
         the drive's own position in axis units; what it raises ends the homing, takes the power, and comes out of here.
-        Raises MachineError naming node, state and error code, the devices that share a node-ID, and if another host
-        commands the drives.
+        `limits` are the software limits 0x607D from then on, axis units, from the drives' own zero. Raises MachineError
+        naming node, state and error code, the devices that share a node-ID, and if another host commands the drives.
         """
         self._next_beat = inf  # drives wait for heartbeats from the first one on
-        with self._failing_bus():
-            self._refuse_company()
-            with library(self._bus) as network:
-                self.limits = prepare(network, self.settings, self._period, watch)
-            self._started = True
-            for drive in self.drives:
-                drive.heard_at = inf
-            self._switch_on()
-            self._wait_for_standstill()
+        super().start(watch)
         for drive in self.drives:
-            drive.origin = 0 if self.settings.absolute or drive.reads_velocity else drive.actual_counts
             drive.hold()
         self._check_beats_at = 0.0
-        self.counters = Counters()
 
     def _refuse_company(self) -> None:
         for message in frames_within(self._bus, LISTENING):
-            if message.arbitration_id not in self._table:
+            if message.arbitration_id not in self._handlers:
                 self._take_foreign(message)
 
-    def _take_foreign(self, message: can.Message) -> None:
-        """A frame that no drive of ours sent. MachineError for a stop of the network, and for another host."""
-        self.counters.foreign += 1
-        if message.is_extended_id or message.is_error_frame or message.is_remote_frame or not message.is_rx:
-            return
-        identifier, data = message.arbitration_id, message.data
-        if identifier == _NMT and len(data) == 2 and data[0] == NmtCommand.STOP:
-            if data[1] in (0, *(drive.node for drive in self.drives)):
-                self.stop()
-                raise MachineError(
-                    f"emergency stop: the drives on bus {self._bus_name} were stopped from outside this run (NMT stop)"
-                )
-        elif identifier in self._hosts:
-            self.stop()
-            raise MachineError(
-                f"another host commands the drives on bus {self._bus_name} (frame {identifier:#05x} was heard); stop "
-                "one of them (`rds estop` stops the machine): two hosts never drive the same axes"
-            )
-
-    def _switch_on(self) -> None:
+    def _set_up(self, watch: Watch) -> None:
+        with library(self._bus) as network:
+            self.limits = prepare(network, self.settings, self._period, watch)
+        self._configured = True
+        for drive in self.drives:
+            drive.heard_at = inf
         deadline = time.monotonic() + _SWITCHING
         while not all(drive.state is State.SWITCHED_ON for drive in self.drives):
             if time.monotonic() > deadline:
@@ -178,20 +156,18 @@ class Cia402Drivers:
                 drive.hold()
             self._paced_exchange()
 
-    def _wait_for_standstill(self) -> None:
-        """An earlier run may have left an axis coasting."""
-        still, before = 0, [drive.actual_counts for drive in self.drives]
-        deadline = time.monotonic() + _LONGEST_COAST
-        while still < _STANDSTILL and time.monotonic() < deadline:
-            self._paced_exchange()
-            now = [drive.actual_counts for drive in self.drives]
-            still = still + 1 if now == before else 0
-            before = now
+    def _hear_foreign(self, identifier: int, data: bytearray) -> None:
+        """MachineError for a stop of the network."""
+        if identifier != _NMT or len(data) != 2 or data[0] != NmtCommand.STOP:
+            return
+        if data[1] in (0, *(drive.node for drive in self.drives)):
+            self.stop()
+            raise MachineError(
+                f"emergency stop: the drives on bus {self._bus_name} were stopped from outside this run (NMT stop)"
+            )
 
-    def _paced_exchange(self) -> None:
-        due = time.monotonic() + self._period
-        self.exchange()
-        time.sleep(max(0.0, due - time.monotonic()))
+    def _leave_to_other_host(self) -> None:
+        self.stop()
 
     # --- the cycle
 
@@ -203,21 +179,11 @@ class Cia402Drivers:
         heartbeat is missing; all drives are stopped then.
         """
         now = time.monotonic()
-        try:
-            if not self._is_sent:
-                self._send_targets()
-            self._is_sent = False
-            self._drain()
-            self.counters.silent += bool(self._unheard)
-            self._unheard.clear()
-            self._bus.send(self._sync, self._timeout * LOST_AFTER)
-            self.counters.ticks += 1
-            self._collect(now + self._timeout)
-            if now >= self._next_beat:
-                self._next_beat = now + self.settings.heartbeat
-                self._bus.send(self._beat, self._timeout * LOST_AFTER)
-        except can.CanError as error:
-            raise MachineError(f"bus {self._bus_name} failed: {error}") from error
+        measured = super().exchange()
+        if now >= self._next_beat:
+            self._next_beat = now + self.settings.heartbeat
+            with self._failing():
+                self._bus.send(self._beat, self._send_timeout)
         acting = self._commanded
         if self._armed:
             self._check(now)
@@ -226,7 +192,13 @@ class Cia402Drivers:
                     [value if drive.enabled else 0.0 for value, drive in zip(acting, self.drives, strict=True)]
                 )
         self._acting = acting
-        return [drive.actual for drive in self.drives]
+        return measured
+
+    def _tick(self) -> None:
+        if not self._is_sent:
+            self._send_targets()
+        self._is_sent = False
+        self._bus.send(self._sync, self._send_timeout)
 
     def write(self, targets: Sequence[float]) -> tuple[float, ...]:
         """Take the targets (V; in the modes csp and csv unit, unit/s) that act from the next SYNC on.
@@ -247,8 +219,8 @@ class Cia402Drivers:
         if self._early:
             try:
                 self._send_targets()
-            except can.CanError as error:
-                raise MachineError(f"bus {self._bus_name} failed: {error}") from error
+            except self.failures as error:
+                raise self._failed(error) from error
             self._is_sent = True
         return self._acting
 
@@ -270,73 +242,26 @@ class Cia402Drivers:
                 drive.quit()
             else:
                 drive.lead(self._armed)
-            self._bus.send(drive.fill(), self._timeout * LOST_AFTER)
+            self._bus.send(drive.fill(), self._send_timeout)
 
-    def _collect(self, deadline: float) -> None:
-        """Take frames until all TPDOs are here or the deadline has passed."""
-        receive, table, clock = self._bus.recv, self._table, time.monotonic
-        awaited = {drive.node for drive in self.drives}
-        while awaited:
-            left = deadline - clock()
-            message = receive(left if left > 0.0 else 0.0)
-            if message is None:
-                if left <= 0.0 or clock() >= deadline:
-                    break
-                continue
-            entry = table.get(message.arbitration_id)
-            if entry is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
-                self._take_foreign(message)
-                continue
-            kind, drive = entry
-            if kind != _TPDO:
-                self._note(kind, drive, message)
-            elif len(message.data) >= 6:
-                drive.take_status(message.data)
-                awaited.discard(drive.node)
-        if awaited:
-            self._note_missing(awaited)
+    def _take_emergency(self, drive: Remote, message: can.Message, late: bool) -> None:
+        if len(message.data) >= 2 and (code := int.from_bytes(message.data[:2], "little")):
+            drive.emergency = code
+            self.counters.emergencies += 1
+            LOG.warning("%s reports %s", drive, error_text(code))
 
-    def _drain(self) -> None:
-        """Take what has come since the last cycle; a position among it is late, and is not this cycle's."""
-        for _ in range(_MOST_WAITING):
-            message = self._bus.recv(0.0)
-            if message is None:
-                return
-            kind, drive = self._table.get(message.arbitration_id, (_OTHER, None))
-            if drive is None:
-                self._take_foreign(message)
-            elif kind == _TPDO:
-                self._unheard.discard(drive.node)
-                self.counters.late += 1
-            else:
-                self._note(kind, drive, message)
+    def _take_heartbeat(self, drive: Remote, message: can.Message, late: bool) -> None:
+        if len(message.data) != 1:
+            return
+        drive.heard_at = time.monotonic()
+        nmt = message.data[0] & 0x7F
+        if nmt != Nmt.OPERATIONAL and self._armed:
+            what = "has restarted" if nmt == Nmt.BOOT_UP else f"has left NMT state OPERATIONAL (now {nmt})"
+            raise self._wrong(drive, what)
 
-    def _note(self, kind: int, drive: Remote, message: can.Message) -> None:
-        if kind == _EMERGENCY and len(message.data) >= 2:
-            code = int.from_bytes(message.data[:2], "little")
-            if code:
-                drive.emergency = code
-                self.counters.emergencies += 1
-                LOG.warning("%s reports %s", drive.name, error_text(code))
-        elif kind == _HEARTBEAT and len(message.data) == 1:
-            drive.heard_at = time.monotonic()
-            nmt = message.data[0] & 0x7F
-            if nmt != Nmt.OPERATIONAL and self._armed:
-                what = "has restarted" if nmt == Nmt.BOOT_UP else f"has left NMT state OPERATIONAL (now {nmt})"
-                raise self._wrong(drive, what)
-
-    def _note_missing(self, awaited: set[int]) -> None:
-        lost = []
-        for drive in self.drives:
-            if drive.node in awaited:
-                self._unheard.add(drive.node)
-                drive.missed += 1
-                self.counters.missing += 1
-                if drive.missed >= LOST_AFTER and drive.seen:
-                    lost.append(drive)
-        if lost:
-            self.stop()
-            raise self._silent(lost)
+    def _lost(self, modules: Sequence[Remote]) -> MachineError:
+        self.stop()
+        return self._silent(modules)
 
     def _check(self, now: float) -> None:
         """Whether each drive is as it should be under command."""
@@ -355,12 +280,9 @@ class Cia402Drivers:
             for drive in self.drives:
                 if drive.heard_at < inf and now - drive.heard_at > allowed:
                     self.stop()
-                    raise MachineError(f"no heartbeat from {drive.name} for {now - drive.heard_at:.2f} s")
+                    raise MachineError(f"no heartbeat from {drive} for {now - drive.heard_at:.2f} s")
 
     # --- the end
-
-    def confirm(self) -> None:
-        """After the last sample: a drive that was silent for 10 periods has ended the run already."""
 
     def stop(self) -> None:
         """Power off on all axes, now: voltage disabled in mode cst, a quick stop in csp and csv.
@@ -370,7 +292,7 @@ class Cia402Drivers:
         self._armed = False
         self._stopping = True
         self._commanded = self._acting = (0.0,) * len(self.drives)
-        if not self._started:
+        if not self._configured:
             return
         try:
             for drive in self.drives:
@@ -381,23 +303,13 @@ class Cia402Drivers:
         except (can.CanError, OSError) as error:
             LOG.error("power off could not be sent (%s); the drives do it when SYNC and heartbeat are missing", error)
 
-    def close(self) -> None:
-        """Power off, drives to PRE-OPERATIONAL, then let go of the bus (a bus that was handed in stays open)."""
-        if self._closed:
-            return
-        self._closed = True
-        self.stop()
-        if self._started:
-            with contextlib.suppress(MachineError, can.CanError, OSError):
-                self._let_go()
-        if self._owns_bus:
-            self._bus.shutdown()
-
     def _let_go(self) -> None:
-        """Wait until the drives have stopped; then they need neither SYNC nor our heartbeat any more.
+        """Wait until the drives have stopped, then bring them to PRE-OPERATIONAL without heartbeats of ours.
 
         One that stays in QUICK STOP ACTIVE, as option codes 5 to 8 of 0x605A have it, is told to give up its power.
         """
+        if not self._configured:
+            return
         deadline = time.monotonic() + _STOPPING
         moving = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
         while any(drive.state in moving for drive in self.drives) and time.monotonic() < deadline:
@@ -419,17 +331,10 @@ class Cia402Drivers:
         self.stop()
         code = ask(self._bus, drive)
         return MachineError(
-            f"{drive.name} {what}: state {drive.state}, statusword {status_text(drive.status)}, "
+            f"{drive} {what}: state {drive.state}, statusword {status_text(drive.status)}, "
             f"error code {error_text(code) if code is not None else 'unknown (no answer)'}"
         )
 
-    def _silent(self, drives: Sequence[Remote]) -> MachineError:
-        names = ", ".join(drive.name for drive in drives)
-        return MachineError(f"no answer from {names} on bus {self._bus_name}; check [bus], power and cable")
 
-    @contextlib.contextmanager
-    def _failing_bus(self) -> Any:
-        try:
-            yield
-        except (can.CanError, OSError) as error:
-            raise MachineError(f"bus {self._bus_name} failed: {error}") from error
+def _pass_over(message: can.Message, late: bool) -> None:
+    """What a drive answers to a request."""

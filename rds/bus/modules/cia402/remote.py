@@ -9,6 +9,7 @@ import can
 from rds.bus.modules.cia402 import codes
 from rds.bus.modules.cia402.codes import State, state_of
 from rds.bus.modules.cia402.settings import Command, DriveSettings
+from rds.bus.modules.drivers_base import Module
 from rds.core.errors import InputError
 
 _STATUS = Struct("<Hi")  # statusword, actual position or velocity
@@ -24,38 +25,34 @@ _TOWARDS = {
 }
 
 
-class Remote:
+class Remote(Module):
     """One drive: its frames, and what it said last. Values are in the axis's units, or V for torque."""
 
     __slots__ = (
         "_command",
-        "_counts",
         "_counts_limit",
         "_factor",
         "_pack",
         "_settings",
-        "actual",
-        "actual_counts",
         "controlword",
         "emergency",
         "enabled",
         "heard_at",
         "message",
-        "missed",
-        "origin",
-        "seen",
         "state",
         "status",
         "target",
         "was_enabled",
     )
 
-    def __init__(self, settings: DriveSettings):
+    def __init__(self, settings: DriveSettings, absolute: bool = False):
+        per_unit = settings.velocity_counts if settings.reads_velocity else settings.counts
+        super().__init__(
+            settings.name, settings.direction / per_unit, absolute=absolute or settings.reads_velocity
+        )  # a speed has no origin
         self._settings, self._command = settings, settings.command
         torque = settings.command is Command.CST
         self._pack = Struct("<Hh" if torque else "<Hi").pack_into
-        per_unit = settings.velocity_counts if settings.reads_velocity else settings.counts
-        self._counts = settings.direction / per_unit  # units per count
         self._factor = (
             settings.direction
             * {
@@ -70,42 +67,29 @@ class Remote:
         )
         self.controlword = codes.DISABLE_VOLTAGE
         self.target = 0  # in the drive's units, as the next RPDO carries it
-        self.actual = 0.0
-        self.actual_counts = 0
-        self.origin = 0  # counts where `actual` is 0
         self.status = 0
         self.state: State | None = None
         self.enabled = self.was_enabled = False
         self.emergency = 0  # error code of the last emergency message; 0 none
-        self.missed = 0  # answers in a row
-        self.seen = False
         self.heard_at = 0.0  # s, of the last heartbeat; infinite before the first
-
-    @property
-    def name(self) -> str:
-        """For messages: "X (node 2)"."""
-        return self._settings.name
 
     @property
     def node(self) -> int:
         """Node-ID."""
         return self._settings.node
 
-    @property
-    def reads_velocity(self) -> bool:
-        """Whether `actual` is a speed, which has no origin."""
-        return self._settings.reads_velocity
-
-    def take_status(self, data: bytes | bytearray) -> None:
-        """A TPDO has come."""
-        self.status, counts = _STATUS.unpack_from(data)
+    def take_status(self, message: can.Message, late: bool = False) -> Remote | None:
+        """As DriversBase._take, of a TPDO. A late one holds a position that is not this cycle's."""
+        if late:
+            return self
+        data = message.data
+        if len(data) < 6:
+            return None
+        self.status, self.counts = _STATUS.unpack_from(data)
         if self.status & 0x6F != 0x27 or not self.enabled:
             self.state = state_of(self.status)
             self.enabled = self.state is State.OPERATION_ENABLED
-        self.actual_counts = counts
-        self.actual = ((counts - self.origin + _HALF) % _TURN - _HALF) * self._counts
-        self.missed = 0
-        self.seen = True
+        return self
 
     def aim(self, value: float) -> float:
         """Take the next target (V, or the axis's unit, or unit/s); returns it as it will be sent.
@@ -115,7 +99,7 @@ class Remote:
         target = value * self._factor
         if not -self._counts_limit <= target <= self._counts_limit:  # false for NaN too
             unit, limit = self._unit()
-            raise InputError(f"{value!r} {unit} for {self.name} must be from -{limit:g} to {limit:g} {unit}")
+            raise InputError(f"{value!r} {unit} for {self} must be from -{limit:g} to {limit:g} {unit}")
         self.target = round(target)
         if self._command is Command.CSP:
             self.target = (self.target + self.origin + _HALF) % _TURN - _HALF
@@ -124,7 +108,7 @@ class Remote:
 
     def hold(self) -> None:
         """The target at which nothing moves: no torque, no velocity, or the position where the axis is."""
-        self.target = self.actual_counts if self._command is Command.CSP else 0
+        self.target = self.counts if self._command is Command.CSP else 0
 
     def fill(self) -> can.Message:
         """The RPDO with controlword and target as they are."""
@@ -145,5 +129,9 @@ class Remote:
 
     def _unit(self) -> tuple[str, float]:
         unit = self._settings.axis.unit
-        name = {Command.CST: "V", Command.CSP: unit, Command.CSV: unit if self.reads_velocity else f"{unit}/s"}
+        name = {
+            Command.CST: "V",
+            Command.CSP: unit,
+            Command.CSV: unit if self._settings.reads_velocity else f"{unit}/s",
+        }
         return name[self._command], self._counts_limit / abs(self._factor)

@@ -39,11 +39,8 @@ class OacsDrivers(AxisDrivers):
         self._where = (interface, default_channel(machine, interface, channel))
         self._options = {key: value for key, value in options.items() if key not in _OF_DRIVERS}
 
-    def start(self) -> None:
-        """Look who is there, then as AxisDrivers.start.
-
-        Raises MachineError for numbers used twice, an emergency stop that is latched, and modules that don't answer.
-        """
+    def _refuse_company(self) -> None:
+        """MachineError also for numbers that are used twice, and for an emergency stop that is latched."""
         bus = self._shared if self._shared is not None else open_bus(*self._where, **self._options)
         try:
             found = survey(bus)
@@ -57,4 +54,4 @@ class OacsDrivers(AxisDrivers):
             raise MachineError(
                 f"the emergency stop of {', '.join(latched)} is latched; release the button, then reset it"
             )
-        super().start()
+        super()._refuse_company()
