@@ -147,7 +147,7 @@ def test_stdout_is_the_json_s_whatever_the_student_prints(folder: Path, mode: st
         (["run", "e.toml", "-m", "emulation", "--out", "law.py"], "law.py: is a file, not a folder"),
         (["check", "gone.py"], "gone.py: there is no such file"),
         (["check", "e.toml"], "e.toml"),
-        (["check", "law.py", "--sample-period", "0"], "must be more than 0"),
+        (["check", "law.py", "--sample-period", "0"], "must be from 1e-06 to 1000 s"),
         (["check", "model.py", "--axes", "2"], "it defines no control(t, r, y, state, params)"),
         (["check", "e.toml", "--axes", "2"], "--axes 2 is for a coupled controller"),
         (["compare", "gone", "law.py"], "gone"),

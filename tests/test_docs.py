@@ -15,12 +15,13 @@ import rds
 from rds.bus.modules.rds import frames
 from rds.checks import check_file
 from rds.controllers import controller_module, controller_names
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.core.types import Ending, Verdict
 from rds.machines import load_machine
 from rds.models import model_module, model_names
 from rds.models.machine_axis import MachineParameters
 from rds.modes import mode_names
+from rds.modes.experiment.experiment_file import EXPERIMENT
 from rds.modes.experiment.resolve import resolve
 from rds.references import make_signal, signal_kinds
 from rds.references import user as user_signal
@@ -32,7 +33,7 @@ BLOCKS = blocks(DOCUMENT)
 NAMED = set(re.findall(r"`\"?([\w.-]+)\"?`", TEXT))  # every word between backticks, in quotes or not
 NAMED |= set(re.findall(r"`(?:name|kind|late) = \"([\w-]+)\"`", TEXT))
 
-EXPERIMENT: dict[str, Any] = {
+TABLE: dict[str, Any] = {
     "axes": ["X"],
     "duration": 0.1,
     "reference": {"kind": "constant", "value": 0.0},
@@ -43,7 +44,7 @@ EXPERIMENT: dict[str, Any] = {
 def known_keys(**table: Any) -> list[str]:
     """The keys that the code knows where it was given the unknown key "no_such_key"."""
     with pytest.raises(rds.InputError) as refusal:
-        resolve(Words(EXPERIMENT | table), Path())
+        resolve(TomlTable(TABLE | table, EXPERIMENT), Path())
     listed = re.search(r"known keys: ([\w, ]+)", str(refusal.value))
     assert listed, str(refusal.value)
     return listed[1].split(", ")
@@ -99,7 +100,7 @@ def test_modes_endings_verdicts_and_metrics() -> None:
 
 
 def test_columns() -> None:
-    table = Words(EXPERIMENT | {"mode": "implementation"})
+    table = TomlTable(TABLE | {"mode": "implementation"}, EXPERIMENT)
     plan, _ = resolve(table, Path())
     columns, _ = plan.columns("modelled")
     assert set(columns) - {"sample"} | {"time", "X_simulated", "lateness", "io", "compute", "model", "taken"} <= NAMED
@@ -107,13 +108,13 @@ def test_columns() -> None:
 
 def test_machine_files() -> None:
     assert {field.name for field in fields(MachineParameters)} <= NAMED
-    from rds.machines import machine, module_table
+    from rds.machines.machine import AXIS, LIMITS, MACHINE
+    from rds.machines.module_table import MODULE
 
-    assert set(module_table.KEYS) <= NAMED
-    assert {"name", "title", "sample_period"} <= NAMED
-    assert set(machine._TOP) == {"name", "title", "sample_period", "converter", "axis"}
-    assert machine._LIMITS <= NAMED
-    assert {f"axis.NAME.{key}" for key in machine._AXIS} | {"converter.range", "converter.bits"} <= NAMED
+    assert {*MODULE.keys, *LIMITS.keys} <= NAMED
+    tables = {"converter", "axis"}
+    assert set(MACHINE.keys) - tables <= NAMED
+    assert {f"axis.NAME.{key}" for key in AXIS.keys} | {"converter.range", "converter.bits"} <= NAMED
 
 
 def test_the_bus_protocol() -> None:

@@ -16,6 +16,7 @@ from rds.checks import clauses
 from rds.checks.child import Ended, run_child
 from rds.checks.report import CheckReport, Fault, FileReport, read_faults, read_report
 from rds.core.errors import ContractError, InputError
+from rds.core.shared_quantities import SAMPLE_PERIOD
 
 TIME_LIMIT = 30.0  # s: an ordinary file takes one or two, and as long again to import what it needs
 MEMORY_LIMIT = 4 << 30  # bytes of address space: an interpreter with scipy and numba has less than half of it
@@ -50,8 +51,7 @@ def check_file(
     This protects from accidents, not from attacks. Raises InputError, with file and line, for a file that is
     missing, cannot be read or run, or fills no interface.
     """
-    if not sample_period > 0:
-        raise InputError(f"sample_period = {sample_period!r} s must be more than 0")
+    SAMPLE_PERIOD.check(sample_period, "sample_period")
     file = Path(path).absolute()
     with tempfile.TemporaryDirectory(prefix="rds-check-") as folder:
         result, trace = Path(folder, "result"), Path(folder, "trace")

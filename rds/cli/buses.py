@@ -66,10 +66,11 @@ def bus_table_of(experiment: Path | None, interface: str | None = None, channel:
     """
     table: dict[str, Any] = {}
     if experiment is not None:
-        from rds.core.toml_table import Words
+        from rds.core.toml_table import TomlTable
+        from rds.modes.experiment.experiment_file import EXPERIMENT
         from rds.modes.experiment.resolve import bus_table
 
-        table = bus_table(Words.read(experiment), experiment.parent)
+        table = bus_table(TomlTable.open(experiment, EXPERIMENT), experiment.parent)
         said = str(table.get("interface", BUILTIN))
         if interface not in (None, said) and table:
             from rds.core.errors import InputError
@@ -86,10 +87,11 @@ def machine_of(experiment: Path | None) -> str:
     """The machine that an experiment is for: a name, or the path of its file."""
     if experiment is None:
         return MACHINE
-    from rds.core.toml_table import Words
+    from rds.core.toml_table import TomlTable
+    from rds.modes.experiment.experiment_file import EXPERIMENT
     from rds.modes.experiment.resolve import machine_name
 
-    return machine_name(Words.read(experiment), experiment.parent)
+    return machine_name(TomlTable.open(experiment, EXPERIMENT), experiment.parent)
 
 
 def chosen_bus(interface: str | None, channel: str | None, experiment: Path | None) -> ChosenBus:

@@ -238,9 +238,9 @@ def _follow_profile(
 
 def _check_program_file(file: Path, T: float) -> None:
     from rds.core.errors import InputError
-    from rds.core.options import Option
+    from rds.core.shared_quantities import SAMPLE_PERIOD
 
-    Option("sample period, s", more_than=0.0).check(T, "--period", "rds interpolate")
+    SAMPLE_PERIOD.check(T, "--period", "rds interpolate")
     if not file.is_file():
         raise InputError("there is no such part program; check the name and the folder", str(file))
 

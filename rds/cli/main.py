@@ -30,6 +30,7 @@ from rds.cli import (
     nc,
     reports,
     robustness,
+    schema,
     validate,
 )
 from rds.cli.app import app as app_page
@@ -77,6 +78,7 @@ app.command()(excite.excite)
 app.command()(validate.validate)
 app.command("app")(app_page)
 app.command()(docs.docs)
+app.command()(schema.schema)
 app.command()(interpolate.interpolate)
 app.command()(robustness.robustness)
 app.add_typer(design.app, name="design")

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
+from rds.core.shared_quantities import SAMPLE_PERIOD
 
 SPINDLE_UNIT = "rev/min"
 
@@ -22,8 +23,8 @@ class AxisData(NamedTuple):
 
 
 _MODEL = {
-    "tau": Option("time constant of the axis, s", more_than=0.0),
-    "K": Option("gain of the axis, (mm/s)/V; (rev/min)/V for a spindle", more_than=0.0),
+    "tau": Quantity("time constant of the axis", "s", above=0.0),
+    "K": Quantity("gain of the axis; (rev/min)/V for a spindle", "(mm/s)/V", above=0.0),
 }
 
 
@@ -32,14 +33,14 @@ def axis_data(axis_model: Mapping[str, Any], T: float, converter_range: float, u
     for name, option in _MODEL.items():
         if name not in axis_model:
             raise InputError(
-                f"{owner} needs the axis's {name} ({option.meaning}), which its model does not give; "
+                f"{owner} needs the axis's {name} ({option.described}), which its model does not give; "
                 f"use the machine's axis model or give {name} among the model's params"
             )
     return AxisData(
         tau=_MODEL["tau"].check(axis_model["tau"], "tau", owner),
         K=_MODEL["K"].check(axis_model["K"], "K", owner),
-        T=Option("sample period, s", more_than=0.0).check(T, "T", owner),
-        converter_range=Option("range of the converter, V", more_than=0.0, infinite=True).check(
+        T=SAMPLE_PERIOD.check(T, "T", owner),
+        converter_range=Quantity("range of the converter", "V", above=0.0, infinite=True).check(
             converter_range, "converter_range", owner
         ),
         spindle=unit == SPINDLE_UNIT,

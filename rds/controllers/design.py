@@ -15,7 +15,7 @@ import numpy as np
 from rds.controllers import observer
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 
 
 def read_poles(poles: Any, count: int | None = None, owner: str = "design") -> list[complex]:
@@ -41,7 +41,7 @@ def _order(pole: complex) -> tuple[float, float]:
 
 
 def _pole(pole: Any, owner: str) -> complex:
-    part = Option("part of a pole, 1/s")
+    part = Quantity("part of a pole", "1/s")
     if isinstance(pole, list | tuple):
         if len(pole) != 2:
             raise InputError(f"{owner}: the pole {pole!r} must be [real, imaginary], 1/s")
@@ -89,7 +89,7 @@ def tracking_gains(tau: float, poles: Any) -> tuple[float, float]:
 
     Raises InputError for poles that are not two, stable and conjugate, or for a `tau` that is not positive.
     """
-    Option("time constant of the axis, s", more_than=0.0).check(tau, "tau", "tracking_gains")
+    Quantity("time constant of the axis", "s", above=0.0).check(tau, "tau", "tracking_gains")
     wanted = read_poles(poles, 2, "tracking_gains")
     gains = _place(np.array([[0.0, 1.0], [0.0, -1.0 / tau]]), np.array([[0.0], [1.0]]), wanted)
     return float(gains[0, 0]), float(gains[0, 1])
@@ -101,7 +101,7 @@ def observer_parameters(tau: float, K: float, pole: float) -> tuple[float, float
     L is placed so that v - v̂ decays with `pole` (1/s): L = -1/τ - pole, F = pole, Ḡ = F L, H = K/τ. Table 2 prints
     these. For a sampled loop use `sampled_observer`.
     """
-    Option("time constant of the axis, s", more_than=0.0).check(tau, "tau", "observer_parameters")
+    Quantity("time constant of the axis", "s", above=0.0).check(tau, "tau", "observer_parameters")
     observer.check_pole(pole, "observer_parameters")
     L = float(_place(np.array([[-1.0 / tau]]), np.array([[1.0]]), [complex(pole)])[0, 0])
     F = -1.0 / tau - L

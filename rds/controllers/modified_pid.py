@@ -18,13 +18,14 @@ from typing import Any
 from rds.controllers.axis_data import axis_data
 from rds.controllers.tuning import pid_gains, set_point_weight
 from rds.controllers.words import BIAS, ERROR_LIMITS, FILTER, GAINS, OUTPUT_LIMIT, limit_or_none, output_limit, retuned
-from rds.core.options import Option, read_options
+from rds.core.options import read_options
+from rds.core.quantities import Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "modified-pid"
 WEIGHTS = {
-    "b": Option("set-point weight of the proportional part", at_least=0.0),
-    "c": Option("set-point weight of the derivative part", at_least=0.0),
+    "b": Quantity("set-point weight of the proportional part", low=0.0),
+    "c": Quantity("set-point weight of the derivative part", low=0.0),
 }
 OPTIONS = GAINS | WEIGHTS | BIAS | {"maxerrorI": ERROR_LIMITS["maxerrorI"]} | OUTPUT_LIMIT | FILTER
 

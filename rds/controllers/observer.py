@@ -20,12 +20,14 @@ from __future__ import annotations
 from math import exp, expm1
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
+from rds.core.shared_quantities import SAMPLE_PERIOD
 
+POLE = Quantity("pole of the observer, left of 0, such as -320", "1/s")
 _OPTIONS = {
-    "tau": Option("time constant of the axis, s", more_than=0.0),
-    "K": Option("gain of the axis, (mm/s)/V"),
-    "T": Option("sample period, s", more_than=0.0),
+    "tau": Quantity("time constant of the axis", "s", above=0.0),
+    "K": Quantity("gain of the axis", "(mm/s)/V"),
+    "T": SAMPLE_PERIOD,
 }
 
 
@@ -55,7 +57,7 @@ def coefficients(tau: float, K: float, pole: float, T: float) -> tuple[float, fl
 
 def check_pole(pole: float, owner: str) -> float:
     """The observer's pole as a float, 1/s; InputError unless it is a negative number."""
-    number = Option("pole of the observer, 1/s, such as -320").check(pole, "observer_pole", owner)
+    number = POLE.check(pole, "observer_pole", owner)
     if number >= 0.0:
         raise InputError(f"{owner}: observer_pole = {pole!r} 1/s is not stable; it must be less than 0, such as -320")
     return number

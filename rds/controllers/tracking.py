@@ -15,14 +15,21 @@ from typing import Any
 from rds.controllers import observer
 from rds.controllers.axis_data import SPINDLE_UNIT, AxisData, axis_data
 from rds.core.errors import InputError
-from rds.core.options import Option, check_known
+from rds.core.options import check_known
+from rds.core.quantities import Anything, Declaration, Items, Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "tracking"
-OPTIONS = ("poles", "observer_pole", "gains")
+_REAL = Quantity("real pole", "1/s")
+_PAIR = Items("pole", Quantity("real or imaginary part", "1/s"), "[real, imaginary]", 2)
+OPTIONS: Mapping[str, Declaration] = {
+    "poles": Items("closed-loop poles, 1/s", Anything("pole", (_REAL, _PAIR)), "two poles", 2),
+    "observer_pole": observer.POLE,
+    "gains": Items("in place of poles", Quantity("gain"), "[g1, g2], in 1/s² and 1/s", 2),
+}
 POLES = ((-32.0, 24.0), (-32.0, -24.0))  # 1/s: the paper's, settling in 0.125 s
 OBSERVER_POLE = -320.0  # 1/s: the paper's
-TUNABLE = {"g1": Option("position gain, 1/s²"), "g2": Option("velocity gain, 1/s")}
+TUNABLE = {"g1": Quantity("position gain", "1/s²"), "g2": Quantity("velocity gain", "1/s")}
 
 
 def law(position, velocity, acceleration, y, state, c):

@@ -9,28 +9,28 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import Any
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import Controller
 
 GAINS = {
-    "Pgain": Option("proportional gain, V/mm", at_least=0.0),
-    "Igain": Option("integral gain, V/(mm s)", at_least=0.0),
-    "Dgain": Option("derivative gain, V/(mm/s)", at_least=0.0),
+    "Pgain": Quantity("proportional gain", "V/mm", low=0.0),
+    "Igain": Quantity("integral gain", "V/(mm s)", low=0.0),
+    "Dgain": Quantity("derivative gain", "V/(mm/s)", low=0.0),
 }
-BIAS = {"bias": Option("constant added to the output, V")}
+BIAS = {"bias": Quantity("constant added to the output", "V")}
 FEEDFORWARD = {
-    "FF0": Option("zeroth-order feedforward, V per mm of reference"),
-    "FF1": Option("first-order feedforward, V per mm/s of reference"),
-    "FF2": Option("second-order feedforward, V per mm/s² of reference"),
+    "FF0": Quantity("zeroth-order feedforward", "V per mm of reference"),
+    "FF1": Quantity("first-order feedforward", "V per mm/s of reference"),
+    "FF2": Quantity("second-order feedforward", "V per mm/s² of reference"),
 }
-DEADBAND = {"deadband": Option("error that counts as none, mm; 0 = none", at_least=0.0)}
+DEADBAND = {"deadband": Quantity("error that counts as none; 0 = none", "mm", low=0.0)}
 ERROR_LIMITS = {
-    "maxerror": Option("limit of the error, mm; 0 = no limit", at_least=0.0),
-    "maxerrorI": Option("limit of the error's integral, mm s; 0 = no limit", at_least=0.0),
-    "maxerrorD": Option("limit of the error's derivative, mm/s; 0 = no limit", at_least=0.0),
+    "maxerror": Quantity("limit of the error; 0 = no limit", "mm", low=0.0),
+    "maxerrorI": Quantity("limit of the error's integral; 0 = no limit", "mm s", low=0.0),
+    "maxerrorD": Quantity("limit of the error's derivative; 0 = no limit", "mm/s", low=0.0),
 }
-OUTPUT_LIMIT = {"maxoutput": Option("limit of the output, V; 0 = the converter's range", at_least=0.0)}
-FILTER = {"derivative_filter": Option("time constant of the derivative's filter, s; 0 = none", at_least=0.0)}
+OUTPUT_LIMIT = {"maxoutput": Quantity("limit of the output; 0 = the converter's range", "V", low=0.0)}
+FILTER = {"derivative_filter": Quantity("time constant of the derivative's filter; 0 = none", "s", low=0.0)}
 
 
 def limit_or_none(value: float) -> float:

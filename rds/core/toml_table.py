@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.quantities import Anything, Declaration, Quantity, Table, Tables, near, shortened
 from rds.core.toml_file import read_toml
 
 
-class Words:
-    """One table of a file. `done()` at the end refuses the keys that nobody asked for.
+class TomlTable:
+    """One table of a file, read by its declaration. `done()` at the end refuses the keys that nobody asked for.
 
     With `general`, keys that the table lacks are looked for in that one, among those in `shared`.
     """
@@ -21,21 +22,22 @@ class Words:
     def __init__(
         self,
         table: dict[str, Any],
+        declared: Table | None = None,
         text: str = "",
         path: str = "",
         name: str = "",
-        general: Words | None = None,
+        general: TomlTable | None = None,
         shared: Sequence[str] = (),
         lines_before: int = 0,
     ):
-        self.table, self.path, self.name = table, path, name
+        self.table, self.declared, self.path, self.name = table, declared, path, name
         self._text, self._general, self._shared = text, general, shared
         self.lines_before = lines_before  # of the file, above `text`, for the lines in errors
         self._asked: list[str] = []
 
-    def over_written(self, table: dict[str, Any]) -> Words:
+    def over_written(self, table: dict[str, Any]) -> TomlTable:
         """The same file with another top table: errors still tell the file's places."""
-        return Words(table, self._text, self.path)
+        return TomlTable(table, self.declared, self._text, self.path)
 
     @property
     def source(self) -> str:
@@ -43,10 +45,10 @@ class Words:
         return self._text
 
     @classmethod
-    def read(cls, path: str | Path) -> Words:
+    def open(cls, path: str | Path, declared: Table | None = None) -> TomlTable:
         """The top table of a TOML file; InputError if it cannot be read or is not TOML."""
         table, text = read_toml(path)
-        return cls(table, text, str(path))
+        return cls(table, declared, text, str(path))
 
     def place(self, key: str | None = None) -> str:
         """File and line of a key of this table, as far as they are known."""
@@ -62,8 +64,11 @@ class Words:
     def fault(self, key: str, remedy: str) -> InputError:
         """The error that this value of `key` will not do."""
         owner = self._owner(key)
-        prefix = f"{owner.name}." if owner.name else ""
-        return InputError(f"{prefix}{key} = {owner.table.get(key)!r:.200} {remedy}", owner.place(key))
+        return InputError(f"{owner.full_name(key)} = {shortened(owner.table.get(key))} {remedy}", owner.place(key))
+
+    def full_name(self, key: str) -> str:
+        """The key with the names of the tables that it stands in."""
+        return f"{self.name}.{key}" if self.name else key
 
     def __contains__(self, key: str) -> bool:
         owner = self._owner(key)
@@ -75,93 +80,89 @@ class Words:
         """Whatever stands there."""
         return self._owner(key).table[key] if key in self else default
 
-    def over(self, general: Words, shared: Sequence[str]) -> Words:
-        """This table, and `general` behind it for the keys in `shared`."""
-        return Words(self.table, self._text, self.path, self.name, general, shared, self.lines_before)
+    def read(self, key: str, default: Any = None) -> Any:
+        """The value of a declared key as it is used; where the file has none, `default`, or that of the declaration.
 
-    def _owner(self, key: str | None) -> Words:
+        InputError for a value that is refused, and for a key that is needed and not there.
+        """
+        declared = self._of(key)
+        if key not in self:
+            if default is None and self.declared is not None and key in self.declared.needed:
+                raise self.missing(key)
+            return declared.default if default is None else default
+        value = self.any(key)
+        if (fault := declared.fault(value)) is not None:
+            raise self.fault(key, fault)
+        return declared.taken(value)
+
+    def missing(self, key: str) -> InputError:
+        """The error that a key that is needed is not there."""
+        declared = self._of(key)
+        slip = get_close_matches(key, [name for name in self.table if name not in self._asked], n=1)
+        hint = f"; is '{slip[0]}' meant to be it?" if slip else ""
+        remedy = f"add it ({declared.meaning})"
+        if isinstance(declared, Quantity):
+            unit = f"it in {declared.unit}" if declared.unit else "a number"
+            remedy = f"give {unit}, as in `{key} = {1 if declared.whole else 1.0}`"
+        return InputError(f"{key} is missing; {remedy}{hint}", self.place())
+
+    def _of(self, key: str) -> Declaration:
+        assert self.declared is not None, f"{key} is read from a table without a declaration"
+        return self.declared.of(key)
+
+    def over(self, general: TomlTable, shared: Sequence[str]) -> TomlTable:
+        """This table, and `general` behind it for the keys in `shared`."""
+        return TomlTable(
+            self.table, self.declared, self._text, self.path, self.name, general, shared, self.lines_before
+        )
+
+    def _owner(self, key: str | None) -> TomlTable:
         """The table in which `key` stands."""
         if key in self._shared and key not in self.table and self._general is not None and key in self._general.table:
             return self._general
         return self
 
-    def number(
-        self,
-        key: str,
-        default: float | None,
-        unit: str,
-        low: float,
-        high: float,
-    ) -> float:
-        """A number in `unit` from `low` to `high`; without a default it must be there."""
-        value = self.any(key, default)
-        if value is None:
-            slip = get_close_matches(key, [name for name in self.table if name not in self._asked], n=1)
-            hint = f"; is '{slip[0]}' meant to be it?" if slip else ""
-            raise InputError(f"{key} is missing; give it in {unit}, as in `{key} = 1.0`{hint}", self.place())
-        if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
-            raise self.fault(key, f"must be a number in {unit}, without quotes")
-        if not low <= value <= high:
-            raise self.fault(key, f"must be from {low:g} to {high:g} {unit}")
-        return float(value)
-
-    def whole(self, key: str, default: int | None, meaning: str, low: int = 0, high: int = 10**9) -> int | None:
-        """A whole number from `low` to `high`."""
-        value = self.any(key, default)
-        if value is None:
-            return None
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise self.fault(key, f"must be a whole number from {low} to {high} ({meaning})")
-        return value
-
-    def flag(self, key: str, default: bool) -> bool:
-        """true or false."""
-        value = self.any(key, default)
-        if not isinstance(value, bool):
-            raise self.fault(key, "must be true or false")
-        return value
-
-    def text(self, key: str, default: str | None = None) -> str | None:
-        """A text in quotes."""
-        value = self.any(key, default)
-        if value is not None and not isinstance(value, str):
-            raise self.fault(key, "must be a text in quotes")
-        return value
-
-    def choice(self, key: str, default: str, choices: Sequence[str]) -> str:
-        """One of several words."""
-        value = self.any(key, default)
-        if not isinstance(value, str) or value not in choices:
-            raise self.fault(key, f"is unknown; known: {', '.join(choices)}{_near(value, choices)}")
-        return str(value)
-
-    def inner(self, key: str) -> Words | None:
+    def inner(self, key: str) -> TomlTable | None:
         """The table under `key`, if there is one."""
         value = self.any(key)
         if value is None:
             return None
         if not isinstance(value, dict):
-            raise self.fault(key, f"must be a table, as in `[{key}]`")
+            raise self.fault(key, f"must be a table; write [{self._owner(key).full_name(key)}]")
         return self.table_of(key, value)
 
-    def tables(self, key: str) -> list[Words]:
+    def inner_or_empty(self, key: str) -> TomlTable:
+        """The table under `key`; an empty one where there is none."""
+        return self.inner(key) or self.table_of(key, {})
+
+    def tables(self, key: str) -> list[TomlTable]:
         """The tables of a list such as `[[logs]]`; none where there is no such list."""
         values = self.any(key, [])
         if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
             raise self.fault(key, f"must be tables, each under `[[{key}]]`")
         owner = self._owner(key)
-        name = f"{owner.name}.{key}" if owner.name else key
+        name = owner.full_name(key)
         texts = _texts_of(owner._text, name, len(values))
+        declared = self._declared_under(key)
         return [
-            Words(value, text, owner.path, name, lines_before=owner.lines_before + before)
+            TomlTable(value, declared, text, owner.path, name, lines_before=owner.lines_before + before)
             for value, (text, before) in zip(values, texts, strict=True)
         ]
 
-    def table_of(self, key: str, table: dict[str, Any]) -> Words:
+    def table_of(self, key: str, table: dict[str, Any]) -> TomlTable:
         """A table that stands for the value of `key`."""
         owner = self._owner(key)
-        name = f"{owner.name}.{key}" if owner.name else key
-        return Words(table, owner._text, owner.path, name, lines_before=owner.lines_before)
+        name, declared = owner.full_name(key), self._declared_under(key)
+        return TomlTable(table, declared, owner._text, owner.path, name, lines_before=owner.lines_before)
+
+    def _declared_under(self, key: str) -> Table | None:
+        """The declaration of the table, or of each table, that `key` holds; None where it has none of its own."""
+        declared = None if self.declared is None else self.declared.of(key)
+        if isinstance(declared, Anything):
+            declared = next((form for form in declared.forms if isinstance(form, Table)), None)
+        if isinstance(declared, Tables):
+            declared = declared.table
+        return declared if isinstance(declared, Table) else None
 
     def done(self) -> None:
         """Refuse keys that have not been asked for."""
@@ -170,14 +171,9 @@ class Words:
             if key not in known:
                 table = f" in [{self.name}]" if self.name else ""
                 raise InputError(
-                    f"unknown key '{key}'{table}; known keys: {', '.join(sorted(known))}{_near(key, known)}",
+                    f"unknown key '{key}'{table}; known keys: {', '.join(sorted(known))}{near(key, known)}",
                     self.place(key),
                 )
-
-
-def _near(word: Any, known: Sequence[str]) -> str:
-    close = get_close_matches(str(word), known, n=1)
-    return f"; did you mean '{close[0]}'?" if close else ""
 
 
 def _texts_of(text: str, name: str, count: int) -> list[tuple[str, int]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 
 
 class Reference(NamedTuple):
@@ -77,7 +77,7 @@ class Controller:
     params: Mapping[str, Any] = field(default_factory=dict)
     source: Source = Source("user-defined")
     coupled: bool = False
-    tunable: Mapping[str, Option] = field(default_factory=dict)
+    tunable: Mapping[str, Quantity] = field(default_factory=dict)
     retune: Callable[[Mapping[str, float]], Mapping[str, Any]] | None = None
 
 

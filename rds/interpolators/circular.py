@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import ArcSegment, Segment
 from rds.interpolators.linear import BLOCK
 from rds.interpolators.segment import Arc, checked, samples
 
-OPTIONS: Mapping[str, Option] = {}
+OPTIONS: Mapping[str, Quantity] = {}
 
 
 def interpolate(segment: Segment, T: float, params: Mapping[str, Any]) -> Iterator[tuple[np.ndarray, ...]]:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import ArcSegment, Segment
 from rds.interpolators import circular, linear
 
-OPTIONS: Mapping[str, Option] = {}
+OPTIONS: Mapping[str, Quantity] = {}
 
 
 def interpolate(segment: Segment, T: float, params: Mapping[str, Any]) -> Iterator[tuple[np.ndarray, ...]]:

@@ -11,10 +11,10 @@ from math import ceil, log
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 
 MULTIPLIERS = False
-OPTIONS: Mapping[str, Option] = {"time_constant": Option("time constant τ of the velocity, s", more_than=0.0)}
+OPTIONS: Mapping[str, Quantity] = {"time_constant": Quantity("time constant τ of the velocity", "s", above=0.0)}
 DEFAULTS = {"time_constant": 0.02}  # chosen
 _LEFT = 1e-5
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import LineSegment, Segment
 from rds.interpolators.segment import checked, samples
 
-OPTIONS: Mapping[str, Option] = {}
+OPTIONS: Mapping[str, Quantity] = {}
 BLOCK = 512  # rows that are worked out at once
 
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 
 MULTIPLIERS = False
-OPTIONS: Mapping[str, Option] = {"time": Option("how long the velocity rises or falls, s", at_least=0.0)}
+OPTIONS: Mapping[str, Quantity] = {"time": Quantity("how long the velocity rises or falls", "s", low=0.0)}
 DEFAULTS = {"time": 0.05}  # chosen
 
 

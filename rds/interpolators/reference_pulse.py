@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import Segment
 from rds.interpolators import constant_velocity
 
 BLU = 0.01  # mm: dcs-thesis, eq. 5.1
-OPTIONS: Mapping[str, Option] = {"blu": Option("basic length unit, mm", more_than=0.0)}
+OPTIONS: Mapping[str, Quantity] = {"blu": Quantity("basic length unit", "mm", above=0.0)}
 DEFAULTS = {"blu": BLU}
 
 

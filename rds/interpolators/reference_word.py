@@ -23,15 +23,15 @@ from typing import Any
 import numpy as np
 
 from rds.core.geometry import length
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import ArcSegment, Segment
 from rds.interpolators.division import Division, Method, Turn, divide
 from rds.interpolators.segment import Arc, checked, samples
 
 BLU = 0.01  # mm: mrm-control, section 8.2; dcs-thesis, eq. 5.1
-OPTIONS: Mapping[str, Option] = {
-    "blu": Option("basic length unit, which bounds the errors of an arc, mm", more_than=0.0),
-    "steps": Option("steps of each arc instead of as many as the bound asks for; 0: those", at_least=0.0),
+OPTIONS: Mapping[str, Quantity] = {
+    "blu": Quantity("basic length unit, which bounds the errors of an arc", "mm", above=0.0),
+    "steps": Quantity("steps of each arc instead of as many as the bound asks for; 0: those", low=0.0),
 }
 DEFAULTS = {"blu": BLU, "steps": 0.0}
 

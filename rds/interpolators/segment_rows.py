@@ -14,11 +14,45 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.core.geometry import PLANES
 from rds.core.options import check_known
-from rds.core.toml_table import Words
+from rds.core.quantities import Choice, Declaration, Flag, Items, Parts, Quantity, Table, Tables
+from rds.core.toml_table import TomlTable
 from rds.core.types import ArcSegment, LineSegment, Segment
 
 FEED_UNITS = {"mm/min": 1 / 60, "mm/s": 1.0, "m/min": 1000 / 60, "in/min": 25.4 / 60, "in/s": 25.4}  # mm/s
-_KEYS = {"line": ("kind", "end", "feed"), "arc": ("kind", "end", "centre", "clockwise", "plane", "feed")}
+_POINT = Items(
+    "one position for each axis, mm", Quantity("position", "mm"), "one to three positions in mm: X, Y, Z", least=1
+)
+_FEED = Quantity("feed along the path, in the unit of the path", above=0.0)
+_LINE: Mapping[str, Declaration] = {"end": _POINT, "feed": _FEED}
+_ARC: Mapping[str, Declaration] = {
+    "end": _POINT,
+    "centre": _POINT,
+    "clockwise": Flag("which way round the arc goes", False),
+    "plane": Choice("plane of the arc", tuple(PLANES), "XY"),
+    "feed": _FEED,
+}
+_ROWS = {
+    "line": Table("a line", _LINE, needed=("end",)),
+    "arc": Table("an arc", _ARC, needed=("end", "centre")),
+}
+SEGMENTS = Table(
+    "A path: lines and arcs, each from where the one before ended.",
+    {
+        "start": _POINT,
+        "feed": _FEED,
+        "feed_unit": Choice("unit of all feeds", tuple(FEED_UNITS), "mm/min"),
+        "segment": Tables(
+            "its segments",
+            Table(
+                "a line or an arc",
+                chosen_by="kind",
+                parts=Parts(lambda: list(_ROWS), lambda kind: _ROWS[kind]),
+            ),
+            least=1,
+        ),
+    },
+    needed=("start", "feed", "segment"),
+)
 
 
 def segments_of(start: Sequence[float], rows: Sequence[Mapping[str, Any]], feed: float, unit: str) -> list[Segment]:
@@ -53,14 +87,14 @@ def point(value: Any, what: str, axes: int | None) -> tuple[float, ...]:
 
 def read_segments(path: str | Path) -> list[Segment]:
     """The path that a TOML file gives: `start`, `feed`, `feed_unit` (mm/min) and `[[segment]]` rows. InputError."""
-    words = Words.read(path)
+    words = TomlTable.open(path, SEGMENTS)
     for key in ("start", "feed"):
         if key not in words:
             raise InputError(
                 f"{key} is missing; as in `{key} = {'[0.0, 0.0]' if key == 'start' else '600'}`", words.place()
             )
     start, feed = words.any("start"), words.any("feed")
-    unit = words.text("feed_unit", "mm/min") or "mm/min"
+    unit = words.read("feed_unit")
     rows = [dict(table.table) for table in words.tables("segment")]
     try:
         made = segments_of(start, rows, _feed(feed, "feed"), unit)
@@ -73,9 +107,9 @@ def read_segments(path: str | Path) -> list[Segment]:
 
 def _segment(here: tuple[float, ...], row: Mapping[str, Any], name: str, feed: float, unit: str) -> Segment:
     kind = row.get("kind")
-    if kind not in _KEYS:
+    if kind not in _ROWS:
         raise InputError(f"{name}: kind = {kind!r} must be line or arc")
-    check_known(row, _KEYS[kind], f"{name} ({kind})")
+    check_known(row, ("kind", *_ROWS[kind].keys), f"{name} ({kind})")
     end = point(row.get("end"), f"{name}: end", len(here))
     rate = FEED_UNITS[unit] * _feed(feed if row.get("feed") is None else row["feed"], f"{name}: feed")
     if kind == "line":
@@ -91,6 +125,4 @@ def _segment(here: tuple[float, ...], row: Mapping[str, Any], name: str, feed: f
 
 
 def _feed(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < float("inf"):
-        raise InputError(f"{what} = {value!r:.60} must be a number above 0")
-    return float(value)
+    return float(_FEED.check(value, what))

@@ -4,21 +4,74 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib.resources import files
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.toml_file import read_toml
-from rds.machines.module_table import module_table
+from rds.core.quantities import Items, Quantity, Table, Text
+from rds.core.shared_quantities import NODE, SAMPLE_PERIOD
+from rds.core.toml_table import TomlTable
+from rds.machines.module_table import MODULE
+
+_RANGE, _BITS = 10.0, 12  # of a machine whose file says nothing
+VOLTAGE_RANGE = Quantity("the output board's range, ±", "V", above=0.0, high=1000.0, default=_RANGE)
+BITS = Quantity("the converter has 2^bits levels", "", 1, 32, default=_BITS, whole=True)
+TRAVEL = Items(
+    "travel; references must stay within",
+    Quantity("end of the travel", "axis unit"),
+    "[lowest, highest], two finite numbers in the axis's unit, the lower one first",
+    2,
+    rising=True,
+)
+RESOLUTION = Quantity("of the encoder", "axis unit per count", above=0.0)
+PARAMETER = Quantity("parameter of the model")
+LIMITS = Table(
+    "what planned motion keeps to; an axis without limits takes part in no part program",
+    {
+        "velocity": Quantity("largest velocity", "axis unit/s", above=0.0),
+        "acceleration": Quantity("largest acceleration", "axis unit/s²", above=0.0),
+        "jerk": Quantity("largest jerk", "axis unit/s³", above=0.0),
+    },
+    needed=("velocity", "acceleration", "jerk"),
+)
+AXIS = Table(
+    "an axis of the machine",
+    {
+        "node": NODE,
+        "unit": Text('unit of its position; "rev/min" makes it a spindle: first order, its speed measured', "mm"),
+        "travel": TRAVEL,
+        "resolution": RESOLUTION,
+        "model": Table(
+            "library model that experiments start from",
+            {"name": Text("its name")},
+            others=PARAMETER,
+            needed=("name",),
+        ),
+        "limits": LIMITS,
+        "machine": Table("the axis behind the bus, for `rds machine serve`", others=PARAMETER),
+        "module": MODULE,
+    },
+    needed=("node", "travel", "resolution"),
+)
+MACHINE = Table(
+    "A machine: its axes, its converter and its sample period.",
+    {
+        "name": Text("name of the machine; by default the file's"),
+        "title": Text("heading of reports", ""),
+        "sample_period": SAMPLE_PERIOD,
+        "converter": Table("digital-to-analogue converter", {"range": VOLTAGE_RANGE, "bits": BITS}),
+        "axis": Table("axes by name, in the order of their voltages in the command frame", others=AXIS),
+    },
+    needed=("sample_period", "axis"),
+)
 
 
 @dataclass(frozen=True)
 class Converter:
     """The digital-to-analogue converter of the output board: ±`range` V in 2^`bits` levels."""
 
-    range: float = 10.0
-    bits: int = 12
+    range: float = _RANGE
+    bits: int = _BITS
 
 
 @dataclass(frozen=True)
@@ -83,97 +136,62 @@ def load_machine(name: str) -> Machine:
         raise InputError(
             f"there is no machine {name!r}; known machines: {', '.join(machine_names())}, or the path of a .toml file"
         )
-    data, _ = read_toml(path)
-    return _machine(data, str(path))
+    return _machine(TomlTable.open(path, MACHINE))
 
 
-_TOP = {"name", "title", "sample_period", "converter", "axis"}
-_AXIS = {"node", "unit", "travel", "resolution", "model", "machine", "module", "limits"}
-_LIMITS = {"velocity", "acceleration", "jerk"}
-
-
-def _machine(data: dict[str, Any], path: str) -> Machine:
-    _known(data, _TOP, path, "")
-    axes = {}
-    for name, table in _table(data, "axis", path).items():
-        place = f"{path}, [axis.{name}]"
-        _known(table, _AXIS, path, f"axis.{name}.")
-        travel = table.get("travel", [])
-        if not _rises(travel):
-            raise InputError(f"travel = {travel!r:.200} must be [lowest, highest]", place)
-        resolution = _number(table, "resolution", place)
-        if not (isfinite(resolution) and resolution > 0):
-            raise InputError(f"resolution = {resolution!r} must be more than 0 (unit per encoder count)", place)
-        node = _number(table, "node", place)
-        if not (isfinite(node) and node == int(node)):
-            raise InputError(f"node = {node!r} must be a whole number", place)
-        for key in ("model", "machine"):
-            _must_be_table(table.get(key, {}), f"axis.{name}.{key}", path)
-        axes[name] = Axis(
-            name=name,
-            node=int(node),
-            unit=str(table.get("unit", "mm")),
-            travel=(float(travel[0]), float(travel[1])),
-            resolution=resolution,
-            model=dict(table.get("model", {})),
-            machine=dict(table.get("machine", {})),
-            module=module_table(table.get("module", {}), f"{path}, [axis.{name}.module]"),
-            limits=_limits(table["limits"], path, name) if "limits" in table else None,
-        )
+def _machine(table: TomlTable) -> Machine:
+    tables = table.inner("axis")
+    if tables is None or not tables.table:
+        raise InputError("needs at least one [axis.NAME] table", table.path)
+    axes = {name: _axis(name, tables) for name in tables.table}
     nodes = [axis.node for axis in axes.values()]
     if len(set(nodes)) != len(nodes):
-        raise InputError(f"two axes share a node; nodes are {nodes}", path)
-    converter = data.get("converter", {})
-    _known(converter, {"range", "bits"}, path, "converter.")
-    return Machine(
-        name=str(data.get("name", Path(path).stem)),
-        title=str(data.get("title", "")),
-        sample_period=_number(data, "sample_period", path),
-        converter=Converter(**converter),
+        raise InputError(f"two axes share a node; nodes are {nodes}", table.path)
+    converter = table.inner_or_empty("converter")
+    made = Machine(
+        name=table.read("name", Path(table.path).stem),
+        title=table.read("title"),
+        sample_period=table.read("sample_period"),
+        converter=Converter(range=converter.read("range"), bits=converter.read("bits")),
         axes=axes,
-        path=path,
+        path=table.path,
     )
+    for each in (converter, table):
+        each.done()
+    return made
 
 
-def _limits(table: Any, path: str, name: str) -> AxisLimits:
-    place = f"{path}, [axis.{name}.limits]"
-    if not isinstance(table, dict):
-        raise InputError(f"limits = {table!r:.200} must be a table", place)
-    _known(table, _LIMITS, path, f"axis.{name}.limits.")
-    values = {key: _number(table, key, place) for key in sorted(_LIMITS)}
-    for key, value in values.items():
-        if not (isfinite(value) and value > 0):
-            raise InputError(f"{key} = {value!r} must be more than 0 and finite", place)
-    return AxisLimits(**{key: float(value) for key, value in values.items()})
+def _axis(name: str, tables: TomlTable) -> Axis:
+    table = tables.inner(name)
+    assert table is not None
+    module, model = table.inner_or_empty("module"), table.inner("model")
+    if model is not None and "name" not in model:
+        raise model.missing("name")
+    travel = table.read("travel")
+    made = Axis(
+        name=name,
+        node=table.read("node"),
+        unit=table.read("unit"),
+        travel=(travel[0], travel[1]),
+        resolution=table.read("resolution"),
+        model=_values(model),
+        machine=_values(table.inner("machine")),
+        module={key: module.read(key) for key in MODULE.keys if key in module},
+        limits=_limits(table.inner("limits")),
+    )
+    for each in (module, table):
+        each.done()
+    return made
 
 
-def _table(data: dict[str, Any], key: str, path: str) -> dict[str, Any]:
-    table = data.get(key)
-    if not isinstance(table, dict) or not table:
-        raise InputError(f"needs at least one [{key}.NAME] table", path)
-    return table
+def _values(table: TomlTable | None) -> dict[str, Any]:
+    """The values of a model's table: a name, and parameters that the model itself knows."""
+    return {} if table is None else {key: table.read(key) for key in table.table}
 
 
-def _rises(travel: Any) -> bool:
-    """Whether it is two finite numbers, the lower one first."""
-    numbers = isinstance(travel, list) and all(isinstance(each, int | float) and isfinite(each) for each in travel)
-    return numbers and len(travel) == 2 and travel[0] < travel[1]
-
-
-def _must_be_table(table: Any, name: str, path: str) -> None:
-    if not isinstance(table, dict):
-        raise InputError(f"{name} = {table!r:.200} must be a table; write [{name}]", path)
-
-
-def _known(table: Any, known: set[str], path: str, prefix: str) -> None:
-    _must_be_table(table, prefix.rstrip("."), path)
-    for key in table:
-        if key not in known:
-            raise InputError(f"unknown key '{prefix}{key}'; known keys: {', '.join(sorted(known))}", path)
-
-
-def _number(table: dict[str, Any], key: str, where: str) -> float:
-    value = table.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{key} = {value!r:.200} must be a number", where)
-    return value
+def _limits(table: TomlTable | None) -> AxisLimits | None:
+    if table is None:
+        return None
+    limits = AxisLimits(**{key: table.read(key) for key in LIMITS.keys})
+    table.done()
+    return limits

@@ -1,74 +1,58 @@
 """The `[axis.NAME.module]` table of a machine's file: what a distributed module knows of itself, and its board does.
 
-Only modules that tell the host what they are (dialect oacs) need it; what it leaves out follows from the axis.
+Only modules that tell the host what they are (dialect oacs) need it; what it leaves out follows from the axis. Whether
+the values make a module (a matrix that is a motion, a letter...) is the dialect's business.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import isfinite
-from typing import Any
-
-from rds.core.errors import InputError
+from rds.core.quantities import Choice, Flag, Items, Quantity, Table, Text
 
 KINDS = ("translational", "rotary", "tool")
-TEXTS = ("board", "kind", "letter", "kind_text", "type_text", "joint")
-SIGNED = ("initial", "start")  # positions, in the axis's unit
-UNSIGNED = (
-    *("accuracy", "repeatability", "counts_per_unit", "least_speed", "clockwise_speed", "counterclockwise_speed"),
-    *("supply", "overtravel", "debounce", "response_call", "response_download", "current_start", "current_run"),
-    *("interrupt_service", "interrupt_pause", "interrupt_every"),
+_PLACE = "position, in the axis's unit"
+_READING = Quantity("reading of 10 bits", "", 0, 1023, whole=True)
+_ROW = Items("row of the matrix", Quantity("entry of the matrix"), "4 numbers", 4)
+
+
+def _not_negative(meaning: str, unit: str) -> Quantity:
+    return Quantity(meaning, unit, low=0.0)
+
+
+def _three(meaning: str) -> Items:
+    return Items(meaning, _READING, "three whole numbers from 0 to 1023", 3)
+
+
+MODULE = Table(
+    "what the module of the axis says of itself (`rds machine serve --dialect oacs`)",
+    {
+        "board": Text("its controller board, for the reader"),
+        "kind": Choice("kind of module; by default from the axis's unit", KINDS),
+        "letter": Text("the axis letter in messages"),
+        "kind_text": Text("what it answers to a general call: its kind"),
+        "type_text": Text("what it answers to a general call: its type"),
+        "joint": Text("the joint of the kinematic chain that it is"),
+        "initial": Quantity(f"initial {_PLACE}"),
+        "start": Quantity(f"first {_PLACE} of the virtual axis"),
+        "accuracy": _not_negative("accuracy", "axis unit"),
+        "repeatability": _not_negative("repeatability, ±", "axis unit"),
+        "counts_per_unit": _not_negative("encoder counts", "counts per axis unit"),
+        "counts_per_turn": Quantity("encoder counts of a turn", "", low=0, whole=True),
+        "least_speed": _not_negative("least speed", "axis unit per min"),
+        "clockwise_speed": _not_negative("full speed clockwise", "axis unit per min"),
+        "counterclockwise_speed": _not_negative("full speed counter-clockwise", "axis unit per min"),
+        "supply": _not_negative("supply voltage of the motor driver", "V"),
+        "overtravel": _not_negative("way beyond the travel at which the switch opens", "axis unit"),
+        "debounce": _not_negative("time for which a switch is ignored after it moved", "s"),
+        "response_call": _not_negative("time until it answers a call", "s"),
+        "response_download": _not_negative("time until it answers a download", "s"),
+        "current_start": _not_negative("current of the motor while it starts", "A"),
+        "current_run": _not_negative("current of the motor while it runs", "A"),
+        "interrupt_service": _not_negative("time that an encoder's interrupt takes", "s"),
+        "interrupt_pause": _not_negative("time for which the board serves no interrupt", "s"),
+        "interrupt_every": _not_negative("how often such a pause begins", "s"),
+        "accelerometer": _three("readings at rest, x, y and z"),
+        "vibration": _three("amplitude of the readings at full speed, x, y and z"),
+        "matrix": Items("the module's homogeneous transformation", _ROW, "4 rows of 4 numbers", 4),
+        "switches": Flag("it has limit switches"),
+    },
 )
-WHOLE = ("counts_per_turn",)
-READINGS = ("accelerometer", "vibration")  # of three channels, 10 bits each
-KEYS = (*TEXTS, *SIGNED, *UNSIGNED, *WHOLE, *READINGS, "matrix", "switches")
-
-
-def module_table(table: Any, place: str) -> dict[str, Any]:
-    """The table, its numbers as floats and its lists as tuples. InputError naming `place` for what cannot be.
-
-    Whether the values make a module (a matrix that is a motion, a letter...) is the dialect's business.
-    """
-    if not isinstance(table, Mapping):
-        raise InputError(f"module = {table!r} must be a table", place)
-    values: dict[str, Any] = {}
-    for key, value in table.items():
-        if key not in KEYS:
-            raise InputError(f"unknown key {key!r}; known keys: {', '.join(sorted(KEYS))}", place)
-        values[key] = _value(key, value, place)
-    return values
-
-
-def _value(key: str, value: Any, place: str) -> Any:
-    if key in TEXTS:
-        if not isinstance(value, str) or (key == "kind" and value not in KINDS):
-            wanted = f"one of {', '.join(KINDS)}" if key == "kind" else "text"
-            raise InputError(f"{key} = {value!r} must be {wanted}", place)
-        return value
-    if key == "switches":
-        if not isinstance(value, bool):
-            raise InputError(f"switches = {value!r} must be true or false", place)
-        return value
-    if key == "matrix":
-        if not (isinstance(value, list) and len(value) == 4 and all(_is_row(row, 4) for row in value)):
-            raise InputError(f"matrix = {value!r} must be 4 rows of 4 numbers", place)
-        return tuple(tuple(map(float, row)) for row in value)
-    if key in READINGS:
-        if not (_is_row(value, 3) and all(isinstance(part, int) and 0 <= part < 1024 for part in value)):
-            raise InputError(f"{key} = {value!r} must be three whole numbers from 0 to 1023", place)
-        return tuple(value)
-    if key in WHOLE:
-        if not (_is_number(value) and isinstance(value, int) and value >= 0):
-            raise InputError(f"{key} = {value!r} must be a whole number of at least 0", place)
-        return value
-    if not _is_number(value) or (key in UNSIGNED and value < 0):
-        raise InputError(f"{key} = {value!r} must be a number{' of at least 0' if key in UNSIGNED else ''}", place)
-    return float(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-
-
-def _is_row(row: Any, length: int) -> bool:
-    return isinstance(row, list) and len(row) == length and all(map(_is_number, row))

@@ -13,17 +13,18 @@ from math import expm1, log1p
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.options import Option, read_options
+from rds.core.options import read_options
+from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 
 NAME = "directional-axis"
 PARAMETERS = {
-    "tau": Option("time constant, s", more_than=0.0),
-    "K": Option("gain, (mm/s)/V"),
-    "friction_plus": Option("Coulomb friction while moving forward, mm/s", at_least=0.0),
-    "friction_minus": Option("Coulomb friction while moving backward, mm/s, not positive"),
-    "viscous_plus": Option("speed lost to viscous friction while moving forward, mm/s per mm/s", more_than=-1.0),
-    "viscous_minus": Option("speed lost to viscous friction while moving backward, mm/s per mm/s", more_than=-1.0),
+    "tau": Quantity("time constant", "s", above=0.0),
+    "K": Quantity("gain", "(mm/s)/V"),
+    "friction_plus": Quantity("Coulomb friction while moving forward", "mm/s", low=0.0),
+    "friction_minus": Quantity("Coulomb friction while moving backward, against the motion", "mm/s", high=0.0),
+    "viscous_plus": Quantity("speed lost to viscous friction while moving forward", "mm/s per mm/s", above=-1.0),
+    "viscous_minus": Quantity("speed lost to viscous friction while moving backward", "mm/s per mm/s", above=-1.0),
 }
 _NEUTRAL = dict.fromkeys(("friction_plus", "friction_minus", "viscous_plus", "viscous_minus"), 0.0)
 
@@ -64,10 +65,5 @@ def make(**params: Any) -> Model:
     values = _NEUTRAL | read_options(params, PARAMETERS, NAME)
     for name, option in PARAMETERS.items():
         if name not in values:
-            raise InputError(f"{NAME} needs {name} ({option.meaning})")
-    if values["friction_minus"] > 0.0:
-        raise InputError(
-            f"{NAME}: friction_minus = {values['friction_minus']!r} mm/s must not be positive: friction opposes "
-            "motion, so friction_plus >= 0 >= friction_minus"
-        )
+            raise InputError(f"{NAME} needs {name} ({option.described})")
     return Model(advance, (0.0, 0.0), values, source=Source(NAME))

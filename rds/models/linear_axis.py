@@ -14,14 +14,15 @@ from math import exp, expm1, log1p
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.options import Option, read_options
+from rds.core.options import read_options
+from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 
 PARAMETERS = {
-    "tau": Option("time constant, s", more_than=0.0),
-    "K": Option("gain, (mm/s)/V"),
-    "friction_plus": Option("Coulomb friction F₊ while moving forward, mm/s", at_least=0.0),
-    "friction_minus": Option("Coulomb friction F₋ while moving backward, mm/s, not positive"),
+    "tau": Quantity("time constant", "s", above=0.0),
+    "K": Quantity("gain", "(mm/s)/V"),
+    "friction_plus": Quantity("Coulomb friction F₊ while moving forward", "mm/s", low=0.0),
+    "friction_minus": Quantity("Coulomb friction F₋ while moving backward, against the motion", "mm/s", high=0.0),
 }
 
 
@@ -108,10 +109,5 @@ def make(**params: Any) -> Model:
     values = {"friction_plus": 0.0, "friction_minus": 0.0} | read_options(params, PARAMETERS, "linear-axis")
     for name, option in PARAMETERS.items():
         if name not in values:
-            raise InputError(f"linear-axis needs {name} ({option.meaning})")
-    if values["friction_minus"] > 0.0:
-        raise InputError(
-            f"linear-axis: friction_minus = {values['friction_minus']!r} mm/s must not be positive: "
-            f"friction opposes motion, so friction_plus >= 0 >= friction_minus"
-        )
+            raise InputError(f"linear-axis needs {name} ({option.described})")
     return Model(advance, (0.0, 0.0), values, source=Source("linear-axis"), motion=LinearAxisMotion)

@@ -20,11 +20,26 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from math import isfinite
+from dataclasses import dataclass
 
 from rds.core.errors import InputError
+from rds.core.options import check_known
+from rds.core.quantities import Quantity
 from rds.models.machine_motion import moved, pull_of
+
+PARAMETERS = {
+    "tau": Quantity("time constant", "s", above=0.0),
+    "K": Quantity("gain", "(mm/s)/V", above=0.0),
+    "friction_plus": Quantity("Coulomb friction forward, at high speed", "mm/s", low=0.0),
+    "friction_minus": Quantity("Coulomb friction backward, at high speed", "mm/s", high=0.0),
+    "viscous": Quantity("speed lost to viscous friction", "(mm/s) per mm/s", low=0.0),
+    "stribeck": Quantity("extra friction at standstill, as a fraction of that at high speed", low=0.0),
+    "stribeck_velocity": Quantity("speed at which it has gone", "mm/s", above=0.0),
+    "backlash": Quantity("play between motor and encoder, its whole width", "mm", low=0.0),
+    "delay": Quantity("time from the command frame to the amplifier's output", "s", low=0.0),
+    "offset": Quantity("what the amplifier adds to the voltage", "V"),
+    "dead_zone": Quantity("half width of the dead zone: smaller voltages do nothing", "V", low=0.0),
+}
 
 
 @dataclass(frozen=True)
@@ -44,14 +59,8 @@ class MachineParameters:
     dead_zone: float = 0.0  # V, half width: what is smaller is no voltage, what is larger is so much less
 
     def __post_init__(self) -> None:
-        for name in ("tau", "K", "stribeck_velocity"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"machine parameter {name} = {getattr(self, name)!r} must be more than 0")
-        for name in ("friction_plus", "viscous", "stribeck", "backlash", "delay", "dead_zone"):
-            if not getattr(self, name) >= 0:
-                raise InputError(f"machine parameter {name} = {getattr(self, name)!r} must be 0 or more")
-        if not self.friction_minus <= 0:
-            raise InputError(f"machine parameter friction_minus = {self.friction_minus!r} must be 0 or less")
+        for name, declared in PARAMETERS.items():
+            declared.check(getattr(self, name), name, "machine parameter")
 
     def motion(self) -> tuple[float, ...]:
         """What `machine_motion.moved` needs after its first five arguments."""
@@ -68,16 +77,11 @@ class MachineParameters:
     @classmethod
     def from_table(cls, table: Mapping[str, float], where: str | None = None) -> MachineParameters:
         """From a TOML table; InputError for an unknown or missing key or a value that can't be."""
-        known = {f.name for f in fields(cls)}
-        for key, value in table.items():
-            if key not in known:
-                raise InputError(f"unknown machine parameter {key!r}; known: {', '.join(sorted(known))}", where)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-                raise InputError(f"machine parameter {key} = {value!r} must be a number", where)
-        for key in ("tau", "K"):
-            if key not in table:
-                raise InputError(f"machine parameter {key!r} is missing", where)
         try:
+            check_known(table, PARAMETERS, "the machine's axis")
+            for key in ("tau", "K"):
+                if key not in table:
+                    raise InputError(f"machine parameter {key} is missing; give it ({PARAMETERS[key].described})")
             return cls(**table)
         except InputError as error:
             raise InputError(str(error), where) from None

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from math import floor
 from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.types import Model, Source
+from rds.models import machine_axis
 from rds.models.machine_axis import MachineParameters
 from rds.models.machine_motion import moved, pull_of
 
 NAME = "machine-axis"
-PARAMETERS = tuple(field.name for field in fields(MachineParameters))
+PARAMETERS = machine_axis.PARAMETERS
 _ROUNDING = 1e-9  # of a sample: a delay that is so near to whole samples is whole
 
 

@@ -14,15 +14,16 @@ from math import exp
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.options import Option, read_options
+from rds.core.options import read_options
+from rds.core.quantities import Quantity
 from rds.core.types import Model, Source
 from rds.models.machine_model import split_delay
 
 PARAMETERS = {
-    "tau": Option("time constant, s", more_than=0.0),
-    "K": Option("gain, (rev/min)/V"),
-    "offset": Option("voltage that acts beside the command, V"),
-    "delay": Option("dead time from a command to its effect, s", at_least=0.0),
+    "tau": Quantity("time constant", "s", above=0.0),
+    "K": Quantity("gain", "(rev/min)/V"),
+    "offset": Quantity("voltage that acts beside the command", "V"),
+    "delay": Quantity("dead time from a command to its effect", "s", low=0.0),
 }
 _NEUTRAL = {"offset": 0.0, "delay": 0.0}
 
@@ -83,5 +84,5 @@ def make(**params: Any) -> Model:
     values = _NEUTRAL | read_options(params, PARAMETERS, "spindle")
     for name, option in PARAMETERS.items():
         if name not in values:
-            raise InputError(f"spindle needs {name} ({option.meaning})")
+            raise InputError(f"spindle needs {name} ({option.described})")
     return Model(advance, (0.0,), values, source=Source("spindle"), motion=SpindleMotion)

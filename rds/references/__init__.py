@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.options import check_known
+from rds.core.quantities import Table
 from rds.references.broadband import chirp, multisine
 from rds.references.periodic import constant, sinusoid, square, triangle
 from rds.references.signal import Signal, sample, sample_voltage
@@ -24,6 +26,7 @@ __all__ = [
     "sample",
     "sample_voltage",
     "signal_kinds",
+    "signal_options",
     "sinusoid",
     "square",
     "staircase",
@@ -48,6 +51,15 @@ _KINDS: Mapping[str, Callable[..., Signal]] = MappingProxyType(
 def signal_kinds() -> list[str]:
     """The kinds of signals there are."""
     return list(_KINDS)
+
+
+def signal_options(kind: str) -> Table:
+    """What a file may say of a signal of this kind."""
+    options = sys.modules[_KINDS[kind].__module__].OPTIONS
+    parameters = inspect.signature(_KINDS[kind]).parameters
+    keys = {name: options[name] for name in parameters if name in options}
+    needed = tuple(name for name in keys if parameters[name].default is inspect.Parameter.empty)
+    return Table(f"signal of kind {kind}", keys, needed=needed)
 
 
 def make_signal(kind: str, **options: Any) -> Signal:

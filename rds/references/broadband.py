@@ -9,6 +9,7 @@ show other nonlinearities. A chirp's frequency rises evenly, falls again, and so
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from math import ceil, floor
 from typing import Any
@@ -16,19 +17,20 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Choice, Declaration, Quantity, checked
 from rds.references.signal import Motion, Signal
 
 LINES = ("all", "odd")
 _MOST_LINES = 2000
 _PER_PERIOD = 16  # points of the fastest sinusoid's period at which the peak is looked for
-_OPTIONS = {
-    "amplitude": Option("middle to peak, V or mm", at_least=0.0),
-    "frequency": Option("the base frequency, of which all others are multiples, Hz", more_than=0.0),
-    "lowest": Option("Hz", more_than=0.0),
-    "highest": Option("Hz", more_than=0.0),
-    "sweep": Option("time from the lowest to the highest frequency, s", more_than=0.0),
-    "offset": Option("middle of the signal, V or mm"),
+OPTIONS: Mapping[str, Declaration] = {
+    "amplitude": Quantity("middle to peak", "V or mm", low=0.0),
+    "frequency": Quantity("the base frequency, of which all others are multiples", "Hz", above=0.0),
+    "lowest": Quantity("frequency", "Hz", above=0.0),
+    "highest": Quantity("frequency", "Hz", above=0.0),
+    "sweep": Quantity("time from the lowest to the highest frequency", "s", above=0.0),
+    "offset": Quantity("middle of the signal", "V or mm"),
+    "lines": Choice("which multiples of the base frequency it has", LINES, "all"),
 }
 
 
@@ -43,8 +45,7 @@ def multisine(
     settings = _checked(
         "multisine", amplitude=amplitude, frequency=frequency, lowest=lowest, highest=highest, offset=offset
     )
-    if lines not in LINES:
-        raise InputError(f"multisine: lines = {lines!r} is not known; known: {', '.join(LINES)}")
+    checked(OPTIONS["lines"], lines, "lines", "multisine")
     base = settings["frequency"]
     multiples = np.arange(ceil(settings["lowest"] / base - 1e-9), floor(settings["highest"] / base + 1e-9) + 1)
     if lines == "odd":
@@ -79,7 +80,7 @@ def chirp(amplitude: float, lowest: float, highest: float, sweep: float, offset:
 
 
 def _checked(kind: str, **given: Any) -> dict[str, float]:
-    settings = {name: _OPTIONS[name].check(value, name, kind) for name, value in given.items()}
+    settings = {name: checked(OPTIONS[name], value, name, kind) for name, value in given.items()}
     if not settings["lowest"] <= settings["highest"]:
         raise InputError(
             f"{kind}: lowest = {settings['lowest']:g} Hz is above highest = {settings['highest']:g} Hz; exchange them"

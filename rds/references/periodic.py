@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.references.signal import Motion, Signal
 
 _EDGE = 1e-9  # of a period
-_OPTIONS = {
-    "amplitude": Option("middle to peak, V or mm; to turn the signal over, use phase = 180", at_least=0.0),
-    "frequency": Option("Hz", more_than=0.0),
-    "offset": Option("middle of the signal, V or mm"),
-    "phase": Option("degrees"),
-    "value": Option("V or mm"),
+OPTIONS = {
+    "amplitude": Quantity("middle to peak; to turn the signal over, use phase = 180", "V or mm", low=0.0),
+    "frequency": Quantity("frequency", "Hz", above=0.0),
+    "offset": Quantity("middle of the signal", "V or mm"),
+    "phase": Quantity("phase", "degrees"),
+    "value": Quantity("constant value", "V or mm"),
 }
 
 
@@ -52,13 +52,13 @@ def sinusoid(amplitude: float, frequency: float, offset: float = 0.0, phase: flo
 
 def constant(value: float) -> Signal:
     """`value` (V or mm) at all times. Raises InputError for a value that is no finite number."""
-    level = _OPTIONS["value"].check(value, "value", "constant")
+    level = OPTIONS["value"].check(value, "value", "constant")
     return Signal("constant", partial(_constant, value=level), settings={"value": level})
 
 
 def _periodic(kind: str, motion: Any, amplitude: Any, frequency: Any, offset: Any, phase: Any) -> Signal:
     given = {"amplitude": amplitude, "frequency": frequency, "offset": offset, "phase": phase}
-    settings = {name: _OPTIONS[name].check(value, name, kind) for name, value in given.items()}
+    settings = {name: OPTIONS[name].check(value, name, kind) for name, value in given.items()}
     return Signal(kind, partial(motion, **settings), 1.0 / settings["frequency"], settings)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.core.types import Reference
 
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -45,7 +45,7 @@ class Signal:
 
     def check_sampling(self, T: float) -> None:
         """InputError if the signal repeats faster than half the sampling frequency 1/`T` can show."""
-        Option("sample period, s", more_than=0.0).check(T, "T", "signal")
+        SAMPLE_PERIOD.check(T, "T", "signal")
         frequency = self.fastest or (1.0 / self.period if self.period is not None else 0.0)
         if 2.0 * T * frequency * (1.0 - 1e-9) > 1.0:
             raise InputError(

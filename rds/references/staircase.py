@@ -6,16 +6,15 @@ from functools import partial
 
 import numpy as np
 
-from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.references.signal import Motion, Signal
 
 _EDGE = 1e-9  # of a step: an edge counts as reached from so much before it, since sample times carry rounding errors
-_OPTIONS = {
-    "amplitude": Option("middle to peak, V or mm", at_least=0.0),
-    "frequency": Option("Hz, of the whole way up, down and back", more_than=0.0),
-    "steps": Option("from the middle to the peak, a whole number", at_least=1.0),
-    "offset": Option("middle of the signal, V or mm"),
+OPTIONS = {
+    "amplitude": Quantity("middle to peak", "V or mm", low=0.0),
+    "frequency": Quantity("of the whole way up, down and back", "Hz", above=0.0),
+    "steps": Quantity("steps from the middle to the peak", low=1, whole=True),
+    "offset": Quantity("middle of the signal", "V or mm"),
 }
 
 
@@ -25,10 +24,8 @@ def staircase(amplitude: float, frequency: float, steps: int, offset: float = 0.
     V or mm, Hz. Velocity and acceleration are 0. Raises InputError for a value that will not do.
     """
     given = {"amplitude": amplitude, "frequency": frequency, "steps": steps, "offset": offset}
-    settings = {name: _OPTIONS[name].check(value, name, "staircase") for name, value in given.items()}
-    if settings["steps"] != int(settings["steps"]):
-        raise InputError(f"staircase: steps = {steps!r} must be a whole number ({_OPTIONS['steps'].meaning})")
-    count = int(settings["steps"])
+    settings = {name: OPTIONS[name].check(value, name, "staircase") for name, value in given.items()}
+    count = settings["steps"]
     levels = np.concatenate([np.arange(count), np.arange(count, -count, -1), np.arange(-count, 0)]) / count
     motion = partial(
         _staircase,
@@ -36,7 +33,7 @@ def staircase(amplitude: float, frequency: float, steps: int, offset: float = 0.
         frequency=settings["frequency"],
     )
     fastest = len(levels) * 0.5 * settings["frequency"]  # every level needs a sample
-    return Signal("staircase", motion, 1.0 / settings["frequency"], {**settings, "steps": count}, fastest=fastest)
+    return Signal("staircase", motion, 1.0 / settings["frequency"], settings, fastest=fastest)
 
 
 def _staircase(t: np.ndarray, levels: np.ndarray, frequency: float) -> Motion:

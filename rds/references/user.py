@@ -17,10 +17,16 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import ContractError, InputError
-from rds.core.options import Option
+from rds.core.quantities import Choice, Quantity, Text
 from rds.references.signal import Motion, Signal
-from rds.references.table import table_signal
+from rds.references.table import INTERPOLATIONS, table_signal
 
+PERIOD = Quantity("time after which the signal repeats", "s", above=0.0)
+OPTIONS = {
+    "file": Text("CSV file of time and value, or of time, position, velocity and acceleration"),
+    "period": PERIOD,
+    "interpolation": Choice("how the rows are joined", INTERPOLATIONS),
+}
 _STEP = 1e-3  # s
 _POWERS = np.arange(5)
 _TO_POLYNOMIAL = np.linalg.inv(np.vander(np.arange(5.0), increasing=True))  # values at 0, 1, .. 4 -> coefficients
@@ -41,7 +47,7 @@ def user(
     if (function is None) == (file is None):
         raise InputError("user: give either a function of time or a file of time and value, and not both")
     if period is not None:
-        period = Option("time after which the signal repeats, s", more_than=0.0).check(period, "period", "user")
+        period = PERIOD.check(period, "period", "user")
     if file is not None:
         if not isinstance(file, str | Path):
             raise InputError(f"user: file = {file!r} must be the name of a CSV file, as text")

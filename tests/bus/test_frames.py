@@ -70,14 +70,14 @@ def test_counters_wrap_round(counts: int, ticks: int) -> None:
     assert (answer.counts - counts) % 2**32 == 0 and (answer.ticks - ticks) % 2**16 == 0
 
 
-@given(st.floats(1e-6, 4000.0))
+@given(st.floats(1e-6, 1000.0))
 def test_sample_period_comes_back_within_half_a_microsecond(period: float) -> None:
     assert abs(frames.decode_setup(0x12, frames.encode_setup(period)) - period) <= 0.5001e-6
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, nan, 5000.0])
 def test_impossible_periods_are_refused(bad: float) -> None:
-    with pytest.raises(InputError, match="sample period"):
+    with pytest.raises(InputError, match=r"sample_period = .* must be"):
         frames.encode_setup(bad)
 
 

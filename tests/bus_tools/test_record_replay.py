@@ -355,6 +355,32 @@ def test_frames_that_act_on_a_live_machine_are_refused(machine: None, open_bus: 
         assert replay(log, bus, selection=Selection(["0x790"])).sent == 1
 
 
+@pytest.mark.parametrize("log, ends", [([0x010, 0x010], True), ([0x790, 0x790], False)])
+def test_a_machine_that_comes_meanwhile_ends_a_replay_of_commands(log: list[int], ends: bool, timed_bus: Any) -> None:
+    class Clock(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            timed_bus.sleep(timeout)
+            return False
+
+    came: list[can.Message] = []
+
+    def recv(timeout: float) -> can.Message | None:
+        if timed_bus.now < 50.0 or came:
+            return None
+        came.append(frame(0x022, bytes(8)))  # module 2 answers
+        return came[0]
+
+    timed_bus.recv = recv
+    messages = [frame(identifier, bytes(8), at) for identifier, at in zip(log, (0.0, 100.0), strict=True)]
+    if not ends:
+        assert replay(messages, timed_bus, stop=Clock()).sent == 2
+        return
+    with pytest.raises(InputError, match="module 2 lives on this bus"):
+        replay(messages, timed_bus, stop=Clock())
+    assert timed_bus.now < 51.0
+    assert timed_bus.sent[-1].data == bytes(8) and timed_bus.sent[-1].arbitration_id == 0x010, "zero volts at the end"
+
+
 def test_with_commands_ends_at_zero_volts(machine: None, open_bus: Opener) -> None:
     bus, witness = open_bus(), open_bus()
     command = frame(0x010, b"\0\x40" + bytes(6))

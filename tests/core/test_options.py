@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from rds.core.errors import InputError
-from rds.core.options import Option, check_known, read_options
+from rds.core.options import check_known, read_options
+from rds.core.quantities import Quantity
 from rds.core.registry import Registry
 
-GAIN = Option("gain, V/mm", at_least=0.0)
+GAIN = Quantity("gain", "V/mm", low=0.0)
 
 
 @pytest.mark.parametrize("value", [2, 2.0, np.float32(2), np.int64(2), Fraction(2)])
@@ -26,11 +27,11 @@ def test_anything_else_is_refused_with_name_value_and_meaning(value):
     with pytest.raises(InputError) as error:
         GAIN.check(value, "gain", "law")
     assert f"law: gain = {value!r} must be" in str(error.value)
-    assert "gain, V/mm" in str(error.value)
+    assert "V/mm" in str(error.value) and "(gain)" in str(error.value)
 
 
 def test_infinity_is_allowed_where_it_has_a_sense():
-    limit = Option("limit, V", more_than=0.0, infinite=True)
+    limit = Quantity("limit", "V", above=0.0, infinite=True)
     assert limit.check(float("inf"), "limit", "law") == float("inf")
     for value in (0.0, -float("inf"), float("nan")):
         with pytest.raises(InputError):

@@ -26,7 +26,8 @@ from hypothesis.strategies import (
 
 import rds
 from rds.core.errors import InputError, RdsError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
+from rds.modes.experiment.experiment_file import EXPERIMENT
 from rds.modes.experiment.resolve import resolve
 from rds.modes.loop.plan import Plan
 
@@ -99,7 +100,7 @@ def edit(change: str, base: str = GOOD) -> str:
         ("mode = 'system-test'", 3, r"sends a voltage signal: give \[signal\]"),
         ("duration = 'long'", 4, "duration = 'long' must be a number in s, without quotes"),
         ("duration = true", 4, "duration = True must be a number"),
-        ("duration = nan", 4, "duration = nan must be a number"),
+        ("duration = nan", 4, "duration = nan must be a finite number in s"),
         ("duration = inf", 4, "duration = inf must be from 0 to 1e.09 s"),
         ("duration = -1.0", 4, "duration = -1.0 must be from 0"),
         ("duration = 1" + "0" * 400, 4, "duration = 1000"),
@@ -363,13 +364,11 @@ PLAUSIBLE = fixed_dictionaries(
 @settings(max_examples=400, deadline=None)
 @given(table=one_of(dictionaries(KEYS, JUNK), PLAUSIBLE))
 def test_junk_is_refused_or_planned_and_nothing_else(table: dict[str, Any]) -> None:
-    from rds.modes.experiment.resolve import resolve
-
     table = _without_none(table)
     if isinstance(table.get("duration"), int | float) and table["duration"] == table["duration"]:
         table["duration"] = min(table["duration"], 1.0)  # a plan of some minutes is fine, but takes as long to make
     try:
-        plan, _ = resolve(Words(table), Path("nowhere"))
+        plan, _ = resolve(TomlTable(table, EXPERIMENT), Path("nowhere"))
     except RdsError as error:
         assert len(str(error)) < 2000
     else:
@@ -407,9 +406,9 @@ def test_drives_that_take_no_voltage_are_refused_in_every_mode(mode: str, comman
     table = {"axes": ["X"], "duration": 0.1, "mode": mode, **source}
     bus = {"dialect": "cia402", "cia402": {"mode": command}}
     with pytest.raises(InputError, match=rf'bus\.cia402\.mode = "{command}" takes positions or velocities.*use "cst"'):
-        resolve(Words(table | {"bus": bus}), Path())
+        resolve(TomlTable(table | {"bus": bus}, EXPERIMENT), Path())
     of_one = bus | {"cia402": {"axis": {"X": {"mode": command}}}}
     with pytest.raises(InputError, match=rf'bus\.cia402\.axis\.X\.mode = "{command}" takes positions or velocities'):
-        resolve(Words(table | {"bus": of_one}), Path())
-    plan, _ = resolve(Words(table | {"bus": bus | {"cia402": {"mode": "cst"}}}), Path())
+        resolve(TomlTable(table | {"bus": of_one}, EXPERIMENT), Path())
+    plan, _ = resolve(TomlTable(table | {"bus": bus | {"cia402": {"mode": "cst"}}}, EXPERIMENT), Path())
     assert plan.bus["cia402"]["mode"] == "cst"

@@ -9,7 +9,8 @@ from hypothesis import assume, given
 from hypothesis.strategies import floats, text
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
+from rds.grading.assignment.assignment_file import LATE
 from rds.grading.assignment.late_rules import Late, days_late, read_late
 from rds.grading.assignment.seeds import part_seed, student_seed
 from rds.grading.criteria.bands import Bands
@@ -63,11 +64,11 @@ def test_lateness_knows_time_zones() -> None:
 
 
 def test_a_late_table_is_read_strictly() -> None:
-    assert read_late(Words({"percent_per_day": 5})) == Late(percent_per_day=5.0)
+    assert read_late(TomlTable({"percent_per_day": 5}, LATE)) == Late(percent_per_day=5.0)
     with pytest.raises(InputError, match="did you mean 'percent_per_day'"):
-        read_late(Words({"percent_a_day": 5}))
+        read_late(TomlTable({"percent_a_day": 5}, LATE))
     with pytest.raises(InputError, match="from 0 to 100"):
-        read_late(Words({"percent_per_day": 500}))
+        read_late(TomlTable({"percent_per_day": 500}, LATE))
 
 
 def test_the_seed_of_a_student_is_written_down_here() -> None:

@@ -50,9 +50,9 @@ def test_limits_that_cannot_be_are_refused(tmp_path: Path) -> None:
     text = "sample_period = 0.001\n[axis.X]\nnode = 2\ntravel = [-1.0, 1.0]\nresolution = 0.001\n"
     for table, message in {
         "": "axis X has no limits",
-        "[axis.X.limits]\nvelocity = 1.0\nacceleration = 1.0": "jerk = None must be a number",
+        "[axis.X.limits]\nvelocity = 1.0\nacceleration = 1.0": "jerk is missing; give it in axis unit/s³",
         "[axis.X.limits]\nvelocity = 1.0\nacceleration = -1.0\njerk = 1.0": "acceleration = -1.0 must be more than 0",
-        "[axis.X.limits]\nspeed = 1.0": "unknown key 'axis.X.limits.speed'",
+        "[axis.X.limits]\nspeed = 1.0": "velocity is missing",
     }.items():
         (tmp_path / "m.toml").write_text(text + table)
         with pytest.raises(InputError, match=message):

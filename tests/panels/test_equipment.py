@@ -133,7 +133,7 @@ def test_wrong_values_are_refused_beside_their_fields(at: Callable[..., Equipmen
         ("Frequency", "0", "Frequency must be more than 0"),
         ("Offset", "twelve", "Offset must be a number in mm, not 'twelve'"),
         ("Final time", "1e9", "Final time must be more than 0 and at most 3600 s"),
-        ("Sample period", "0.00001", "Sample period must be from 0.0001 to 1 s"),
+        ("Sample period", "0.0000001", "Sample period must be from 1e-06 to 1000 s"),
     ):
         control.type(label, value)
         assert reason in control.refusal(label)

@@ -111,7 +111,7 @@ def test_nobody_changes_the_period_of_a_host_that_commands() -> None:
     for k in range(5):
         at = START + k * PERIOD
         say(made, at, at)
-    made.receive(frames.SETUP, frames.encode_setup(3600.0), at)
+    made.receive(frames.SETUP, frames.encode_setup(1000.0), at)
     made.expire(at + 0.02)
     made.motion.advance(at + 0.02)
     assert made.motion.voltage == 0.0 and made.status == Status.WATCHDOG

@@ -6,11 +6,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from rds.bus.hub import wire
+from rds.core.errors import InputError
+from rds.core.quantities import Quantity
 
-BITRATES = (10_000, 1_000_000)  # bit/s, least and most: what CAN controllers do
-DATA_BITRATES = (10_000, 8_000_000)
+# what CAN controllers do
+BITRATE = Quantity(
+    "bit rate; every frame then takes its exact time on the wire", "bit/s", 10_000, 1_000_000, whole=True
+)
+DATA_BITRATE = Quantity("bit rate of the fast part of CAN FD frames", "bit/s", 10_000, 8_000_000, whole=True)
+RESTART = Quantity("time until the host comes back from bus off", "ms", 0, 3_600_000, whole=True)
 OPTIONS = ("bitrate", "data_bitrate", "name", "error_frames", "restart_ms")
-_LONGEST_RESTART = 3_600_000  # ms
 
 # what drivers, servers and scans are told beside an adapter's options: a key of this name would be taken for it
 _OF_BUSES = ("identifiers", "mask", "can_filters", "ignore_config", "node", "timeout", "first")
@@ -31,8 +36,8 @@ def read_settings(options: Mapping[str, Any]) -> wire.Settings:
             f"the built-in bus has no option {', '.join(unknown)}; it takes channel, can_filters, "
             f"receive_own_messages, fd, {', '.join(OPTIONS)} (python-can's files and variables count too)"
         )
-    bitrate = _whole(given, "bitrate", *BITRATES, 0)
-    data_bitrate = _whole(given, "data_bitrate", *DATA_BITRATES, 0)
+    bitrate = _whole(given, "bitrate", BITRATE, 0)
+    data_bitrate = _whole(given, "data_bitrate", DATA_BITRATE, 0)
     if data_bitrate and not bitrate:
         raise ValueError("data_bitrate without bitrate: give both, or join whatever bus there is with neither")
     name = given.get("name", "")
@@ -41,14 +46,15 @@ def read_settings(options: Mapping[str, Any]) -> wire.Settings:
     error_frames = given.get("error_frames", False)
     if not isinstance(error_frames, bool):
         raise ValueError(f"error_frames {error_frames!r} must be true or false")
-    restart = _whole(given, "restart_ms", 0, _LONGEST_RESTART, -1)
+    restart = _whole(given, "restart_ms", RESTART, -1)
     return wire.Settings(name, bitrate, data_bitrate, restart, error_frames)
 
 
-def _whole(given: Mapping[str, Any], name: str, least: int, most: int, default: int) -> int:
+def _whole(given: Mapping[str, Any], name: str, declared: Quantity, default: int) -> int:
     value = given.get(name, default)
     if name not in given or value == default == 0:
         return default
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise ValueError(f"{name} {value!r} must be a whole number from {least:,} to {most:,}")
-    return value
+    try:
+        return int(declared.check(value, name))
+    except InputError as error:
+        raise ValueError(str(error)) from None

@@ -13,17 +13,37 @@ import re
 from pathlib import Path
 from typing import Any
 
-from rds.bus.medium.fault_kinds import Fault
+from rds.bus.medium.fault_kinds import KINDS, WORDS, Fault
 from rds.core.errors import InputError
-from rds.core.toml_file import read_toml
+from rds.core.quantities import Parts, Table, Tables
+from rds.core.toml_table import TomlTable
+
+FAULTS = Table(
+    "A schedule of faults on the built-in bus.",
+    {
+        "fault": Tables(
+            "faults",
+            Table("a fault", chosen_by="kind", parts=Parts(lambda: list(KINDS), lambda kind: _of_kind(kind))),
+            least=1,
+        )
+    },
+    needed=("fault",),
+)
+
+
+def _of_kind(name: str) -> Table:
+    kind = KINDS[name]
+    needed = (*kind.needed, *(("by",) if name == "delay" else ()))
+    return Table(kind.meaning, {word: WORDS[word] for word in ("at", *kind.words)}, needed=needed)
 
 
 def read_faults(path: str | Path) -> tuple[Fault, ...]:
     """The faults of a file, in the order of their times. InputError names file and line, and what is known."""
-    content, text = read_toml(path)
+    words = TomlTable.open(path, FAULTS)
+    text, content = words.source, words.table
     for key in content:
         if key != "fault":
-            raise InputError(f"unknown key {key!r}; a schedule consists of [[fault]] tables", str(path))
+            raise InputError(f"unknown key {key!r}; a schedule consists of [[fault]] tables", words.place(key))
     tables = content.get("fault", [])
     if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
         raise InputError("holds no [[fault]] tables; each fault is one", str(path))

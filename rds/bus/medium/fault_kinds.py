@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from difflib import get_close_matches
-from math import isfinite
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
+from rds.core.quantities import Quantity, Text, checked
 
 ENDLESS = 1 << 62  # ns
 
@@ -41,9 +41,21 @@ KINDS = {
     "plug": Kind("an unplugged node is plugged in again", ("node",), ("node",)),
     "restart": Kind("a node that is bus off is asked to come back", ("node",), ("node",), True),
 }
-# whole numbers: least, most, how to write them
 BEHIND_ARBITRATION = 13  # the first bit that can be disturbed in any frame: start bit, 11 of the identifier, RTR
-_WHOLE = (("count", 1, 10**9, ","), ("identifier", 0, 0x1FFFFFFF, "#x"), ("bit", BEHIND_ARBITRATION, 1000, ","))
+_LONGEST = 1e6  # s
+# what may be said of a fault, by the words of a file
+WORDS: Mapping[str, Quantity | Text] = {
+    "at": Quantity("when it strikes, from the start", "s", 0.0, _LONGEST, default=0.0),
+    "node": Text("the node that sends, or that it strikes"),
+    "for": Quantity("how long it lasts", "s", above=0.0, high=_LONGEST),
+    "count": Quantity("how many frames it strikes", "", 1, 10**9, whole=True),
+    "identifier": Quantity("identifier of the frames", "", 0, 0x1FFFFFFF, whole=True, hexadecimal=True),
+    "by": Quantity("the delay", "s", above=0.0, high=_LONGEST),
+    "bit": Quantity("the disturbed bit, counted on the wire from 0", "", BEHIND_ARBITRATION, 1000, whole=True),
+    "receiver": Text("the one node that does not get the frame"),
+    "probability": Quantity("of striking each frame", "", above=0.0, high=1.0),
+    "seed": Quantity("of the chance, so that the same faults come again", whole=True),
+}
 FRAME_KINDS = ("lose", "corrupt", "delay", "duplicate")
 
 
@@ -87,29 +99,17 @@ class Fault:
         self._check_values()
 
     def _check_values(self) -> None:
-        for name in ("node", "receiver"):
-            value = getattr(self, name)
-            if value is not None and (not isinstance(value, str) or not value):
-                raise InputError(f"{name} = {value!r} must be the name of a node")
-        for name, least in (("at", False), ("duration", True), ("by", True)):
-            value = getattr(self, name)
-            if value is not None and not (_is_number(value) and (value > 0 or not (least or value)) and value < 1e6):
-                bound = "more than" if least else "at least"
-                raise InputError(f"{_word(name)} = {value!r} must be {bound} 0 s and less than 1,000,000 s")
-        for name, low, high, form in _WHOLE:
-            value = getattr(self, name)
-            if value is not None and not (_is_whole(value) and low <= value <= high):
-                shown = hex(value) if form == "#x" and _is_whole(value) else repr(value)
-                raise InputError(f"{name} = {shown} must be a whole number from {low} to {high:{form}}")
+        for name, value in asdict(self).items():
+            if value is None or name == "kind":
+                continue
+            if value == "":
+                raise InputError(f"{name} = '' must be the name of a node")
+            checked(WORDS[_word(name)], value, _word(name))
         if self.probability is not None:
-            if not (_is_number(self.probability) and 0.0 < self.probability <= 1.0):
-                raise InputError(f"probability = {self.probability!r} must be more than 0 and at most 1")
             if self.seed is None:
                 raise InputError("probability needs a seed, so that the same faults come again")
             if self.count is None and self.duration is None:
                 raise InputError("probability needs 'count' or 'for', so that it has an end")
-        if self.seed is not None and not _is_whole(self.seed):
-            raise InputError(f"seed = {self.seed!r} must be a whole number")
         if self.seed is not None and self.probability is None:
             raise InputError("a seed without a probability decides nothing")
 
@@ -133,11 +133,3 @@ class Fault:
 
 def _word(name: str) -> str:
     return "for" if name == "duration" else name
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)

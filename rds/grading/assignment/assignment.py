@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
+from rds.grading.assignment.assignment_file import ASSIGNMENT, READERS
 from rds.grading.assignment.late_rules import Late, read_late
 from rds.grading.assignment.seeds import student_seed
 from rds.grading.cases.case import Case
@@ -20,14 +21,6 @@ from rds.grading.criteria.criterion import Criterion, read_criterion
 from rds.grading.sandbox.limits import Limits
 
 FILE = "assignment.toml"
-READERS: Mapping[str, str] = {
-    "controller": "rds.grading.cases.control",
-    "model": "rds.grading.cases.model",
-    "interpolator": "rds.grading.cases.segment",
-    "functions": "",
-}
-SELF_CHECKS = ("visible", "blind", "off")
-FEEDBACKS = ("visible", "all")
 _LEAST_SECRET = 8  # characters
 
 
@@ -93,14 +86,14 @@ def read_assignment(path: str | Path) -> Assignment:
     file = file / FILE if file.is_dir() else file
     if not file.is_file():
         raise InputError(f"there is no {FILE}; name the assignment's folder", str(path))
-    words, folder = Words.read(file), file.parent
-    kind = words.choice("kind", "", tuple(READERS))
-    machine = words.text("machine", "mini-cnc") or "mini-cnc"
+    words, folder = TomlTable.open(file, ASSIGNMENT), file.parent
+    kind = words.read("kind")
+    machine = words.read("machine")
     cases = _cases(words, folder, kind, machine)
     criteria = _criteria(words, kind, cases)
     files = _files(words)
     names = {key: inside(words, key, folder) for key in ("solution", "template", "handout")}
-    title = words.text("title", folder.resolve().name)
+    title = words.read("title", folder.resolve().name)
     made = Assignment(
         folder=folder,
         title=title or folder.resolve().name,
@@ -108,8 +101,8 @@ def read_assignment(path: str | Path) -> Assignment:
         files=files,
         due=_due(words),
         secret=_secret(words),
-        self_check=words.choice("self_check", "visible", SELF_CHECKS),
-        feedback=words.choice("feedback", "visible", FEEDBACKS),
+        self_check=words.read("self_check"),
+        feedback=words.read("feedback"),
         limits=_limits(words.inner("limits")),
         late=read_late(words.inner("late")),
         cases=tuple(cases.values()),
@@ -122,7 +115,7 @@ def read_assignment(path: str | Path) -> Assignment:
     return made
 
 
-def _cases(words: Words, folder: Path, kind: str, machine: str) -> dict[str, Case]:
+def _cases(words: TomlTable, folder: Path, kind: str, machine: str) -> dict[str, Case]:
     tables = words.tables("case")
     if kind == "functions":
         if tables:
@@ -140,7 +133,7 @@ def _cases(words: Words, folder: Path, kind: str, machine: str) -> dict[str, Cas
     return found
 
 
-def _criteria(words: Words, kind: str, cases: Mapping[str, Case]) -> tuple[Criterion, ...]:
+def _criteria(words: TomlTable, kind: str, cases: Mapping[str, Case]) -> tuple[Criterion, ...]:
     found: dict[str, Criterion] = {}
     for table in words.tables("criterion"):
         criterion = read_criterion(table, kind, cases)
@@ -163,7 +156,7 @@ def _criteria(words: Words, kind: str, cases: Mapping[str, Case]) -> tuple[Crite
     return tuple(found.values())
 
 
-def _files(words: Words) -> tuple[str, ...]:
+def _files(words: TomlTable) -> tuple[str, ...]:
     given = words.any("files", ["submission.py"])
     if isinstance(given, str):
         given = [given]
@@ -175,7 +168,7 @@ def _files(words: Words) -> tuple[str, ...]:
     return tuple(given)
 
 
-def _due(words: Words) -> datetime | None:
+def _due(words: TomlTable) -> datetime | None:
     given: Any = words.any("due")
     if isinstance(given, str):
         try:
@@ -191,8 +184,8 @@ def _due(words: Words) -> datetime | None:
     return given
 
 
-def _secret(words: Words) -> str:
-    secret = words.text("secret")
+def _secret(words: TomlTable) -> str:
+    secret = words.read("secret")
     if secret is None or len(secret) < _LEAST_SECRET:
         raise InputError(
             f"secret must be a text of {_LEAST_SECRET} characters or more that students do not know: their plants are "
@@ -202,25 +195,20 @@ def _secret(words: Words) -> str:
     return secret
 
 
-def _limits(words: Words | None) -> Limits:
+def _limits(words: TomlTable | None) -> Limits:
     if words is None:
         return Limits()
-    given = {}
-    for field in fields(Limits):
-        if field.name in words:
-            whole = isinstance(field.default, int)
-            value = words.whole(field.name, None, "limit", 1, 1 << 40) if whole else None
-            given[field.name] = value if whole else words.number(field.name, None, "s", 0.01, 86_400.0)
+    limits = Limits(**{field.name: words.read(field.name) for field in fields(Limits)})
     words.done()
-    return Limits(**given)  # type: ignore[arg-type]
+    return limits
 
 
-def _hidden(words: Words | None) -> Hidden:
+def _hidden(words: TomlTable | None) -> Hidden:
     if words is None:
         return Hidden()
-    count, points = words.whole("criteria", 0, "hidden criteria"), words.number("points", 0.0, "points", 0.0, 1e9)
+    hidden = Hidden(words.read("criteria"), words.read("points"))
     words.done()
-    return Hidden(count or 0, points)
+    return hidden
 
 
 def _sha256(folder: Path, file: Path, names: set[str]) -> str:

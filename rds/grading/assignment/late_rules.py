@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from math import ceil, inf
 
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 
 _DAY = 86_400.0  # s
 
@@ -45,15 +45,10 @@ def days_late(due: datetime | None, submitted: datetime | None) -> float:
     return max(0.0, (submitted - due).total_seconds() / _DAY)
 
 
-def read_late(words: Words | None) -> Late:
+def read_late(words: TomlTable | None) -> Late:
     """The table `[late]`; without one nothing is lost. InputError for a word or value that will not do."""
     if words is None:
         return Late()
-    late = Late(
-        percent_per_day=words.number("percent_per_day", 0.0, "% of the points", 0.0, 100.0),
-        grace_hours=words.number("grace_hours", 0.0, "h", 0.0, 1e4),
-        cap_percent=words.number("cap_percent", 100.0, "% of the points", 0.0, 100.0),
-        zero_after_days=words.number("zero_after_days", inf, "days", 0.0, inf),
-    )
+    late = Late(**{key: words.read(key) for key in Late.__dataclass_fields__})
     words.done()
     return late

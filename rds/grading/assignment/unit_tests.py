@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.grading.cases.case import Submitted
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
@@ -67,20 +67,20 @@ def failing(tests: Sequence[UnitTest], submitted: Submitted) -> list[UnitTest]:
     return [test for test in tests if not test.passes(submitted)]
 
 
-def read_tests(words: Words) -> tuple[UnitTest, ...]:
+def read_tests(words: TomlTable) -> tuple[UnitTest, ...]:
     """The tables `[[criterion.test]]`. InputError with the place of what will not do."""
     return tuple(_test(table) for table in words.tables("test"))
 
 
-def _test(words: Words) -> UnitTest:
-    function, args = words.text("function"), words.any("args", [])
+def _test(words: TomlTable) -> UnitTest:
+    function, args = words.read("function"), words.any("args", [])
     if not function or not function.isidentifier():
         raise InputError(f"function = {function!r} must be the name of a function", words.place("function"))
     if not isinstance(args, list):
         raise words.fault("args", "must be a list of the function's arguments")
     if "expected" not in words:
         raise InputError("expected is missing; give what the function must return", words.place())
-    expected, tolerance = words.any("expected"), words.number("tolerance", 0.0, "the unit of the answer", 0.0, 1e300)
+    expected, tolerance = words.any("expected"), words.read("tolerance")
     for key, value in (("args", args), ("expected", expected)):
         if not _is_plain(value):
             raise words.fault(key, "must be made of finite numbers, texts, true, false, lists and tables")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.core.types import Controller, Model
 from rds.grading.assignment.seeds import part_seed
 from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
@@ -27,7 +27,7 @@ from rds.identification.robustness.uncertain import Uncertain, uncertain
 from rds.machines import Axis, Machine, load_machine
 from rds.machines.encoder import encoder
 from rds.models import library_model
-from rds.modes.experiment.resolve import PERIODS, resolve
+from rds.modes.experiment.resolve import resolve
 from rds.modes.loop.plan import Plan
 from rds.nc.check import Setup, motion
 from rds.nc.run.judge import judged
@@ -197,7 +197,7 @@ class ControlCase:
         return linear_loop(moves, self.plan.T)
 
 
-def read(words: Words, folder: Path, machine: str) -> ControlCase:
+def read(words: TomlTable, folder: Path, machine: str) -> ControlCase:
     """A table `[[case]]` of a controller's assignment. InputError with its place for what will not do."""
     words = as_own_file(words, {"machine": machine})
     common = read_common(words)
@@ -205,11 +205,11 @@ def read(words: Words, folder: Path, machine: str) -> ControlCase:
         if key in words.table:
             raise InputError(f"{key} has no place in a case: it is a simulation of the submission", words.place(key))
     own = inside(words, "machine", folder) if str(words.any("machine")).endswith(".toml") else None
-    rig = load_machine(str(folder / own) if own else str(words.text("machine")))
+    rig = load_machine(str(folder / own) if own else words.read("machine"))
     prepared, files = _program(words, folder, rig)
-    is_coupled = words.flag("coupled", False)
-    noise = words.number("noise", 0.0, "the axis's unit, as a standard deviation", 0.0, 1e9)
-    words.choice("plant", "model", ("model", "machine"))
+    is_coupled = words.read("coupled")
+    noise = words.read("noise")
+    words.read("plant")
     given = words.inner("params")
     for key in ("vary", "disturbance"):
         words.inner(key)
@@ -234,18 +234,18 @@ def read(words: Words, folder: Path, machine: str) -> ControlCase:
     )
 
 
-def _program(words: Words, folder: Path, machine: Machine) -> tuple[Prepared | None, tuple[str, ...]]:
+def _program(words: TomlTable, folder: Path, machine: Machine) -> tuple[Prepared | None, tuple[str, ...]]:
     """The part program's motion, planned here; its spindle stands still."""
     name = inside(words, "program", folder)
     if name is None:
         return None, ()
-    T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
+    T = words.read("sample_period", machine.sample_period)
     # planned from the text: a compiled form beside it would be written into the assignment
     prepared = planned(motion(folder / name, machine, Setup()), machine, T, folder / name)
     return replace(prepared, program=replace(prepared.program, spindle=None)), (name,)
 
 
-def _named_files(words: Words, folder: Path) -> list[str]:
+def _named_files(words: TomlTable, folder: Path) -> list[str]:
     """The files of references and models; InputError for one outside the assignment."""
     tables = [words]
     overrides = words.inner("axis") if isinstance(words.any("axis"), dict) else None
@@ -255,13 +255,13 @@ def _named_files(words: Words, folder: Path) -> list[str]:
     return [file for part in parts if (file := inside(part, "file", folder))]
 
 
-def plants_of(plan: Plan, words: Words) -> tuple[Plan, tuple[Uncertain, ...]]:
+def plants_of(plan: Plan, words: TomlTable) -> tuple[Plan, tuple[Uncertain, ...]]:
     """The plan with the plants that `plant` names, and what each of them may be by `[case.vary]`."""
     axes = tuple(replace(axis, model=_plant(axis, words)) for axis in plan.axes)
     return replace(plan, axes=axes), tuple(_uncertain(axis, words) for axis in axes)
 
 
-def _plant(axis: Any, words: Words) -> Any:
+def _plant(axis: Any, words: TomlTable) -> Any:
     if words.any("plant", "model") == "model":
         return axis.model
     if "model" in words.table:
@@ -274,7 +274,7 @@ def _plant(axis: Any, words: Words) -> Any:
     return library_model("machine-axis", **own.machine)
 
 
-def _uncertain(axis: Any, words: Words) -> Uncertain:
+def _uncertain(axis: Any, words: TomlTable) -> Uncertain:
     numbers = {k: float(v) for k, v in axis.model.params.items() if isinstance(v, int | float)}
     ranges = read_spread(words, numbers)
     if ranges:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.grading.cases.case import COUNTS, CaseRun, Submitted
 from rds.grading.cases.control import plants_of
 from rds.grading.cases.loop import run_loop
@@ -83,7 +83,7 @@ def free_run(subject: Any, voltages: Sequence[float], params: dict[str, Any], T:
     return [first, *map(subject.advance, voltages[:-1])]
 
 
-def read(words: Words, folder: Path, machine: str) -> ModelCase:
+def read(words: TomlTable, folder: Path, machine: str) -> ModelCase:
     """A table `[[case]]` of a model's assignment: with `log`, or with `signal` and a plant."""
     words = as_own_file(words, {"machine": machine})
     common = read_common(words)
@@ -95,8 +95,8 @@ def read(words: Words, folder: Path, machine: str) -> ModelCase:
     log = inside(words, "log", folder)
     if log is not None:
         return _of_log(words, common, params, folder, log)
-    noise = words.number("noise", 0.0, "the axis's unit, as a standard deviation", 0.0, 1e9)
-    words.choice("plant", "model", ("model", "machine"))
+    noise = words.read("noise")
+    words.read("plant")
     words.inner("vary")
     if "signal" not in words.table:
         raise InputError("a model's case needs `log` (a file of data) or [case.signal] (voltages)", words.place())
@@ -111,10 +111,10 @@ def read(words: Words, folder: Path, machine: str) -> ModelCase:
     return ModelCase(common, params, unit, tuple(files), plan=plan, plants=plants, noise=noise)
 
 
-def _of_log(words: Words, common: Common, params: dict[str, Any], folder: Path, log: str) -> ModelCase:
+def _of_log(words: TomlTable, common: Common, params: dict[str, Any], folder: Path, log: str) -> ModelCase:
     from rds.identification.logs.read_log import read_log
 
-    mapping, axis = inside(words, "map", folder), words.text("axis")
+    mapping, axis = inside(words, "map", folder), words.read("axis")
     words.any("machine")
     words.done()
     if common.runs != 1:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf
 from typing import Any
 
 import numpy as np
 
 from rds.core.contracts import Motion
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.core.types import Model
 from rds.grading.assignment.seeds import part_seed
 from rds.identification.robustness.draws import draws
@@ -20,7 +19,7 @@ from rds.identification.robustness.uncertain import Uncertain
 from rds.models import library_model
 from rds.models.machine_model import MachineAxisMotion, linear_part
 from rds.modes.parts import start
-from rds.references import make_signal, signal_kinds
+from rds.references import make_signal
 
 
 @dataclass(frozen=True)
@@ -35,15 +34,15 @@ class Disturbance:
     end: float
 
 
-def read_disturbance(words: Words | None, T: float, samples: int) -> Disturbance | None:
+def read_disturbance(words: TomlTable | None, T: float, samples: int) -> Disturbance | None:
     """`[case.disturbance]`: a signal by `kind` with its options, V, from `start` to `end`, s."""
     if words is None:
         return None
-    first = words.number("start", 0.0, "s", 0.0, inf)
-    end = words.number("end", inf, "s", 0.0, inf)
+    first = words.read("start")
+    end = words.read("end")
     if "kind" not in words:
         raise InputError('kind is missing; as in `kind = "constant"` with `value` in V', words.place())
-    kind = words.choice("kind", "", signal_kinds())
+    kind = words.read("kind")
     options = {key: words.any(key) for key in words.table if key not in ("kind", "start", "end")}
     try:
         signal = make_signal(kind, **options)

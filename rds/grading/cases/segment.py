@@ -12,7 +12,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.geometry import length
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.grading.cases.case import COUNTS, CaseRun, Submitted
 from rds.grading.cases.words import Common, as_own_file, inside, read_common
@@ -70,13 +70,13 @@ class SegmentCase:
         return CaseRun(self.name, number, result, counts=counts, facts=facts, rows=rows)
 
 
-def read(words: Words, folder: Path, machine: str) -> SegmentCase:
+def read(words: TomlTable, folder: Path, machine: str) -> SegmentCase:
     """A table `[[case]]` of an interpolator's assignment, with `[case.segment]`."""
     words = as_own_file(words, {"machine": machine})
     common = read_common(words)
     own = inside(words, "machine", folder) if str(words.any("machine")).endswith(".toml") else None
-    rig = load_machine(str(folder / own) if own else str(words.text("machine")))
-    T = words.number("sample_period", rig.sample_period, "s", 1e-6, 10.0)
+    rig = load_machine(str(folder / own) if own else words.read("machine"))
+    T = words.read("sample_period", rig.sample_period)
     given, table = words.inner("params"), words.inner("segment")
     if table is None:
         raise InputError('[case.segment] is missing; as in `kind = "line"`, start, end, feed_rate', words.place())
@@ -88,10 +88,10 @@ def read(words: Words, folder: Path, machine: str) -> SegmentCase:
     return SegmentCase(common, segment, T, dict(given.table) if given else {}, axes, (own,) if own else ())
 
 
-def _segment(words: Words, T: float) -> Segment:
-    kind = words.choice("kind", "line", ("line", "arc"))
+def _segment(words: TomlTable, T: float) -> Segment:
+    kind = words.read("kind")
     start, end = _point(words, "start"), _point(words, "end")
-    feed = words.number("feed_rate", None, "mm/s along the path", 1e-6, 1e6)
+    feed = words.read("feed_rate")
     if len(start) != len(end):
         raise words.fault("end", f"must have as many values as start, {len(start)}")
     segment: Segment
@@ -102,7 +102,7 @@ def _segment(words: Words, T: float) -> Segment:
         if not isinstance(plane, list) or len(plane) != 2 or not all(type(axis) is int for axis in plane):
             raise words.fault("plane", "must be two axes by index, as in [0, 1]")
         centre = _point(words, "centre")
-        segment = ArcSegment(start, end, centre, feed, words.flag("clockwise", False), (plane[0], plane[1]))
+        segment = ArcSegment(start, end, centre, feed, words.read("clockwise"), (plane[0], plane[1]))
     words.done()
     try:
         return checked(segment, T)
@@ -110,7 +110,7 @@ def _segment(words: Words, T: float) -> Segment:
         raise InputError(str(error), words.place()) from error
 
 
-def _point(words: Words, key: str) -> tuple[float, ...]:
+def _point(words: TomlTable, key: str) -> tuple[float, ...]:
     given = words.any(key)
     known = isinstance(given, list) and 0 < len(given) <= 6
     if not known or not all(isinstance(v, int | float) and not isinstance(v, bool) and -inf < v < inf for v in given):

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 
-MOST_RUNS = 1000
 _SHARE = re.compile(r"(?:±|\+-|\+/-)\s*(\d+(?:\.\d*)?(?:e-?\d+)?)\s*(%?)")
 
 Ranges = dict[str, tuple[float, float]]
@@ -26,31 +25,33 @@ class Common:
     runs: int
 
 
-def as_own_file(words: Words, defaults: dict[str, Any]) -> Words:
+def as_own_file(words: TomlTable, defaults: dict[str, Any]) -> TomlTable:
     """A table `[[case]]` as if it were a file of its own: errors tell the places in the assignment."""
     prefix = rf"(\s*\[{{1,2}}\s*){re.escape(words.name)}\."
     lines = [
         "" if re.match(rf"\s*\[\[\s*{re.escape(words.name)}\s*\]\]", line) else re.sub(rf"^{prefix}", r"\1", line)
         for line in words.source.split("\n")
     ]
-    return Words(defaults | words.table, "\n".join(lines), words.path, lines_before=words.lines_before)
+    return TomlTable(
+        defaults | words.table, words.declared, "\n".join(lines), words.path, lines_before=words.lines_before
+    )
 
 
-def read_common(words: Words) -> Common:
+def read_common(words: TomlTable) -> Common:
     """Name, title, visibility and number of runs."""
-    name = words.text("name")
+    name = words.read("name")
     if not name or not re.fullmatch(r"[\w .()+-]{1,80}", name):
         raise InputError(
             f"name = {name!r} of a case must be a short text of letters, digits, spaces and . ( ) + - _",
             words.place("name"),
         )
-    runs = words.whole("runs", 1, "plants that are drawn for each student", 1, MOST_RUNS)
-    return Common(name, words.text("title", name) or name, words.flag("visible", True), runs or 1)
+    runs = words.read("runs")
+    return Common(name, words.read("title", name) or name, words.read("visible"), runs)
 
 
-def inside(words: Words, key: str, folder: Path) -> str | None:
+def inside(words: TomlTable, key: str, folder: Path) -> str | None:
     """A file of the assignment that is named under `key`, counted from its folder; InputError if there is none."""
-    name = words.text(key)
+    name: str | None = words.read(key)
     if name is None:
         return None
     path = folder / name
@@ -61,7 +62,7 @@ def inside(words: Words, key: str, folder: Path) -> str | None:
     return name
 
 
-def read_spread(words: Words, values: dict[str, float]) -> Ranges:
+def read_spread(words: TomlTable, values: dict[str, float]) -> Ranges:
     """`[case.vary]`: of each parameter a range: "±10 %" or "±0.001" about `values`, or [lowest, highest]."""
     table = words.inner("vary")
     if table is None:
@@ -71,7 +72,7 @@ def read_spread(words: Words, values: dict[str, float]) -> Ranges:
     return ranges
 
 
-def _range(table: Words, key: str, values: dict[str, float]) -> tuple[float, float]:
+def _range(table: TomlTable, key: str, values: dict[str, float]) -> tuple[float, float]:
     given = table.any(key)
     if key not in values:
         raise InputError(f"the plant has no parameter {key!r}; it has {', '.join(values)}", table.place(key))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import isfinite
 from types import ModuleType
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.options import Option
-from rds.core.toml_table import Words
+from rds.core.quantities import Quantity
+from rds.core.toml_table import TomlTable
 from rds.grading.assignment.unit_tests import UnitTest, read_tests
 from rds.grading.cases.case import LINEAR, Case, CaseRun
 from rds.grading.criteria import KINDS
@@ -108,12 +108,15 @@ class Criterion:
         )
 
 
-def read_criterion(words: Words, kind_of_submission: str, cases: Mapping[str, Case]) -> Criterion:
+_SHARE = Quantity("share of the points", "", 0.0, 1.0)
+
+
+def read_criterion(words: TomlTable, kind_of_submission: str, cases: Mapping[str, Case]) -> Criterion:
     """A table `[[criterion]]`. InputError with its place for a word, a value or a case that will not do."""
-    name = words.text("name")
+    name = words.read("name")
     if not name:
         raise InputError("name is missing; give each criterion a name of its own", words.place())
-    kind = words.choice("kind", "", KINDS.names())
+    kind = words.read("kind")
     module = KINDS.module(kind)
     if kind_of_submission not in module.FOR:
         said = f"is for {' and '.join(module.FOR)} assignments; this one's kind is {kind_of_submission}"
@@ -124,18 +127,18 @@ def read_criterion(words: Words, kind_of_submission: str, cases: Mapping[str, Ca
         raise InputError("it has no test; add [[criterion.test]] with function, args, expected", words.place())
     _check_cases(words, module, [cases[each] for each in chosen])
     options = _options(words, module)
-    points = words.number("points", None, "points", 0.0, 1e6)
-    weight = words.number("weight", 1.0, "a factor of the points", 0.0, 1e6)
+    points = words.read("points")
+    weight = words.read("weight")
     unit = _unit(words, module, [cases[each] for each in chosen])
     criterion = Criterion(
         name,
-        words.text("title", name) or name,
+        words.read("title", name) or name,
         kind,
         chosen,
         points * weight,
         _bands(words, module, unit),
         unit,
-        words.flag("visible", True),
+        words.read("visible"),
         options,
         tests,
         _requires(words, name),
@@ -144,8 +147,8 @@ def read_criterion(words: Words, kind_of_submission: str, cases: Mapping[str, Ca
     return criterion
 
 
-def _cases(words: Words, cases: Mapping[str, Case], kind: str) -> tuple[str, ...]:
-    one, several = words.text("case"), words.any("cases")
+def _cases(words: TomlTable, cases: Mapping[str, Case], kind: str) -> tuple[str, ...]:
+    one, several = words.read("case"), words.any("cases")
     if kind == "unit-tests":
         if one is not None or several is not None:
             raise InputError("unit tests need no case; remove it", words.place("case" if one else "cases"))
@@ -162,7 +165,7 @@ def _cases(words: Words, cases: Mapping[str, Case], kind: str) -> tuple[str, ...
     return tuple(dict.fromkeys(names))
 
 
-def _check_cases(words: Words, module: ModuleType, cases: Sequence[Case]) -> None:
+def _check_cases(words: TomlTable, module: ModuleType, cases: Sequence[Case]) -> None:
     for case in cases:
         for part in getattr(module, "CASE_HAS", ()):
             if not getattr(case, part, None):
@@ -172,12 +175,12 @@ def _check_cases(words: Words, module: ModuleType, cases: Sequence[Case]) -> Non
             raise words.fault("kind", f"{said}; case {case.name!r} is not one")
 
 
-def _unit(words: Words, module: ModuleType, cases: Sequence[Case]) -> str:
+def _unit(words: TomlTable, module: ModuleType, cases: Sequence[Case]) -> str:
     units = {case.unit for case in cases} if module.UNIT is None else {module.UNIT}
     if len(units) > 1:
         raise words.fault("cases", f"measure in different units ({', '.join(sorted(units))}); split the criterion")
     unit = str(units.pop())
-    written = words.text("unit")
+    written = words.read("unit")
     if written is None:
         raise InputError(f'unit is missing; write `unit = "{unit}"`, so that nobody mistakes the bands', words.place())
     if written != unit:
@@ -185,22 +188,20 @@ def _unit(words: Words, module: ModuleType, cases: Sequence[Case]) -> str:
     return unit
 
 
-def _bands(words: Words, module: ModuleType, unit: str) -> Bands:
-    full, none = words.number("full", None, unit, -inf, inf), words.number("none", None, unit, -inf, inf)
+def _bands(words: TomlTable, module: ModuleType, unit: str) -> Bands:
+    full, none = words.read("full"), words.read("none")
     partial = words.any("partial", "linear")
-    if partial != "linear" and (isinstance(partial, bool) or not isinstance(partial, int | float)):
-        raise words.fault("partial", 'must be "linear", or a share of the points from 0 to 1')
-    share = None if partial == "linear" else words.number("partial", None, "share of the points", 0.0, 1.0)
-    if not isfinite(full) or not isfinite(none):
-        raise words.fault("full" if not isfinite(full) else "none", f"must be a finite number in {unit}")
+    if partial != "linear" and (fault := _SHARE.fault(partial)) is not None:
+        raise words.fault("partial", f'{fault}, or "linear"')
+    share = None if partial == "linear" else float(partial)
     if full == none or (none > full) is not module.MORE_IS_WORSE:
         way = "more" if module.MORE_IS_WORSE else "less"
         raise words.fault("none", f"must be {way} than full = {full:g} {unit}: {way} is worse for this criterion")
     return Bands(full, none, share)
 
 
-def _options(words: Words, module: ModuleType) -> dict[str, Any]:
-    known: Mapping[str, Option] = getattr(module, "OPTIONS", {})
+def _options(words: TomlTable, module: ModuleType) -> dict[str, Any]:
+    known: Mapping[str, Quantity] = getattr(module, "OPTIONS", {})
     found: dict[str, Any] = dict(getattr(module, "DEFAULTS", {}))
     for key, option in known.items():
         if key in words:
@@ -210,11 +211,11 @@ def _options(words: Words, module: ModuleType) -> dict[str, Any]:
                 raise InputError(str(error), words.place(key)) from error
     for key in getattr(module, "NEEDED", ()):
         if key not in found:
-            raise InputError(f"{key} is missing; give it: {known[key].meaning}", words.place())
+            raise InputError(f"{key} is missing; give it: {known[key].described}", words.place())
     return found
 
 
-def _requires(words: Words, name: str) -> tuple[str, ...]:
+def _requires(words: TomlTable, name: str) -> tuple[str, ...]:
     given = words.any("requires", [])
     given = [given] if isinstance(given, str) else given
     if not isinstance(given, list) or not all(isinstance(each, str) for each in given):

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import RdsError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.grading.cases.case import CaseRun
 from rds.results.metrics import error_metrics, settled, tracking_error
 
 Options = Mapping[str, Any]
 
 WINDOW = {
-    "from": Option("s, the first sample that counts", at_least=0.0),
-    "until": Option("s, the end of what counts", more_than=0.0),
+    "from": Quantity("the first sample that counts", "s", low=0.0),
+    "until": Quantity("the end of what counts", "s", above=0.0),
 }
 """Which samples count. Without them all do but the first period of a periodic reference, as in every result."""
 
@@ -81,8 +81,8 @@ class Step:
 
 
 STEP = {
-    "from": Option("s, when the reference steps", at_least=0.0),
-    "until": Option("s, the end of the response", more_than=0.0),
+    "from": Quantity("when the reference steps", "s", low=0.0),
+    "until": Quantity("the end of the response", "s", above=0.0),
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.contour import contour
 from rds.grading.criteria.measuring import WINDOW, NotMeasured, Options
@@ -13,7 +13,7 @@ MEANING = "the part of the path within the tolerance"
 UNIT = "%"
 MORE_IS_WORSE = False
 FOR = ("controller",)
-OPTIONS = {"tolerance": Option("mm from the path", more_than=0.0), **WINDOW}
+OPTIONS = {"tolerance": Quantity("distance from the path", "mm", above=0.0), **WINDOW}
 NEEDED = ("tolerance",)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.measuring import NotMeasured, Options, error_of, over_axes
 
@@ -12,7 +12,7 @@ MEANING = "the time to recover from the disturbance"
 UNIT = "s"
 MORE_IS_WORSE = True
 FOR = ("controller",)
-OPTIONS = {"within": Option("of the axis's unit, about the reference", more_than=0.0)}
+OPTIONS = {"within": Quantity("about the reference, in the axis's unit", above=0.0)}
 NEEDED = ("within",)
 CASE_HAS = ("disturbance",)
 

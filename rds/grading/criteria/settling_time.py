@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.measuring import STEP, NotMeasured, Options, over_axes, step_of
 
@@ -12,7 +12,7 @@ MEANING = "the settling time"
 UNIT = "s"
 MORE_IS_WORSE = True
 FOR = ("controller",)
-OPTIONS = {"within": Option("% of the step, to either side of the final reference", more_than=0.0), **STEP}
+OPTIONS = {"within": Quantity("share of the step, to either side of the final reference", "%", above=0.0), **STEP}
 DEFAULTS = {"within": 2.0}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.measuring import NotMeasured, Options, error_of, over_axes
 
@@ -11,8 +11,8 @@ UNIT = None
 MORE_IS_WORSE = True
 FOR = ("controller",)
 OPTIONS = {
-    "last": Option("s, over which the mean is taken", more_than=0.0),
-    "until": Option("s, where they end; default: with the run", more_than=0.0),
+    "last": Quantity("time over which the mean is taken", "s", above=0.0),
+    "until": Quantity("where it ends; default: with the run", "s", above=0.0),
 }
 DEFAULTS = {"last": 0.1}
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.identification.structures.structure import Structure
 from rds.machines.machine import Axis, Machine
 from rds.references import Signal, make_signal, sample_voltage
@@ -33,8 +33,8 @@ _HIGHEST = (5.0, 15.0, 40.0)  # Hz, of multisine and chirp
 _STEPS = (2, 4)
 _MOST_SAMPLES = 200_000
 _OPTIONS = {
-    "duration": Option("length of the test, s", more_than=0.0),
-    "noise": Option("standard deviation of the output's noise beside rounding, mm (rev/min)", at_least=0.0),
+    "duration": Quantity("length of the test", "s", above=0.0),
+    "noise": Quantity("standard deviation of the output's noise beside rounding", "mm (rev/min)", low=0.0),
 }
 
 Progress = Callable[[int, int], None]

@@ -21,7 +21,8 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
-from rds.core.options import Option, check_known
+from rds.core.options import check_known
+from rds.core.quantities import Quantity
 from rds.identification.fit.estimate import UNUSABLE, Estimate
 from rds.identification.fit.frequency_response import FrequencyResponse, frequency_response, model_response, output_rate
 from rds.identification.fit.made_estimate import made_estimate
@@ -31,7 +32,7 @@ from rds.identification.logs.log import Log
 from rds.identification.structures.structure import Structure
 
 STRUCTURES: Mapping[str, tuple[str, ...]] = {"spindle": ("delay",), "axis": ("delay",)}  # and their options
-OPTIONS = {"period": Option("period of a command that repeats, s; found in the data if not given", more_than=0.0)}
+OPTIONS = {"period": Quantity("period of a command that repeats; found in the data if not given", "s", above=0.0)}
 _LEAST_LINES = 3
 _FLOOR = 1e-3  # of the response: how exactly a line may be believed, however quiet
 _COHERENT = 0.9  # a median coherence below it deserves a warning

@@ -19,7 +19,8 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
-from rds.core.options import Option, check_known
+from rds.core.options import check_known
+from rds.core.quantities import Quantity
 from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.made_estimate import made_estimate
 from rds.identification.fit.regression import Regression, regress
@@ -28,18 +29,16 @@ from rds.identification.structures.motion_form import MotionForm, motion_form
 from rds.identification.structures.structure import Structure
 
 OPTIONS = {
-    "cutoff": Option(
-        "cut-off of the zero-phase filter, Hz; a tenth of the sampling frequency if not given", more_than=0.0
+    "cutoff": Quantity(
+        "cut-off of the zero-phase filter; a tenth of the sampling frequency if not given", "Hz", above=0.0
     ),
-    "order": Option("order of the filter, run forward and backward; 4 if not given", at_least=1.0),
-    "decimation": Option("one of how many samples is kept; sampling frequency over cut-off if not given", at_least=1.0),
-    "hold": Option(
+    "order": Quantity("order of the filter, run forward and backward; 4 if not given", low=1.0),
+    "decimation": Quantity("one of how many samples is kept; sampling frequency over cut-off if not given", low=1.0),
+    "hold": Quantity(
         "share of the command before in what acts at a sample: 0.5 for a held command, 0 for a force at that instant",
-        at_least=0.0,
+        low=0.0,
     ),
-    "drop": Option(
-        "samples left out at each end; 4.9 sampling frequencies over the cut-off if not given", at_least=0.0
-    ),
+    "drop": Quantity("samples left out at each end; 4.9 sampling frequencies over the cut-off if not given", low=0.0),
 }
 _JITTER = 0.1  # of a sample period: how far a time may be off the regular grid
 _REST = 2  # decimated samples within which an axis at rest moves no more than one step of its encoder

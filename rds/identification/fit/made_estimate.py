@@ -112,9 +112,9 @@ def t_quantile(freedom: float, share: float = 0.95) -> float:
 
 def _check_bounds(structure: Structure, name: str, value: float, method: str) -> None:
     option, high = structure.parameters[name], structure.bounds(name)[1]
-    if not np.isfinite(value) or value < option.at_least or value <= option.more_than or value > high:
+    if not np.isfinite(value) or value < option.low or value <= option.above or value > high:
         raise InputError(
-            f"by {method}, {name} = {value:.4g} {structure.units[name]}, which no axis has ({option.meaning}): the "
+            f"by {method}, {name} = {value:.4g} {structure.units[name]}, which no axis has ({option.described}): the "
             "sign of the command or the position is reversed, columns are swapped, or noise hides the motion; look at "
             "the data with `rds data describe`, or try another method"
         )

@@ -15,7 +15,7 @@ import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite, nan
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,8 @@ import numpy as np
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.core.installed import version
-from rds.core.toml_table import Words
+from rds.core.quantities import Anything, Declaration, Items, Quantity, Table, Tables, Text
+from rds.core.toml_table import TomlTable
 from rds.core.toml_text import toml_text
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
 
@@ -139,22 +140,72 @@ def _errors_table(errors: Errors) -> dict[str, Any]:
     return {key: float(getattr(errors, key)) for key in _ERRORS} | {"unit": errors.unit}
 
 
+_MAY_BE_UNKNOWN = "a number (nan where it is not known)"
+_FIGURES: Mapping[str, Declaration] = {
+    **{key: Anything(_MAY_BE_UNKNOWN) for key in _ERRORS},
+    "unit": Text("unit of rmse and maximum"),
+}
+_PARAMETER = Table(
+    "a parameter",
+    {
+        "value": Quantity("value of the parameter"),
+        "unit": Text('unit of the parameter; "" for a pure number'),
+        **{key: Anything(_MAY_BE_UNKNOWN) for key in _SPREAD},
+    },
+    needed=("value", "unit"),
+)
+_SAMPLE = Quantity("number of a sample", "", 0, 10**12, whole=True)
+_LOG = Table(
+    "a log that it was fitted to",
+    {
+        **{key: Text(f"{key} of the log") for key in _LOG_TEXTS},
+        "first": _SAMPLE,
+        "end": _SAMPLE,
+        **{key: Anything(f"{key} of the log, numbers") for key in ("command", "velocity", "initial_state")},
+        "free_run": Table("errors of a free run", _FIGURES),
+        "ahead": Table("errors so many samples ahead", others=Table("errors", _FIGURES)),
+    },
+)
+MODEL_FILE = Table(
+    "A model file, as `rds fit` writes it.",
+    {
+        "format": Quantity(
+            "format of model files that this version reads", "", FORMAT, FORMAT, default=FORMAT, whole=True
+        ),
+        "structure": Text("structure of the model, or a student's .py file"),
+        "structure_sha256": Text("SHA-256 of the student's file", ""),
+        "options": Items("options of the structure", Text("name"), "a list of texts"),
+        "method": Text("how it was fitted", ""),
+        "warnings": Items("what was noticed", Text("sentence"), "a list of texts"),
+        "untold": Items("parameters that the data do not determine", Text("name"), "a list of texts"),
+        "parameters": Table("parameters by name", others=_PARAMETER),
+        "covariance": Table(
+            "covariance of the parameters",
+            {"order": Items("names", Text("name"), "a list of texts"), "rows": Anything("rows of the matrix")},
+        ),
+        "logs": Tables("logs that it was fitted to", _LOG),
+        "versions": Table("versions of programs", others=Text("version")),
+    },
+    needed=("structure", "parameters"),
+)
+
+
 def read_model(path: str | Path) -> ModelFile:
     """The model file at `path`; InputError with file, line, key, value and remedy for whatever will not do.
 
     No key is ignored. That the parameters are those of the structure is checked when the model is used.
     """
-    words = Words.read(path)
+    words = TomlTable.open(path, MODEL_FILE)
     if "parameters" not in words:
         raise InputError(
             "it is no model file: there is no [parameters]; `rds fit LOG --structure axis -o MODEL.toml` makes one",
             words.place(),
         )
-    words.whole("format", FORMAT, "of model files that this version reads", FORMAT, FORMAT)
-    structure = words.text("structure")
+    words.read("format")
+    structure = words.read("structure")
     if not structure:
         raise InputError('structure is missing; as in `structure = "axis"`', words.place())
-    sha256 = words.text("structure_sha256", "") or ""
+    sha256 = words.read("structure_sha256")
     if sha256 and not structure.endswith(".py"):
         raise words.fault("structure_sha256", "is for a student's structure, a .py file; remove it")
     if structure.endswith(".py"):
@@ -167,11 +218,11 @@ def read_model(path: str | Path) -> ModelFile:
         options=_texts(words, "options"),
         parameters=parameters,
         covariance=_read_covariance(words, tuple(parameters)),
-        method=words.text("method", "") or "",
+        method=words.read("method"),
         logs=logs,
         warnings=_texts(words, "warnings"),
         untold=_texts(words, "untold"),
-        versions={name: str(versions.text(name)) for name in versions.table} if versions else {},
+        versions={name: versions.read(name) for name in versions.table} if versions else {},
         structure_sha256=sha256,
         path=str(path),
         sha256=file_sha256(Path(path)),
@@ -190,7 +241,7 @@ def file_sha256(path: Path) -> str:
         raise InputError(f"cannot be read: {error.strerror}; check the path", str(path)) from error
 
 
-def _read_parameters(words: Words) -> dict[str, Parameter]:
+def _read_parameters(words: TomlTable) -> dict[str, Parameter]:
     tables = words.inner("parameters")
     assert tables is not None  # read_model has looked
     if not tables.table:
@@ -199,10 +250,8 @@ def _read_parameters(words: Words) -> dict[str, Parameter]:
     for name in tables.table:
         table = tables.inner(name)
         assert table is not None
-        value = table.any("value")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise table.fault("value", "must be a finite number")
-        unit = table.text("unit")
+        value = table.read("value")
+        unit = table.read("unit")
         if unit is None:
             raise InputError(f'unit of {name} is missing; as in `unit = "s"` ("" for a pure number)', table.place())
         spread = {key: _real(table, key) for key in _SPREAD}
@@ -215,7 +264,7 @@ def _read_parameters(words: Words) -> dict[str, Parameter]:
     return read
 
 
-def _real(table: Words, key: str) -> float:
+def _real(table: TomlTable, key: str) -> float:
     """A number that may be infinite or not known (nan): what the data do not tell."""
     value = table.any(key, nan)
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -223,7 +272,7 @@ def _real(table: Words, key: str) -> float:
     return float(value)
 
 
-def _read_covariance(words: Words, names: tuple[str, ...]) -> np.ndarray:
+def _read_covariance(words: TomlTable, names: tuple[str, ...]) -> np.ndarray:
     table = words.inner("covariance")
     if table is None:
         return np.full((len(names), len(names)), nan)
@@ -246,10 +295,10 @@ def _read_covariance(words: Words, names: tuple[str, ...]) -> np.ndarray:
     return matrix
 
 
-def _read_log(table: Words) -> dict[str, Any]:
-    log: dict[str, Any] = {key: value for key in _LOG_TEXTS if (value := table.text(key)) is not None}
+def _read_log(table: TomlTable) -> dict[str, Any]:
+    log: dict[str, Any] = {key: value for key in _LOG_TEXTS if (value := table.read(key)) is not None}
     for key in ("first", "end"):
-        if (sample := table.whole(key, None, "sample", 0, 10**12)) is not None:
+        if (sample := table.read(key)) is not None:
             log[key] = sample
     for key, count in (("command", 2), ("velocity", 2), ("initial_state", None)):
         if key in table:
@@ -268,21 +317,21 @@ def _read_log(table: Words) -> dict[str, Any]:
     return log
 
 
-def _read_errors(table: Words) -> Errors:
+def _read_errors(table: TomlTable) -> Errors:
     fit_percent, rmse, maximum = (_real(table, key) for key in _ERRORS)
-    errors = Errors(fit_percent, rmse, maximum, table.text("unit", "") or "")
+    errors = Errors(fit_percent, rmse, maximum, table.read("unit", ""))
     table.done()
     return errors
 
 
-def _texts(words: Words, key: str) -> tuple[str, ...]:
+def _texts(words: TomlTable, key: str) -> tuple[str, ...]:
     values = words.any(key, [])
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
         raise words.fault(key, "must be a list of texts")
     return tuple(values)
 
 
-def _numbers(words: Words, key: str, count: int | None) -> tuple[float, ...]:
+def _numbers(words: TomlTable, key: str, count: int | None) -> tuple[float, ...]:
     values = words.any(key)
     is_list = isinstance(values, list) and (count is None or len(values) == count)
     if not is_list or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):

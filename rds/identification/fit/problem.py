@@ -56,7 +56,7 @@ class Problem:
         """The lowest and highest of every free number."""
         pairs = [self.structure.bounds(name) for name in self.names]
         options = [self.structure.parameters[name] for name in self.names]
-        pairs = [(max(low, o.more_than + _ABOVE), high) for (low, high), o in zip(pairs, options, strict=True)]
+        pairs = [(max(low, o.above + _ABOVE), high) for (low, high), o in zip(pairs, options, strict=True)]
         states = self.structure.state_bounds or ((-np.inf, np.inf),) * self.structure.states
         low, high = zip(*pairs, *(states * len(self.logs)), strict=True)
         return np.array(low), np.array(high)

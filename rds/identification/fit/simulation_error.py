@@ -161,7 +161,7 @@ def _checked(given: Mapping[str, Any], structure: Structure) -> dict[str, float]
         if value > structure.bounds(name)[1]:
             raise InputError(
                 f"{owner}: {name} = {value:g} must be at most {structure.bounds(name)[1]:g} "
-                f"({structure.parameters[name].meaning})"
+                f"({structure.parameters[name].described})"
             )
     return values
 

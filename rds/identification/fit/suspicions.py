@@ -41,7 +41,7 @@ def _search(problem: Problem, solution: Solution) -> list[str]:
     values = problem.values(solution.point)
     for name, side in zip(problem.names, solution.at_bound, strict=False):
         if side:
-            meaning = problem.structure.parameters[name].meaning
+            meaning = problem.structure.parameters[name].described
             conclusion = (
                 "these data show nothing of it; fit without that option"
                 if name in problem.structure.neutral and side < 0

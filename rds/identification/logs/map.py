@@ -8,9 +8,10 @@ from math import inf
 from pathlib import Path
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.identification.logs.csv_layout import DELIMITERS
 from rds.identification.logs.log import QUANTITIES
+from rds.identification.logs.map_file import FORCE_GAIN, JITTER_LIMIT, MAP
 from rds.identification.logs.units import check_unit
 from rds.machines import load_machine
 from rds.machines.machine import Machine
@@ -18,7 +19,6 @@ from rds.machines.machine import Machine
 UNKNOWN = "?"  # what a draft has for the column of a quantity that nothing in the file tells
 SUFFIX = ".map.toml"
 WRAPPING = ("position", "reference")  # what a counter that begins again may count
-JITTER_LIMIT = 0.1  # of the sample period: how far a step of the time may be from it
 ROTARY = ("angle", "angular speed")
 # what each quantity may be measured in
 DIMENSIONS: Mapping[str, tuple[str, ...]] = {
@@ -116,10 +116,10 @@ class LogMap:
     @classmethod
     def read(cls, path: str | Path) -> LogMap:
         """The map in a TOML file; InputError, with file and line, for a key or value that has no meaning."""
-        words = Words.read(path)
+        words = TomlTable.open(path, MAP)
         folder = Path(path).parent
-        table = words.inner("table") or Words({}, words.source, words.path, "table")
-        bus = words.inner("bus") or Words({}, words.source, words.path, "bus")
+        table = words.inner_or_empty("table")
+        bus = words.inner_or_empty("bus")
         delimiter, decimal = _layout(table)
         machine = _machine(words, folder)
         made = cls(
@@ -131,11 +131,11 @@ class LogMap:
             delimiter=delimiter,
             decimal=decimal,
             dbc=_files(bus, "dbc", folder),
-            samples=words.whole("samples", None, "how many there should be", 2),
-            jitter_limit=words.number("jitter_limit", JITTER_LIMIT, "parts of the sample period", 0.0, 0.5),
-            duplicates=words.choice("duplicates", "refuse", ("refuse", "drop")),
-            gaps=words.choice("gaps", "refuse", ("refuse", "split", "keep")),
-            blanks=words.choice("blanks", "refuse", ("refuse", "drop")),
+            samples=words.read("samples"),
+            jitter_limit=words.read("jitter_limit"),
+            duplicates=words.read("duplicates"),
+            gaps=words.read("gaps"),
+            blanks=words.read("blanks"),
         )
         for part in (table, bus, words):
             part.done()
@@ -156,8 +156,8 @@ def beside(path: Path) -> Path | None:
     return found if found.is_file() else None
 
 
-def _machine(words: Words, folder: Path) -> Machine | None:
-    name = words.text("machine")
+def _machine(words: TomlTable, folder: Path) -> Machine | None:
+    name = words.read("machine")
     if name is None:
         return None
     try:
@@ -166,13 +166,13 @@ def _machine(words: Words, folder: Path) -> Machine | None:
         raise error if error.where else InputError(str(error), words.place("machine")) from error
 
 
-def _layout(table: Words) -> tuple[str | None, str | None]:
-    delimiter = table.choice("delimiter", "find", ("find", *DELIMITERS))
-    decimal = table.choice("decimal", "find", ("find", "point", "comma"))
+def _layout(table: TomlTable) -> tuple[str | None, str | None]:
+    delimiter = table.read("delimiter")
+    decimal = table.read("decimal")
     return DELIMITERS.get(delimiter), {"point": ".", "comma": ","}.get(decimal)
 
 
-def _files(words: Words, key: str, folder: Path) -> tuple[Path, ...]:
+def _files(words: TomlTable, key: str, folder: Path) -> tuple[Path, ...]:
     given = words.any(key, [])
     names = [given] if isinstance(given, str) else given
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
@@ -180,8 +180,8 @@ def _files(words: Words, key: str, folder: Path) -> tuple[Path, ...]:
     return tuple(folder / name for name in names)
 
 
-def _unit(words: Words, quantity: str) -> str | None:
-    unit = words.text("unit")
+def _unit(words: TomlTable, quantity: str) -> str | None:
+    unit: str | None = words.read("unit")
     if unit is not None:
         try:
             check_unit(unit, DIMENSIONS[quantity], quantity)
@@ -190,22 +190,22 @@ def _unit(words: Words, quantity: str) -> str | None:
     return unit
 
 
-def _time(words: Words | None, path: str) -> TimeMap:
+def _time(words: TomlTable | None, path: str) -> TimeMap:
     if words is None:
         return TimeMap(place=path)
-    rate = words.number("rate", None, "Hz", 1e-6, 1e9) if "rate" in words else None
-    column = words.text("column")
+    rate = words.read("rate")
+    column = words.read("column")
     if rate is not None and column is not None:
         raise words.fault("rate", "is for a file without a column of time; give one of rate and column")
-    uncertainty = words.number("uncertainty", -1.0, "s", 0.0, 1e3) if "uncertainty" in words else None
+    uncertainty = words.read("uncertainty")
     made = TimeMap(
         column=column,
         unit=_unit(words, "time"),
         scale=_scale(words),
-        offset=words.number("offset", 0.0, "the time's unit", -1e15, 1e15),
+        offset=words.read("offset"),
         rate=rate,
-        wrap=words.number("wrap", None, "numbers of the column", 1e-9, 1e15) if "wrap" in words else None,
-        source=words.text("source", "") or "",
+        wrap=words.read("wrap"),
+        source=words.read("source"),
         uncertainty=uncertainty,
         place=words.place(),
     )
@@ -216,14 +216,14 @@ def _time(words: Words | None, path: str) -> TimeMap:
     return made
 
 
-def _scale(words: Words) -> float:
-    scale = words.number("scale", 1.0, "the column's unit per number", -1e15, 1e15)
+def _scale(words: TomlTable) -> float:
+    scale: float = words.read("scale")
     if scale == 0.0:
         raise words.fault("scale", "must not be 0: nothing would be left of the column")
     return scale
 
 
-def _axes(words: Words, machine: Machine | None) -> dict[str, AxisMap]:
+def _axes(words: TomlTable, machine: Machine | None) -> dict[str, AxisMap]:
     tables = words.inner("axis")
     if tables is None or not tables.table:
         raise InputError("there is no [axis.NAME] table; say which columns are command and position", words.place())
@@ -235,7 +235,7 @@ def _axes(words: Words, machine: Machine | None) -> dict[str, AxisMap]:
     return made
 
 
-def _axis(name: str, words: Words, machine: Machine | None) -> AxisMap:
+def _axis(name: str, words: TomlTable, machine: Machine | None) -> AxisMap:
     columns = {q: _column(words, q) for q in QUANTITIES if q in words}
     for needed in ("command", "position"):
         if needed not in columns:
@@ -245,7 +245,7 @@ def _axis(name: str, words: Words, machine: Machine | None) -> AxisMap:
         raise InputError(
             f"command and position are both {command.column!r}; one of them is another column", command.place
         )
-    of = words.text("machine_axis")
+    of = words.read("machine_axis")
     if of is not None and machine is None:
         raise words.fault("machine_axis", 'names an axis of no machine; add machine = "mini-cnc" at the top')
     if machine is not None:
@@ -253,7 +253,7 @@ def _axis(name: str, words: Words, machine: Machine | None) -> AxisMap:
             of = name
         if of is not None and of not in machine.axes:
             raise words.fault("machine_axis", f"is no axis of {machine.name}; it has {', '.join(machine.axes)}")
-    closed = words.flag("closed_loop", False) if "closed_loop" in words else None
+    closed = words.read("closed_loop")
     made = AxisMap(
         name=name,
         columns=columns,
@@ -268,12 +268,12 @@ def _axis(name: str, words: Words, machine: Machine | None) -> AxisMap:
     return made
 
 
-def _column(axis: Words, quantity: str) -> ColumnMap:
+def _column(axis: TomlTable, quantity: str) -> ColumnMap:
     if isinstance(axis.any(quantity), str):
         return ColumnMap(axis.any(quantity), place=axis.place(quantity))
     words = axis.inner(quantity)
     assert words is not None
-    column = words.text("column")
+    column = words.read("column")
     if column is None:
         raise InputError(f'{quantity} needs column = "..." ', axis.place(quantity))
     if column == UNKNOWN:
@@ -285,10 +285,10 @@ def _column(axis: Words, quantity: str) -> ColumnMap:
         column=column,
         unit=_unit(words, quantity),
         scale=_scale(words),
-        offset=words.number("offset", 0.0, "the column's unit", -1e15, 1e15),
+        offset=words.read("offset"),
         sign=int(sign),
-        wrap=words.number("wrap", None, "numbers of the column", 1e-9, 1e15) if "wrap" in words else None,
-        second=words.flag("second", False),
+        wrap=words.read("wrap"),
+        second=words.read("second"),
         place=axis.place(quantity),
     )
     words.done()
@@ -297,29 +297,28 @@ def _column(axis: Words, quantity: str) -> ColumnMap:
     return made
 
 
-def _resolution(words: Words) -> float | None:
+def _resolution(words: TomlTable) -> float | None:
     if "resolution" in words and "counts_per_unit" in words:
         raise words.fault("counts_per_unit", "and resolution say the same; give one of them")
     if "counts_per_unit" in words:
-        return 1.0 / words.number("counts_per_unit", None, "counts per mm (or the axis's unit)", 1e-9, 1e12)
-    return (
-        words.number("resolution", None, "mm (or the axis's unit) per count", 1e-12, 1e9)
-        if ("resolution" in words)
-        else None
-    )
+        return 1.0 / float(words.read("counts_per_unit"))
+    resolution: float | None = words.read("resolution")
+    return resolution
 
 
-def _gain(words: Words) -> float | str | None:
+def _gain(words: TomlTable) -> float | str | None:
     value = words.any("force_gain")
     if value is None or isinstance(value, str):
         return value
-    gain = words.number("force_gain", None, "N/V", -1e9, 1e9)
+    if (fault := FORCE_GAIN.fault(value)) is not None:
+        raise words.fault("force_gain", fault)
+    gain = float(value)
     if gain == 0.0:
         raise words.fault("force_gain", "must not be 0: the command would make no force")
     return gain
 
 
-def _range(words: Words) -> tuple[float, float] | None:
+def _range(words: TomlTable) -> tuple[float, float] | None:
     value = words.any("voltage_range")
     if value is None:
         return None
@@ -332,15 +331,15 @@ def _range(words: Words) -> tuple[float, float] | None:
     return low, high
 
 
-def _second(words: Words | None, folder: Path) -> SecondMap | None:
+def _second(words: TomlTable | None, folder: Path) -> SecondMap | None:
     if words is None:
         return None
-    name = words.text("file")
+    name = words.read("file")
     if name is None:
         raise InputError('[second] needs file = "...", the second recorder\'s', words.place())
     delimiter, decimal = _layout(words)
-    offset = words.number("offset", None, "s", -1e9, 1e9) if "offset" in words else None
-    drift = words.number("drift", None, "s per s", -0.1, 0.1) if "drift" in words else None
+    offset = words.read("offset")
+    drift = words.read("drift")
     if drift is not None and offset is None:
         raise words.fault("drift", "is given without offset; give both, or neither and let them be estimated")
     for key in ("relation", "window"):
@@ -349,7 +348,7 @@ def _second(words: Words | None, folder: Path) -> SecondMap | None:
     same = words.inner("same")
     first = second = None
     if same is not None:
-        first, second = same.text("first"), same.text("second")
+        first, second = same.read("first"), same.read("second")
         if first is None or second is None:
             raise InputError('same needs both columns: { first = "...", second = "..." }', words.place("same"))
         same.done()
@@ -364,10 +363,10 @@ def _second(words: Words | None, folder: Path) -> SecondMap | None:
         time=_time(words.inner("time"), words.place()),
         first_column=first,
         second_column=second,
-        relation=words.choice("relation", "same", ("same", "rate")),
+        relation=words.read("relation"),
         offset=offset,
         drift=drift,
-        window=words.number("window", inf, "s", 1e-9, inf),
+        window=words.read("window"),
         delimiter=delimiter,
         decimal=decimal,
         place=words.place(),

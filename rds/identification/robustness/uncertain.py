@@ -11,7 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.load import StudentFile, load_student
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.core.types import Model
 from rds.identification.fit.estimate import said_of_guesses
 from rds.identification.fit.model_file import ModelFile, read_model
@@ -127,7 +127,7 @@ def _by_ranges(axis: AxisPlan, file: ModelFile | None, ranges: Mapping[str, tupl
 
 def read_ranges(path: str | Path) -> dict[str, dict[str, tuple[float, float]]]:
     """A file of ranges: a table for each axis, in it a parameter's [lowest, highest]. InputError with its place."""
-    words, found = Words.read(path), {}
+    words, found = TomlTable.open(path), {}
     for axis in words.table:
         table = words.inner(axis)
         assert table is not None
@@ -139,7 +139,7 @@ def read_ranges(path: str | Path) -> dict[str, dict[str, tuple[float, float]]]:
     return found
 
 
-def _range(table: Words, name: str) -> tuple[float, float]:
+def _range(table: TomlTable, name: str) -> tuple[float, float]:
     value: Any = table.any(name)
     is_pair = isinstance(value, list) and len(value) == 2
     if not is_pair or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in value):

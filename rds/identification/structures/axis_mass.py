@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.identification.logs.log import Log
 from rds.identification.structures import mass_kernel
 from rds.identification.structures.structure import Structure
@@ -27,19 +27,19 @@ from rds.identification.structures.structure import Structure
 OPTIONS = ("per-direction",)
 _MM = 1000.0  # mm in a metre
 
-_GAIN = {"force_gain": Option("force that the command makes, N/V; given, not estimated")}
+_GAIN = {"force_gain": Quantity("force that the command makes; given, not estimated", "N/V")}
 PLAIN = {
-    "M": Option("moved mass, kg", more_than=0.0),
-    "F_v": Option("viscous friction, N·s/m", at_least=0.0),
-    "F_c": Option("Coulomb friction, N", at_least=0.0),
-    "offset": Option("force that the drive holds against at rest (gravity, amplifier), N"),
+    "M": Quantity("moved mass", "kg", above=0.0),
+    "F_v": Quantity("viscous friction", "N·s/m", low=0.0),
+    "F_c": Quantity("Coulomb friction", "N", low=0.0),
+    "offset": Quantity("force that the drive holds against at rest (gravity, amplifier)", "N"),
 }
 PER_DIRECTION = {
     "M": PLAIN["M"],
-    "F_v_plus": Option("viscous friction while moving forward, N·s/m", at_least=0.0),
-    "F_v_minus": Option("viscous friction while moving backward, N·s/m", at_least=0.0),
-    "F_c_plus": Option("Coulomb friction while moving forward, N", at_least=0.0),
-    "F_c_minus": Option("Coulomb friction while moving backward, N", at_least=0.0),
+    "F_v_plus": Quantity("viscous friction while moving forward", "N·s/m", low=0.0),
+    "F_v_minus": Quantity("viscous friction while moving backward", "N·s/m", low=0.0),
+    "F_c_plus": Quantity("Coulomb friction while moving forward", "N", low=0.0),
+    "F_c_minus": Quantity("Coulomb friction while moving backward", "N", low=0.0),
 }
 UNITS = {"M": "kg", "offset": "N", "force_gain": "N/V"}
 

@@ -14,34 +14,34 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.identification.logs.log import Log
 from rds.identification.structures.structure import PLAY, Idle, Start, Structure
 
 OPTIONS = ("viscous", "stribeck", "offset", "dead-zone", "delay", "backlash")
 
 PLAIN = {
-    "tau": Option("time constant, s", more_than=0.0),
-    "K": Option("gain, (mm/s)/V"),
-    "friction_plus": Option("Coulomb friction while moving forward, mm/s", at_least=0.0),
-    "friction_minus": Option("Coulomb friction while moving backward, mm/s, not positive"),
+    "tau": Quantity("time constant", "s", above=0.0),
+    "K": Quantity("gain", "(mm/s)/V"),
+    "friction_plus": Quantity("Coulomb friction while moving forward", "mm/s", low=0.0),
+    "friction_minus": Quantity("Coulomb friction while moving backward, not positive", "mm/s"),
 }
 SYMMETRIC = {
     "tau": PLAIN["tau"],
     "K": PLAIN["K"],
-    "friction": Option("Coulomb friction, the same both ways, mm/s", at_least=0.0),
-    "offset": Option("voltage that acts beside the command, V"),
+    "friction": Quantity("Coulomb friction, the same both ways", "mm/s", low=0.0),
+    "offset": Quantity("voltage that acts beside the command", "V"),
 }
 ADDED = {
-    "viscous": {"viscous": Option("speed lost to viscous friction, mm/s per mm/s", at_least=0.0)},
+    "viscous": {"viscous": Quantity("speed lost to viscous friction", "mm/s per mm/s", low=0.0)},
     "stribeck": {
-        "stribeck": Option("friction added at standstill, as a fraction of Coulomb friction", at_least=0.0),
-        "stribeck_velocity": Option("speed at which the Stribeck part has fallen to 1/e, mm/s", more_than=0.0),
+        "stribeck": Quantity("friction added at standstill, as a fraction of Coulomb friction", low=0.0),
+        "stribeck_velocity": Quantity("speed at which the Stribeck part has fallen to 1/e", "mm/s", above=0.0),
     },
     "offset": {},
-    "dead-zone": {"dead_zone": Option("voltage to either side of 0 without effect, V", at_least=0.0)},
-    "delay": {"delay": Option("time from a command to its effect, s", at_least=0.0)},
-    "backlash": {"backlash": Option("whole width of the play before the encoder, mm", at_least=0.0)},
+    "dead-zone": {"dead_zone": Quantity("voltage to either side of 0 without effect", "V", low=0.0)},
+    "delay": {"delay": Quantity("time from a command to its effect", "s", low=0.0)},
+    "backlash": {"backlash": Quantity("whole width of the play before the encoder", "mm", low=0.0)},
 }
 NEUTRAL = {"stribeck": 0.0, "stribeck_velocity": 1.0, "dead_zone": 0.0, "delay": 0.0, "backlash": 0.0}
 UNITS = {

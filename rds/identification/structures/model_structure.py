@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import Model
 from rds.identification.structures.structure import Structure
 
@@ -25,7 +25,7 @@ def structure_of_model(model: Model, unit: str = "mm") -> Structure:
     state_names = ("position", "velocity", *(f"state {i + 1}" for i in range(2, states)))[:states]
     return Structure(
         name=model.source.name,
-        parameters={key: Option(key) for key in names},
+        parameters={key: Quantity(key) for key in names},
         units=dict.fromkeys(names, ""),
         states=states,
         respond=respond,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.identification.logs.log import Log
 from rds.identification.structures import spindle_kernel
 from rds.identification.structures.structure import Structure
@@ -22,10 +22,10 @@ from rds.identification.structures.structure import Structure
 OPTIONS = ("offset", "delay")
 
 PARAMETERS = {
-    "tau": Option("time constant, s", more_than=0.0),
-    "K": Option("gain, (rev/min)/V"),
-    "offset": Option("voltage that acts beside the command, V"),
-    "delay": Option("dead time from a command to its effect, s", at_least=0.0),
+    "tau": Quantity("time constant", "s", above=0.0),
+    "K": Quantity("gain", "(rev/min)/V"),
+    "offset": Quantity("voltage that acts beside the command", "V"),
+    "delay": Quantity("dead time from a command to its effect", "s", low=0.0),
 }
 UNITS = {"tau": "s", "K": "(rev/min)/V", "offset": "V", "delay": "s"}
 

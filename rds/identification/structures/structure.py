@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.identification.structures import SIMULATION_ERROR
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Structure:
     """A parametrized model of an axis, ready to be fitted, simulated, validated or written as a model file."""
 
     name: str
-    parameters: Mapping[str, Option]  # meaning with unit, and bounds
+    parameters: Mapping[str, Quantity]  # meaning with unit, and bounds
     units: Mapping[str, str]
     states: int
     respond: Response
@@ -77,4 +77,4 @@ class Structure:
     def bounds(self, name: str) -> tuple[float, float]:
         """The lowest and the highest value that the parameter may take."""
         option = self.parameters[name]
-        return max(option.at_least, option.more_than), self.at_most.get(name, inf)
+        return max(option.low, option.above), self.at_most.get(name, inf)

@@ -23,7 +23,7 @@ from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.errors import InputError
 from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, load_student
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.solve import first_state
 from rds.identification.logs.log import Log
@@ -81,7 +81,7 @@ def _structure(student: StudentFile, path: str | Path, substeps: int) -> Structu
 
     structure = Structure(
         name=where,
-        parameters={name: Option("a parameter of the file", at_least=bounds[name][0]) for name in begun},
+        parameters={name: Quantity("a parameter of the file", low=bounds[name][0]) for name in begun},
         units={name: str(units.get(name, "")) for name in begun},
         states=states,
         respond=respond,

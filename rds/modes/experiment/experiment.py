@@ -10,9 +10,10 @@ from typing import Any
 
 from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.folder_kept import folder_kept
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.core.types import Ending
 from rds.modes import DEFAULT, load_mode
+from rds.modes.experiment.experiment_file import EXPERIMENT
 from rds.modes.experiment.folder import new_folder, require_writable
 from rds.modes.experiment.outcome import outcome
 from rds.modes.experiment.resolve import resolve
@@ -83,7 +84,7 @@ class Experiment:
             table["axes"] = [axis] if isinstance(axis, str) else list(axis) if isinstance(axis, Iterable) else axis
             if overrides:
                 table["axis"] = dict(overrides)
-        self._words = Words(table)
+        self._words = TomlTable(table, EXPERIMENT)
         self._folder = Path.cwd()
         self.plan()
 
@@ -91,7 +92,7 @@ class Experiment:
     def from_toml(cls, path: str | Path) -> Experiment:
         """The experiment that a file describes; the files that it names are looked for from its own folder."""
         experiment = cls.__new__(cls)
-        experiment._words = Words.read(path)
+        experiment._words = TomlTable.open(path, EXPERIMENT)
         experiment._folder = Path(path).resolve().parent
         experiment.plan()
         return experiment
@@ -100,7 +101,7 @@ class Experiment:
     def from_table(cls, table: Mapping[str, Any], folder: str | Path = ".") -> Experiment:
         """The experiment of a table that says what a TOML file would; files are looked for from `folder`."""
         experiment = cls.__new__(cls)
-        experiment._words = Words(dict(table))
+        experiment._words = TomlTable(dict(table), EXPERIMENT)
         experiment._folder = Path(folder).resolve()
         experiment.plan()
         return experiment
@@ -220,7 +221,7 @@ class Experiment:
 
     def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None, live: Live | None) -> Rows:
         note = None
-        if self._words.flag("compiled", False):
+        if self._words.read("compiled"):
             from rds.modes.experiment.compiled import obstacle, run_compiled
 
             note = obstacle(plan) or (None if live is None else "somebody may change it while it runs")

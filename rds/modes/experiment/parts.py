@@ -10,15 +10,14 @@ from typing import Any
 from rds.controllers import controller_names, library_controller
 from rds.core.adapt import as_controller, as_model, is_control_system
 from rds.core.errors import InputError
-from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, from_function, from_namespace, load_student
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.core.types import Controller, Model
 from rds.machines import Axis
 from rds.models import library_model, model_names
 from rds.models.machine_model import MachineAxisMotion, linear_part
 from rds.models.student import student_model
-from rds.references import Signal, make_signal, signal_kinds, user
+from rds.references import Signal, make_signal, user
 
 _FUNCTIONS = ("control", "derivatives", "advance", "output")
 
@@ -37,7 +36,7 @@ class Setting:
         return self.folder / name
 
 
-def make_model(words: Words, setting: Setting) -> Model:
+def make_model(words: TomlTable, setting: Setting) -> Model:
     """The axis's model; the machine's own where the user names none."""
     given = words.any("model")
     default = dict(setting.axis.model)
@@ -49,11 +48,11 @@ def make_model(words: Words, setting: Setting) -> Model:
         return as_model(given, setting.T)
     table, student = _table_or_student(words, "model", setting)
     if student is not None:
-        substeps = table.whole("substeps", SUBSTEPS, "steps of RK4 in each sample", 1, 10_000)
+        substeps = table.read("substeps")
         params = _params(table)
         table.done()
         with _named(table):
-            return student_model(student, params, substeps or SUBSTEPS)
+            return student_model(student, params, substeps)
     if "file" in table:
         return _fitted_model(table, setting)
     name, options = _name_and_options(table, "model", model_names())
@@ -61,17 +60,17 @@ def make_model(words: Words, setting: Setting) -> Model:
         return library_model(name, **((default if name == default.pop("name", None) else {}) | options))
 
 
-def _fitted_model(table: Words, setting: Setting) -> Model:
+def _fitted_model(table: TomlTable, setting: Setting) -> Model:
     """The model of a model file, as `rds fit` writes it."""
     from rds.identification.fit.model_file import read_model
     from rds.identification.fit.run_model import run_model
 
-    path = setting.path(str(table.text("file")))
+    path = setting.path(table.read("file"))
     table.done()
     return run_model(read_model(path), unit=setting.axis.unit)
 
 
-def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
+def make_controller(words: TomlTable, setting: Setting, model: Model) -> Controller:
     """The axis's controller, designed for its model where it is a library's."""
     given = words.any("controller")
     if given is None:
@@ -86,7 +85,7 @@ def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
         return as_controller(given, setting.T)
     table, student = _table_or_student(words, "controller", setting)
     if student is not None:
-        is_coupled, params = table.flag("coupled", False), _params(table)
+        is_coupled, params = table.read("coupled"), _params(table)
         table.done()
         with _named(table):
             return student.controller(coupled=is_coupled, params=params)
@@ -99,7 +98,7 @@ def make_controller(words: Words, setting: Setting, model: Model) -> Controller:
         return library_controller(name, design, setting.T, setting.limit, unit=setting.axis.unit, **options)
 
 
-def make_drive(words: Words, key: str, setting: Setting, unit: str) -> Signal:
+def make_drive(words: TomlTable, key: str, setting: Setting, unit: str) -> Signal:
     """The reference or the voltage signal of an axis, in `unit`. InputError if sampling is too slow for it."""
     given = words.any(key)
     table = words.inner(key) if not isinstance(given, Signal) and not callable(given) else None
@@ -109,21 +108,21 @@ def make_drive(words: Words, key: str, setting: Setting, unit: str) -> Signal:
     return signal
 
 
-def _signal(given: Any, table: Words | None, setting: Setting, unit: str) -> Signal:
+def _signal(given: Any, table: TomlTable | None, setting: Setting, unit: str) -> Signal:
     if isinstance(given, Signal):
         return given
     if table is None:
         return user(function=given)
     if "kind" not in table:
         raise InputError(f'kind is missing; as in `kind = "sinusoid"` (amplitudes in {unit})')
-    kind = table.choice("kind", "", signal_kinds())
+    kind = table.read("kind")
     options = {name: table.any(name) for name in table.table if name != "kind"}
     if isinstance(options.get("file"), str):
         options["file"] = str(setting.path(options["file"]))
     return make_signal(kind, **options)
 
 
-def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, StudentFile | None]:
+def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[TomlTable, StudentFile | None]:
     """The table that was given under `key`, and the student's functions if it was a file, or these themselves."""
     given = words.any(key)
     nameless = words.table_of(key, {})
@@ -144,7 +143,7 @@ def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, 
         return table, None
     if "name" in table:
         raise InputError("name and file both say what to take; give one of them", table.place("name"))
-    path = setting.path(str(table.text("file")))
+    path = setting.path(table.read("file"))
     if not path.is_file():
         kind = f"{path} is a folder" if path.is_dir() else f"there is no such file as {path}"
         raise table.fault("file", f"will not do: {kind}; a name counts from the experiment's folder")
@@ -155,7 +154,7 @@ def _table_or_student(words: Words, key: str, setting: Setting) -> tuple[Words, 
     return table, load_student(path)
 
 
-def _functions(words: Words, key: str, given: dict[str, Any]) -> Words:
+def _functions(words: TomlTable, key: str, given: dict[str, Any]) -> TomlTable:
     """What a table of functions says besides. A notebook's `globals()` holds much else; a table by hand does not."""
     if "__name__" in given:
         return words.table_of(key, {})
@@ -166,15 +165,15 @@ def _functions(words: Words, key: str, given: dict[str, Any]) -> Words:
     return table
 
 
-def _name_and_options(table: Words, kind: str, known: Sequence[str]) -> tuple[str, dict[str, Any]]:
+def _name_and_options(table: TomlTable, kind: str, known: Sequence[str]) -> tuple[str, dict[str, Any]]:
     """The library part that a table names, and the rest of the table."""
     if "name" not in table:
         raise InputError(f"{kind} needs `name` ({', '.join(known)}) or `file`", table.place())
-    name = table.choice("name", "", known)
+    name = table.read("name")
     return name, {key: table.any(key) for key in table.table if key != "name"}
 
 
-def _params(table: Words) -> dict[str, Any] | None:
+def _params(table: TomlTable) -> dict[str, Any] | None:
     inner = table.inner("params")
     return dict(inner.table) if inner else None
 
@@ -182,7 +181,7 @@ def _params(table: Words) -> dict[str, Any] | None:
 class _named:
     """Errors inside tell the place of the table that asked for it, unless they know a better one."""
 
-    def __init__(self, table: Words):
+    def __init__(self, table: TomlTable):
         self._table = table
 
     def __enter__(self) -> None:

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from rds.bus.hub.bus_settings import BITRATES, DATA_BITRATES, OUR_WORDS
+from rds.bus.hub.bus_settings import OUR_WORDS
 from rds.bus.medium.fault_file import read_faults
-from rds.bus.modules.dialects import DEFAULT, dialect_names
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
 from rds.core.folder_kept import folder_kept
-from rds.core.toml_table import Words
+from rds.core.quantities import Choice
+from rds.core.toml_table import TomlTable
 from rds.machines import Axis, Machine, load_machine
-from rds.modes import DEFAULT as DEFAULT_MODE
-from rds.modes import load_mode, mode_names
+from rds.modes import load_mode
+from rds.modes.experiment.experiment_file import AXIS_KEYS
 from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model
 from rds.modes.loop.laws import ReferenceSamples
 from rds.modes.loop.mode import Mode
@@ -28,26 +28,24 @@ from rds.modes.loop.program import Program
 from rds.modes.process.machine import BUILTIN
 
 MOST_SAMPLES = 20_000_000
-PERIODS = (1e-6, 1000.0)  # s: the shortest and the longest sample period
-AXIS_WORDS = ("reference", "signal", "controller", "model")
 
 
 @folder_kept()
 def resolve(
-    words: Words, folder: Path, mode_name: str | None = None, program: Program | None = None
+    words: TomlTable, folder: Path, mode_name: str | None = None, program: Program | None = None
 ) -> tuple[Plan, dict[str, Any]]:
     """The plan of the experiment, in `mode_name` if that is given, and what is known of it for the result's meta.
 
     With a part program, that drives its axes and the spindle: the words say their controllers, and no reference.
     Raises InputError with file, line, key, value and remedy for anything that will not do.
     """
-    words.text("title")
+    words.read("title")
     machine = _machine(words, folder)
-    written = words.choice("mode", DEFAULT_MODE, mode_names())
+    written = words.read("mode")
     mode = load_mode(written if mode_name is None else mode_name)
-    T = words.number("sample_period", machine.sample_period, "s", *PERIODS)
+    T = words.read("sample_period", machine.sample_period)
     samples = _samples(words, T) if program is None else program.samples
-    words.flag("compiled", False)
+    words.read("compiled")
     saturation, quantization = _interface(words, mode)
     limit = machine.converter.range if saturation else inf
     timing = _timing(words, mode)
@@ -75,8 +73,8 @@ def resolve(
     return plan, {"period": periods}
 
 
-def _samples(words: Words, T: float) -> int:
-    duration = words.number("duration", None, "s", 0.0, 1e9)
+def _samples(words: TomlTable, T: float) -> int:
+    duration = words.read("duration")
     samples = round(duration / T)
     if duration < T * (1.0 - 1e-9):
         raise words.fault("duration", f"s must be at least one sample period, {T:g} s")
@@ -85,13 +83,13 @@ def _samples(words: Words, T: float) -> int:
     return samples
 
 
-def machine_name(words: Words, folder: Path) -> str:
+def machine_name(words: TomlTable, folder: Path) -> str:
     """The machine's name, or the path of its file, which an experiment names as seen from its own folder."""
-    name = words.text("machine", "mini-cnc") or ""
+    name: str = words.read("machine")
     return str(folder / name) if name.endswith(".toml") else name
 
 
-def _machine(words: Words, folder: Path) -> Machine:
+def _machine(words: TomlTable, folder: Path) -> Machine:
     name = machine_name(words, folder)
     try:
         return load_machine(name)
@@ -99,7 +97,7 @@ def _machine(words: Words, folder: Path) -> Machine:
         raise error if error.where else InputError(str(error), words.place("machine")) from error
 
 
-def _axes(words: Words, machine: Machine) -> list[tuple[Axis, Words]]:
+def _axes(words: TomlTable, machine: Machine) -> list[tuple[Axis, TomlTable]]:
     """Each axis of the run with its words: its own tables over the general ones."""
     given, several = words.any("axis"), words.any("axes")
     if given is not None and not isinstance(given, str | dict):
@@ -124,10 +122,10 @@ def _axes(words: Words, machine: Machine) -> list[tuple[Axis, Words]]:
     return _with_words(words, machine, several)
 
 
-def _with_words(words: Words, machine: Machine, several: list[str]) -> list[tuple[Axis, Words]]:
+def _with_words(words: TomlTable, machine: Machine, several: list[str]) -> list[tuple[Axis, TomlTable]]:
     """Each axis with its own tables over the general ones."""
     given = words.any("axis")
-    for key in AXIS_WORDS:
+    for key in AXIS_KEYS:
         _ = key in words  # known even where every axis has its own
     overrides = words.inner("axis") if isinstance(given, dict) else None
     for name in overrides.table if overrides else ():
@@ -137,21 +135,21 @@ def _with_words(words: Words, machine: Machine, several: list[str]) -> list[tupl
     return [(machine.axes[name], _own_words(words, overrides, name)) for name in several]
 
 
-def _own_words(words: Words, overrides: Words | None, name: str) -> Words:
+def _own_words(words: TomlTable, overrides: TomlTable | None, name: str) -> TomlTable:
     own = overrides.inner(name) if overrides else None
     if own is None:
         return words
-    own = own.over(words, AXIS_WORDS)
-    for key in AXIS_WORDS:
+    own = own.over(words, AXIS_KEYS)
+    for key in AXIS_KEYS:
         _ = key in own
     return own
 
 
-def _drive(words: Words, mode: Mode) -> str:
+def _drive(words: TomlTable, mode: Mode) -> str:
     """Whether controllers or voltage signals drive this run."""
     overrides = words.table.get("axis")
     tables = [words.table, *(overrides.values() if isinstance(overrides, dict) else ())]
-    has = {key: any(isinstance(table, dict) and key in table for table in tables) for key in AXIS_WORDS}
+    has = {key: any(isinstance(table, dict) and key in table for table in tables) for key in AXIS_KEYS}
     controlled = has["reference"] or has["controller"]
     if controlled and has["signal"]:
         raise InputError(
@@ -169,7 +167,7 @@ def _drive(words: Words, mode: Mode) -> str:
     return "signal" if has["signal"] else "controller"
 
 
-def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tuple[AxisPlan, float | None]:
+def _axis_plan(words: TomlTable, setting: Setting, driven: str, samples: int) -> tuple[AxisPlan, float | None]:
     axis = setting.axis
     times = np.arange(samples) * setting.T
     model = make_model(words, setting)
@@ -194,7 +192,7 @@ def _axis_plan(words: Words, setting: Setting, driven: str, samples: int) -> tup
     return plan, period
 
 
-def _program(words: Words, mode: Mode) -> str:
+def _program(words: TomlTable, mode: Mode) -> str:
     """What a part program takes the place of is refused."""
     if "controller" not in mode.drives:
         raise InputError(f"mode {mode.name} has no controllers, which a part program needs", words.place("mode"))
@@ -207,7 +205,7 @@ def _program(words: Words, mode: Mode) -> str:
     return "program"
 
 
-def _program_axes(words: Words, machine: Machine, program: Program) -> list[tuple[Axis, Words]]:
+def _program_axes(words: TomlTable, machine: Machine, program: Program) -> list[tuple[Axis, TomlTable]]:
     """The axes that a program moves and the spindle, in the machine's order."""
     given = words.any("axis")
     if given is not None and not isinstance(given, dict):
@@ -220,7 +218,7 @@ def _program_axes(words: Words, machine: Machine, program: Program) -> list[tupl
     return _with_words(words, machine, axes)
 
 
-def _check_travel(reference: ReferenceSamples, axis: Axis, words: Words) -> None:
+def _check_travel(reference: ReferenceSamples, axis: Axis, words: TomlTable) -> None:
     low, high = axis.travel
     lowest, highest = reference.position.min(), reference.position.max()
     if lowest < low or highest > high:
@@ -231,12 +229,12 @@ def _check_travel(reference: ReferenceSamples, axis: Axis, words: Words) -> None
         )
 
 
-def _interface(words: Words, mode: Mode) -> tuple[bool, bool]:
+def _interface(words: TomlTable, mode: Mode) -> tuple[bool, bool]:
     """Whether the simulated converter saturates, and whether it and the encoder quantize."""
     table = words.inner("interface")
     if table is None:
         return True, True
-    flags = table.flag("saturation", True), table.flag("quantization", True)
+    flags = table.read("saturation"), table.read("quantization")
     table.done()
     for key, on in zip(("saturation", "quantization"), flags, strict=True):
         if not on and mode.drivers == "live":
@@ -246,7 +244,7 @@ def _interface(words: Words, mode: Mode) -> tuple[bool, bool]:
     return flags
 
 
-def bus_table(words: Words, folder: Path) -> dict[str, Any]:
+def bus_table(words: TomlTable, folder: Path) -> dict[str, Any]:
     """The keyword arguments of can.Bus; python-can itself knows which options an interface has.
 
     On the built-in bus also "faults", the schedule that is injected during the run.
@@ -254,11 +252,11 @@ def bus_table(words: Words, folder: Path) -> dict[str, Any]:
     table = words.inner("bus")
     if table is None:
         return {}
-    interface = table.text("interface", BUILTIN) or BUILTIN
+    interface = table.read("interface")
     channel = table.any("channel")
     if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
         raise table.fault("channel", "must be the name or the number of a channel")
-    table.choice("dialect", DEFAULT, dialect_names())
+    table.read("dialect")
     if "cia402" in table and table.any("dialect") != "cia402":
         raise table.fault("cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it')
     drives = table.any("cia402")
@@ -270,12 +268,12 @@ def bus_table(words: Words, folder: Path) -> dict[str, Any]:
                 table.place("cia402"),
             )
     if interface == BUILTIN:
-        table.whole("bitrate", None, "bit/s", *BITRATES)
-        table.whole("data_bitrate", None, "bit/s, of CAN FD", *DATA_BITRATES)
+        table.read("bitrate")
+        table.read("data_bitrate")
         if "data_bitrate" in table and "bitrate" not in table:
             raise table.fault("data_bitrate", "needs a bitrate beside it: only a bus with bit timing has a data rate")
-        table.whole("restart_ms", None, "ms until the host comes back from bus off", 0, 3_600_000)
-        file = table.text("faults")
+        table.read("restart_ms")
+        file = table.read("faults")
         table.done()
         return dict(table.table) | ({} if file is None else {"faults": read_faults(folder / file)})
     if "faults" in table:
@@ -284,7 +282,8 @@ def bus_table(words: Words, folder: Path) -> dict[str, Any]:
 
     if ours := sorted(OUR_WORDS & table.table.keys()):
         raise table.fault(ours[0], f"cannot be said: {ours[0]} is no option of a bus, but a word of our own; remove it")
-    table.choice("interface", "", sorted(VALID_INTERFACES))
+    if (fault := Choice("interface", sorted(VALID_INTERFACES)).fault(interface)) is not None:
+        raise table.fault("interface", fault)
     return dict(table.table)
 
 
@@ -299,17 +298,15 @@ def _drive_modes(drives: Any) -> Iterator[tuple[str, Any]]:
             yield f"bus.cia402.axis.{name}.mode", axis.get("mode")
 
 
-def _timing(words: Words, mode: Mode) -> dict[str, Any]:
+def _timing(words: TomlTable, mode: Mode) -> dict[str, Any]:
     """Late policy and real-time settings; the mode's own where nothing is said."""
-    table = words.inner("timing") or Words({})
-    late = table.choice("late", "discard" if mode.late.discard else "process", ("process", "discard"))
-    phase = table.choice("phase", "keep" if mode.late.keep_phase else "ignore", ("keep", "ignore"))
-    stop_after = table.whole("stop_after", mode.late.stop_after, "late samples in a row that end the run; 0: never")
+    table = words.inner_or_empty("timing")
+    late = table.read("late", "discard" if mode.late.discard else "process")
+    phase = table.read("phase", "keep" if mode.late.keep_phase else "ignore")
+    stop_after = table.read("stop_after", mode.late.stop_after)
     settings = {
-        "late": LatePolicy(late == "discard", phase == "keep", stop_after or 0),
-        "late_limit": table.whole("late_limit", 0, "late samples that the verdict allows"),
-        "priority": table.whole("priority", 80, "of SCHED_FIFO", 1, 99),
-        "cpu": table.whole("cpu", None, "processor to run on", 0, 4095),
+        "late": LatePolicy(late == "discard", phase == "keep", stop_after),
+        **{key: table.read(key) for key in ("late_limit", "priority", "cpu")},
     }
     table.done()
     usable = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
@@ -318,7 +315,7 @@ def _timing(words: Words, mode: Mode) -> dict[str, Any]:
     return settings
 
 
-def _check_coupling(axes: list[AxisPlan], words: Words) -> None:
+def _check_coupling(axes: list[AxisPlan], words: TomlTable) -> None:
     controllers = [plan.controller for plan in axes if plan.controller is not None]
     if not any(controller.coupled for controller in controllers):
         return

@@ -17,11 +17,12 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from difflib import get_close_matches
-from math import inf, isfinite
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
+from rds.core.quantities import Quantity
 from rds.modes.loop.shared_words import read_word, write_float, write_word
 from rds.modes.process.shared import make
 
@@ -44,26 +45,17 @@ class Channel:
     above: float = -inf  # a value must be more than this
     whole: bool = False
 
+    @classmethod
+    def of(cls, quantity: Quantity, name: str, value: float, unit: str = "mm") -> Channel:
+        """The live value of a declared quantity. Where it says mm, `unit` is the axis's."""
+        q = quantity
+        meaning, of = q.meaning.replace("mm", unit), q.unit.replace("mm", unit)
+        return cls(name, value, meaning, of, q.low, q.high, q.above, q.whole)
+
     def check(self, value: Any) -> float:
         """The value as a float; InputError with unit and range if it will not do."""
-        place = f"{self.name} = {value!r:.100}"
-        unit = f" {self.unit}" if self.unit else ""
-        if isinstance(value, bool):
-            value = int(value)
-        if not isinstance(value, int | float) or not isfinite(value):
-            raise InputError(f"{place} must be a finite number{f' in{unit}' if unit else ''} ({self.meaning})")
-        if not self.low <= value <= self.high:
-            both = isfinite(self.low) and isfinite(self.high)
-            bounds = f"from {self.low:g} to {self.high:g}" if both else f"at {self._bound()}"
-            raise InputError(f"{place} must be {bounds}{unit} ({self.meaning})")
-        if not value > self.above:
-            raise InputError(f"{place} must be more than {self.above:g}{unit} ({self.meaning})")
-        if self.whole and value != int(value):
-            raise InputError(f"{place} must be a whole number{unit} ({self.meaning})")
-        return float(value)
-
-    def _bound(self) -> str:
-        return f"least {self.low:g}" if isfinite(self.low) else f"most {self.high:g}"
+        declared = Quantity(self.meaning, self.unit, self.low, self.high, self.above, whole=self.whole)
+        return float(declared.check(value, self.name))
 
 
 class Note(NamedTuple):

@@ -7,12 +7,12 @@ from functools import partial
 from math import isfinite
 from typing import Any
 
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import Controller
 from rds.core.values import own_copy
 from rds.modes.loop.live_values import Channel
 
-_ANY = Option("parameter of control()")
+_ANY = Quantity("parameter of control()")
 
 
 class Tuning:
@@ -31,16 +31,7 @@ class Tuning:
         for name, option in options.items():
             value = self.params[name]
             self._values[name] = float(value)
-            self.channels.append(
-                Channel(
-                    name=f"{owner}.{name}",
-                    value=float(value),
-                    meaning=option.meaning.replace("mm", unit),
-                    unit=_unit(option).replace("mm", unit),
-                    low=option.at_least,
-                    above=option.more_than,
-                )
-            )
+            self.channels.append(Channel.of(option, f"{owner}.{name}", float(value), unit))
 
     def actions(self) -> dict[str, Callable[[float], None]]:
         """What a new value does, by channel."""
@@ -56,7 +47,7 @@ class Tuning:
         self.params.update({name: value} if self._retune is None else self._retune(self._values))
 
 
-def _numbers(params: Mapping[str, Any]) -> dict[str, Option]:
+def _numbers(params: Mapping[str, Any]) -> dict[str, Quantity]:
     """The plain numbers among a student's parameters."""
     return {name: _ANY for name, value in params.items() if isinstance(name, str) and _is_number(value)}
 
@@ -66,8 +57,3 @@ def _is_number(value: Any) -> bool:
         return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
     except OverflowError:  # an int of hundreds of digits
         return False
-
-
-def _unit(option: Option) -> str:
-    """The unit in an option's meaning: "proportional gain, V/mm; 0 = none" has V/mm."""
-    return option.meaning.partition(";")[0].rpartition(", ")[2] if ", " in option.meaning.partition(";")[0] else ""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import ceil, cos, degrees, floor, hypot, pi, radians, sin, sqrt
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.nc.paths.numbers import FEED_RATE, NOT_NEGATIVE, POSITIVE, number, point
 
@@ -89,10 +89,10 @@ def chord_angle(
     if step_angle is not None and tolerance is not None:
         raise InputError("cone: step angle and tolerance both say how long a chord is; give one of them")
     if tolerance is not None:
-        allowed = number(tolerance, "tolerance", "cone", Option("chord error, mm", more_than=0.0))
+        allowed = number(tolerance, "tolerance", "cone", Quantity("chord error", "mm", above=0.0))
         largest = degrees(sqrt(8 * allowed / hypot(radius, step_width / pi)))
         return 360.0 / max(ceil(360.0 / largest), 8)
-    step = Option("degrees per chord", more_than=0.0).check(
+    step = Quantity("angle of a chord", "degrees", above=0.0).check(
         STEP_ANGLE if step_angle is None else step_angle, "step angle", "cone"
     )
     if step > LARGEST_STEP:

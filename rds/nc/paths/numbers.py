@@ -6,23 +6,23 @@ from collections.abc import Sequence
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 
 FARTHEST = 1e6  # mm; beyond it a double has fewer decimals than a program prints, and the unit is wrong anyway
 
-FEED_RATE = Option("feed rate along the path, mm/s", more_than=0.0)
-POSITIVE = Option("length, mm", more_than=0.0)
-NOT_NEGATIVE = Option("length, mm", at_least=0.0)
-COORDINATE = Option("coordinate, mm")
-ANGLE = Option("angle, degrees")
+FEED_RATE = Quantity("feed rate along the path", "mm/s", above=0.0)
+POSITIVE = Quantity("length", "mm", above=0.0)
+NOT_NEGATIVE = Quantity("length", "mm", low=0.0)
+COORDINATE = Quantity("coordinate", "mm")
+ANGLE = Quantity("angle", "degrees")
 
 
-def number(value: Any, name: str, owner: str, option: Option) -> float:
+def number(value: Any, name: str, owner: str, option: Quantity) -> float:
     """The value as a checked float; InputError says what it must be. Lengths end at a kilometre, as do angles at a
     million degrees."""
     checked = option.check(value, name, owner)
     if abs(checked) > FARTHEST:
-        raise InputError(f"{owner}: {name} = {value!r} must be at most {FARTHEST:g} ({option.meaning})")
+        raise InputError(f"{owner}: {name} = {value!r} must be at most {FARTHEST:g} ({option.described})")
     return checked
 
 

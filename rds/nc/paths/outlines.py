@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import LineSegment, Segment
 from rds.nc.paths.arc_fit import fit
 from rds.nc.paths.boundary import boundary_cells
@@ -23,7 +23,7 @@ from rds.nc.paths.smoothing import are_simple, smoothed, without_idle_points
 
 Trace = Literal["contour", "blob"]
 TRACES: tuple[Trace, ...] = ("contour", "blob")
-LEVEL = Option("darkness from 0 to 1 where the shape begins", more_than=0.0)
+LEVEL = Quantity("darkness from 0 to 1 where the shape begins", above=0.0)
 MOST_PASSES = 1000
 _ARC_SHARE = 0.25  # of the tolerance, for fitting arcs to the smoothed outline
 _BLUR_BEFORE_ARCS = 0.95  # of the rest; arcs are fitted to points that are dense

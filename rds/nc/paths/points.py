@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import Segment
 from rds.nc.paths.arc_fit import fit
 from rds.nc.paths.lines import polyline
@@ -19,7 +19,7 @@ from rds.nc.paths.measure import without_repeats
 from rds.nc.paths.numbers import COORDINATE, FARTHEST, FEED_RATE, number
 
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, "inch": 25.4}
-TOLERANCE = Option("how far arcs may be from the lines between the points, mm", more_than=0.0)
+TOLERANCE = Quantity("how far arcs may be from the lines between the points", "mm", above=0.0)
 MOST_POINTS = 2_000_000
 _LONGEST_LINE = 1000  # characters
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)

@@ -8,7 +8,7 @@ from math import dist, hypot, inf, pi
 
 from rds.core.errors import InputError
 from rds.core.geometry import sweep
-from rds.core.options import Option
+from rds.core.quantities import Quantity
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.nc.paths.measure import pieces
 from rds.nc.paths.numbers import FARTHEST, FEED_RATE, number
@@ -21,9 +21,9 @@ DECIMALS = 4
 _COMMENT = 200  # characters; LinuxCNC's lines end at 255
 _ACTIVE = re.compile(r"(msg|debug|print|log|py|abort|probe)", re.IGNORECASE)  # comments that LinuxCNC acts on
 
-SPINDLE = Option("spindle speed, rev/min, clockwise", more_than=0.0)
-BLEND = Option("how far blended corners may be off the path, mm", more_than=0.0)
-HEIGHT = Option("safe height above z = 0, mm")
+SPINDLE = Quantity("spindle speed, clockwise", "rev/min", above=0.0)
+BLEND = Quantity("how far blended corners may be off the path", "mm", above=0.0)
+HEIGHT = Quantity("safe height above z = 0", "mm")
 
 
 def part_program(

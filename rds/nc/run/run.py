@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.machines import Machine, load_machine
 from rds.modes.experiment import Experiment
-from rds.modes.experiment.resolve import PERIODS, resolve
+from rds.modes.experiment.experiment_file import EXPERIMENT
+from rds.modes.experiment.resolve import resolve
 from rds.modes.experiment.run import Run
 from rds.modes.loop.execution import State
 from rds.modes.loop.plan import Plan
@@ -110,7 +111,7 @@ class PartProgram(Experiment):
         sample_period: float | None = None,
         progress: Progress | None = None,
     ):
-        words = Words({}) if experiment is None else Words.read(experiment)
+        words = TomlTable({}, EXPERIMENT) if experiment is None else TomlTable.open(experiment, EXPERIMENT)
         given = {"machine": machine, "mode": mode, "sample_period": sample_period, "controller": controller}
         for key, value in given.items():
             if value is not None and key in words.table and key not in ("mode", "controller"):
@@ -120,7 +121,7 @@ class PartProgram(Experiment):
         self._machine = _load(str(table.get("machine", "mini-cnc")), self._folder)
         table.setdefault("controller", AXES_CONTROLLER)
         self._words = words.over_written(_with_spindle(table, self._machine))
-        T = self._words.number("sample_period", self._machine.sample_period, "s", *PERIODS)
+        T = self._words.read("sample_period", self._machine.sample_period)
         self.prepared = prepare(Path(file), self._machine, setup, T, progress)
         self.plan()
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.controllers.tracking import OBSERVER_POLE, POLES
+from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.machines import Machine
 from rds.panels.session.fields import Choice, Field, Number, Text
 
@@ -22,9 +23,7 @@ def fields(machine: Machine) -> Iterable[Field]:
     yield Choice("source", "Axis from", "the machine's own data, or a model file that you fitted", LIBRARY, sources)
     yield Choice(AXIS, "Axis", "which axis of the machine", next(iter(axes)), axes)
     yield Text("model_file", "Model file", "what `rds fit -o MODEL.toml` wrote, in your folder", "", "model.toml")
-    yield Number(
-        "sample_period", "Sample period", "of the loop", machine.sample_period, unit="s", low=1e-4, high=1.0
-    )  # fmt: skip
+    yield Number.of(SAMPLE_PERIOD, "sample_period", "Sample period", machine.sample_period)  # fmt: skip
     kinds = {PAIR: "Conjugate pair", REAL: "Two real"}
     yield Choice("kind", "Poles of the error", "how the tracking error dies away: with or without a swing", PAIR, kinds)
     (real, imaginary), _ = POLES

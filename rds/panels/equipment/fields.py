@@ -8,7 +8,8 @@ from typing import Any
 
 from rds.controllers import controller_module
 from rds.controllers.tracking import OBSERVER_POLE, POLES
-from rds.core.options import Option
+from rds.core.quantities import Quantity
+from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.machines import Axis, Machine
 from rds.modes.loop.mode import Drive
 from rds.panels.session.fields import Choice, Field, Number, Text, mode_choice
@@ -71,15 +72,7 @@ def first_fields(kind: str, machine: Machine, kept: object = None) -> Iterable[F
             "controller_file", "File of the controller", "a Python file with control()", "", "e.g. my_controller.py"
         )
     yield Number("duration", "Final time", "how long it runs", 10.0, unit="s", above=0.0, high=3600.0)
-    yield Number(
-        "sample_period",
-        "Sample period",
-        "time from one sample to the next",
-        machine.sample_period,
-        unit="s",
-        low=1e-4,
-        high=1.0,
-    )
+    yield Number.of(SAMPLE_PERIOD, "sample_period", "Sample period", machine.sample_period)
 
 
 def controllers(axis: Axis) -> Choice:
@@ -107,10 +100,10 @@ def parameter_fields(controller: str, axis: Axis) -> Iterable[Field]:
     """The parameters of one of the library's controllers; `own_fields` has those of a student's file."""
     if controller == USER:
         return
-    options: Any = controller_module(controller).OPTIONS
-    if not isinstance(options, Mapping):
+    if controller == "tracking":
         yield from _tracking_fields()
         return
+    options: Mapping[str, Quantity] = controller_module(controller).OPTIONS
     for name, option in options.items():
         yield _parameter(name, option, axis.unit)
 
@@ -159,16 +152,16 @@ def _tracking_fields() -> Iterable[Field]:
     )
 
 
-def _parameter(name: str, option: Option, unit: str) -> Number:
-    meaning, _, of = option.meaning.partition(", ")
+def _parameter(name: str, option: Quantity, unit: str) -> Number:
+    meaning = option.meaning.partition(";")[0]
     return Number(
         f"{PREFIX}{name}",
         f"{name}, {meaning}",
-        f"{option.meaning.replace('mm', unit)}; empty: tuned from the axis's data",
+        f"{option.described.replace('mm', unit)}; empty: tuned from the axis's data",
         None,
-        unit=of.partition(";")[0].replace("mm", unit),
-        low=option.at_least,
-        above=option.more_than,
+        unit=option.unit.replace("mm", unit),
+        low=option.low,
+        above=option.above,
         optional=True,
     )
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.geometry import PLANES
+from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.interpolators import DEFAULT, interpolator_module, interpolator_names
 from rds.interpolators.segment_rows import FEED_UNITS, segments_of
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text
@@ -59,7 +60,7 @@ def fields() -> Iterable[Field]:
     yield Text("program", "Part program", "a file in your folder", "", "e.g. part.ngc")
     yield Choice("feed_unit", "Unit of the feed rate", "", "mm/min", {unit: unit for unit in FEED_UNITS})
     yield feed("mm/min", 600.0)
-    yield Number("period", "Sample period", "from one point to the next", 0.001, unit="s", low=1e-5, high=1.0)
+    yield Number.of(SAMPLE_PERIOD, "period", "Sample period", 0.001)
     yield _method(LINE)
     yield Text("line_file", "File for lines", "a Python file with interpolate()", "", "e.g. my_interpolator.py")
     yield _method(ARC)
@@ -82,17 +83,15 @@ def option_fields(role: str, method: str) -> Iterable[Field]:
         return
     module = interpolator_module(method)
     for name, option in module.OPTIONS.items():
-        _, _, unit = option.meaning.rpartition(", ")
-        known = unit if unit == "mm" else ""
         yield Number(
             f"{role}.{name}",
             f"{name} ({role}s)",
             option.meaning,
             module.DEFAULTS[name],
-            unit=known,
-            low=option.at_least,
-            above=option.more_than,
-            whole=name == "steps",
+            unit=option.unit,
+            low=option.low,
+            above=option.above,
+            whole=option.whole,
         )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import columns, group, row
@@ -29,7 +30,7 @@ _FILTER = Text(
 )
 _LOAD = (
     Number("bitrate", "Bit rate", "Of the bus", 1_000_000, unit="bit/s", low=10_000, high=1_000_000, whole=True),
-    Number("period", "Sample period", "Of the loop", 0.001, unit="s", low=0.0001, high=1.0),
+    Number.of(SAMPLE_PERIOD, "period", "Sample period", 0.001),
     Number("answer", "Modules answer within", "From a command's arrival", 0.0, unit="s", low=0.0, high=0.1),
 )
 _EVERY = 3  # ticks of 0.1 s between two tables

@@ -29,7 +29,7 @@ from email.utils import make_msgid
 from pathlib import Path
 
 from rds.core.errors import InputError, MachineError
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 
 FILE = "email.toml"
 SECURITY = ("starttls", "tls", "none")
@@ -69,7 +69,7 @@ def mail_server(folder: Path, environment: Mapping[str, str] = os.environ) -> Se
     where a password would be sent.
     """
     path = folder / FILE
-    of_file = dict(Words.read(path).table) if path.is_file() else {}
+    of_file = dict(TomlTable.open(path).table) if path.is_file() else {}
     if unknown := [key for key in of_file if key not in _KEYS]:
         raise InputError(f"there is no key {unknown[0]!r}; there are {', '.join(_KEYS)}", str(path))
     of_user = {key: environment[_variable(key)] for key in _KEYS if _variable(key) in environment}

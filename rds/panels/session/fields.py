@@ -5,10 +5,11 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf, isfinite
+from math import inf
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.core.quantities import Quantity, shortened
 from rds.modes import DEFAULT, load_mode, mode_names
 from rds.modes.loop.mode import Drive
 
@@ -46,47 +47,43 @@ class Number(Field):
         if self.optional and (value is None or (isinstance(value, str) and not value.strip())):
             return None
         number = self._number(value)
-        if not (isfinite(number) and self.low <= number <= self.high and number > self.above):
-            raise InputError(f"{self.label} must be {self.range}, not {value!s:.60}")
-        if self.whole:
-            if number != int(number):
-                raise InputError(f"{self.label} must be a whole number{self._unit}, not {value!s:.60}")
-            return int(number)
-        return number
+        if (fault := self.quantity.fault(number)) is not None:
+            shown = f"{value:.60}" if isinstance(value, str) else shortened(value, 60)
+            raise InputError(f"{self.label} {fault}, not {shown}")
+        return self.quantity.taken(number)
+
+    @classmethod
+    def of(cls, quantity: Quantity, name: str, label: str, default: Any = None, **more: Any) -> Number:
+        """The field of a declared quantity, whose meaning is its tooltip."""
+        q = quantity
+        bounds = {"unit": q.unit, "low": q.low, "high": q.high, "above": q.above, "whole": q.whole}
+        more = {"tooltip": q.meaning, **bounds, **more}
+        return cls(name=name, label=label, default=q.default if default is None else default, **more)
+
+    @property
+    def quantity(self) -> Quantity:
+        """What it may be. The tooltip has the meaning, so that a refusal need not repeat it."""
+        return Quantity("", self.unit, self.low, self.high, self.above, whole=self.whole)
 
     @property
     def range(self) -> str:
         """The range in words, with the unit."""
-        low = max(self.low, self.above)
-        if isfinite(low) and isfinite(self.high):
-            return f"from {low:g} to {self.high:g}{self._unit}" if low == self.low else self._more_than_to()
-        if isfinite(low):
-            return f"{'at least' if low == self.low else 'more than'} {low:g}{self._unit}"
-        if isfinite(self.high):
-            return f"at most {self.high:g}{self._unit}"
-        return self._a_number
-
-    def _more_than_to(self) -> str:
-        return f"more than {self.above:g} and at most {self.high:g}{self._unit}"
+        return self.quantity.range
 
     @property
-    def _a_number(self) -> str:
-        return f"a number{' in' + self._unit if self.unit else ''}"
+    def _no_number(self) -> str:
+        return str(self.quantity.fault(None))
 
-    @property
-    def _unit(self) -> str:
-        return f" {self.unit}" if self.unit else ""
-
-    def _number(self, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise InputError(f"{self.label} must be {self._a_number}, not {value!r:.60}")
-        text = value.strip().removesuffix(self.unit).strip() if isinstance(value, str) else value
-        if isinstance(text, str) and text.count(",") == 1 and "." not in text:
+    def _number(self, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        text = value.strip().removesuffix(self.unit).strip()
+        if text.count(",") == 1 and "." not in text:
             text = text.replace(",", ".")
         try:
-            return float("" if "_" in str(text) else text)  # 1_0 is 10 to Python alone
-        except (ValueError, OverflowError):
-            raise InputError(f"{self.label} must be {self._a_number}, not {value!r:.60}") from None
+            return float("" if "_" in text else text)  # 1_0 is 10 to Python alone
+        except ValueError:
+            raise InputError(f"{self.label} {self._no_number}, not {value!r:.60}") from None
 
 
 @dataclass(frozen=True)

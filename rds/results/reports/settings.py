@@ -8,7 +8,8 @@ from math import inf
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.options import Option, check_known
+from rds.core.options import check_known
+from rds.core.quantities import Quantity
 from rds.results.reports.reading import BEYOND_MEASURE
 
 
@@ -30,16 +31,13 @@ class Setting:
         if self.text:
             return str(value)
         meaning = f"{self.meaning}, in {self.unit}" if self.unit else self.meaning
-        number = Option(meaning, at_least=self.at_least, more_than=self.more_than).check(_number(value), name, owner)
+        declared = Quantity(self.meaning, self.unit, low=self.at_least, above=self.more_than, whole=self.whole)
+        number: float | int = declared.check(_number(value), name, owner)
         if number > self.at_most:
             raise InputError(f"{owner}: {name} = {value!r} must be at most {self.at_most:g} ({meaning})")
         if 0 < abs(number) < 1 / BEYOND_MEASURE:
             raise InputError(f"{owner}: {name} = {value!r} is too close to zero; check its unit ({meaning})")
-        if not self.whole:
-            return number
-        if not number.is_integer():
-            raise InputError(f"{owner}: {name} = {value!r} must be a whole number ({meaning})")
-        return int(number)
+        return number
 
 
 def _number(value: Any) -> Any:

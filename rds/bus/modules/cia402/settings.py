@@ -13,7 +13,8 @@ from rds.bus.modules.cia402.codes import Mode
 from rds.bus.modules.cia402.homing import METHODS
 from rds.bus.modules.cia402.servo import SPINDLE_COUNTS, SPINDLE_UNIT
 from rds.core.errors import InputError
-from rds.core.options import Option, check_known
+from rds.core.options import check_known
+from rds.core.quantities import Quantity
 from rds.machines.machine import Axis, Machine
 
 OUR_EDS = "axis.eds"
@@ -190,7 +191,7 @@ def _home_offset(table: Mapping[str, Any], counts: float, where: str) -> int | N
         raise InputError(
             f"home = {table['home']!r} says where homing ends; give its method as well: homing = 17", where
         )
-    offset = round(-counts * Option("position that home gets, axis unit").check(table["home"], "home", where))
+    offset = round(-counts * Quantity("position that home gets", "axis unit").check(table["home"], "home", where))
     if not -_HALF <= offset < _HALF:
         raise InputError(f"home = {table['home']!r} is beyond what a drive can count", where)
     return offset
@@ -235,4 +236,4 @@ def _whole(table: Mapping[str, Any], key: str, default: int, allowed: Sequence[i
 
 
 def _more_than_0(table: Mapping[str, Any], key: str, default: float, meaning: str, where: str) -> float:
-    return Option(meaning, more_than=0.0).check(table.get(key, default), key, where)
+    return Quantity(meaning, above=0.0).check(table.get(key, default), key, where)

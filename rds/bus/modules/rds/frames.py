@@ -28,6 +28,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from rds.core.errors import InputError, MachineError
+from rds.core.shared_quantities import SAMPLE_PERIOD
 
 GENERAL = 0x001  # a call to all modules of all dialects
 COMMAND = 0x010
@@ -65,7 +66,6 @@ _NUMBER_BITS = 0x0003_0003_0003_0003
 _SETUP = Struct("<II")
 _IDENTITY = Struct("<BBHI")
 _ANSWER = Struct("<iBBH")
-_LONGEST_PERIOD = 0xFFFFFFFF  # µs
 
 
 class Status(IntFlag):
@@ -150,11 +150,8 @@ def decode_voltages(identifier: int, data: bytes | bytearray) -> tuple[float, ..
 
 
 def encode_setup(sample_period: float) -> bytes:
-    """Data of a set-up frame; `sample_period` in s, 1 µs to 4294 s (InputError)."""
-    microseconds = round(sample_period * 1e6) if sample_period == sample_period else 0
-    if not 1 <= microseconds <= _LONGEST_PERIOD:
-        raise InputError(f"sample period {sample_period!r} s must be from 1e-6 to 4294 s")
-    return _SETUP.pack(microseconds, 0)
+    """Data of a set-up frame; `sample_period` in s. InputError for one out of the range that holds everywhere."""
+    return _SETUP.pack(round(SAMPLE_PERIOD.check(sample_period, "sample_period") * 1e6), 0)
 
 
 def decode_setup(identifier: int, data: bytes | bytearray) -> float:

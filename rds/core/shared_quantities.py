@@ -1,0 +1,10 @@
+"""Quantities that more than one room takes, each with its one range."""
+
+from __future__ import annotations
+
+from rds.core.quantities import Quantity
+
+SAMPLE_PERIOD = Quantity("time from one sample to the next", "s", 1e-6, 1000.0)
+DURATION = Quantity("length of the run", "s", 0.0, 1e9)
+NODE = Quantity("CAN node of the axis, different for each; a dialect may take fewer", "", 1, 127, whole=True)
+FEED_RATE = Quantity("feed rate along the path", "mm/s", 1e-6, 1e6)
