@@ -1,25 +1,22 @@
 """RDS: the rapid development system for machine-tool axes.
 
-The names below are imported when they are first used, so that `import rds` is light.
+What a person types in a notebook, flat: `rds.Experiment(...)`, `rds.fit(...)`, `rds.PartProgram(...)`. Each name is
+imported when it is first used, so that `import rds` is light.
 """
 
-from __future__ import annotations
+from importlib import import_module as _import
+from typing import Any as _Any
 
-from importlib import import_module
-from typing import Any
-
+# name: where it is defined; "module:name" where it is called otherwise there
 _NAMES = {
+    # runs
     "Experiment": "rds.modes.experiment",
+    "PartProgram": "rds.nc.run.run",
     "Result": "rds.results",
-    "compare": "rds.results.compare",
     "open_result": "rds.results",
-    "load_machine": "rds.machines",
-    "machine_names": "rds.machines",
-    "Controller": "rds.core.types",
-    "Model": "rds.core.types",
-    "Reference": "rds.core.types",
-    "LineSegment": "rds.core.types",
-    "ArcSegment": "rds.core.types",
+    "compare": "rds.results.compare",
+    "lsim": "rds.modes.experiment.model_alone",
+    # references and voltages
     "sinusoid": "rds.references",
     "square": "rds.references",
     "triangle": "rds.references",
@@ -28,24 +25,55 @@ _NAMES = {
     "chirp": "rds.references",
     "staircase": "rds.references",
     "user": "rds.references",
+    # machines, and what the three interfaces exchange
+    "Machine": "rds.machines.machine",
+    "load_machine": "rds.machines",
+    "machine_names": "rds.machines",
+    "Model": "rds.core.types",
+    "Controller": "rds.core.types",
+    "Reference": "rds.core.types",
+    "LineSegment": "rds.core.types",
+    "ArcSegment": "rds.core.types",
+    # paths
+    "interpolate": "rds.interpolators.path",
+    "interpolator": "rds.interpolators.interpolator:library_interpolator",
+    # checks
     "check_file": "rds.checks",
     "check_controller": "rds.checks",
     "check_model": "rds.checks",
     "check_interpolator": "rds.checks",
+    # logs, models and designs
+    "read_log": "rds.identification.logs.read_log",
+    "shipped_log": "rds.identification.logs.shipped:path",
+    "structure": "rds.identification.structures.structures",
+    "fit": "rds.identification.fit.fit",
+    "validate": "rds.identification.validate.validate",
+    "read_model": "rds.identification.fit.model_file",
+    "write_model": "rds.identification.fit.model_file",
+    "design": "rds.identification.fit.design:design_tracking",
+    "robustness": "rds.identification.robustness.study:study",
+    # grading
+    "grade": "rds.grading.batch.run:run_batch",
+    # errors
     "RdsError": "rds.core.errors",
     "InputError": "rds.core.errors",
     "ContractError": "rds.core.errors",
     "MachineError": "rds.core.errors",
 }
 
-__all__ = list(_NAMES)
+__all__ = [*_NAMES, "__version__"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> _Any:
+    if name == "__version__":
+        from rds.core.installed import version
+
+        return version()
     if name not in _NAMES:
-        raise AttributeError(f"module 'rds' has no attribute {name!r}")
-    return getattr(import_module(_NAMES[name]), name)
+        raise AttributeError(f"module 'rds' has no attribute {name!r}; dir(rds) lists what there is")
+    module, _, called = _NAMES[name].partition(":")
+    return getattr(_import(module), called or name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_NAMES])
+    return sorted(__all__)

@@ -1,0 +1,70 @@
+"""`import rds` offers what a person types in a notebook, flat, and nothing else."""
+
+from __future__ import annotations
+
+import inspect
+
+import control
+import numpy as np
+import pytest
+import scipy.signal
+
+import rds
+
+TAU, K = 9.943e-3, 1.764
+
+
+def test_what_there_is() -> None:
+    assert dir(rds) == sorted(rds.__all__)
+    assert 38 <= len(rds.__all__) <= 48
+    for name in rds.__all__:
+        thing = getattr(rds, name)
+        assert name == "__version__" or (inspect.getdoc(thing) or "").strip(), f"rds.{name} has no docstring"
+    assert rds.__version__.startswith("0.")
+
+
+def test_an_unknown_name_says_where_to_look() -> None:
+    with pytest.raises(AttributeError, match=r"no attribute 'simulate'; dir\(rds\)"):
+        rds.simulate  # noqa: B018
+
+
+class TestAModelAlone:
+    times = np.arange(0.0, 0.2, 0.001)
+    voltage = 3.0 * np.sign(np.sin(40.0 * times))
+
+    def test_as_scipy_s_lsim(self) -> None:
+        def derivatives(t, x, u, params):  # type: ignore[no-untyped-def]
+            return [x[1], (params["K"] * u[0] - x[1]) / params["tau"]]
+
+        model = {"derivatives": derivatives, "params": {"tau": TAU, "K": K}}
+        _, y, x = rds.lsim(model, self.voltage, self.times)
+        _, expected, states = scipy.signal.lsim(
+            ([[0, 1], [0, -1 / TAU]], [[0], [K / TAU]], [[1, 0]], [[0]]), self.voltage, self.times, interp=False
+        )
+        assert np.abs(y - expected).max() < 1e-8
+        assert np.abs(x - states).max() < 1e-6
+
+    def test_a_python_control_system_and_a_first_state(self) -> None:
+        system = control.ss([[0, 1], [0, -1 / TAU]], [[0], [K / TAU]], [[1, 0]], [[0]])
+        _, y, x = rds.lsim(system, 0.0, self.times, X0=[1.0, 20.0])
+        assert np.abs(y - (1.0 + 20.0 * TAU * (1.0 - np.exp(-self.times / TAU)))).max() < 1e-8
+        assert x.shape == (len(self.times), 2)
+
+    def test_the_axis_of_a_machine_with_other_parameters(self) -> None:
+        _, _, slow = rds.lsim("linear-axis", 5.0, self.times)
+        _, _, fast = rds.lsim("linear-axis", 5.0, self.times, params={"K": 2 * K})
+        assert fast[-1, 1] > slow[-1, 1] > 0.0
+
+    @pytest.mark.parametrize(
+        ("arguments", "said"),
+        [
+            ({"U": [1.0, 2.0], "T": times}, r"U has the shape \(2,\)"),
+            ({"U": 1.0, "T": [0.0, 0.1, 0.3]}, "not at equal distances"),
+            ({"U": 1.0, "T": [0.0]}, "two times or more"),
+            ({"U": 1.0, "T": times, "X0": [1.0]}, "X0 has 1 values; the model has 2 states"),
+            ({"U": 1.0, "T": times, "params": {"mass": 1.0}}, "no parameter 'mass'; it has"),
+        ],
+    )
+    def test_what_is_refused(self, arguments: dict[str, object], said: str) -> None:
+        with pytest.raises(rds.InputError, match=said):
+            rds.lsim("linear-axis", **arguments)
