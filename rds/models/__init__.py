@@ -1,4 +1,4 @@
-"""Plant models, one per file, by name. Each file has `make(**params) -> Model`."""
+"""Plant models, one per file, by name. Each file has `PARAMETERS` and `make(**params) -> Model`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Modes by name, imported on use. What others must know of a mode, the mode says (`loop/mode.py`)."""
+"""Modes by name, imported on use. Each file has `MODE`, which says what others must know of it (`loop/mode.py`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Signals by kind: voltages for system tests, references for controllers."""
+"""Signals by kind: voltages for system tests, references for controllers.
+
+A kind is a function that returns a `Signal`; its arguments are the options that a TOML table may give.
+"""
 
 from __future__ import annotations
 

@@ -25,8 +25,7 @@ def served() -> Iterator[Callable[[str], tuple[Machine, str]]]:
         def start(dialect: str) -> tuple[Machine, str]:
             machine, channel = load_machine(MACHINES[dialect]), uuid4().hex
             stop, ready = threading.Event(), threading.Event()
-            server = import_module(server_module(dialect))
-            serve = server.serve_oacs if dialect == "oacs" else server.serve
+            serve = import_module(server_module(dialect)).serve
             thread = threading.Thread(target=lambda: serve(machine, "virtual", channel, ready=ready.set, stop=stop))
             thread.start()
             stack.callback(thread.join, 30.0)

@@ -23,12 +23,9 @@ def main(dialect: str, channel: str) -> None:
     options = {"serials": {"X": 77}} if dialect == "oacs" else {}
     if dialect == "oacs":
         messages.load()
-        serve = server.serve_oacs
-    else:
-        serve = server.serve
     say("standby")
     sys.stdin.readline()
-    serve(machine, "rds", channel, ["X"], ready=lambda: say("ready"), **options)
+    server.serve(machine, "rds", channel, ["X"], ready=lambda: say("ready"), **options)
 
 
 def say(line: str) -> None:

@@ -1,4 +1,8 @@
-"""What the modules on a bus speak: for each dialect its server, its drivers on the host, and how to see it is there."""
+"""What the modules on a bus speak: for each dialect its server, its drivers on the host, and how to see it is there.
+
+A dialect is a folder beside this file. Its server module has `serve(machine, interface, channel, axes, ready, stop,
+**options)` and is a program (`server_program.py`); its drivers are a class that keeps `rds.core.contracts.Drivers`.
+"""
 
 from __future__ import annotations
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
-from rds.bus.modules.dialects import check_dialect
+from rds.bus.modules.dialects import check_dialect, server_module
 from rds.machines import Machine
 
 
@@ -17,15 +18,4 @@ def serve_machine(
     InputError for an unknown dialect; else as each server says.
     """
     check_dialect(dialect)
-    if dialect == "rds":
-        from rds.bus.modules.rds.server import serve
-
-        serve(machine, interface, channel, ready=ready, **options)
-    elif dialect == "oacs":
-        from rds.bus.modules.oacs.server import serve_oacs
-
-        serve_oacs(machine, interface, channel, ready=ready, **options)
-    else:
-        from rds.bus.modules.cia402.server import serve as serve_drives
-
-        serve_drives(machine, interface, channel, ready=ready, **options)
+    import_module(server_module(dialect)).serve(machine, interface, channel, ready=ready, **options)

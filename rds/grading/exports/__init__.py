@@ -15,7 +15,13 @@ from rds.core.registry import Registry
 GRADEBOOKS = Registry(
     "gradebook",
     MappingProxyType(
-        {name: f"rds.grading.exports.{name}" for name in ("nbgrader", "moodle", "canvas", "gradescope", "prairielearn")}
+        {
+            "nbgrader": "rds.grading.exports.nbgrader",
+            "moodle": "rds.grading.exports.moodle",
+            "canvas": "rds.grading.exports.canvas",
+            "gradescope": "rds.grading.exports.gradescope",
+            "prairielearn": "rds.grading.exports.prairielearn",
+        }
     ),
     own=False,
 )

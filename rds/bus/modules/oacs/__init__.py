@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rds.bus.modules.oacs.drivers import OacsDrivers
     from rds.bus.modules.oacs.host import ModuleInfo, estop, scan
     from rds.bus.modules.oacs.remote import Information, Module
-    from rds.bus.modules.oacs.server import serve_oacs
+    from rds.bus.modules.oacs.server import serve
     from rds.bus.modules.oacs.watch import Change, Event, Watch
 
 _WHERE = {
@@ -30,7 +30,7 @@ _WHERE = {
     "Watch": "watch",
     "estop": "host",
     "scan": "host",
-    "serve_oacs": "server",
+    "serve": "server",
 }
 
 __all__ = [
@@ -43,7 +43,7 @@ __all__ = [
     "Watch",
     "estop",
     "scan",
-    "serve_oacs",
+    "serve",
 ]
 
 

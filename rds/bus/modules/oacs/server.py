@@ -35,7 +35,7 @@ from rds.machines.machine import Axis
 LOG = logging.getLogger(__name__)
 
 
-def serve_oacs(
+def serve(
     machine: Machine,
     interface: str = BUILTIN,
     channel: str | None = None,
@@ -88,8 +88,8 @@ def _do_lines(lines: queue.SimpleQueue[str], nodes: Sequence[OacsNode]) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The program. Exit code 0: told to end; 1: the bus failed at the start; 2: bad input."""
     lines = queue.SimpleQueue[str]()
-    serve = partial(serve_oacs, lines=lines)
-    return server_program.run(serve, "rds.bus.modules.oacs.server", "serve distributed modules", arguments, lines)
+    with_hands = partial(serve, lines=lines)
+    return server_program.run(with_hands, "rds.bus.modules.oacs.server", "serve distributed modules", arguments, lines)
 
 
 _WIRES = {"broken": False, "bridged": True, "whole": None}
