@@ -8,10 +8,10 @@ from time import perf_counter_ns
 from benchmarks.figures import Figure
 from rds.interpolators.motion.segments import arc, chain, line
 from rds.machines import load_machine
-from rds.modes.loop.changes import Heed, stop_channel
+from rds.modes.loop.changes import LiveChanges, stop_channel
 from rds.modes.loop.execution import Execution
 from rds.modes.loop.laws import LiveReference
-from rds.modes.loop.live_values import Channel, Desk
+from rds.modes.loop.live_values import Channel, LiveValues
 from rds.modes.loop.retimed import Retimed
 from rds.nc.run.prepare import planned
 from rds.nc.toolpath import Event, PathBlock
@@ -32,28 +32,28 @@ def run() -> list[Figure]:
     ]
 
 
-def _heed() -> tuple[Heed, Desk]:
+def _live() -> tuple[LiveChanges, LiveValues]:
     channels = [Channel(f"value{i}", 0.0, "") for i in range(CHANNELS)]
-    heed = Heed([*channels, stop_channel()], {channel.name: lambda value: None for channel in channels})
-    heed.desk = Desk.create(None, [*channels, stop_channel()])
-    return heed, heed.desk
+    live_changes = LiveChanges([*channels, stop_channel()], {channel.name: lambda value: None for channel in channels})
+    live_changes.desk = LiveValues.create(None, [*channels, stop_channel()])
+    return live_changes, live_changes.desk
 
 
 def _look() -> float:
-    heed, _ = _heed()
+    live_changes, _ = _live()
     started = perf_counter_ns()
     for k in range(SAMPLES):
-        heed(k)
+        live_changes(k)
     return (perf_counter_ns() - started) / SAMPLES / 1e3
 
 
 def _change() -> float:
-    heed, desk = _heed()
+    live_changes, desk = _live()
     total = 0
     for k in range(2000):
         desk.set("value7", k + 1.0)
         started = perf_counter_ns()
-        heed(k)
+        live_changes(k)
         total += perf_counter_ns() - started
     return total / 2000 / 1e3
 

@@ -71,7 +71,7 @@ ONLY = {
     ("identification", "modes"): {"rds.modes", "rds.modes.loop.mode"},  # what the mode of a result says of its data
 }
 # inside functions only
-LAZY = [("results", "modes"), ("identification", "modes"), ("modes", "bus"), ("results.reports", "bus")]
+LAZY = [("results", "modes"), ("modes", "bus"), ("results.reports", "bus")]
 TOP = {"__main__", "cli", "panels"}
 
 

@@ -95,7 +95,7 @@ def loop(
 ) -> Loop:
     """The loop of these parts in virtual time, its rows going nowhere."""
     drive = plan.start()
-    return Loop(plan.most_samples, _due, read, drive.laws, write, follow, _dropped, _going_on, drive.heed)
+    return Loop(plan.most_samples, _due, read, drive.laws, write, follow, _dropped, _going_on, drive.changes)
 
 
 def at_once(voltages: Sequence[float]) -> Sequence[float]:

@@ -15,7 +15,7 @@ from rds.core.errors import InputError
 from rds.core.types import Ending
 from rds.interpolators.motion.segments import BLEND, SEGMENT, arc, chain, line
 from rds.machines import load_machine
-from rds.modes.loop.changes import Heed, plan_changes, stop_channel
+from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
 from rds.modes.loop.execution import Execution, State
 from rds.modes.loop.laws import LiveReference
 from rds.modes.loop.program import program_channels
@@ -54,13 +54,15 @@ def execute(program: Prepared, changes: Any = (), speed: Any = lambda k, wanted:
     channels = program_channels()
     references = [LiveReference() for _ in range(4)]
     execution = Execution(
-        program.program, T, Retimed(program.program, T), references, 3, 1.0, lambda names: heed.expects(names)
+        program.program, T, Retimed(program.program, T), references, 3, 1.0, lambda names: live_changes.expects(names)
     )
     by_name = {channel.name: channel for channel in (*channels, STOP)}
-    heed = Heed([*channels, STOP], execution.actions(), plan_changes(changes, by_name, T), execution.over)
+    live_changes = LiveChanges(
+        [*channels, STOP], execution.actions(), plan_changes(changes, by_name, T), execution.over
+    )
     rows, parts = [], []
     k = 0
-    while (ending := heed(k)) is None:
+    while (ending := live_changes(k)) is None:
         row: list[float] = []
         wanted = references[3].position.value
         execution.law(k, [0.0, 0.0, 0.0, speed(k, wanted)], row, [])
@@ -70,7 +72,7 @@ def execute(program: Prepared, changes: Any = (), speed: Any = lambda k, wanted:
         assert k < 200_000
     p = np.array(parts)
     columns = np.array(rows).T
-    return Ran(p[:, :, 0], p[:, :, 1], p[:, :, 2], *columns, ending, heed.reason)
+    return Ran(p[:, :, 0], p[:, :, 1], p[:, :, 2], *columns, ending, live_changes.reason)
 
 
 PATH = chain(

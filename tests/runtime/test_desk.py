@@ -19,8 +19,8 @@ from misbehaviour import send
 
 import rds
 from rds.core.types import Ending
-from rds.modes.loop.changes import Heed, as_text, plan_changes, read_changes, stop_channel, timed
-from rds.modes.loop.live_values import NOTES, Channel, Desk, Note
+from rds.modes.loop.changes import LiveChanges, as_text, plan_changes, read_changes, stop_channel, timed
+from rds.modes.loop.live_values import NOTES, Channel, LiveValues, Note
 from rds.modes.process.ring import Ring
 
 Maker = Callable[..., rds.Experiment]
@@ -36,7 +36,7 @@ CHANGES = [(0.4, "X.Pgain", 35.0), (0.4, "X.Igain", 3.0), (0.7215, "X.FF1", 0.0)
 
 @given(values=st.lists(st.tuples(st.sampled_from(["X.Pgain", "override"]), st.floats(0.0, 2.0)), max_size=30))
 def test_a_reader_sees_what_was_set_last(values: list[tuple[str, float]]) -> None:
-    desk = Desk.create(None, [GAIN, OVERRIDE])
+    desk = LiveValues.create(None, [GAIN, OVERRIDE])
     assert not desk.news()
     expected = {"X.Pgain": 10.0, "override": 1.0}
     for name, value in values:
@@ -49,21 +49,20 @@ def test_a_reader_sees_what_was_set_last(values: list[tuple[str, float]]) -> Non
 
 
 def test_two_processes_share_a_desk(tmp_path: Path) -> None:
-    desk = Desk.create(tmp_path / "a.desk", [GAIN, OVERRIDE])
-    other = (
-        f"from rds.modes.loop.live_values import Desk; Desk.open({str(tmp_path / 'a.desk')!r}).set('override', 0.25)"
-    )
+    desk = LiveValues.create(tmp_path / "a.desk", [GAIN, OVERRIDE])
+    opened_there = f"LiveValues.open({str(tmp_path / 'a.desk')!r})"
+    other = f"from rds.modes.loop.live_values import LiveValues; {opened_there}.set('override', 0.25)"
     subprocess.run([sys.executable, "-c", other], check=True)
     assert desk.take() == (10.0, 0.25)
     desk.note(Note(3, "override", 1.0, 0.25))
-    opened = Desk.open(tmp_path / "a.desk")
+    opened = LiveValues.open(tmp_path / "a.desk")
     assert opened.channels == desk.channels
     assert opened.notes() == (0, [Note(3, "override", 1.0, 0.25)])
 
 
 def test_values_that_belong_together_are_never_seen_apart() -> None:
     """A writer sets both channels to the same value all the time; whoever reads sees equal values or none."""
-    desk = Desk.create(None, [OVERRIDE, Channel("hold", 1.0, "", low=0.0, high=2.0)])
+    desk = LiveValues.create(None, [OVERRIDE, Channel("hold", 1.0, "", low=0.0, high=2.0)])
     stop = threading.Event()
 
     def write() -> None:
@@ -85,7 +84,7 @@ def test_values_that_belong_together_are_never_seen_apart() -> None:
 
 
 def test_a_writer_that_died_in_the_middle_blocks_nobody() -> None:
-    desk = Desk.create(None, [GAIN])
+    desk = LiveValues.create(None, [GAIN])
     desk._memory[8:16] = (7).to_bytes(8, "little")  # odd, as a killed process leaves it
     assert desk.take() == ()
     desk.set("X.Pgain", 3.0)
@@ -93,7 +92,7 @@ def test_a_writer_that_died_in_the_middle_blocks_nobody() -> None:
 
 
 def test_notes_that_nobody_copied_in_time_are_counted() -> None:
-    desk = Desk.create(None, [GAIN])
+    desk = LiveValues.create(None, [GAIN])
     for k in range(NOTES + 10):
         desk.note(Note(k, "X.Pgain", float(k), float(k + 1)))
     first, notes = desk.notes(5)
@@ -111,7 +110,7 @@ def test_notes_that_nobody_copied_in_time_are_counted() -> None:
     ],
 )
 def test_what_cannot_be_set_is_refused(name: str, value: Any, said: str) -> None:
-    desk = Desk.create(None, [GAIN, OVERRIDE])
+    desk = LiveValues.create(None, [GAIN, OVERRIDE])
     with pytest.raises(rds.InputError, match=said):
         desk.set_all({"override": 0.5, name: value})
     assert desk.values() == {"X.Pgain": 10.0, "override": 1.0}
@@ -125,12 +124,12 @@ def test_a_change_is_taken_at_the_sample_of_its_time() -> None:
     said: list[tuple[int, float]] = []
     k = 0
     planned = plan_changes([(0.0, "X.Pgain", 1.0), (0.0101, "X.Pgain", 2.0)], {"X.Pgain": GAIN}, 0.001)
-    heed = Heed([GAIN, stop_channel()], {"X.Pgain": lambda value: said.append((k, value))}, planned)
+    live_changes = LiveChanges([GAIN, stop_channel()], {"X.Pgain": lambda value: said.append((k, value))}, planned)
     for k in range(30):
-        assert heed(k) is None
+        assert live_changes(k) is None
     assert said == [(0, 1.0), (11, 2.0)]
-    assert heed.taken == [Note(0, "X.Pgain", 10.0, 1.0), Note(11, "X.Pgain", 1.0, 2.0)]
-    assert not heed.expects(["X.Pgain"])
+    assert live_changes.taken == [Note(0, "X.Pgain", 10.0, 1.0), Note(11, "X.Pgain", 1.0, 2.0)]
+    assert not live_changes.expects(["X.Pgain"])
 
 
 @given(sample=st.integers(0, 10**9), T=st.sampled_from([0.001, 0.002, 1e-4, 0.0123, 1 / 3000]))
@@ -380,12 +379,14 @@ def test_a_count_is_never_seen_half_written(tmp_path: Path) -> None:
 
 
 def test_a_planned_change_is_not_undone_by_a_desk_that_did_not_know_of_it() -> None:
-    desk = Desk.create(None, [GAIN, OVERRIDE])
-    heed = Heed([GAIN, OVERRIDE], dict.fromkeys(("X.Pgain", "override"), lambda value: None), [(0, "override", 0.5)])
-    heed.desk = desk
-    heed(0)
+    desk = LiveValues.create(None, [GAIN, OVERRIDE])
+    live_changes = LiveChanges(
+        [GAIN, OVERRIDE], dict.fromkeys(("X.Pgain", "override"), lambda value: None), [(0, "override", 0.5)]
+    )
+    live_changes.desk = desk
+    live_changes(0)
     assert desk["override"] == 0.5
     desk.set("X.Pgain", 3.0)
-    heed(1)
-    assert heed.values == {"X.Pgain": 3.0, "override": 0.5}
-    assert [note.name for note in heed.taken] == ["override", "X.Pgain"]
+    live_changes(1)
+    assert live_changes.values == {"X.Pgain": 3.0, "override": 0.5}
+    assert [note.name for note in live_changes.taken] == ["override", "X.Pgain"]

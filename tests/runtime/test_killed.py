@@ -27,7 +27,7 @@ from rds.bus.modules.calling import find_machine
 from rds.bus.modules.dialects import server_module
 from rds.bus.modules.rds.frames import CALL, Kind, Status, answer_identifier, decode_answer
 from rds.bus.modules.server_process import start_server
-from rds.modes.loop.live_values import Desk
+from rds.modes.loop.live_values import LiveValues
 from rds.modes.process import recorder
 from rds.modes.process.recorder import READY, Recorder, conclude, watch
 from rds.modes.process.ring import Ring
@@ -156,7 +156,7 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[
     """A target that takes no samples, and its recorder, who is impatient."""
     monkeypatch.setattr(recorder, "HANG_AFTER", 0.3)
     ring = Ring.create(tmp_path / "a.ring", ["sample"], 10, ready=READY)
-    Desk.create(ring.desk_path, []).close()
+    LiveValues.create(ring.desk_path, []).close()
     ring.beat(READY)
     with subprocess.Popen([sys.executable, "-S", "-c", "input()"], stdin=-1, stderr=subprocess.DEVNULL) as target:
         yield target, Recorder(tmp_path, ring)

@@ -11,7 +11,7 @@ from lost_machines import unless_lost
 
 import rds
 from rds.core.errors import InputError
-from rds.modes.loop.live_values import Desk
+from rds.modes.loop.live_values import LiveValues
 from rds.modes.process import host, shared
 from rds.modes.process.ring import Ring
 
@@ -30,7 +30,7 @@ def test_a_ring_is_removed_when_the_last_of_its_processes_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ring = Ring.create(tmp_path / "rds-0.ring", ["a"], 100)
-    Desk.create(ring.desk_path, [])
+    LiveValues.create(ring.desk_path, [])
     files = {ring.path, ring.desk_path}
     command = [sys.executable, "-c", HOLDER, str(ring.path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
@@ -49,7 +49,7 @@ def test_a_ring_is_removed_when_the_last_of_its_processes_is_killed(
 def test_shared_memory_is_there_to_its_last_byte(tmp_path: Path) -> None:
     """In a full /dev/shm, as that of a container soon is, its pages were missing when the loop came to write them."""
     ring = Ring.create(tmp_path / "rds-0.ring", ["a", "b"], 10_000)
-    Desk.create(ring.desk_path, []).close()
+    LiveValues.create(ring.desk_path, []).close()
     ring.close()
     for path in (ring.path, ring.desk_path):
         about = path.stat()

@@ -57,7 +57,7 @@ def run_loop(plan: Plan, meta: dict[str, Any]) -> LoopRun:
     recorded = array("d")
     loop = replace(mode.build(plan, None), record=recorded.extend)
     if plan.program is None:
-        loop.heed = None  # nobody changes anything while it runs
+        loop.changes = None  # nobody changes anything while it runs
     fault, ending = "", Ending.FAULT
     try:
         ending = loop.run() or Ending.DONE

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from rds.core.errors import InputError
 from rds.core.types import Ending
-from rds.modes.loop.live_values import Channel, Desk, Note, find
+from rds.modes.loop.live_values import Channel, LiveValues, Note, find
 
 FILE = "changes.csv"
 STOP = "stop"
@@ -34,13 +34,14 @@ def stop_channel() -> Channel:
     return Channel(STOP, 0.0, "1 ends the run before its next sample", low=0.0, high=1.0, whole=True)
 
 
-class Heed:
+class LiveChanges:
     """Takes the changes that are due: called with the number of each sample before it is taken.
 
     `actions` say what a new value does, by channel ("stop" ends the run unless they say otherwise); `planned` are
-    changes known before the run, as (sample, channel, value) in order. Set `desk` to heed somebody who changes values
-    while it runs. `over()` is asked at each sample whether what drives the axes is at its end, and
-    why. `in_virtual_time`, time stands still for as long as `waits()` says that only somebody at the desk can go on.
+    changes known before the run, as (sample, channel, value) in order. Set `desk` to take those of
+    somebody who changes values while it runs. `over()` is asked at each sample whether what drives the axes is at its
+    end, and why. `in_virtual_time`, time stands still for as long as `waits()` says that only somebody at the desk can
+    go on.
     """
 
     def __init__(
@@ -53,7 +54,7 @@ class Heed:
     ):
         self.values = {channel.name: channel.value for channel in channels}
         self.taken: list[Note] = []
-        self.desk: Desk | None = None
+        self.desk: LiveValues | None = None
         self.in_virtual_time = False
         self.reason = ""  # why the run ended early, in a sentence
         self._names = list(self.values)

@@ -67,7 +67,7 @@ class Note(NamedTuple):
     new: float
 
 
-class Desk:
+class LiveValues:
     """Channels in shared memory. `set` is the host's side; `news`, `take` and `note` are the loop's."""
 
     def __init__(self, memory: mmap.mmap, channels: Sequence[Channel], path: Path | None = None):
@@ -83,7 +83,7 @@ class Desk:
         self._verify: Any = None
 
     @classmethod
-    def create(cls, path: str | Path | None, channels: Sequence[Channel]) -> Desk:
+    def create(cls, path: str | Path | None, channels: Sequence[Channel]) -> LiveValues:
         """A new desk in the file `path`, or (None) in the memory of this process alone. OSError if there is no room."""
         text = json.dumps([asdict(channel) for channel in channels]).encode()
         values = struct.Struct(f"<{len(channels)}d")
@@ -101,7 +101,7 @@ class Desk:
         return cls(memory, channels, None if path is None else Path(path))
 
     @classmethod
-    def open(cls, path: str | Path) -> Desk:
+    def open(cls, path: str | Path) -> LiveValues:
         """The desk in an existing file."""
         memory = _map(path)
         if memory[: len(_MAGIC)] != _MAGIC:

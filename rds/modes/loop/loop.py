@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rds.core.types import Ending
-from rds.modes.loop.changes import Heed
+from rds.modes.loop.changes import LiveChanges
 
 Law = Callable[[int, Sequence[float], list[float], list[float]], None]
 
@@ -25,8 +25,8 @@ class Loop:
       returns what is to be recorded of them, as it was at this sample.
     - `record(row)`: takes the row: the sample's number, what the laws appended, the acting voltages, the outputs.
     - `finish(k) -> ending`: sample `k` is complete; how the run ends here, if it does.
-    - `heed(k) -> ending`: live values that were changed are taken before sample `k`, which is the last chance to end
-      the run before it is taken. None where nobody has a say. See `runtime.changes`.
+    - `changes(k) -> ending`: live values that were changed are taken before sample `k`, which is the last chance to end
+      the run before it is taken. None where the run has no live values. See `loop.changes`.
     """
 
     samples: int
@@ -37,14 +37,14 @@ class Loop:
     follow: Callable[[Sequence[float]], Sequence[float]]
     record: Callable[[list[float]], object]
     finish: Callable[[int], Ending | None]
-    heed: Heed | None = None
+    changes: LiveChanges | None = None
     k: int = 0  # the sample to take next, or the one that failed
 
     def run(self, until: int | None = None) -> Ending | None:
         """Take the samples up to `until` (default: all); None means that there are more to take."""
         wait, read, laws, write = self.wait, self.read, self.laws, self.write
         follow, record, finish, samples = self.follow, self.record, self.finish, self.samples
-        heed = self.heed
+        changes = self.changes
         until = samples if until is None else min(until, samples)
         k = self.k
         try:
@@ -56,8 +56,8 @@ class Loop:
                     if due >= samples:
                         return Ending.DONE
                     k = due
-                if heed is not None:
-                    ending = heed(k)
+                if changes is not None:
+                    ending = changes(k)
                     if ending is not None:
                         return ending
                 positions = read()

@@ -15,7 +15,7 @@ from rds.core.portable import portable
 from rds.core.types import Controller, Model
 from rds.machines import Axis, Machine
 from rds.machines.converter import converter
-from rds.modes.loop.changes import Heed, plan_changes, stop_channel
+from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
 from rds.modes.loop.execution import Execution
 from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
 from rds.modes.loop.live_values import Channel
@@ -102,7 +102,7 @@ class Plan:
         program = self.program
         if program is None:
             references = [plan.reference for plan in self.axes if plan.reference is not None]
-            return Drive(self._laws(params, references), Heed(self.channels(), actions, self.changes))
+            return Drive(self._laws(params, references), LiveChanges(self.channels(), actions, self.changes))
         live = {name: LiveReference() for name in self.names}
         spindle = None if program.spindle is None else self.names.index(program.spindle)
         execution = Execution(
@@ -112,10 +112,12 @@ class Plan:
             [live[name] for name in (*program.axes, *([program.spindle] if program.spindle else []))],
             spindle,
             0.0 if spindle is None else self.axes[spindle].axis.resolution,
-            lambda names: heed.expects(names),
+            lambda names: changes.expects(names),
         )
-        heed = Heed(self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits)
-        return Drive([execution.law, *self._laws(params, list(live.values()))], heed)
+        changes = LiveChanges(
+            self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits
+        )
+        return Drive([execution.law, *self._laws(params, list(live.values()))], changes)
 
     def _tunings(self) -> list[Tuning]:
         """The live parameters of each controller; of one controller, if it drives all axes."""
@@ -172,7 +174,7 @@ class Drive:
     """What drives the axes of a run that has begun: its laws, and what takes the changes of live values."""
 
     laws: list[Law]
-    heed: Heed
+    changes: LiveChanges
 
 
 def dump(plan: Plan) -> bytes:

@@ -26,7 +26,7 @@ from rds.core.private_files import make_folder
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.loop.changes import Change, read_changes, timed
-from rds.modes.loop.live_values import Desk
+from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.plan import Plan, dump
 from rds.modes.loop.stopwatch import TIMING_COLUMNS
 from rds.modes.process.blame import fault
@@ -88,15 +88,15 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     columns, units = plan.columns(mode.followed)
     recorded = array("d")
     loop = replace(mode.build(plan, None), record=recorded.extend)
-    heed = loop.heed
-    assert heed is not None
+    changes = loop.changes
+    assert changes is not None
     attached: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
     if live is not None:
-        heed.desk = Desk.create(None, plan.channels())
-        heed.in_virtual_time = True
-        attached = live.attach(plan, heed.desk, columns, units, recorded=recorded)
-    elif heed.is_idle:
-        loop = replace(loop, heed=None)
+        changes.desk = LiveValues.create(None, plan.channels())
+        changes.in_virtual_time = True
+        attached = live.attach(plan, changes.desk, columns, units, recorded=recorded)
+    elif changes.is_idle:
+        loop = replace(loop, changes=None)
 
     def run() -> Ending:
         ending = None
@@ -112,7 +112,7 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     except (*STUDENT_ERRORS, Endless) as error:
         raise ContractError(fault(plan, error, loop.k)) from error
     values = np.frombuffer(recorded).reshape(-1, len(columns))
-    return Rows(columns, units, values, ending, heed.reason, {}, changes=tuple(timed(heed.taken, plan.T)))
+    return Rows(columns, units, values, ending, changes.reason, {}, changes=tuple(timed(changes.taken, plan.T)))
 
 
 def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None, live: Live) -> Rows:
@@ -176,7 +176,7 @@ def _recorded(
                 left.unlink()
 
 
-def _shared(plan: Plan, columns: list[str], capacity: int, about: dict[str, Any]) -> tuple[Ring, Desk]:
+def _shared(plan: Plan, columns: list[str], capacity: int, about: dict[str, Any]) -> tuple[Ring, LiveValues]:
     """The memory that the run's processes share, in the first folder that has room; InputError if none has."""
     full = []
     for folder in folders():
@@ -185,7 +185,7 @@ def _shared(plan: Plan, columns: list[str], capacity: int, about: dict[str, Any]
         try:
             ring = Ring.create(path, columns, capacity, **about)
             try:
-                return ring, Desk.create(ring.desk_path, plan.channels())
+                return ring, LiveValues.create(ring.desk_path, plan.channels())
             except OSError:
                 ring.close()
                 path.unlink()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.modes.loop.live_values import Desk
+from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.plan import Plan
 from rds.modes.process.ring import Ring
 
@@ -29,13 +29,13 @@ class Live:
         self._hard = False
         self.columns: list[str] = []
         self.units: dict[str, str] = {}
-        self.desk: Desk | None = None
+        self.desk: LiveValues | None = None
         self.attached = threading.Event()
 
     def attach(
         self,
         plan: Plan,
-        desk: Desk,
+        desk: LiveValues,
         columns: list[str],
         units: dict[str, str],
         *,
@@ -76,7 +76,7 @@ class Live:
         """Set live values; InputError if the run is over, has not begun, or will not have them."""
         self.at_desk(lambda desk: desk.set_all(values))
 
-    def at_desk(self, act: Callable[[Desk], Any]) -> Any:
+    def at_desk(self, act: Callable[[LiveValues], Any]) -> Any:
         """What `act` makes of the desk; InputError where there is none."""
         with self._lock:
             if self.desk is None:

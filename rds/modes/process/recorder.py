@@ -21,7 +21,7 @@ from rds.core.private_files import keep_process_private, open_private, write_pri
 from rds.core.types import Ending
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import STOP, as_text, read_changes, timed
-from rds.modes.loop.live_values import Desk
+from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.program import HOLD
 from rds.modes.process.processes import is_stopped, wait_for_end
 from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
@@ -43,7 +43,7 @@ class Recorder:
         self.lost = 0  # rows that the ring had overwritten before they were copied
         self._file: RecordFile | None = None
         self._next = 0
-        self._desk = Desk.open(ring.desk_path)
+        self._desk = LiveValues.open(ring.desk_path)
         self._noted = -1  # changes of live values that have been copied; -1: not known yet
 
     def drain(self) -> int:

@@ -60,7 +60,7 @@ def _pass(
     deadline: float,
 ) -> np.ndarray | None:
     drive, now, taken = plan.start(), clock.now, clock.taken
-    laws, heed = drive.laws, drive.heed
+    laws, changes = drive.laws, drive.changes
     times = np.empty(len(samples))
     next_sample = 0
     voltages: list[float] = []
@@ -69,7 +69,7 @@ def _pass(
             for motion, voltage in zip(motions, voltages, strict=False):
                 motion.write(voltage)
         next_sample = k + 1
-        heed(k)
+        changes(k)
         before, started = taken(), now()
         row: list[float] = [k]
         for law in laws:

@@ -25,7 +25,7 @@ from rds.core.errors import MachineError, RdsError
 from rds.core.private_files import keep_process_private
 from rds.core.types import Ending
 from rds.modes import load_mode
-from rds.modes.loop.live_values import Desk
+from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.plan import Plan, load
 from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
 from rds.modes.process.blame import fault
@@ -37,7 +37,7 @@ from rds.modes.process.ring import Ring
 log = logging.getLogger(__name__)
 
 
-def run(plan: Plan, ring: Ring, desk: Desk) -> dict[str, Any]:
+def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
     """Take every sample of the plan; returns how it ended, why, and the environment."""
     from rds.bus.hub.command import Command
     from rds.bus.hub.run_watch import RunWatch
@@ -63,8 +63,8 @@ def run(plan: Plan, ring: Ring, desk: Desk) -> dict[str, Any]:
             watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
         loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
-        assert loop.heed is not None
-        loop.heed.desk = desk
+        assert loop.changes is not None
+        loop.changes.desk = desk
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
         counted = asdict(drivers.counters)
         if watch is not None:
@@ -74,7 +74,7 @@ def run(plan: Plan, ring: Ring, desk: Desk) -> dict[str, Any]:
         with quiet_memory():
             clock.start()
             report["ending"] = loop.run()
-        report["reason"] = loop.heed.reason
+        report["reason"] = loop.changes.reason
         if report["ending"] is Ending.DONE:
             drivers.confirm()
     except MachineError as error:
@@ -110,7 +110,7 @@ def main(arguments: list[str]) -> None:
         signal.signal(number, lambda *_: ring.ask_to_stop())
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     plan = load(directory / PLAN)
-    report = run(plan, ring, Desk.open(ring.desk_path))
+    report = run(plan, ring, LiveValues.open(ring.desk_path))
     write_whole(directory / REPORT, json.dumps(report, default=str).encode())
     sys.stdout.flush()
     sys.stderr.flush()
