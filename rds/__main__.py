@@ -11,10 +11,8 @@ _INTERRUPTED = 130  # the exit code of what Ctrl-C ended, by the shell's custom
 def main() -> None:
     """Run the command line; Ctrl-C in the middle of an import is no traceback."""
     try:
-        from rds.bus.tools.mf4 import put_off_asammdf
         from rds.cli.main import main as run
 
-        put_off_asammdf()
         run()
     except KeyboardInterrupt:
         sys.stderr.write("rds: stopped by Ctrl-C\n")

@@ -68,10 +68,11 @@ PARTS = {
         "two-volts",
         {
             "rds/controllers/NAME.py": text("""
-                from rds.core.options import Option, read_options
+                from rds.core.options import read_options
+                from rds.core.quantities import Quantity
                 from rds.core.types import Controller, Source
 
-                OPTIONS = {"volts": Option("the voltage, V")}
+                OPTIONS = {"volts": Quantity("the voltage", "V")}
 
                 def law(position, velocity, acceleration, y, state, c):
                     return c[0], state
@@ -97,10 +98,11 @@ PARTS = {
         "integrator",
         {
             "rds/models/NAME.py": text("""
-                from rds.core.options import Option, read_options
+                from rds.core.options import read_options
+                from rds.core.quantities import Quantity
                 from rds.core.types import Model, Source
 
-                PARAMETERS = {"K": Option("gain, (mm/s)/V")}
+                PARAMETERS = {"K": Quantity("gain", "(mm/s)/V")}
 
                 def advance(x, u, T, params):
                     return (x[0] + params["K"] * u * T,)
@@ -227,7 +229,10 @@ PARTS = {
                 MODE = replace(simulation.MODE, name="late-simulation", build=build)
             """),
             "rds/modes/__init__.py": [
-                Line('    "simulation": "simulation",', '    "late-simulation": "late_simulation",')
+                Line(
+                    '        SIMULATION: "rds.modes.simulation",',
+                    '        "late-simulation": "rds.modes.late_simulation",',
+                )
             ],
         },
         run(
@@ -373,10 +378,12 @@ PARTS = {
         "import rds\n"
         "from pathlib import Path\n"
         "Path('control.py').write_text('def control(t, r, y, state, params):\\n    return 0.0, state\\n')\n"
-        "Path('assignment.toml').write_text('''title = 'T'\nkind = 'controller'\nfiles = ['control.py']\nsecret = 's'\n"
+        "Path('assignment.toml').write_text('''title = 'T'\nkind = 'controller'\nfiles = ['control.py']\n"
+        "secret = 'long enough'\n"
         "solution = 'control.py'\n"
         "[[case]]\nname = 'c'\naxis = 'X'\nduration = 0.1\n[case.reference]\nkind = 'constant'\nvalue = 1.5\n"
-        "[[criterion]]\nname = 'n'\nkind = 'first-error'\ncase = 'c'\npoints = 4\nfull = 1.0\nnone = 2.0\nunit = 'mm'\n''')\n"
+        "[[criterion]]\nname = 'n'\nkind = 'first-error'\ncase = 'c'\npoints = 4\n"
+        "full = 1.0\nnone = 2.0\nunit = 'mm'\n''')\n"
         "(criterion,) = read_assignment('assignment.toml').criteria\n"
         "columns = {'time': [0.0, 0.1], 'X_reference': [1.5, 1.5]}\n"
         "result = rds.Result(columns, {}, {'axes': ['X'], 'sample_period': 0.1})\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import fields
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,15 @@ import rds
 from rds.bus.modules.rds import frames
 from rds.checks import check_file
 from rds.controllers import controller_module, controller_names
+from rds.core.quantities import Quantity, Table
 from rds.core.toml_table import TomlTable
 from rds.core.types import Ending, Verdict
 from rds.machines import load_machine
+from rds.machines.machine import AXIS, MACHINE
 from rds.models import model_module, model_names
-from rds.models.machine_axis import MachineParameters
+from rds.models.machine_axis import PARAMETERS, MachineParameters
 from rds.modes import mode_names
-from rds.modes.experiment.experiment_file import EXPERIMENT
+from rds.modes.experiment.experiment_file import BUS, EXPERIMENT, TIMING
 from rds.modes.experiment.resolve import resolve
 from rds.references import make_signal, signal_kinds
 from rds.references import user as user_signal
@@ -39,6 +42,16 @@ TABLE: dict[str, Any] = {
     "reference": {"kind": "constant", "value": 0.0},
     "controller": {"name": "p"},
 }
+
+DECLARED = [
+    ("", EXPERIMENT),
+    ("", TIMING),
+    ("", BUS),
+    ("converter.", MACHINE.keys["converter"]),
+    ("axis.NAME.", AXIS),
+    ("", Table("the axis behind the bus", PARAMETERS)),
+]
+UNBOUNDED = ("stop_after", "late_limit", "restart_ms", "data_bitrate")  # whose bounds nobody meets
 
 
 def known_keys(**table: Any) -> list[str]:
@@ -115,6 +128,25 @@ def test_machine_files() -> None:
     tables = {"converter", "axis"}
     assert set(MACHINE.keys) - tables <= NAMED
     assert {f"axis.NAME.{key}" for key in AXIS.keys} | {"converter.range", "converter.bits"} <= NAMED
+
+
+def rows_of_tables() -> dict[str, str]:
+    """The rows of all tables of keys, by their keys; digits in groups are joined."""
+    rows = re.findall(r"^\| `([\w.]+)` \|(.*)$", TEXT, re.MULTILINE)
+    return {key: re.sub(r"(?<=\d) (?=\d{3})", "", row) for key, row in rows}
+
+
+@pytest.mark.parametrize("prefix, table", DECLARED, ids=[table.meaning[:20] for _, table in DECLARED])
+def test_ranges_and_defaults_of_the_tables_are_those_of_the_declarations(prefix: str, table: Table) -> None:
+    rows = rows_of_tables()
+    for key, declared in table.keys.items():
+        row = rows.get(f"{prefix}{key}")
+        if row is None or not isinstance(declared, Quantity):
+            continue
+        numbers = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", row)]
+        for bound in (declared.low, declared.high, declared.above, declared.default):
+            if bound is not None and isfinite(bound) and bound < 1e9 and f"{prefix}{key}" not in UNBOUNDED:
+                assert bound in numbers, f"{prefix}{key}: {bound:g} is not in |{row}"
 
 
 def test_the_bus_protocol() -> None:

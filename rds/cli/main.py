@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from rds.bus.tools.mf4 import put_off_asammdf
 from rds.cli import (
     analyse,
     bus,
@@ -249,6 +250,7 @@ def machine_serve(
 
 def main() -> None:
     """The console command `rds`. What runs a student's code in this process does so in a child of it."""
+    put_off_asammdf()
     try:
         keep_process_private()
     except InputError as error:

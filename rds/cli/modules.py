@@ -14,7 +14,6 @@ import typer
 from rds.bus.modules.oacs.pid import MEANINGS
 from rds.cli.buses import Channel, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, writes_files
-from rds.cli.console import cell, show_table
 
 module_app = typer.Typer(
     no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
@@ -353,6 +352,8 @@ def folder_for(out: Path | None, force: bool) -> Path:
 
 def show_info(found: Mapping[str, Any]) -> None:
     """The download and the tuning, as `module.info().as_dict()` has them."""
+    from rds.cli.console import cell, show_table
+
     unit = found["unit"]
     units = dict.fromkeys(("accuracy", "repeatability", "lowest", "highest", "initial"), unit)
     units |= {"counts_per_unit": f"counts/({unit})" if "/" in unit else f"counts/{unit}", "supply": "V"}
@@ -375,5 +376,7 @@ def show_info(found: Mapping[str, Any]) -> None:
 
 def show_tuning(values: Mapping[str, Any]) -> None:
     """The tuning in force, by name."""
+    from rds.cli.console import cell, show_table
+
     rows = [[name, cell(value), *MEANINGS.get(name, ("", ""))] for name, value in values.items()]
     show_table("Tuning", ["parameter", "value", "unit", "meaning"], rows)

@@ -11,12 +11,13 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.common import refusals
+from rds.cli.common import refusals, writes_files
 
 DIALECT = "http://json-schema.org/draft-07/schema#"  # what Taplo, and with it Even Better TOML, reads
 KINDS = ("experiment", "machine", "assignment", "map", "path", "faults", "model")
 
 
+@writes_files
 def schema(
     kind: Annotated[
         str | None, typer.Argument(help=f"Kind: {', '.join(KINDS)}. Without it, the shipped files are listed.")
@@ -26,15 +27,16 @@ def schema(
     """Print the JSON Schema of a kind of file, or where the shipped ones are; an editor checks files by them."""
     with refusals():
         from rds.core.errors import InputError
+        from rds.core.private_files import make_folder, write_private
 
         if kind is not None and kind not in KINDS:
             from rds.core.quantities import near
 
             raise InputError(f"there are no files of kind {kind!r}; known kinds: {', '.join(KINDS)}{near(kind, KINDS)}")
         if out is not None:
-            out.mkdir(parents=True, exist_ok=True)
+            make_folder(out)
             for each in KINDS if kind is None else (kind,):
-                (out / f"{each}.json").write_text(schema_text(each), encoding="utf-8")
+                write_private(out / f"{each}.json", schema_text(each).encode())
         elif kind is not None:
             typer.echo(schema_text(kind), nl=False)
         else:

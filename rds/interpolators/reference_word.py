@@ -31,7 +31,7 @@ from rds.interpolators.segment import Arc, checked, samples
 BLU = 0.01  # mm: mrm-control, section 8.2; dcs-thesis, eq. 5.1
 OPTIONS: Mapping[str, Quantity] = {
     "blu": Quantity("basic length unit, which bounds the errors of an arc", "mm", above=0.0),
-    "steps": Quantity("steps of each arc instead of as many as the bound asks for; 0: those", low=0.0),
+    "steps": Quantity("steps of each arc instead of as many as the bound asks for; 0: those", low=0.0, whole=True),
 }
 DEFAULTS = {"blu": BLU, "steps": 0.0}
 

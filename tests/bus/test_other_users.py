@@ -133,7 +133,7 @@ def test_a_bus_beyond_this_computer_has_to_be_wanted(
     interface: str, channel: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[dict[str, Any]] = []
-    monkeypatch.setattr("rds.bus.tools.link.can.Bus", lambda **given: opened.append(given))
+    monkeypatch.setattr("can.Bus", lambda **given: opened.append(given))
     with pytest.raises(InputError, match="beyond_this_computer = true"):
         open_any(interface, channel, **options)
     with pytest.raises(InputError, match="must be true or false"):
@@ -166,6 +166,6 @@ def test_what_stays_on_this_computer_needs_no_word(
     interface: str, channel: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[dict[str, Any]] = []
-    monkeypatch.setattr("rds.bus.tools.link.can.Bus", lambda **given: opened.append(given))
+    monkeypatch.setattr("can.Bus", lambda **given: opened.append(given))
     open_any(interface, channel, **options)
     assert opened

@@ -121,18 +121,18 @@ def test_the_umask_of_a_process_of_rds(monkeypatch: pytest.MonkeyPatch) -> None:
 # Files that are made elsewhere, each with the reason why it may be.
 ELSEWHERE = {
     "core/private_files.py": "the one place",
-    "bus/runtime_folder.py": "its own modes, checked",
-    "bus/board.py": "0600, in the runtime folder",
-    "bus/command.py": "0600, in the runtime folder",
-    "bus/address.py": "0600, in the runtime folder",
-    "bus/hub.py": "0600, in the runtime folder",
+    "bus/hub/runtime_folder.py": "its own modes, checked",
+    "bus/hub/error_states.py": "0600, in the runtime folder",
+    "bus/hub/command.py": "0600, in the runtime folder",
+    "bus/hub/address.py": "0600, in the runtime folder",
+    "bus/hub/hub.py": "0600, in the runtime folder",
     "panels/app/whereabouts.py": "0600, in a folder of mkdtemp",
-    "grading/one_submission.py": "in a folder of mkdtemp",
+    "grading/exports/one_submission.py": "in a folder of mkdtemp",
     "grading/sandbox/user.py": "in a mount namespace of its own",
     "grading/sandbox/inside/worker.py": "inside the sandbox",
     "grading/sandbox/inside/walls.py": "inside the sandbox",
     "grading/sandbox/inside/probe.py": "inside the sandbox",
-    "help/conf.py": "in sphinx's process, which has a umask of rds",
+    "panels/help/conf.py": "in sphinx's process, which has a umask of rds",
 }
 METHODS = ("write_text", "write_bytes", "mkdir", "makedirs", "touch", "copytree", "copyfile", "copy2", "mknod")
 

@@ -11,7 +11,7 @@ from rds.bus.medium.fault_file import read_faults
 from rds.core.errors import InputError
 from rds.core.limits import LIFT
 from rds.core.toml_file import LARGEST, parse_toml, read_toml
-from rds.core.toml_table import Words
+from rds.core.toml_table import TomlTable
 from rds.grading.assignment.assignment import read_assignment
 from rds.identification.logs.map import LogMap
 from rds.machines import load_machine
@@ -43,7 +43,7 @@ def test_it_is_refused_with_place_and_reason(name: str, tmp_path: Path) -> None:
 
 
 DOORS: dict[str, Callable[[Path], object]] = {
-    "experiment or model": lambda path: Words.read(path),
+    "experiment or model": lambda path: TomlTable.open(path),
     "machine": lambda path: load_machine(str(path)),
     "faults": read_faults,
     "map": lambda path: LogMap.read(path),
@@ -78,7 +78,7 @@ def test_dots_in_texts_comments_and_numbers_count_for_nothing() -> None:
 def test_many_tables_do_not_multiply_the_text(tmp_path: Path) -> None:
     path = tmp_path / "many.toml"
     path.write_text("\n" * 1000 + "[[case]]\nname = 1\n" * 1000)
-    tables = Words.read(path).tables("case")
+    tables = TomlTable.open(path).tables("case")
     assert sum(len(table.source) for table in tables) <= path.stat().st_size
     assert tables[500].place("name") == f"{path}, line 2002"
 

@@ -182,7 +182,7 @@ def test_a_file_that_changes_the_folder_changes_nobody_else_s(alone: Path) -> No
 
 def test_a_run_s_tables_are_written_once(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from rds.modes.experiment.report import run_and_save
-    from rds.results import files as results
+    from rds.results import result as results
 
     written, save = [], results.save_all
     monkeypatch.setattr(results, "save_all", lambda result, folder: written.append(folder) or save(result, folder))

@@ -93,11 +93,15 @@ def test_a_file_by_hand_needs_structure_values_and_units_only(tmp_path: Path) ->
     [
         ('method = "simulation"', 'methode = "simulation"', "did you mean 'method'"),
         ('structure = "axis"', "structure = 3", "must be a text"),
-        ("value = 0.01\n", 'value = "0.01"\n', "line 12: parameters.tau.value = '0.01' must be a finite number"),
+        (
+            "value = 0.01\n",
+            'value = "0.01"\n',
+            "line 12: parameters.tau.value = '0.01' must be a number, without quotes",
+        ),
         ("value = 0.01\n", "value = nan\n", "must be a finite number"),
         ("value = 0.01\n", "value = 0.5\n", "must be an interval around"),
         ("std_error = 0.001", "std_error = -0.001", "must not be negative"),
-        ('unit = "s"\n', "", "unit of tau is missing"),
+        ('unit = "s"\n', "", "unit is missing"),
         ('order = ["tau", "K"', 'order = ["K", "tau"', "must be that of [parameters]"),
         ("rows = [", "rows = [[1.0],", "must be rows of numbers"),
         ("format = 1", "format = 2", "of model files that this version reads"),

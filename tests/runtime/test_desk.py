@@ -104,7 +104,7 @@ def test_notes_that_nobody_copied_in_time_are_counted() -> None:
     [
         ("X.Pgian", 1.0, r"no live value 'X.Pgian'; this run has X.Pgain, override; did you mean 'X.Pgain'\?"),
         ("X.Pgain", -1.0, r"X.Pgain = -1.0 must be at least 0 V/mm \(proportional gain"),
-        ("X.Pgain", "much", r"X.Pgain = 'much' must be a finite number in V/mm"),
+        ("X.Pgain", "much", r"X.Pgain = 'much' must be a number in V/mm, without quotes"),
         ("override", 2.5, r"override = 2.5 must be from 0 to 2 \(feed override\)"),
         ("override", float("nan"), r"override = nan must be a finite number"),
     ],

@@ -271,7 +271,7 @@ def test_hosts_take_nothing_for_an_answer_that_may_pass() -> None:
     bus: Any = NoBus()
     ours, drives = AxisDrivers(CNC, bus=bus), Cia402Drivers(CNC, bus=bus)
     assert not set(ours._listens_to) & set(harmless_identifiers())
-    assert not (set(drives._table) | drives._hosts) & set(harmless_identifiers())
+    assert not (set(drives._handlers) | drives._hosts) & set(harmless_identifiers())
     assert not [i for i in harmless_identifiers() if messages.kind_of(i)]
 
 

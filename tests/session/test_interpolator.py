@@ -126,7 +126,7 @@ def test_user_s_file_is_checked_first_and_its_fault_is_at_its_line(tmp_path: Pat
         ("centre", "0, 1e400", "two or three positions in mm"),
         ("end", "", "two or three positions in mm"),
         ("feed", 0.0, "more than 0"),
-        ("period", "0 s", "from 1e-05 to 1 s"),
+        ("period", "0 s", "from 1e-06 to 1000 s"),
         ("arc_method", "linear", "one of"),
         ("rows", [{"kind": "arc", "end": [1.0, 2.0]}], "segment 1: centre"),
         ("rows", [{"kind": "line", "end": [1.0, 2.0], "center": [0, 0]}], "no option 'center'"),

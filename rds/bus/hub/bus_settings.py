@@ -24,6 +24,15 @@ _OF_SERVERS = ("nodes", "ready", "stop", "orphaned", "afterlife", "chores", "exa
 OUR_WORDS = frozenset((*_OF_BUSES, *_OF_DRIVERS, *_OF_SERVERS))
 
 
+def bus_fault(table: Mapping[str, Any]) -> tuple[str, str] | None:
+    """The key of a `[bus]` table that no bus can have, and why; None if there is none. Every door refuses with it."""
+    if ours := sorted(OUR_WORDS & table.keys()):
+        return ours[0], f"cannot be said: {ours[0]} is no option of a bus, but a word of our own; remove it"
+    if "cia402" in table and table.get("dialect") != "cia402":
+        return "cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it'
+    return None
+
+
 def read_settings(options: Mapping[str, Any]) -> wire.Settings:
     """The settings that `options` ask for; None stands for an option that is not given.
 

@@ -139,7 +139,7 @@ ASSIGNMENT = Table(
         "machine": Text("a machine of the package, or a file in the assignment's folder", "mini-cnc"),
         "files": Anything("names that the file may have", (Text("name"), Items("names", Text("name"), "names"))),
         "due": Anything("when it is due: date, time and time zone"),
-        "secret": Text("text from which the students' plants are drawn"),
+        "secret": Text("8 characters or more that students do not know: their plants are drawn from it"),
         "solution": Text("file of the solution"),
         "template": Text("file of the template"),
         "handout": Text("file that is handed out"),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.bus.hub.bus_settings import OUR_WORDS
+from rds.bus.hub.bus_settings import bus_fault
 from rds.bus.medium.fault_file import read_faults
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
@@ -257,8 +257,8 @@ def bus_table(words: TomlTable, folder: Path) -> dict[str, Any]:
     if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
         raise table.fault("channel", "must be the name or the number of a channel")
     table.read("dialect")
-    if "cia402" in table and table.any("dialect") != "cia402":
-        raise table.fault("cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it')
+    if (wrong := bus_fault(table.table)) is not None and (wrong[0] == "cia402" or interface != BUILTIN):
+        raise table.fault(*wrong)
     drives = table.any("cia402")
     for name, mode in _drive_modes(drives):
         if mode in ("csp", "csv"):
@@ -280,8 +280,6 @@ def bus_table(words: TomlTable, folder: Path) -> dict[str, Any]:
         raise table.fault("faults", "can be injected on the built-in bus only; remove it, or the interface")
     from can.interfaces import VALID_INTERFACES
 
-    if ours := sorted(OUR_WORDS & table.table.keys()):
-        raise table.fault(ours[0], f"cannot be said: {ours[0]} is no option of a bus, but a word of our own; remove it")
     if (fault := Choice("interface", sorted(VALID_INTERFACES)).fault(interface)) is not None:
         raise table.fault("interface", fault)
     return dict(table.table)

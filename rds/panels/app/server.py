@@ -8,7 +8,6 @@ user gets at it, on a computer that others use as well: see the methods.
 from __future__ import annotations
 
 import asyncio
-import os
 import shutil
 import threading
 import webbrowser
@@ -27,6 +26,7 @@ from voila.app import Voila
 from voila.request_info_handler import RequestInfoSocketHandler
 from voila.shutdown_kernel_handler import VoilaShutdownKernelHandler
 
+from rds.core.private_files import write_private
 from rds.panels.app.rescue import handlers
 
 _LARGEST = 256 << 20  # bytes of a page's message, such as a file that is imported
@@ -87,8 +87,7 @@ class PanelsServer(Voila):
     def launch_browser(self) -> None:
         """Open the page by a file that only this user can read: all users see what a browser is started with."""
         file = Path(self.connection_dir) / "open.html"
-        with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as stream:
-            stream.write(_OPEN.format(escape(self.display_url)))
+        write_private(file, _OPEN.format(escape(self.display_url)).encode(), is_own=True)
         try:
             browser = webbrowser.get(self.browser or None)
         except webbrowser.Error:

@@ -26,8 +26,8 @@ ORDER = (
     *("readme", "panels", "equipment", "design", "program-panel", "machine-panel", "experiments", "paper", "data"),
     *("identification", "identification-methods", "validation", "robustness", "part-programs", "part-program-language"),
     *("cutter-compensation", "motion", "interpolation", "paths", "assignments", "submissions", "grading"),
-    *("grading-setup", "sandbox", "safety", "bus", "bus-timing", "oacs", "cia402", "thesis-reports"),
-    *("architecture", "changelog"),
+    *("grading-setup", "sandbox", "shared-computers", "safety", "bus", "bus-timing", "oacs", "cia402"),
+    *("thesis-reports", "architecture", "changelog"),
 )
 
 

@@ -12,9 +12,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from rds.bus.hub.bus_settings import OUR_WORDS
+from rds.bus.hub.bus_settings import bus_fault
 from rds.bus.tools.link import BUILTIN, bus_name
 from rds.core.errors import InputError, MachineError
+from rds.core.toml_table import TomlTable
 from rds.machines import Machine, load_machine
 from rds.panels.jog.axes import JogAxis, JogSpindle, jog_axes, jog_spindles
 from rds.panels.session.expired_orders import refusal
@@ -115,12 +116,10 @@ class Jog:
         try:
             self.positions, self.speeds, self.left_out, self.homed, self.error = {}, {}, {}, set(), ""
             bus = dict(self.session.bus)
-            if ours := sorted(OUR_WORDS & bus.keys()):
-                raise InputError(f"[bus] {ours[0]} is no option of a bus, but a word of our own; remove it")
+            if (fault := bus_fault(bus)) is not None:
+                raise TomlTable(bus, name="bus").fault(*fault)
             if "faults" in bus:
                 raise InputError("[bus] faults are injected in runs; take them out of the table to jog")
-            if "cia402" in bus and bus.get("dialect") != "cia402":
-                raise InputError('[bus.cia402] is for drives: add dialect = "cia402" to [bus], or remove it')
             if bus.get("dialect") == "cia402":
                 from rds.bus.modules.cia402.settings import read_settings
 
