@@ -18,7 +18,7 @@ Drive = Literal["controller", "signal"]
 class Mode:
     """A mode: which parts make its loop, and what panels, plots and logs must know of it.
 
-    `build(plan, drivers)` gives the loop, in virtual time and without a record; `runtime.stopwatch` puts it under a
+    `build(plan, drivers)` gives the loop, in virtual time and without a record; `loop.stopwatch` puts it under a
     clock. `drivers` says whether the mode needs the machine's
     drivers: not at all, as a dry run (timed, without effect on the machine) or live. A mode with drivers runs in
     real time, in the target process. `followed` names the column of what its models give besides. `drives` says

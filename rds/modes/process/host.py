@@ -212,7 +212,7 @@ def _dumped(plan: Plan) -> bytes:
 
 @contextlib.contextmanager
 def _folder(directory: Path) -> Iterator[int]:
-    """The folder of a run, claimed for it (see `runtime.record.claim`), and taken away if nothing came into it."""
+    """The folder of a run, claimed for it (see `record.claim`), and taken away if nothing came into it."""
     try:
         is_new = not directory.is_dir()
         make_folder(directory)

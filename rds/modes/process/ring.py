@@ -91,7 +91,7 @@ class Ring:
 
     @property
     def desk_path(self) -> Path:
-        """Where the live values of the same run are (see `runtime.desk`)."""
+        """Where the live values of the same run are (see `loop.live_values`)."""
         return self.path.with_suffix(".desk")
 
     def ask_to_stop(self) -> None:
