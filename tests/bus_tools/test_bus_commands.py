@@ -70,9 +70,10 @@ def test_monitor_prints_one_table_in_a_pipe(rds: Callable[..., subprocess.Popen[
 
 
 def test_monitor_reports_a_killed_hub(
-    rds: Callable[..., subprocess.Popen[str]], hub: Callable[..., subprocess.Popen[str]]
+    rds: Callable[..., subprocess.Popen[str]], hub: Callable[..., subprocess.Popen[str]], open_bus: Opener
 ) -> None:
     process = hub("test")
+    open_bus()  # a hub without nodes leaves after some seconds, and a monitor may take longer to start
     with Faults("test") as desk:
         others = len(desk.nodes())
         watcher = rds("monitor", "--seconds", "3", "--json")
