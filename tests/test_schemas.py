@@ -13,7 +13,7 @@ from jsonschema import Draft7Validator
 
 from rds.cli.schema import KINDS, schema_text, shipped
 
-MADE = "`python -m rds schema --out rds/core/schemas` renews them"
+MADE = "`python -m rds schema --out rds/cli/schemas` renews them"
 
 
 def files_of(kind: str) -> list[Path]:

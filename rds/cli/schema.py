@@ -46,7 +46,7 @@ def schema(
 
 def shipped(kind: str) -> Path:
     """The file of a schema that comes with the package."""
-    return Path(str(files("rds.core").joinpath("schemas", f"{kind}.json")))
+    return Path(str(files("rds.cli").joinpath("schemas", f"{kind}.json")))
 
 
 def schema_text(kind: str) -> str:

@@ -51,7 +51,11 @@ def student_line(exc: BaseException, path: str | Path) -> int | None:
 
 
 def _own_frames(exc: BaseException, path: str | Path | None) -> list[FrameSummary]:
-    return [frame for frame in extract_tb(exc.__traceback__) if _is_own(frame.filename, path)]
+    frames = extract_tb(exc.__traceback__)
+    own = {
+        name: _is_own(name, path) for name in {frame.filename for frame in frames}
+    }  # a recursion has a thousand frames
+    return [frame for frame in frames if own[frame.filename]]
 
 
 def _is_own(filename: str, path: str | Path | None) -> bool:

@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.grading.assignment.assignment import SELF_CHECKS, read_assignment
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.assignment_file import SELF_CHECKS
 from rds.grading.assignment.late_rules import Late
 from rds.grading.criteria import KINDS
 from rds.grading.sandbox import Pool

@@ -116,7 +116,7 @@ BOMBS: dict[str, tuple[Callable[[Path], None], str]] = {
     "view.db": (view, "its frames are computed, by a view or in a column"),
 }
 READ = """
-import resource, sys
+import re, resource, sys
 from pathlib import Path
 from rds.core.errors import InputError
 from rds.identification.logs.tables import read_table
@@ -126,7 +126,8 @@ try:
     read(Path(sys.argv[1]))
 except InputError as error:
     print(error)
-most = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+own = int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])  # ru_maxrss begins with the parent's
+most = max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 print(most // 1024)
 """
 

@@ -68,11 +68,7 @@ def test_every_key_of_a_map_is_named(tmp_path: Path, text: str) -> None:
 
 def test_every_kind_of_finding_is_named() -> None:
     kinds = set()
-    for file in (ROOT / "rds" / "logs").glob("*.py"):
-        if re.match(
-            r"data_|time_base|csv_table|can_table|other_tables|axis_log|second_file|columns|result_log|describe",
-            file.name,
-        ):
-            kinds |= set(re.findall(r"Finding\(\s*\"([\w-]+)\"", file.read_text(encoding="utf-8")))
+    for file in (ROOT / "rds" / "identification" / "logs").glob("*.py"):
+        kinds |= set(re.findall(r"Finding\(\s*\"([\w-]+)\"", file.read_text(encoding="utf-8")))
     assert len(kinds) > 12
     assert kinds <= NAMED

@@ -51,7 +51,7 @@ def read_common(words: TomlTable) -> Common:
 
 def inside(words: TomlTable, key: str, folder: Path) -> str | None:
     """A file of the assignment that is named under `key`, counted from its folder; InputError if there is none."""
-    name: str | None = words.read(key)
+    name: str | None = words.read(key) if key in words else None  # a table's other kinds need no file
     if name is None:
         return None
     path = folder / name
