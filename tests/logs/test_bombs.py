@@ -126,7 +126,8 @@ try:
     read(Path(sys.argv[1]))
 except InputError as error:
     print(error)
-own = int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])  # ru_maxrss begins with the parent's
+# not ru_maxrss of this process, which begins with its parent's
+own = int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
 most = max(own, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 print(most // 1024)
 """
