@@ -20,6 +20,10 @@ from hypothesis import settings
 from rds.bus.tools.mf4 import put_off_asammdf
 
 put_off_asammdf()  # as our programs do: seconds of each worker
+# ... and of each process that a test starts; see there
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    filter(None, (str(Path(__file__).parent / "quick_can"), os.environ.get("PYTHONPATH")))
+)
 
 # Random input is the same every time; `make test ARGS=--hypothesis-profile=search` goes on looking for trouble.
 settings.register_profile("same", deadline=None, derandomize=True)

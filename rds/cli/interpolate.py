@@ -90,8 +90,9 @@ def interpolate(
         filter_ = _acceleration(acceleration, acceleration_time, multipliers, exact_stop)
         rests: dict[int, float] = {}
         if file is not None and file.suffix != ".toml":
-            segments, rests, said = _program(file, machine, period, reading)
-            notes += said
+            programmed = _program(file, machine, period, reading)
+            segments, rests = programmed.segments, programmed.rests
+            notes += programmed.notes
         else:
             of_programs: dict[str, Any] = {
                 "tools": tools,
@@ -146,7 +147,7 @@ def _method(name: str, options: list[str] | None, T: float, notes: list[str]) ->
     from rds.interpolators import LIBRARY
     from rds.interpolators.interpolator import find_interpolator
 
-    given = dict(_option(text) for text in options or ())
+    given = dict(option_of(text) for text in options or ())
     found = find_interpolator(name, given)
     if name not in LIBRARY.modules:
         notes += _check_student(name, T)
@@ -168,7 +169,8 @@ def _check_student(file: str, T: float) -> list[str]:
     return warnings
 
 
-def _option(text: str) -> tuple[str, Any]:
+def option_of(text: str) -> tuple[str, Any]:
+    """NAME=VALUE as a name and a number, list or text."""
     from rds.core.errors import InputError
 
     name, equals, value = text.partition("=")

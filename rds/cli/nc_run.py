@@ -58,6 +58,25 @@ def run(
         str | None,
         typer.Option(help="Of the position axes: a name, your .py file, or an experiment's .toml (default tracking)."),
     ] = None,
+    interpolator: Annotated[
+        str | None,
+        typer.Option(help="Make the samples in the loop: a method of the library, or your .py with interpolate()."),
+    ] = None,
+    option: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Of --interpolator: blu=0.001, a file's params.")
+    ] = None,
+    acceleration: Annotated[
+        str | None, typer.Option(help="Filter on top of --interpolator: linear, exponential or s-shape.")
+    ] = None,
+    acceleration_time: Annotated[
+        float | None, typer.Option(help="How long the velocity rises, s; of exponential its time constant.")
+    ] = None,
+    exact_stop: Annotated[
+        bool, typer.Option("--exact-stop", help="With --acceleration: come to rest at the end of each segment.")
+    ] = False,
+    look_ahead: Annotated[
+        int | None, typer.Option(help="Rows that --interpolator makes before they are needed (default 3).", min=3)
+    ] = None,
     optional_stop: Annotated[bool, typer.Option("--optional-stop/--no-optional-stop", help="Whether M1 stops.")] = True,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for the results (default: a new one under runs/).")
@@ -66,7 +85,8 @@ def run(
 ) -> None:
     """Run a program on all axes and the spindle; report following and contour error by program line.
 
-    The motion is the planned one, with look-ahead; `rds nc time --profile` compares others.
+    The motion is the planned one, with look-ahead; `rds nc time --profile` compares others. With --interpolator, a
+    method of the library or your own makes the samples while the axes move.
 
     In a terminal, while it runs in real time: space holds and goes on, + and - change the feed, h moves home, q stops.
     Elsewhere `rds nc operate` does the same.
@@ -91,6 +111,9 @@ def run(
                 machine,
                 setup=setup(tools, parameters, with_, max_jumps),
                 controller=None if experiment is not None else controller,
+                interpolator=_interpolator(interpolator, option, look_ahead),
+                acceleration=_acceleration(acceleration, acceleration_time),
+                exact_stop=exact_stop,
                 experiment=experiment,
                 mode=mode,
                 progress=bar("check"),
@@ -112,6 +135,33 @@ def run(
         _show(result, files)
     explain(result)
     raise typer.Exit(exit_code(result))
+
+
+def _interpolator(name: str | None, options: list[str] | None, look_ahead: int | None) -> dict[str, Any] | None:
+    """The words of an interpolator; InputError for those that go with one which is not given."""
+    from rds.cli.interpolate import option_of
+    from rds.core.errors import InputError
+
+    if name is None:
+        for key, given in (("--option", options), ("--look-ahead", look_ahead)):
+            if given is not None and given != []:
+                raise InputError(f"{key} goes with --interpolator, which is not given; add --interpolator tustin")
+        return None
+    words: dict[str, Any] = {"interpolator": name, "params": dict(map(option_of, options or ()))}
+    return words if look_ahead is None else words | {"look_ahead": look_ahead}
+
+
+def _acceleration(name: str | None, seconds: float | None) -> dict[str, Any] | None:
+    from rds.core.errors import InputError
+
+    if name is None:
+        if seconds is not None:
+            raise InputError(
+                "--acceleration-time goes with --acceleration, which is not given; add --acceleration linear"
+            )
+        return None
+    key = "time_constant" if name == "exponential" else "time"
+    return {"name": name} if seconds is None else {"name": name, key: seconds}
 
 
 def _operated(part: PartProgram, folder: Path, changes: list[tuple[float, str, float]]) -> Result:

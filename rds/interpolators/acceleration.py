@@ -90,6 +90,27 @@ def smooth(
         window = window[len(block) :]
 
 
+def smooth_one_by_one(
+    rows: Iterable[Sequence[np.ndarray]], start: Sequence[float] | np.ndarray, weights: np.ndarray, T: float
+) -> Iterator[tuple[np.ndarray, ...]]:
+    """The rows of `smooth` to the last digits, each as soon as the rows before it and one after it are made."""
+    n = len(weights)
+    oldest_first = np.ascontiguousarray(weights[::-1])
+    begin = np.array(start, dtype=float)
+    window = np.zeros((2 * n, len(begin)))  # twice, so that the last n rows always lie together; from `begin`
+    last, velocity = begin, np.zeros(len(begin))
+    positions = _held(rows, n - 1)
+    position, at = next(positions, None), 0
+    while position is not None:
+        following = next(positions, None)
+        window[at] = window[at + n] = position - begin
+        at = (at + 1) % n
+        here = oldest_first @ window[at : at + n] + begin if following is not None else position
+        now = (here - last) / T
+        yield here, now, (now - velocity) / T
+        last, velocity, position = here, now, following
+
+
 def adder_output(pulses: Sequence[int] | np.ndarray, multipliers: Sequence[int]) -> np.ndarray:
     """Σ Kᵢ A(k - i) of figure 61 for input pulses A (zero before and after): exact, int64."""
     return np.convolve(np.asarray(pulses, np.int64), np.asarray(multipliers, np.int64))

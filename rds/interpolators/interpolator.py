@@ -51,7 +51,12 @@ class Interpolator:
         yield from (self.theory or self.function)(segment, T, dict(self.params))
 
     def rows(self, segment: Segment, T: float) -> np.ndarray:
-        """Its theoretical rows as an array of shape (rows, 3, axes).
+        """Its theoretical rows as an array of shape (rows, 3, axes); errors as of `each`."""
+        rows = list(self.each(segment, T))
+        return np.array(rows) if rows else np.empty((0, 3, len(segment.start)))
+
+    def each(self, segment: Segment, T: float) -> Iterator[np.ndarray]:
+        """Its theoretical rows one by one, as they are made: arrays of shape (3, axes).
 
         Raises ContractError where a user's function breaks its interface; `rds check` names every fault.
         """
@@ -61,13 +66,11 @@ class Interpolator:
             raise InputError(f"{said} of {T:g} s, more than {_MOST}; give a longer sample period or a shorter path")
         most = _ROWS_PER_ROW * int(expected) + _SPARE_ROWS
         axes = len(segment.start)
-        rows: list[np.ndarray] = []
         with_errors = self._errors(segment)
-        for row in with_errors(self.theoretical(segment, T)):
-            rows.append(self._row(row, axes, len(rows)))
-            if len(rows) > most:
+        for k, row in enumerate(with_errors(self.theoretical(segment, T))):
+            yield self._row(row, axes, k)
+            if k >= most:
                 raise self._broken(f"has yielded {most} rows of a segment of {length(segment):g} mm, and no end")
-        return np.array(rows) if rows else np.empty((0, 3, axes))
 
     def steps(self, segment: Segment, T: float) -> Steps | None:
         """How a reference word method takes an arc; None for other methods and for lines."""
@@ -87,7 +90,9 @@ class Interpolator:
 
     def _row(self, row: Any, axes: int, k: int) -> np.ndarray:
         try:
-            values = np.array([np.atleast_1d(np.asarray(part, dtype=float)) for part in row])
+            values = np.array(row, dtype=float)  # by far the most frequent form
+            if values.shape != (3, axes):
+                values = np.array([np.atleast_1d(np.asarray(part, dtype=float)) for part in row])
         except (TypeError, ValueError):
             values = np.empty(0)
         if values.shape != (3, axes) or not np.isfinite(values).all():

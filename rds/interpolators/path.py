@@ -43,7 +43,7 @@ def interpolate(
     base = method or from_library("constant-velocity", {})
     pair = (lines or base, arcs or base)
     names = _names(axes, segments)
-    _check_chain(segments, T)
+    check_chain(segments, T)
     chosen = [pair[isinstance(segment, ArcSegment)] for segment in segments]
     parts = [each.rows(segment, T) for each, segment in zip(chosen, segments, strict=True)]
     weights = acceleration.weights(T) if acceleration else np.ones(1)
@@ -124,7 +124,8 @@ def _names(axes: Sequence[str] | None, segments: Sequence[Segment]) -> tuple[str
     return names
 
 
-def _check_chain(segments: Sequence[Segment], T: float) -> None:
+def check_chain(segments: Sequence[Segment], T: float) -> None:
+    """InputError for a segment that can't be interpolated, or that does not start where the one before ended."""
     for number, segment in enumerate(segments, start=1):
         checked(segment, T)
         if number > 1:

@@ -95,7 +95,9 @@ def loop(
 ) -> Loop:
     """The loop of these parts in virtual time, its rows going nowhere."""
     drive = plan.start()
-    return Loop(plan.most_samples, _due, read, drive.laws, write, follow, _dropped, _going_on, drive.changes)
+    return Loop(
+        plan.most_samples, _due, read, drive.laws, write, follow, _dropped, _going_on, drive.changes, drive.refers
+    )
 
 
 def at_once(voltages: Sequence[float]) -> Sequence[float]:

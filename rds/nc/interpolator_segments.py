@@ -14,7 +14,7 @@ from rds.core.types import ArcSegment, LineSegment, Segment
 
 if TYPE_CHECKING:
     from rds.machines import Machine
-    from rds.nc.toolpath import PathBlock
+    from rds.nc.toolpath import Event, PathBlock
 
 MOST = 2_000_000  # samples of a program, which are held in memory
 _RESTING = {"dwell": "dwell (G4)", "stop": "stop (M0, M1, M60)", "tool": "tool change (M6)"}
@@ -22,11 +22,16 @@ _TURN = 2 * pi * (1 + 1e-12)
 
 
 class Programmed(NamedTuple):
-    """A program's moves, after which of them the axes rest and for how long (s; -1: before the first), and notes."""
+    """A program's moves, after which of them the axes rest and for how long (s; -1: before the first), and notes.
+
+    `lines` has the program line of each move; `events` what happens where the axes rest, after which move.
+    """
 
     segments: list[Segment]
     rests: dict[int, float]
     notes: list[str]
+    lines: list[int]
+    events: list[tuple[int, Event]]
 
 
 def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) -> Programmed:
@@ -35,9 +40,12 @@ def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) 
     Raises InputError for a program that moves rotary axes, moves nothing, or takes more than `most` samples of `T` s.
     """
     from rds.interpolators.motion.limits import Limits
+    from rds.interpolators.motion.planner import PASSING
 
     fastest = Limits.of(machine).velocity
     segments: list[Segment] = []
+    lines: list[int] = []
+    events: list[tuple[int, Event]] = []
     rests: dict[int, float] = {}
     counts: dict[str, int] = {}
     samples = 0.0
@@ -55,8 +63,11 @@ def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) 
             rate = _rapid(row, fastest) if row["rapid"] else float(row["rate"])
             samples = _counted(samples + row["length"] / rate / T + 1.0, most, T)
             segments += _segments(row, rate)
+            lines += [int(row["line"])] * (len(segments) - len(lines))
             made.append(len(segments) - 1)
         for event in block.events:
+            if event.kind not in PASSING:
+                events.append((made[event.after + 1], event))
             if event.kind in _RESTING:
                 seconds = float(event.value) if event.kind == "dwell" else 0.0
                 after = made[event.after + 1]
@@ -69,7 +80,7 @@ def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) 
     notes = [f"{' and '.join(said)}: the axes rest, and it goes on at once"] if said else []
     if seconds := sum(rests.values()):
         notes.append(f"{counts['dwell']} × {_RESTING['dwell']}: the axes rest for {seconds:g} s in all")
-    return Programmed(segments, rests, notes)
+    return Programmed(segments, rests, notes, lines, events)
 
 
 def _counted(samples: float, most: int, T: float) -> float:

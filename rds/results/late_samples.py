@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from rds.results.result import Result
 
-STAGES = ("lateness", "io", "compute", "model")
+STAGES = ("lateness", "io", "interpolate", "compute", "model")
 
 
 def total_time(result: Result) -> np.ndarray | None:

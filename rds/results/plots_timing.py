@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Picture, dress, legend
+from rds.core.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Picture, dress, legend
 from rds.results.late_samples import STAGES, late_samples, total_time
 from rds.results.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_COLOURS = dict(zip(STAGES, (BLUE, ORANGE, GREEN, PURPLE), strict=True))
+_COLOURS = dict(zip(STAGES, (BLUE, ORANGE, SKY, GREEN, PURPLE), strict=True))
 _TITLES = {
     "lateness": "lateness (system)",
     "io": "I/O (bus)",
+    "interpolate": "interpolate (path)",
     "compute": "compute (controller)",
     "model": "model",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-_WHOLE = {"time": "s", "lateness": "µs", "io": "µs", "compute": "µs", "model": "µs"}
+_WHOLE = {"time": "s", "lateness": "µs", "io": "µs", "interpolate": "µs", "compute": "µs", "model": "µs"}
 _ENDINGS = {
     "_reference": "mm",
     "_reference_velocity": "mm/s",

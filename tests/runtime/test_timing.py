@@ -39,7 +39,7 @@ def ran(
             if k >= samples:
                 break
         busy = float(compute[k]) + inside.get(k, 0.0) + taken.get(k, 0.0)
-        rows.append((k, start - k, float(io[k]), busy, 0.01, taken.get(k, 0.0)))
+        rows.append((k, start - k, float(io[k]), 0.0, busy, 0.01, taken.get(k, 0.0)))
         free = start + float(io[k]) + busy + 0.01
         k += 1
     table = np.array(rows).T

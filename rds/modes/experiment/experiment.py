@@ -13,7 +13,7 @@ from rds.core.folder_kept import folder_kept
 from rds.core.toml_table import TomlTable
 from rds.core.types import Ending
 from rds.modes import DEFAULT, load_mode
-from rds.modes.experiment.experiment_file import EXPERIMENT
+from rds.modes.experiment.experiment_file import EXPERIMENT, PATHS
 from rds.modes.experiment.folder import new_folder, require_writable
 from rds.modes.experiment.outcome import outcome
 from rds.modes.experiment.resolve import resolve
@@ -22,6 +22,7 @@ from rds.modes.experiment.validation import validated
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import as_text
 from rds.modes.loop.plan import Plan
+from rds.modes.loop.program import InterpolatedProgram
 from rds.modes.process.host import Progress, Rows, run_plan
 from rds.modes.process.live import Live
 from rds.modes.process.record import write_whole
@@ -36,7 +37,9 @@ class Experiment:
     `globals()` of a notebook that defines one, a python-control system, an `rds.Controller`, or a table (dict);
     `model` likewise with `derivatives` or `advance`; `reference` and `signal` a signal (`rds.sinusoid(5.0, 0.2)`),
     a function of time, or a table. `axis` may be one name or several; with several, `overrides` such as
-    {"Y": {"controller": ...}} differ for one axis. What is wrong raises InputError at once.
+    {"Y": {"controller": ...}} differ for one axis. `duration` is 10 s unless it is given; with a path as `reference`
+    (`{"kind": "path", ...}`, docs/experiments.md) the path says how long the run lasts. What is wrong
+    raises InputError at once.
 
         experiment = rds.Experiment(axis="X", reference=rds.sinusoid(5.0, 0.2), controller="my_controller.py")
         simulated = experiment.run()
@@ -48,7 +51,7 @@ class Experiment:
         machine: str = "mini-cnc",
         axis: str | Sequence[str] = "X",
         mode: str = DEFAULT,
-        duration: float = 10.0,
+        duration: float | None = None,
         sample_period: float | None = None,
         *,
         reference: Any = None,
@@ -62,6 +65,8 @@ class Experiment:
         compiled: bool = False,
         title: str | None = None,
     ):
+        if duration is None and not (isinstance(reference, Mapping) and reference.get("kind") in PATHS.modules):
+            duration = 10.0
         given: dict[str, Any] = {
             "title": title,
             "machine": machine,
@@ -201,7 +206,7 @@ class Experiment:
             raise ContractError(f"{rows.reason}{kept}")
         if not len(rows.values):
             raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
-        result = self._complete(outcome(plan, rows, known))
+        result = self._complete(outcome(plan, rows, known), plan)
         if load_mode(plan.mode).validates:
             result = validated(plan, result)
         if out is not None:
@@ -215,8 +220,11 @@ class Experiment:
     def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
         return resolve(self._words, self._folder, mode)
 
-    def _complete(self, result: Result) -> Result:
+    def _complete(self, result: Result, plan: Plan) -> Result:
         """What else is to be said of a result; a run of another kind adds to it."""
+        if isinstance(plan.program, InterpolatedProgram):
+            judged: Result = PATHS.module("path").judged_path(result, plan.program, plan.T)
+            return judged
         return result
 
     def _rows(self, plan: Plan, folder: Path | None, progress: Progress | None, live: Live | None) -> Rows:

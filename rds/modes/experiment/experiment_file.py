@@ -9,12 +9,16 @@ from rds.bus.modules.dialects import DEFAULT, dialect_names
 from rds.controllers import controller_module, controller_names
 from rds.core.integrate import SUBSTEPS
 from rds.core.quantities import Anything, Choice, Declaration, Flag, Items, Parts, Quantity, Table, Text
+from rds.core.registry import Registry
 from rds.core.shared_quantities import DURATION, SAMPLE_PERIOD
 from rds.models import model_module, model_names
 from rds.modes import mode_names
 from rds.references import signal_kinds, signal_options
 
 AXIS_KEYS = ("reference", "signal", "controller", "model")
+PATHS = Registry("reference", {"path": "rds.nc.run.path"})
+"""Kinds of references that drive all axes of a run together. Each module gives `WORDS` (the table's keys),
+`program(words, folder, machine, axes, T)` and `judged_path(result, program, T)`."""
 
 
 def _controller(name: str) -> Table:
@@ -27,6 +31,14 @@ def _model(name: str) -> Table:
 
 _PARAMS = Table("values over those of the file's own `params`", others=Anything("parameter of the file"))
 SIGNAL = Table("how the value changes over time", chosen_by="kind", parts=Parts(signal_kinds, signal_options))
+REFERENCE = Table(
+    "what the axis is to follow; kind = path: what all axes of the run follow together",
+    chosen_by="kind",
+    parts=Parts(
+        lambda: [*signal_kinds(), *PATHS.names()],
+        lambda kind: PATHS.module(kind).WORDS if kind in PATHS.modules else signal_options(kind),
+    ),
+)
 _CONTROLLER = Table(
     "a law of the library by name, or a student's file",
     {
@@ -58,7 +70,7 @@ _MODEL = Table(
 )
 _NAME_OR_FILE = Text("name of the library, or path of a file")
 _OF_AN_AXIS: Mapping[str, Declaration] = {
-    "reference": Anything("what the axis is to follow, in its unit", (SIGNAL,)),
+    "reference": Anything("what the axis is to follow, in its unit", (REFERENCE,)),
     "signal": Anything("voltage that drives the axis without a controller, V", (SIGNAL,)),
     "controller": Anything("the law that answers with a voltage", (_CONTROLLER, _NAME_OR_FILE)),
     "model": Anything("what stands for the axis in simulation; by default the machine's own", (_MODEL, _NAME_OR_FILE)),
@@ -114,5 +126,4 @@ EXPERIMENT = Table(
         "timing": TIMING,
         "bus": BUS,
     },
-    needed=("duration",),
 )

@@ -35,6 +35,9 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
     """The result of a run: its table, and in `meta` all that was known of it."""
     mode = load_mode(plan.mode)
     columns, units = table(rows.columns, rows.units, rows.values, plan.T)
+    if plan.program is None:
+        for told in (columns, units):
+            told.pop("interpolate", None)  # nothing was interpolated
     sample = rows.values[:, 0].astype(np.int64)
     if mode.followed and plan.controlled:
         columns |= _simulated(plan, rows, sample)

@@ -17,6 +17,7 @@ from rds.machines import Axis
 from rds.models import library_model, model_names
 from rds.models.machine_model import MachineAxisMotion, linear_part
 from rds.models.student import student_model
+from rds.modes.experiment.experiment_file import PATHS
 from rds.references import Signal, make_signal, user
 
 _FUNCTIONS = ("control", "derivatives", "advance", "output")
@@ -116,6 +117,9 @@ def _signal(given: Any, table: TomlTable | None, setting: Setting, unit: str) ->
     if "kind" not in table:
         raise InputError(f'kind is missing; as in `kind = "sinusoid"` (amplitudes in {unit})')
     kind = table.read("kind")
+    if kind in PATHS.modules:
+        where = "a path leads all axes of the run together: give it once, in the general [reference]"
+        raise InputError(where, table.place("kind"))
     options = {name: table.any(name) for name in table.table if name != "kind"}
     if isinstance(options.get("file"), str):
         options["file"] = str(setting.path(options["file"]))

@@ -70,7 +70,7 @@ def run_json(result: Result, files: dict[str, Path]) -> dict[str, Any]:
     timing = result.meta.get("timing")
     stages = {
         stage: {name: timing[stage][name] for name in STAGE_FIGURES}
-        for stage in ("lateness", "io", "compute", "model")
+        for stage in ("lateness", "io", "interpolate", "compute", "model")
         if timing and stage in timing
     }
     counts = {name: timing[name] for name in ("late", "longest_late_run", "discarded", "samples")} if timing else None

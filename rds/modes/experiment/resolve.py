@@ -19,12 +19,12 @@ from rds.core.quantities import Choice
 from rds.core.toml_table import TomlTable
 from rds.machines import Axis, Machine, load_machine
 from rds.modes import load_mode
-from rds.modes.experiment.experiment_file import AXIS_KEYS
+from rds.modes.experiment.experiment_file import AXIS_KEYS, PATHS
 from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model
 from rds.modes.loop.laws import ReferenceSamples
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import AxisPlan, Plan
-from rds.modes.loop.program import Program
+from rds.modes.loop.program import InterpolatedProgram, Program
 from rds.modes.process.machine import BUILTIN
 
 MOST_SAMPLES = 20_000_000
@@ -32,7 +32,10 @@ MOST_SAMPLES = 20_000_000
 
 @folder_kept()
 def resolve(
-    words: TomlTable, folder: Path, mode_name: str | None = None, program: Program | None = None
+    words: TomlTable,
+    folder: Path,
+    mode_name: str | None = None,
+    program: Program | InterpolatedProgram | None = None,
 ) -> tuple[Plan, dict[str, Any]]:
     """The plan of the experiment, in `mode_name` if that is given, and what is known of it for the result's meta.
 
@@ -44,14 +47,20 @@ def resolve(
     written = words.read("mode")
     mode = load_mode(written if mode_name is None else mode_name)
     T = words.read("sample_period", machine.sample_period)
-    samples = _samples(words, T) if program is None else program.samples
+    drawn, own_file = _path(words, folder, machine, T) if program is None else (None, None)
+    leads = program or drawn
+    samples = _samples(words, T) if leads is None else leads.samples
     words.read("compiled")
     saturation, quantization = _interface(words, mode)
     limit = machine.converter.range if saturation else inf
     timing = _timing(words, mode)
     driven = _drive(words, mode) if program is None else _program(words, mode)
+    if drawn is not None:
+        driven = "program"
     axes, periods = [], {}
     for axis, own in _axes(words, machine) if program is None else _program_axes(words, machine, program):
+        if drawn is not None and own is not words and "reference" in own.table:
+            raise InputError("the path drives all axes of the run: remove this reference", own.place("reference"))
         made, periods[axis.name] = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
         axes.append(made)
     bus = bus_table(words, folder)
@@ -66,14 +75,39 @@ def resolve(
         saturation=saturation,
         quantization=quantization,
         bus=bus,
-        import_path=_import_path(axes),
-        program=program,
+        import_path=_import_path(axes, own_file),
+        program=leads,
         **timing,
     )
     return plan, {"period": periods}
 
 
+def _path(words: TomlTable, folder: Path, machine: Machine, T: float) -> tuple[InterpolatedProgram | None, str | None]:
+    """The path that all axes of the run follow, and the file of its interpolator, if the user wrote one."""
+    given = words.any("reference")
+    if not isinstance(given, Mapping) or given.get("kind") not in PATHS.modules:
+        return None, None
+    for key, why in (
+        ("signal", "a signal drives the axes without a controller"),
+        ("duration", "the path says how long the run lasts"),
+    ):
+        if key in words:
+            raise InputError(f"{why}: remove {key}, or the path", words.place(key))
+    table = words.inner("reference")
+    assert table is not None
+    kind = table.read("kind")
+    table.declared = PATHS.module(kind).WORDS
+    names = [axis.name for axis, _ in _axes(words, machine)]
+    try:
+        made: tuple[InterpolatedProgram, str | None] = PATHS.module(kind).program(table, folder, machine, names, T)
+    except InputError as error:
+        raise error if error.where else InputError(str(error), table.place()) from error
+    return made
+
+
 def _samples(words: TomlTable, T: float) -> int:
+    if "duration" not in words:
+        raise words.missing("duration")
     duration = words.read("duration")
     samples = round(duration / T)
     if duration < T * (1.0 - 1e-9):
@@ -205,7 +239,9 @@ def _program(words: TomlTable, mode: Mode) -> str:
     return "program"
 
 
-def _program_axes(words: TomlTable, machine: Machine, program: Program) -> list[tuple[Axis, TomlTable]]:
+def _program_axes(
+    words: TomlTable, machine: Machine, program: Program | InterpolatedProgram
+) -> list[tuple[Axis, TomlTable]]:
     """The axes that a program moves and the spindle, in the machine's order."""
     given = words.any("axis")
     if given is not None and not isinstance(given, dict):
@@ -326,6 +362,7 @@ def _check_coupling(axes: list[AxisPlan], words: TomlTable) -> None:
         )
 
 
-def _import_path(axes: list[AxisPlan]) -> tuple[str, ...]:
+def _import_path(axes: list[AxisPlan], interpolator: str | None) -> tuple[str, ...]:
     paths = [part.source.path for plan in axes for part in (plan.controller, plan.model) if part is not None]
+    paths.append(interpolator)
     return tuple(dict.fromkeys(str(Path(path).parent) for path in paths if path and path.endswith(".py")))

@@ -14,7 +14,17 @@ from rds.core.types import Ending
 from rds.modes.loop.changes import STOP
 from rds.modes.loop.homing import Homing
 from rds.modes.loop.laws import LiveReference
-from rds.modes.loop.program import HOLD, HOME, OPTIONAL_STOP, OVERRIDE, RESUME, Happening, Program, dwell_samples
+from rds.modes.loop.program import (
+    HOLD,
+    HOME,
+    OPTIONAL_STOP,
+    OVERRIDE,
+    RESUME,
+    Happening,
+    InterpolatedProgram,
+    Program,
+    dwell_samples,
+)
 
 SPINDLE_WITHIN = 0.02  # of its speed, or two counts: at speed
 SPINDLE_STEADY = 10  # samples in a row at speed
@@ -42,6 +52,17 @@ class Follower(Protocol):
     position: list[float]
     velocity: list[float]
     acceleration: list[float]
+    last: int  # the last sample of the path, as far as it is known
+
+    @property
+    def happenings(self) -> Sequence[Happening]:
+        """What happens along the path, in order, as far as it is known."""
+
+    def line(self, sample: int) -> int:
+        """The program line of a sample."""
+
+    def shown(self) -> tuple[float, ...]:
+        """What else is recorded of where it is."""
 
     def advance(self, wanted: float, until: int) -> None:
         """One sample period, at a rate that goes towards `wanted`; not beyond the sample `until`, a place of rest."""
@@ -59,7 +80,7 @@ class Execution:
 
     def __init__(
         self,
-        program: Program,
+        program: Program | InterpolatedProgram,
         T: float,
         follower: Follower,
         references: Sequence[LiveReference],
@@ -78,11 +99,11 @@ class Execution:
         self._steady = 0
         self._resumed = 0.0  # the value of resume when a stop began
         self._last = -1  # sample of the run; -1: the program begins
-        self._line = self._shown_line = int(program.line[min(1, program.samples - 1)])  # the first row is at rest
+        self._line = self._shown_line = follower.line(min(1, follower.last))  # the first row is at rest
         self._speed = 0.0
         self._turns = False  # the spindle may turn
         self._changes_tool = False  # as soon as the spindle stands
-        self._position = [float(value) for value in program.position[0]]
+        self._position = list(program.start)
         self._way: Homing | None = None  # home
         for reference, value in zip(references, self._position, strict=False):
             reference.position.value = value
@@ -114,6 +135,7 @@ class Execution:
         if shown is State.HOME and self._way is not None:
             rate = self._way.rate
         row += (self._shown_line, self._follower.place, rate, shown)
+        row += self._follower.shown()
 
     def over(self) -> tuple[Ending, str] | None:
         """How the run ends before its next sample, and why, if it does."""
@@ -146,7 +168,7 @@ class Execution:
         follower, until, wanted = self._follower, self._until(), self._wanted()
         follower.advance(wanted, until)
         self._put(follower.position, follower.velocity, follower.acceleration)
-        self._line = self._shown_line = int(self._program.line[-int(-follower.place // 1)])
+        self._line = self._shown_line = follower.line(-int(-follower.place // 1))
         is_there = follower.place >= until
         is_still = is_there or follower.rate == 0.0
         if is_still and self._values[STOP]:
@@ -161,8 +183,8 @@ class Execution:
 
     def _until(self) -> int:
         """The sample at which the path rests next."""
-        happenings = self._program.happenings
-        return happenings[self._next].sample if self._next < len(happenings) else self._program.samples - 1
+        happenings = self._follower.happenings
+        return happenings[self._next].sample if self._next < len(happenings) else self._follower.last
 
     def _held(self) -> None:
         others = [STOP, HOME, HOLD if self._values[HOLD] else OVERRIDE]
@@ -173,14 +195,14 @@ class Execution:
 
     def _happen(self) -> None:
         """What is due where the path has come to; the last of it ends the program."""
-        happenings, place = self._program.happenings, self._follower.place
+        happenings, place = self._follower.happenings, self._follower.place
         while self._next < len(happenings) and happenings[self._next].sample <= place:
             happening = happenings[self._next]
             self._next += 1
             self._line = happening.line or self._line
             if self._takes_time(happening):
                 return
-        if self._next >= len(happenings) and self._follower.place >= self._program.samples - 1:
+        if self._next >= len(happenings) and self._follower.place >= self._follower.last:
             self._end(Ending.DONE, "")
 
     def _takes_time(self, happening: Happening) -> bool:
@@ -199,7 +221,7 @@ class Execution:
         elif kind == "tool" or (kind == "stop" and not (value and not self._values[OPTIONAL_STOP])):
             self._await_somebody(State.TOOL if kind == "tool" else State.STOP)
         elif kind == "end":
-            self._next = len(self._program.happenings)
+            self._next = len(self._follower.happenings)
             self._end(Ending.DONE, "")
         return self.state is not State.RUNS or self.ending is not None
 

@@ -16,11 +16,12 @@ from rds.core.types import Controller, Model
 from rds.machines import Axis, Machine
 from rds.machines.converter import converter
 from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
-from rds.modes.loop.execution import Execution
+from rds.modes.loop.execution import Execution, Follower
+from rds.modes.loop.interpolated import Interpolated
 from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
 from rds.modes.loop.live_values import Channel
 from rds.modes.loop.loop import Law
-from rds.modes.loop.program import COLUMNS, Program, program_channels
+from rds.modes.loop.program import COLUMNS, MADE_COLUMNS, InterpolatedProgram, Program, program_channels
 from rds.modes.loop.retimed import Retimed
 from rds.modes.loop.tuning import Tuning
 
@@ -57,7 +58,7 @@ class Plan:
     rehearsal: float = 0.25  # s of clock and I/O without the student's code, before a real-time run
     import_path: tuple[str, ...] = ()  # folders of the students' files, for what they import from there
     changes: tuple[tuple[int, str, float], ...] = ()  # of live values: (sample, channel, value), in order
-    program: Program | None = None  # instead of references; `samples` is then what it takes without waiting
+    program: Program | InterpolatedProgram | None = None  # instead of references; `samples` is what it takes unhindered
 
     @property
     def names(self) -> list[str]:
@@ -81,7 +82,8 @@ class Plan:
 
     def channels(self) -> list[Channel]:
         """What may be changed while it runs: the parameters of controllers, the override of a program, the stop."""
-        own = [] if self.program is None else program_channels()
+        made = isinstance(self.program, InterpolatedProgram)
+        own = [] if self.program is None else program_channels(1.0 if made else 2.0)
         return [channel for tuning in self._tunings() for channel in tuning.channels] + own + [stop_channel()]
 
     def with_changes(self, changes: Iterable[Any]) -> Plan:
@@ -105,10 +107,11 @@ class Plan:
             return Drive(self._laws(params, references), LiveChanges(self.channels(), actions, self.changes))
         live = {name: LiveReference() for name in self.names}
         spindle = None if program.spindle is None else self.names.index(program.spindle)
+        follower: Follower = Retimed(program, self.T) if isinstance(program, Program) else Interpolated(program, self.T)
         execution = Execution(
             program,
             self.T,
-            Retimed(program, self.T),
+            follower,
             [live[name] for name in (*program.axes, *([program.spindle] if program.spindle else []))],
             spindle,
             0.0 if spindle is None else self.axes[spindle].axis.resolution,
@@ -117,7 +120,7 @@ class Plan:
         changes = LiveChanges(
             self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits
         )
-        return Drive([execution.law, *self._laws(params, list(live.values()))], changes)
+        return Drive([execution.law, *self._laws(params, list(live.values()))], changes, refers=True)
 
     def _tunings(self) -> list[Tuning]:
         """The live parameters of each controller; of one controller, if it drives all axes."""
@@ -151,8 +154,9 @@ class Plan:
         columns = ["sample"]
         units = {"sample": ""}
         if self.program is not None:
-            columns += COLUMNS
-            units |= COLUMNS
+            of_program = COLUMNS | (MADE_COLUMNS if isinstance(self.program, InterpolatedProgram) else {})
+            columns += of_program
+            units |= of_program
         for plan in self.axes:
             name, unit = plan.axis.name, plan.axis.unit
             parts = {"measured": unit, "command": "V"}
@@ -175,6 +179,7 @@ class Drive:
 
     laws: list[Law]
     changes: LiveChanges
+    refers: bool = False  # the first of the laws sets the references of the others
 
 
 def dump(plan: Plan) -> bytes:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import ceil
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rds.modes.loop.live_values import Channel
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
 OVERRIDE, HOLD, RESUME, HOME, OPTIONAL_STOP = "override", "hold", "resume", "home", "optional_stop"
 COLUMNS = {"program_line": "", "program_sample": "", "program_override": "", "program_state": ""}
+MADE_COLUMNS = {"program_segment": "", "program_buffer": ""}  # of motion that is made while it is carried out
 
 
 class Happening(NamedTuple):
@@ -55,17 +57,64 @@ class Program:
         """Samples that the program takes at an override of 100 %, without what it waits for."""
         return len(self.position)
 
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Where the motion begins (n)."""
+        return tuple(float(value) for value in self.position[0])
+
+
+Row = tuple[Sequence[float], Sequence[float], Sequence[float], int]
+"""Position, velocity and acceleration of the axes (mm, mm/s, mm/s²), and the number of the segment."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Motion from rest to rest: what makes its rows, one sample period apart, and what happens where they end."""
+
+    rows: Callable[[], Iterator[Row]]
+    happenings: tuple[Happening, ...] = ()  # their `sample` is not known before the rows are made
+
+
+@dataclass(frozen=True)
+class InterpolatedProgram:
+    """A path whose samples an interpolator makes while they are carried out, one by one.
+
+    `axes`, `spindle`, `home`, `limits` and `name` as of a `Program`. The motion begins at `start` (n), where `first` is
+    due, and goes through the `stretches`. `line` has the program line of each segment; `feed` is the largest rate along
+    the path, mm/s. `ahead` rows are made before they are needed. `samples` is how many it takes at the programmed
+    feed, as far as that is known before the rows are made. `travel` (n × 2) is where the axes may go. `path` is the
+    programmed path, rows of `SEGMENT`, for measuring; `about` says what made the rows, for the result.
+    """
+
+    axes: tuple[str, ...]
+    spindle: str | None
+    start: tuple[float, ...]
+    first: tuple[Happening, ...]
+    stretches: tuple[Stretch, ...]
+    line: tuple[int, ...]
+    feed: float
+    ahead: int
+    samples: int
+    home: tuple[float, ...]
+    limits: np.ndarray
+    travel: np.ndarray
+    path: np.ndarray
+    about: dict[str, Any]
+    notes: tuple[str, ...] = ()
+    name: str = ""
+
 
 def dwell_samples(seconds: float, T: float) -> int:
     """A dwell lasts for at least so long."""
     return ceil(seconds / T - 1e-9)
 
 
-def program_channels() -> list[Channel]:
-    """What may be changed while a program runs, besides the parameters of controllers."""
+def program_channels(fastest: float) -> list[Channel]:
+    """What may be changed while a program runs, besides the parameters of controllers; `fastest` feed override."""
     switch = partial(Channel, low=0.0, high=1.0, whole=True)
+    feed = "feed as a multiple of the programmed one; " + ("rapids only get slower" if fastest > 1.0 else "at most 1")
     return [
-        Channel(OVERRIDE, 1.0, "feed as a multiple of the programmed one; rapids only get slower", low=0.0, high=2.0),
+        Channel(OVERRIDE, 1.0, feed, low=0.0, high=fastest),
         switch(HOLD, 0.0, "1 brings the motion to rest on its path until it is 0 again"),
         Channel(RESUME, 0.0, "another number than before goes on after M0, M1 and a tool change", low=0.0, high=1e9),
         switch(HOME, 0.0, "1 ends the program where it is and moves the axes home"),

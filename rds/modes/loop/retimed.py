@@ -44,6 +44,7 @@ class Retimed:
         views: list[Any] = [table.reshape(-1).data for table in self._tables]
         self._p, self._v, self._a = views
         self._n = len(program.axes)
+        self.happenings, self.last, self._line = program.happenings, program.samples - 1, program.line
         self._limits = np.asarray(program.limits, dtype=float)
         self.place, self.rate = 0.0, 1.0
         self.position: list[float] = self._p[: self._n].tolist()
@@ -55,6 +56,14 @@ class Retimed:
         self._back = Ramp(1.0, 1.0, 1)  # from a rate above FREE, known to keep the limits
         self._tries = self._sure = 0
         self._rests = True
+
+    def line(self, sample: int) -> int:
+        """The program line of a sample."""
+        return int(self._line[sample])
+
+    def shown(self) -> tuple[float, ...]:
+        """Nothing else is recorded of it."""
+        return ()
 
     def advance(self, wanted: float, until: int) -> None:
         """One sample period towards the rate `wanted`, and along the path at most to the sample `until`."""

@@ -8,21 +8,24 @@ from dataclasses import replace
 
 from rds.core.clock import RealTimeClock
 from rds.core.types import Ending
-from rds.modes.loop.loop import Loop
+from rds.modes.loop.loop import Law, Loop
 
-TIMING_COLUMNS = ("lateness", "io", "compute", "model", "taken")  # ns
+TIMING_COLUMNS = ("lateness", "io", "interpolate", "compute", "model", "taken")  # ns
 
 
 class Stopwatch:
     """Puts a loop under a real-time clock, and the times of each sample in front of its row (after its number).
 
-    Lateness is from the due time to the start; I/O is `read` and `write`; compute is the laws; model is `follow`;
-    taken is what the scheduler took from compute and after (see `core.clock`).
+    Lateness is from the due time to the start; I/O is `read` and `write`; interpolate is the law that sets references,
+    0 where there is none; compute is the other laws; model is `follow`; taken is what the scheduler took from these
+    three (see `core.clock`).
     """
 
     def __init__(self, clock: RealTimeClock, append: Callable[[list[float]], None], stop: Callable[[], bool]):
         self._clock, self._append, self._stop = clock, append, stop
-        self._k = self._started = self._read = self._computed = self._written = self._ended = self._taken = 0
+        self._k = self._started = self._read = self._referred = self._computed = self._written = self._ended = (
+            self._taken
+        ) = 0
 
     def time(self, loop: Loop) -> Loop:
         """The same loop, timed; its rows go to `append`, and it ends when `stop()` is true or by the late policy."""
@@ -38,6 +41,7 @@ class Stopwatch:
             positions = read()
             self._read = now()
             self._taken = taken()
+            self._referred = self._read
             return positions
 
         def timed_write(voltages: Sequence[float]) -> Sequence[float]:
@@ -51,16 +55,37 @@ class Stopwatch:
             self._ended = now()
             return outputs
 
+        laws = [self._timed(loop.laws[0]), *loop.laws[1:]] if loop.refers else loop.laws
+
         return replace(
-            loop, wait=wait, read=timed_read, write=timed_write, follow=timed_follow, record=self._row, finish=self._end
+            loop,
+            laws=laws,
+            wait=wait,
+            read=timed_read,
+            write=timed_write,
+            follow=timed_follow,
+            record=self._row,
+            finish=self._end,
         )
+
+    def _timed(self, law: Law) -> Law:
+        """The law that sets references, timed."""
+        now = self._clock.now
+
+        def timed(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
+            law(k, positions, row, voltages)
+            self._referred = now()
+
+        return timed
 
     def _row(self, row: list[float]) -> None:
         started, read, computed, written, ended = self._started, self._read, self._computed, self._written, self._ended
+        referred = self._referred
         row[1:1] = (
             self._clock.lateness(int(row[0]), started),
             read - started + written - computed,
-            computed - read,
+            referred - read,
+            computed - referred,
             ended - written,
             self._clock.taken() - self._taken,
         )

@@ -14,6 +14,7 @@ from rds.core.blame import STUDENT_ERRORS
 from rds.core.clock import RealTimeClock
 from rds.core.contracts import Motion
 from rds.modes.loop.plan import Plan
+from rds.modes.loop.program import InterpolatedProgram
 from rds.modes.parts import start
 from rds.modes.process.host import Rows
 from rds.modes.process.replay import as_recorded
@@ -23,12 +24,14 @@ PATIENCE = 5.0  # s for all of them
 
 
 def own_times(plan: Plan, rows: Rows) -> np.ndarray | None:
-    """The time of each sample's control() and model, ns, at the least of some passes; None if they can't be repeated.
+    """The time of each sample's interpolate(), control() and model, ns, at the least of some passes.
 
+    None if they can't be repeated.
     Each pass starts from the initial states and gets the positions and the voltages that were recorded, and the
     changes of live values.
     """
-    plan = as_recorded(plan, rows)
+    made = isinstance(plan.program, InterpolatedProgram)  # by the student's code, whose time counts
+    plan = plan.with_changes(rows.changes) if made else as_recorded(plan, rows)
     of = dict(zip(rows.columns, rows.values.T, strict=True))
     samples = of["sample"].astype(int).tolist()
     measured = np.array([of[f"{name}_measured"] for name in plan.names]).T.tolist()

@@ -1,7 +1,7 @@
 """Was the sample period kept, and if not, whose fault was it?
 
-Each sample's time has three owners: the system (waking the loop), the student (compute and model) and the bus
-(I/O). A late sample is the student's only if it would have been late on a system without any delay of its own.
+Each sample's time has three owners: the system (waking the loop), the student (interpolate, compute and model) and the
+bus (I/O). A late sample is the student's only if it would have been late on a system without any delay of its own.
 That is decided by a replay of the run on such a system: every sample starts the moment it is due, or when the
 one before it is complete; the student's code takes the time it took, less what the scheduler took from it;
 I/O takes its median of the periods in which every module answered: where one was silent, the loop waited for it in
@@ -25,7 +25,7 @@ import numpy as np
 
 from rds.core.types import Verdict
 
-STAGES = ("lateness", "io", "compute", "model")
+STAGES = ("lateness", "io", "interpolate", "compute", "model")
 LASTING = 9  # periods of silence, the shortest that ends a run (with a tenth, which has no row)
 FEW = 3  # overruns that may be stalls even if nothing stalled while waiting
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9}
@@ -39,14 +39,15 @@ class Timing:
     sample: np.ndarray
     lateness: np.ndarray  # from due time to start
     io: np.ndarray
+    interpolate: np.ndarray
     compute: np.ndarray
     model: np.ndarray
-    taken: np.ndarray  # of compute and model: not run although ready to, the scheduler's doing
+    taken: np.ndarray  # of the three before it: not run although ready to, the scheduler's doing
 
     @property
     def total(self) -> np.ndarray:
         """From due time to completion, ns."""
-        return self.lateness + self.io + self.compute + self.model
+        return self.lateness + self.io + self.interpolate + self.compute + self.model
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def judge(
     if count + discarded <= limit:
         return Judgement(Verdict.MET, _met(count, limit, len(timing.sample)), count, 0, discarded)
     io = _usual_io(timing.io, silent)
-    student = timing.compute + timing.model
+    student = timing.interpolate + timing.compute + timing.model
     own = student - np.minimum(timing.taken, student)
     alone = _late_alone(own + io, timing, period)
     if alone > limit and _is_doubtful(own + io, timing, period, stalls):
@@ -124,7 +125,7 @@ def judge(
         elif _overruns(own + io, period) <= _stalls(own + io, timing, period) + stalls:
             alone = 0
     if alone > limit:
-        reason = f"{lost}, and {alone} would have been on a system without delays: {_overrun(own, io, period)}"
+        reason = f"{lost}, and {alone} would have been on a system without delays: {_overrun(own, io, period, timing)}"
         return Judgement(Verdict.MISSED, reason, count, alone, discarded)
     if threads and not stalls:
         reason = (
@@ -156,7 +157,7 @@ def summary(timing: Timing, period: int) -> dict[str, Any]:
     stages: dict[str, Any] = {}
     for name in STAGES:
         values = getattr(timing, name) / 1e3
-        if not len(values):
+        if not len(values) or (name == "interpolate" and not values.any()):  # the run had no path to interpolate
             continue
         stages[name] = {key: float(np.percentile(values, p)) for key, p in PERCENTILES.items()}
         stages[name]["max"] = float(values.max())
@@ -218,17 +219,26 @@ def _is_doubtful(work: np.ndarray, timing: Timing, period: int, stalls: int) -> 
     return _overruns(work, period) <= max(_stalls(work, timing, period) + stalls, FEW)
 
 
-def _overrun(own: np.ndarray, io: float, period: int) -> str:
+def _overrun(own: np.ndarray, io: float, period: int, timing: Timing) -> str:
     """What took too long, in a sentence's end."""
     over = _overruns(own + io, period)
     of = f"of a sample period of {period / 1e6:g} ms"
     bus = f"the bus's I/O took {io / 1e6:.3f} ms at the median"
-    if io > period:
-        return f"{bus}, {of}"
     often = over > len(own) / 100
     took, where = (float(np.percentile(own, 99)), "the 99th percentile") if often else (float(own.max()), "most")
-    code = f"control() and the model took {took / 1e6:.3f} ms at {where}"
+    code = f"{_whose(timing)} took {took / 1e6:.3f} ms at {where}"
+    if io > period:
+        return f"{code}, and {bus}, {of}" if took > period else f"{bus}, {of}"
     return f"{bus}, and {code}, {of}" if io > took else f"{code}, {of}"
+
+
+def _whose(timing: Timing) -> str:
+    """The code that ran in the samples; of an interpolator, what share of its time."""
+    referring = float(timing.interpolate.sum())
+    if not referring:
+        return "control() and the model"
+    share = referring / max(float((timing.interpolate + timing.compute + timing.model).sum()), 1.0)
+    return f"the interpolator ({share:.0%} of it), control() and the model"
 
 
 def _met(count: int, limit: int, samples: int) -> str:

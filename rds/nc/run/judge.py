@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from rds.interpolators.motion.planner import TOLERANCE
 from rds.interpolators.motion.segments import AXES, BLEND
 from rds.modes.loop.execution import State
+from rds.modes.loop.program import InterpolatedProgram
 from rds.nc.run.contour import contour_error
 from rds.nc.run.prepare import Prepared
 from rds.results import Result
@@ -28,10 +30,15 @@ _LINEAR = AXES[:3]
 def judged(result: Result, prepared: Prepared) -> Result:
     """The result with the column `contour_error` (mm; 0 on the way home) and with `meta["program"]`."""
     state = result["program_state"].astype(int)
+    made = prepared.program if isinstance(prepared.program, InterpolatedProgram) else None
+    if made is not None:
+        prepared = replace(prepared, segment=_segments(result))
     error, line = contour(result, prepared, state)
     columns = dict(result.columns)
     units = dict(result.units)
     columns["contour_error"], units["contour_error"] = error, "mm"
+    if made is not None:
+        columns["path_error"], units["path_error"] = contour(result, prepared, state, "reference")[0], "mm"
     moves = moving(result)
     on_path = moves & (state != State.HOME)
 
@@ -45,6 +52,7 @@ def judged(result: Result, prepared: Prepared) -> Result:
         "waiting_samples": len(result) - int(moves.sum()),
         "limit_shares": _limit_shares(result, prepared),
         "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) else None,
+        **({"path_error": worst(columns["path_error"], line, on_path, "mm")} | made.about if made is not None else {}),
         "following_error": {
             name: found
             for name in prepared.program.axes
@@ -73,12 +81,21 @@ def worst_lines(result: Result, column: np.ndarray, count: int = 5) -> list[tupl
     return sorted(found, key=lambda entry: -entry[1])[:count]
 
 
+def _segments(result: Result) -> np.ndarray:
+    """Which segment each sample of an interpolator belongs to, as the run recorded it."""
+    sample = np.ceil(result["program_sample"]).astype(int)
+    segment = np.zeros(int(sample.max(initial=0)) + 1, dtype=int)
+    segment[sample] = result["program_segment"].astype(int) - 1
+    return np.maximum.accumulate(segment)  # samples that were passed over
+
+
 def contour(
-    result: Result | Mapping[str, np.ndarray], prepared: Prepared, state: np.ndarray
+    result: Result | Mapping[str, np.ndarray], prepared: Prepared, state: np.ndarray, of: str = "measured"
 ) -> tuple[np.ndarray, np.ndarray]:
     """Distance (mm) of each measured position to the path, and the program line that it is nearest to.
 
-    `result` may be some of a run's rows, as columns; `state` is its `program_state`, as integers.
+    `of` "reference": of each commanded position. `result` may be some of a run's rows, as columns; `state` is its
+    `program_state`, as integers.
     """
     path, axes = prepared.path, prepared.program.axes
     line = result["program_line"].astype(int)
@@ -87,7 +104,7 @@ def contour(
     points, wanted = np.zeros((len(line), 3)), np.zeros((len(line), 3))
     for i, name in enumerate(_LINEAR):
         if name in axes:
-            points[:, i], wanted[:, i] = result[f"{name}_measured"], result[f"{name}_reference"]
+            points[:, i], wanted[:, i] = result[f"{name}_{of}"], result[f"{name}_reference"]
         else:
             points[:, i] = wanted[:, i] = path["start"][0, i]
     row = np.clip(np.ceil(result["program_sample"]).astype(int), 0, len(prepared.segment) - 1)
@@ -118,8 +135,15 @@ def _times(result: Result, prepared: Prepared, state: np.ndarray) -> dict[str, A
         **{name: samples * prepared.T for name, samples in waited.items()},
         "last_line": int(result["program_line"][-1]),
         "completed": result.meta.get("ending") == "done",
-        "done_percent": 100.0 * min(float(result["program_sample"].max() + 1.0) / prepared.program.samples, 1.0),
+        "done_percent": _share_done(result, prepared),
     }
+
+
+def _share_done(result: Result, prepared: Prepared) -> float:
+    """Per cent of the program's samples; of an interpolator's, how many there are is known in the end only."""
+    if isinstance(prepared.program, InterpolatedProgram) and result.meta.get("ending") == "done":
+        return 100.0
+    return 100.0 * min(float(result["program_sample"].max() + 1.0) / prepared.program.samples, 1.0)
 
 
 def _limit_shares(result: Result, prepared: Prepared) -> dict[str, dict[str, float]]:

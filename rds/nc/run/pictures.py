@@ -8,6 +8,7 @@ import numpy as np
 
 from rds.core.figure import BLACK, CYCLE, GREY, ORANGE, SKY, VERMILLION, Picture, dress, legend
 from rds.modes.loop.execution import State
+from rds.modes.loop.program import InterpolatedProgram
 from rds.nc.run.judge import worst_lines
 from rds.nc.run.prepare import Prepared
 from rds.results import Result
@@ -38,8 +39,7 @@ def path(result: Result, prepared: Prepared) -> Picture:
     axes = prepared.program.axes
     views = [view for view in _VIEWS if view[1] in axes and view[2] in axes]
     error = result["contour_error"] * 1e3
-    rapid = prepared.path["rapid"][prepared.segment] if len(prepared.path) else np.zeros(len(prepared.segment), bool)
-    row = np.clip(np.ceil(result["program_sample"]).astype(int), 0, len(rapid) - 1)
+    planned, rapid, row = _planned(result, prepared)
     at = _thinned(error, np.flatnonzero(~rapid[row] & (result["program_state"] != State.HOME)))
     picture = Picture(4.6 if len(views) == 1 else 8.0)
     places = picture.subplots(-(-len(views) // 2), min(len(views), 2) or 1, squeeze=False).ravel()
@@ -47,7 +47,7 @@ def path(result: Result, prepared: Prepared) -> Picture:
     for place, (title, across, up) in zip(places, views, strict=False):
         x, y = result[f"{across}_measured"], result[f"{up}_measured"]
         edges = _edges(len(rapid))
-        u, v = (prepared.program.position[edges, axes.index(name)] for name in (across, up))
+        u, v = (planned[edges, axes.index(name)] for name in (across, up))
         for kind, style in ((False, _CUT), (True, _RAPID)):
             place.plot(np.where(rapid[edges] == kind, u, np.nan), np.where(rapid[edges] == kind, v, np.nan), **style)
         drawn = place.scatter(x[at], y[at], c=error[at], s=5.0, cmap="viridis", linewidths=0, zorder=2)
@@ -65,6 +65,20 @@ def path(result: Result, prepared: Prepared) -> Picture:
         handles, texts = places[0].get_legend_handles_labels()
         picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
     return picture
+
+
+def _planned(result: Result, prepared: Prepared) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Samples of the path as planned, which of them are rapids, and which of them each row of the result is.
+
+    Of a path that was interpolated while it ran these are its references.
+    """
+    program = prepared.program
+    if isinstance(program, InterpolatedProgram):
+        positions = np.column_stack([result[f"{name}_reference"] for name in program.axes])
+        return positions, np.zeros(len(result), bool), np.arange(len(result))
+    count = len(prepared.segment)
+    rapid = prepared.path["rapid"][prepared.segment] if len(prepared.path) else np.zeros(count, bool)
+    return program.position, rapid, np.clip(np.ceil(result["program_sample"]).astype(int), 0, count - 1)
 
 
 def along(result: Result, prepared: Prepared) -> Picture:

@@ -17,7 +17,7 @@ from rds.interpolators.motion.planner import PASSING, plan
 from rds.interpolators.motion.samples import SampleBlock
 from rds.interpolators.motion.segments import AXES, SEGMENT
 from rds.machines import Machine
-from rds.modes.loop.program import Happening, Program
+from rds.modes.loop.program import Happening, InterpolatedProgram, Program
 from rds.nc.check import Setup, check_program, compiled_if_current
 from rds.nc.compiled_file import open_compiled
 from rds.nc.toolpath import PathBlock
@@ -36,7 +36,7 @@ class Prepared:
     """
 
     file: Path
-    program: Program
+    program: Program | InterpolatedProgram
     path: np.ndarray  # of SEGMENT
     segment: np.ndarray
     T: float

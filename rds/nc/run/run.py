@@ -8,6 +8,8 @@ from math import hypot
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
 from rds.machines import Machine, load_machine
@@ -22,7 +24,8 @@ from rds.modes.process.host import Progress
 from rds.modes.process.live import Live
 from rds.nc.check import Setup
 from rds.nc.run.judge import judged
-from rds.nc.run.prepare import SPINDLE_UNIT, prepare
+from rds.nc.run.path import WORDS, method_of, of_part_program
+from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, prepare
 from rds.results import Result
 
 AXES_CONTROLLER = {"name": "tracking"}
@@ -92,6 +95,11 @@ class PartProgram(Experiment):
     options of the dialect). Each position axis follows under `controller` (default: tracking), the spindle under PID; a
     table of an experiment file (`experiment`) says more: controllers and models of single axes, interface, timing, bus.
 
+    With `interpolator` (a name of the library, the path of a student's .py file, a function, or a table with
+    `interpolator`, `params` and `look_ahead`) its moves are not planned: the interpolator makes the samples inside the
+    loop, with `acceleration` (a filter's name, or a table with `name` and `time`) on top, and at rest at the end of
+    each segment if `exact_stop`.
+
         part = PartProgram("part.ngc")
         result = part.run()
         run = part.start("emulation")
@@ -106,6 +114,9 @@ class PartProgram(Experiment):
         *,
         setup: Setup | None = None,
         controller: Any = None,
+        interpolator: Any = None,
+        acceleration: Any = None,
+        exact_stop: bool = False,
         experiment: str | Path | None = None,
         mode: str | None = None,
         sample_period: float | None = None,
@@ -122,7 +133,18 @@ class PartProgram(Experiment):
         table.setdefault("controller", AXES_CONTROLLER)
         self._words = words.over_written(_with_spindle(table, self._machine))
         T = self._words.read("sample_period", self._machine.sample_period)
-        self.prepared = prepare(Path(file), self._machine, setup, T, progress)
+        if interpolator is None:
+            for key, value in (("acceleration", acceleration), ("exact_stop", exact_stop)):
+                if value:
+                    raise InputError(f"{key} goes with interpolator, which is not given: planned motion needs neither")
+            self.prepared = prepare(Path(file), self._machine, setup, T, progress)
+        else:
+            how = {"interpolator": interpolator} if not isinstance(interpolator, dict) else dict(interpolator)
+            how |= {} if acceleration is None else {"acceleration": acceleration}
+            how |= {"exact_stop": True} if exact_stop else {}
+            method = method_of(TomlTable(how, WORDS), Path.cwd())
+            made = of_part_program(Path(file), self._machine, setup, T, method, progress)
+            self.prepared = Prepared(Path(file), made, made.path, np.zeros(0, int), T, made.notes)
         self.plan()
 
     @classmethod
@@ -146,7 +168,7 @@ class PartProgram(Experiment):
     def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
         return resolve(self._words, self._folder, mode, self.prepared.program)
 
-    def _complete(self, result: Result) -> Result:
+    def _complete(self, result: Result, plan: Plan) -> Result:
         return judged(result, self.prepared)
 
 

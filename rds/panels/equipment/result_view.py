@@ -102,6 +102,7 @@ class ResultView:
 _STAGE_NAMES = {
     "lateness": "lateness (of the system)",
     "io": "I/O (on the bus)",
+    "interpolate": "interpolate (the path)",
     "compute": "compute (the controller)",
     "model": "model",
 }

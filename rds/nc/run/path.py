@@ -1,0 +1,352 @@
+"""A path as the reference of a run: an interpolator makes its samples inside the loop, while the axes move.
+
+`[reference] kind = "path"` of an experiment names this module (`rds.modes.experiment.resolve`); `rds nc run
+--interpolator` gets a part program's moves through here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.core.geometry import PLANES, length
+from rds.core.load import StudentFile, from_function
+from rds.core.quantities import Anything, Choice, Flag, Items, Quantity, Table, Text
+from rds.core.toml_table import TomlTable
+from rds.core.types import ArcSegment, LineSegment, Segment
+from rds.interpolators import DEFAULT, LIBRARY
+from rds.interpolators.acceleration import LIBRARY as FILTERS
+from rds.interpolators.acceleration import Acceleration, make_acceleration, smooth_one_by_one
+from rds.interpolators.interpolator import Interpolator, find_interpolator, from_student
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.segments import AXES, arc, line
+from rds.interpolators.path import check_chain
+from rds.interpolators.segment import Arc
+from rds.interpolators.segment_rows import SEGMENTS, read_segments, segments_of
+from rds.machines import Machine
+from rds.modes.loop.interpolated import LEAST_AHEAD
+from rds.modes.loop.program import Happening, InterpolatedProgram, Row, Stretch, dwell_samples
+from rds.nc.check import Setup, motion
+from rds.nc.interpolator_segments import program as moves_of
+from rds.results import Result
+
+SUFFIX = ".toml"  # of a path file; any other is a part program
+MOST_SAMPLES = 20_000_000
+_MOST_AHEAD = 100_000
+_ARC_POINTS = 65  # of an arc, looked at for the travel of the axes
+_LINEAR = AXES[:3]
+
+WORDS = Table(
+    "a path of lines and arcs that all axes of the run follow together, through an interpolator",
+    {
+        "file": Text(f"a path file ({SUFFIX}), or a part program"),
+        "start": SEGMENTS.keys["start"],
+        "feed": SEGMENTS.keys["feed"],
+        "feed_unit": SEGMENTS.keys["feed_unit"],
+        "segment": SEGMENTS.keys["segment"],
+        "interpolator": Anything(
+            "what makes the samples", (Choice("of the library", LIBRARY.names), Text("your .py file")), DEFAULT
+        ),
+        "params": Table("options of the interpolator", others=Anything("option, or parameter of the file")),
+        "acceleration": Anything(
+            "a filter on top of it: its name, or a table with its options",
+            (
+                Choice("of the library", FILTERS.names),
+                Table(
+                    "a filter",
+                    {
+                        "name": Choice("of the library", FILTERS.names),
+                        "time": Quantity("how long the velocity rises or falls", "s", low=0.0),
+                        "time_constant": Quantity("of exponential", "s", above=0.0),
+                        "multipliers": Items("weights", Quantity("weight", "", 0.0), "a list of numbers, one a sample"),
+                    },
+                    needed=("name",),
+                ),
+            ),
+        ),
+        "exact_stop": Flag("with acceleration: the axes come to rest at the end of each segment", False),
+        "look_ahead": Quantity(
+            "rows that are made before they are needed",
+            *("", LEAST_AHEAD, _MOST_AHEAD),
+            default=LEAST_AHEAD,
+            whole=True,
+        ),
+    },
+)
+
+
+@dataclass(frozen=True)
+class Method:
+    """What makes the samples of a path: an interpolator, a filter on top of it, and how many rows ahead it works."""
+
+    interpolator: Interpolator
+    acceleration: Acceleration | None = None
+    exact_stop: bool = False
+    ahead: int = LEAST_AHEAD
+
+
+def program(
+    words: TomlTable, folder: Path, machine: Machine, axes: Sequence[str], T: float
+) -> tuple[InterpolatedProgram, str | None]:
+    """The program of a `[reference]` table for the axes of a run, and the path of the user's interpolator.
+
+    InputError with the place of the words that won't do.
+    """
+    method = method_of(words, folder)
+    file = words.read("file")
+    inline = [key for key in ("start", "feed", "segment") if key in words]
+    if (file is None) != bool(inline):
+        raise InputError(
+            "a path needs either file (a path file or a part program), or start, feed and [[reference.segment]]",
+            words.place("file" if file is not None else None),
+        )
+    if file is not None and not str(file).endswith(SUFFIX):
+        words.done()
+        made = of_part_program(folder / file, machine, None, T, method)
+        if set(axes) - {made.spindle} != set(made.axes):
+            raise InputError(
+                f"a part program moves {', '.join(made.axes)}, and the run has {', '.join(axes)}; "
+                f"give axes = {list(made.axes)}",
+                words.place("file"),
+            )
+        if made.spindle is not None and made.spindle not in axes:
+            note = f"the spindle stands: {made.spindle} is none of the axes of this run"
+            made = replace(made, spindle=None, notes=(*made.notes, note))
+        return made, method.interpolator.source.path
+    if file is not None:
+        segments, name = read_segments(folder / file), str(file)
+    else:
+        segments, name = _inline(words), "path"
+    words.done()
+    if len(segments[0].start) != len(axes):
+        raise InputError(
+            f"the path has {len(segments[0].start)} positions in each point, and the run {len(axes)} "
+            f"({', '.join(axes)}); give as many, in the order of the axes",
+            words.place("axes"),
+        )
+    first: Segment = LineSegment((0.0,) * len(axes), segments[0].start, max(each.feed_rate for each in segments))
+    lines: list[int] = list(range(1, len(segments) + 1))
+    rests: dict[int, tuple[Happening, ...]] = {}
+    notes: tuple[str, ...] = ()
+    if any(segments[0].start):
+        segments, lines, rests = [first, *segments], [0, *lines], {0: ()}
+        notes = (f"the axes begin at 0: a straight line leads to the start of the path, {segments[1].start}",)
+    made = _made(name, segments, lines, rests, (), method, machine, axes, T)
+    return replace(made, notes=notes), method.interpolator.source.path
+
+
+def of_part_program(
+    file: Path,
+    machine: Machine,
+    setup: Setup | None,
+    T: float,
+    method: Method,
+    progress: Callable[[int, int], None] | None = None,
+) -> InterpolatedProgram:
+    """A part program whose moves `method` interpolates, rapids at the speed of the slowest axis.
+
+    InputError or ProgramError for a program that the machine cannot run, and for one that moves rotary axes.
+    """
+    if not file.is_file():
+        raise InputError("there is no such part program; check the name and the folder", str(file))
+    if any(name not in machine.axes for name in _LINEAR):
+        raise InputError(f"{machine.name} lacks one of X, Y and Z, all of which an interpolator moves", str(file))
+    programmed = moves_of(motion(file, machine, setup or Setup(), progress), machine, T, MOST_SAMPLES)
+    due: dict[int, tuple[Happening, ...]] = {}
+    for after, event in programmed.events:
+        due[after] = (*due.get(after, ()), Happening(0, event.kind, float(event.value), event.line))
+    first = due.pop(-1, ())
+    return _made(
+        file.name, programmed.segments, programmed.lines, due, first, method, machine, _LINEAR, T, spindle=True
+    )
+
+
+def method_of(words: TomlTable, folder: Path) -> Method:
+    """What the words `interpolator`, `params`, `acceleration`, `exact_stop` and `look_ahead` of a table ask for."""
+    given = words.any("interpolator", DEFAULT)
+    params = words.inner("params")
+    options = dict(params.table) if params else {}
+    if isinstance(given, Interpolator):
+        found = given
+    elif isinstance(given, StudentFile):
+        found = from_student(given, options)
+    elif callable(given):
+        found = from_student(from_function(given), options)
+    elif isinstance(given, str):
+        is_file = given not in LIBRARY.modules and given.endswith(".py")
+        if is_file and not (folder / given).is_file():
+            raise words.fault("interpolator", f"will not do: there is no file {folder / given}")
+        found = find_interpolator(str(folder / given) if is_file else given, options)
+    else:
+        raise words.fault("interpolator", "must be a name of the library, the path of a .py file, or a function")
+    filter_ = _filter(words)
+    exact_stop = words.read("exact_stop")
+    if exact_stop and filter_ is None:
+        raise words.fault("exact_stop", "goes with acceleration, which is not given: without it no segment slows down")
+    return Method(found, filter_, exact_stop, words.read("look_ahead"))
+
+
+def _filter(words: TomlTable) -> Acceleration | None:
+    given = words.any("acceleration")
+    if given is None or isinstance(given, Acceleration):
+        return given
+    if isinstance(given, str):
+        return make_acceleration(given)
+    if not isinstance(given, Mapping) or "name" not in given:
+        raise words.fault("acceleration", f"must be one of {', '.join(FILTERS.names())}, or a table with name and time")
+    return make_acceleration(**given)
+
+
+def _inline(words: TomlTable) -> list[Segment]:
+    for key in ("start", "feed", "segment"):
+        if key not in words:
+            raise InputError(f"{key} of the path is missing; it needs start, feed and segment", words.place())
+    rows = [dict(table.table) for table in words.tables("segment")]
+    return segments_of(words.read("start"), rows, words.read("feed"), words.read("feed_unit"))
+
+
+def _made(
+    name: str,
+    segments: Sequence[Segment],
+    lines: Sequence[int],
+    due: Mapping[int, tuple[Happening, ...]],
+    first: tuple[Happening, ...],
+    method: Method,
+    machine: Machine,
+    axes: Sequence[str],
+    T: float,
+    spindle: bool = False,
+) -> InterpolatedProgram:
+    """The program of these segments; `due` says after which of them the axes rest, and what happens there."""
+    check_chain(segments, T)
+    _check_room(segments, lines, machine, axes)
+    weights = method.acceleration.weights(T) if method.acceleration else np.ones(1)
+    ends = set(due) | (set(range(len(segments))) if method.exact_stop else set()) | {len(segments) - 1}
+    stretches, begin, samples = [], 0, 1
+    for end in sorted(ends):
+        part = tuple(segments[begin : end + 1])
+        happens = tuple(due.get(end, ()))
+        stretches.append(Stretch(_Rows(part, begin, method.interpolator, weights, T), happens))
+        samples += sum(ceil(length(each) / each.feed_rate / T - 1e-9) for each in part) + len(weights) - 1
+        samples += sum(dwell_samples(each.value, T) for each in happens if each.kind == "dwell")
+        begin = end + 1
+    if samples > MOST_SAMPLES:
+        raise InputError(f"the path takes {samples} samples of {T:g} s; a run takes at most {MOST_SAMPLES}", name)
+    limits = Limits.of(machine)
+    order = [AXES.index(each) for each in axes]
+    turning = next((each.name for each in machine.axes.values() if each.unit == "rev/min"), None) if spindle else None
+    filter_ = method.acceleration
+    return InterpolatedProgram(
+        axes=tuple(axes),
+        spindle=turning,
+        start=tuple(float(value) for value in segments[0].start),
+        first=first,
+        stretches=tuple(stretches),
+        line=tuple(lines),
+        feed=max(each.feed_rate for each in segments),
+        ahead=method.ahead,
+        samples=samples,
+        home=(0.0,) * len(axes),
+        limits=np.array([limits.velocity, limits.acceleration, limits.jerk])[:, order],
+        travel=np.array([machine.axes[each].travel for each in axes], dtype=float),
+        path=_path(segments, lines, order),
+        about={
+            "interpolator": method.interpolator.name,
+            "interpolator_params": dict(method.interpolator.params),
+            "acceleration": None if filter_ is None else {"name": filter_.name, **filter_.params},
+            "exact_stop": method.exact_stop,
+            "look_ahead": method.ahead,
+        },
+        name=name,
+    )
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Makes the rows of segments that are passed without a rest. `first` is the number of the first segment."""
+
+    segments: tuple[Segment, ...]
+    first: int
+    method: Interpolator
+    weights: np.ndarray
+    T: float
+
+    def __call__(self) -> Iterator[Row]:
+        number = self.first - 1
+        blu = self.method.blu
+
+        def made() -> Iterator[np.ndarray]:
+            nonlocal number
+            for segment in self.segments:
+                number += 1
+                yield from self.method.each(segment, self.T)
+
+        rows: Iterable[Sequence[np.ndarray]] = made()  # type: ignore[assignment]
+        if len(self.weights) > 1:
+            rows = smooth_one_by_one(rows, self.segments[0].start, self.weights, self.T)
+        for position, velocity, acceleration in rows:
+            at = position if blu is None else np.rint(position / blu) * blu
+            yield at.tolist(), velocity.tolist(), acceleration.tolist(), number
+
+
+def _check_room(segments: Sequence[Segment], lines: Sequence[int], machine: Machine, axes: Sequence[str]) -> None:
+    """InputError for a path that leaves the travel of an axis, or axes that a path does not move."""
+    wrong = [name for name in axes if name not in _LINEAR]
+    if wrong or list(axes) != [name for name in _LINEAR if name in axes]:
+        raise InputError(f"a path moves X, Y and Z, in that order, and the run has {', '.join(axes)}; change axes")
+    for segment, number in zip(segments, lines, strict=True):
+        points = np.array([segment.start, segment.end])
+        if isinstance(segment, ArcSegment):
+            points = Arc.of(segment).points(np.linspace(0.0, 1.0, _ARC_POINTS))
+        for i, name in enumerate(axes):
+            low, high = machine.axes[name].travel
+            if points[:, i].min() < low - 1e-9 or points[:, i].max() > high + 1e-9:
+                raise InputError(
+                    f"segment {number} takes {name} from {points[:, i].min():g} to {points[:, i].max():g} mm; "
+                    f"it travels from {low:g} to {high:g} mm; move the path into that range"
+                )
+
+
+def _path(segments: Sequence[Segment], lines: Sequence[int], order: Sequence[int]) -> np.ndarray:
+    """The segments as rows of SEGMENT, in machine axes."""
+    planes = list(PLANES.values())
+    rows = []
+    for segment, number in zip(segments, lines, strict=True):
+        start, end = _in_space(segment.start, order), _in_space(segment.end, order)
+        if isinstance(segment, ArcSegment):
+            plane = order[segment.plane[0]], order[segment.plane[1]]
+            is_seen_from_behind = plane not in planes
+            rows.append(
+                arc(
+                    start,
+                    end,
+                    _in_space(segment.centre, order),
+                    segment.feed_rate,
+                    clockwise=segment.clockwise != is_seen_from_behind,
+                    plane=planes.index(plane[::-1] if is_seen_from_behind else plane),
+                    program_line=number,
+                )
+            )
+        else:
+            rows.append(line(start, end, segment.feed_rate, program_line=number))
+    return np.concatenate(rows)
+
+
+def _in_space(point: Sequence[float], order: Sequence[int]) -> list[float]:
+    whole = [0.0, 0.0, 0.0]
+    for i, value in zip(order, point, strict=True):
+        whole[i] = float(value)
+    return whole
+
+
+def judged_path(result: Result, made: InterpolatedProgram, T: float) -> Result:
+    """The result of a run along a path, with its contour error; see `judge.judged`."""
+    from rds.nc.run.judge import judged
+    from rds.nc.run.prepare import Prepared
+
+    return judged(result, Prepared(Path(made.name), made, made.path, np.zeros(0, int), T, made.notes))
