@@ -200,7 +200,8 @@ def test_only_our_own_programs_put_off_the_package_of_mf4(tmp_path: Path, script
     """Our programs do without it until such a log is opened; a user's interpreter is left as it is."""
     pytest.importorskip("asammdf", reason="MF4 needs the package asammdf: pip install asammdf")
     words = [sys.executable, "-c", script, str(tmp_path / "a.mf4")]
-    done = subprocess.run(words, check=True, capture_output=True, text=True)
+    as_a_user = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(words, check=True, capture_output=True, text=True, env=as_a_user)
     assert not done.stderr, done.stderr
 
 
