@@ -255,7 +255,9 @@ def _program(file: Path, machine: str, T: float, reading: tuple[Any, Any, Any, A
     _check_program_file(file, T)
     loaded = load_machine(machine)
     with progress_bars() as bar:
-        return program(motion(file, loaded, setup(*reading), bar("read")), loaded, T, MOST)
+        notes: list[str] = []
+        found = program(motion(file, loaded, setup(*reading), bar("read"), notes), loaded, T, MOST)
+        return found._replace(notes=[*notes, *found.notes])
 
 
 def _save(done: Interpolation, out: Path | None, plot: bool) -> list[Path]:

@@ -33,9 +33,10 @@ def follow(
 
     loaded = load_machine(machine)
     limits = Limits.of(loaded)
+    notes: list[str] = []
     with progress_bars() as bar:
         samples, certificate = motion_of(
-            profile, motion(file, loaded, setup, bar("plan")), limits, T, start=np.zeros(6)
+            profile, motion(file, loaded, setup, bar("plan"), notes), limits, T, start=np.zeros(6)
         )
         blocks = _gathered(samples, T)
     axes = [k for k in range(6) if limits.present[k]]
@@ -51,9 +52,11 @@ def follow(
         "certificate": certificate.to_dict(),
     }
     if json:
-        print_json({**about, "files": [str(path) for path in files]})
+        print_json({**about, "notes": notes, "files": [str(path) for path in files]})
     else:
         _show(file, about, certificate, files)
+        for note in notes:
+            typer.echo(f"note: {note}")
     raise typer.Exit(0 if certificate.ok else 1)
 
 

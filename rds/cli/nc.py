@@ -162,24 +162,32 @@ def plot(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Draw a program's path in machine coordinates: from three sides and in space."""
+    """Draw a program's path in machine coordinates: from three sides and in space.
+
+    On a machine with less than two linear axes: each axis along the program.
+    """
     with refusals():
         from rds.machines import load_machine
-        from rds.nc.check import followed
+        from rds.nc.axis_plot import has_no_side, plot_axes
+        from rds.nc.check import followed, watched
         from rds.nc.plots import plot as draw
-        from rds.nc.toolpath import toolpath
         from rds.nc.trace import Trace
         from rds.nc.validate import Validator
 
         path = out or file.with_name(f"{file.stem}-path.png")
         of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
         validator = Validator(of, what.tool_list(), str(file))
-        trace = Trace()
+        trace, flat = Trace(), has_no_side(of)
+        segments = []
         with progress_bars() as bar:
-            for block in toolpath(followed(what.interpret(file), file, bar("read")), report=validator.report):
+            items = followed(what.interpret(file, validator.warn), file, bar("read"))
+            for block in watched(items, validator, what, validator.report):
                 validator.look(block)
-                trace.add(block.segments)
-        _save(draw(trace, of, file.name), path)
+                if flat:
+                    segments.append(block.segments)
+                else:
+                    trace.add(block.segments)
+        _save(plot_axes(segments, of, file.name) if flat else draw(trace, of, file.name), path)
         result = validator.result()
     if not result.ok:
         count = len(result.faults) + result.more
@@ -227,10 +235,11 @@ def time(
         from rds.nc.cycle_time import cycle_time
 
         of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
+        notes: list[str] = []
         with progress_bars() as bar:
-            found = cycle_time(motion(file, of, what, bar("plan")), of, sample_period, profile)
+            found = cycle_time(motion(file, of, what, bar("plan"), notes), of, sample_period, profile)
     if json:
-        print_json({"program": str(file), "machine": of.name, "profile": profile, **found.to_json()})
+        print_json({"program": str(file), "machine": of.name, "profile": profile, **found.to_json(), "notes": notes})
         raise typer.Exit(0 if found.certificate.ok else 1)
     from rds.cli.console import show_table
 
@@ -242,6 +251,8 @@ def time(
     title = f"{file}: {_clock(found.total)} on {of.name}{how}, {found.samples} samples of {found.T:g} s"
     show_table(title, ["tool", "cutting [s]", "rapid [s]", "dwell [s]", "total [s]"], rows)
     typer.echo(found.certificate.sentence())
+    for note in notes:
+        typer.echo(f"note: {note}")
     raise typer.Exit(0 if found.certificate.ok else 1)
 
 

@@ -19,7 +19,7 @@ With = Annotated[
     typer.Option(
         "--with",
         metavar="OPTION",
-        help="Of the dialect: block-delete, gr, program-numbers, inch-machine or any-exit.",
+        help="Of the dialect: block-delete, gr, program-numbers, default-feed, open-end, inch-machine or any-exit.",
     ),
 ]
 ProfileName = Annotated[
@@ -31,7 +31,7 @@ MaxJumps = Annotated[
         min=1, help="Calls and jumps back after which a program is taken for endless (default 1000000).", metavar="N"
     ),
 ]
-DIALECT = ("block-delete", "gr", "program-numbers", "inch-machine", "any-exit")
+DIALECT = ("block-delete", "gr", "program-numbers", "default-feed", "open-end", "inch-machine", "any-exit")
 
 
 def setup(

@@ -23,6 +23,11 @@ TRAVEL = Items(
     2,
     rising=True,
 )
+DEFAULT_FEED = Quantity(
+    "feed of part programs that give none (--with default-feed); by default what the slowest linear axis can do",
+    "mm/min",
+    above=0.0,
+)
 RESOLUTION = Quantity("of the encoder", "axis unit per count", above=0.0)
 PARAMETER = Quantity("parameter of the model")
 LIMITS = Table(
@@ -59,6 +64,7 @@ MACHINE = Table(
         "name": Text("name of the machine; by default the file's"),
         "title": Text("heading of reports", ""),
         "sample_period": SAMPLE_PERIOD,
+        "default_feed": DEFAULT_FEED,
         "converter": Table("digital-to-analogue converter", {"range": VOLTAGE_RANGE, "bits": BITS}),
         "axis": Table("axes by name, in the order of their voltages in the command frame", others=AXIS),
     },
@@ -105,7 +111,10 @@ class Axis:
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine: its axes by name, its converter, its sample period in s, and the file it was read from."""
+    """A machine: its axes by name, its converter, its sample period in s, and the file it was read from.
+
+    `default_feed` (mm/min) is that of part programs that give none; None: what the slowest linear axis can do.
+    """
 
     name: str
     title: str
@@ -113,6 +122,7 @@ class Machine:
     converter: Converter
     axes: dict[str, Axis]
     path: str
+    default_feed: float | None = None
 
     def axis(self, name: str) -> Axis:
         """The axis called `name`; InputError names the ones there are."""
@@ -155,6 +165,7 @@ def _machine(table: TomlTable) -> Machine:
         converter=Converter(range=converter.read("range"), bits=converter.read("bits")),
         axes=axes,
         path=table.path,
+        default_feed=table.read("default_feed", None),
     )
     for each in (converter, table):
         each.done()

@@ -20,11 +20,12 @@ from rds.nc.language.interpreter import interpret
 from rds.nc.language.parameters import read_parameters
 from rds.nc.language.reading_on import Later
 from rds.nc.language.tools import Tool, read_tools
-from rds.nc.toolpath import PathBlock, Report, toolpath
+from rds.nc.toolpath import PathBlock, Report, raise_it, toolpath
 from rds.nc.validate import Validation, Validator
 
 Item = MotionBlock | Call
 Progress = Callable[[int, int], None]
+_MOST_NOTES, _LONGEST_NOTE = 5, 300  # of a program, characters: they stand in the last line of the compiled form
 _LONGEST_NAME = 200  # bytes, of a subroutine that may have a file
 _CALLS = re.compile(rb"(?:o|gr)\s*(?:<\s*([^>\n]+?)\s*>|(\d+))", re.IGNORECASE)
 
@@ -48,14 +49,43 @@ class Setup:
         return interpret(program, tools=tools, parameters=parameters, options=self.options, name=name, remark=remark)
 
 
-def motion(program: Path, machine: Machine, setup: Setup, progress: Progress | None = None) -> Iterator[PathBlock]:
-    """The machine's motion for a program, checked as it comes: raises ProgramError at the first fault."""
+def motion(
+    program: Path,
+    machine: Machine,
+    setup: Setup,
+    progress: Progress | None = None,
+    notes: list[str] | None = None,
+) -> Iterator[PathBlock]:
+    """The machine's motion for a program, checked as it comes: raises ProgramError at the first fault.
+
+    `notes`, when given, gets at the end what is no fault and worth a look, by line.
+    """
     validator = Validator(machine, setup.tool_list(), str(program))
-    for block in toolpath(followed(setup.interpret(program), program, progress)):
+    for block in watched(
+        followed(setup.interpret(program, validator.warn), program, progress), validator, setup, raise_it
+    ):
         validator.look(block)
         if not validator.ok:
             raise validator.result().faults[0]
         yield block
+    if notes is not None:
+        notes += notes_of(validator.result())
+
+
+def watched(items: Iterable[Item], validator: Validator, setup: Setup, report: Report) -> Iterator[PathBlock]:
+    """The motion of canonical calls on the validator's machine; it hears of what is assumed and hardly meant."""
+    return toolpath(
+        items,
+        report=report,
+        warn=validator.warn_of_spindle,
+        default_feed=validator.default_feed if setup.options.default_feed else None,
+        assume=validator.warn_of_feed,
+    )
+
+
+def notes_of(validation: Validation) -> list[str]:
+    """The warnings of a valid program as sentences, the first few: what a reader of its run should know."""
+    return [f"line {found.line}: {found.reason}"[:_LONGEST_NOTE] for found in validation.warnings[:_MOST_NOTES]]
 
 
 def check_program(
@@ -72,7 +102,7 @@ def check_program(
         raise InputError("is where the compiled program would go, and is none; rename or move it", str(place))
     validator = Validator(machine, setup.tool_list(), str(program))
     items = followed(setup.interpret(program, validator.warn), program, progress)
-    blocks = validator.watch(toolpath(items, report=validator.report, warn=validator.warn_of_spindle))
+    blocks = validator.watch(watched(items, validator, setup, validator.report))
     try:
         write_files({place: write_compiled(header, _while_valid(blocks, validator), lambda: _summary(validator))})
     except _Faulty:
@@ -103,7 +133,8 @@ def _while_valid(blocks: Iterable[PathBlock], validator: Validator) -> Iterator[
 
 def _summary(validator: Validator) -> dict[str, Any]:
     result = validator.result()
-    return {"cutting_mm": result.cutting, "rapid_mm": result.rapid, "tools": list(result.tools)}
+    about = {"cutting_mm": result.cutting, "rapid_mm": result.rapid, "tools": list(result.tools)}
+    return about | {"notes": notes_of(result)}
 
 
 def compiled_if_current(program: Path, machine: Machine, setup: Setup) -> Compiled | None:

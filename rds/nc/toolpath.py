@@ -49,6 +49,14 @@ class Event(NamedTuple):
     line: int
 
 
+class DefaultFeed(NamedTuple):
+    """What a machine moves at by feed where no word F says more (option default-feed of the dialect)."""
+
+    machine: str
+    linear: float  # mm/min
+    rotary: float  # degrees/min, of moves of A, B, C alone
+
+
 @dataclass(frozen=True)
 class PathBlock:
     """Segments (dtype SEGMENT) in machine coordinates, and the events among them, all of one file and one tool.
@@ -76,14 +84,17 @@ def toolpath(
     *,
     report: Report = raise_it,
     warn: Report = lambda _: None,
+    default_feed: DefaultFeed | None = None,
+    assume: Report = lambda _: None,
 ) -> Iterator[PathBlock]:
     """The machine's motion for a stream of canonical calls, block by block; memory does not grow with its length.
 
     What no machine can do (an arc in a plane that the rotation tilts, a feed per revolution of a standing spindle, a
     call that nothing here carries out) goes to `report` as a ProgramError; if that returns, the path goes on. What is
-    allowed and hardly meant (a spindle started at S0) goes to `warn`.
+    allowed and hardly meant (a spindle started at S0) goes to `warn`. `default_feed` is that of moves without a feed
+    rate, and the first of them goes to `assume`.
     """
-    converter = _Converter(report, warn)
+    converter = _Converter(report, warn, default_feed, assume)
     try:
         for item in items:
             if isinstance(item, MotionBlock):
@@ -102,8 +113,10 @@ def toolpath(
 class _Converter:
     """Gathers rows while nothing changes that matters to them, then makes segments of them at once."""
 
-    def __init__(self, report: Report, warn: Report):
+    def __init__(self, report: Report, warn: Report, default_feed: DefaultFeed | None, assume: Report):
         self._report, self._warn = report, warn
+        self._default_feed, self._assume = default_feed, assume
+        self._assumed = False
         self._frame = Frame()
         self._mode, self._tolerance, self._collinear = BLEND, inf, 0.0
         self._per_revolution = False
@@ -208,12 +221,30 @@ class _Converter:
                 )
             )
         moving = segments["length"] > 0.0
-        still = moving & ~segments["rapid"] & ~(segments["rate"] > 0.0)
+        still = ~segments["rapid"] & ~(segments["rate"] > 0.0)
+        if self._default_feed is not None and not self._per_revolution and still.any():
+            self._take_default(self._default_feed, segments, still)
+            rate_lines = np.where(still, np.int32(0), rate_lines)  # no word F gave it
+            still &= ~(segments["rate"] > 0.0)
+        still &= moving
         if still.any():
             self._no_feed(int(segments["line"][np.argmax(still)]))
         self._segments.append(segments[moving])
         self._feed_lines.append(rate_lines[moving])
         self._count += int(moving.sum())
+
+    def _take_default(self, feed: DefaultFeed, segments: np.ndarray, still: np.ndarray) -> None:
+        rotary = only_rotary(segments[still]) & ((segments["length"][still] > 0.0) | (feed.linear == 0.0))
+        segments["rate"][still] = np.where(rotary, feed.rotary, feed.linear) / 60.0
+        if not self._assumed:
+            self._assumed = True
+            value, unit = (feed.rotary, "degrees/min") if rotary[0] else (feed.linear, "mm/min")
+            message = (
+                f"no feed rate is set before this move: the default feed of {feed.machine}, {value:g} {unit}, is "
+                "assumed (option default-feed)"
+            )
+            line = int(segments["line"][np.argmax(still)])
+            self._assume(ProgramError(message, file=self._file, line=line))
 
     def _no_feed(self, line: int) -> None:
         if self._per_revolution and not self._turning:

@@ -1,15 +1,16 @@
 """Validation of a part program against a machine (oacs-thesis, section 7.3 and appendices D and E).
 
-Along the whole path, exactly: each axis within its travel; the feed no faster than the slowest axis; the spindle within
-its range; both within what the tool bears; no move of an axis that the machine does not have.
+Along the whole path, exactly: each axis within its travel; the feed no faster than the slowest axis of those that move;
+the spindle within its range; both within what the tool bears; no move of an axis that the machine does not have.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,21 +21,18 @@ from rds.nc.extent import extents
 from rds.nc.fault_columns import at_their_words
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import only_rotary
+from rds.nc.toolpath import DefaultFeed
 
 if TYPE_CHECKING:
     from rds.nc.language.tools import Tool
     from rds.nc.toolpath import Event, PathBlock
-import re
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    from rds.nc.language.tools import Tool
 
 TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
 LONGEST_DWELL = 3600.0  # s; chosen: more is a P in milliseconds
 MOST_FAULTS = 1000  # are kept; others are counted
 MOST_WARNINGS = 100  # are kept
 _FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
+LINEAR, ROTARY = slice(0, 3), slice(3, 6)  # of the axes
 _UNITS = ("mm", "mm", "mm", "degrees", "degrees", "degrees")
 
 
@@ -136,7 +134,6 @@ class Validator:
         axes = [machine.axes[axis] if here else None for axis, here in zip(AXES, self._present, strict=True)]
         self._least = np.array([axis.travel[0] if axis else -inf for axis in axes]) - TOLERANCE
         self._most = np.array([axis.travel[1] if axis else inf for axis in axes]) + TOLERANCE
-        self._slowest = {False: self._slowest_of(slice(0, 3)), True: self._slowest_of(slice(3, 6))}
         self._spindle = next((axis for axis in machine.axes.values() if axis.unit == "rev/min"), None)
         self._worst: dict[tuple[str, int, str], tuple[float, ProgramError, str]] = {}
         self._files: dict[str, int] = {}
@@ -157,15 +154,21 @@ class Validator:
         """The same, of what M3, M4 and S say."""
         self.warn(found, "M3 M4 S")
 
+    def warn_of_feed(self, found: ProgramError) -> None:
+        """The same, of a move whose feed is assumed."""
+        self.warn(found, "G1 G2 G3 X Y Z A B C")
+
+    @property
+    def default_feed(self) -> DefaultFeed:
+        """What the machine moves at by feed where a program gives none: its own, or what its slowest axis can do."""
+        slowest = [60.0 * self._velocity[some][self._present[some]].min(initial=inf) for some in (LINEAR, ROTARY)]
+        linear, rotary = (float(speed) if speed < inf else 0.0 for speed in slowest)
+        return DefaultFeed(self._machine.name, self._machine.default_feed or linear, rotary)
+
     @property
     def ok(self) -> bool:
         """Whether no fault has been found so far."""
         return not self._worst
-
-    def _slowest_of(self, some: slice) -> tuple[str, float]:
-        """The slowest of some axes, and its velocity; inf when the machine has none of them."""
-        speeds = np.where(self._present, self._velocity, inf)[some]
-        return AXES[some][int(np.argmin(speeds))], float(np.min(speeds))
 
     def watch(self, blocks: Iterable[PathBlock]) -> Iterator[PathBlock]:
         """The same blocks, looked at. What ends the program (its ProgramError) ends it here as one fault more."""
@@ -209,7 +212,7 @@ class Validator:
         low, high = extents(segments)
         self._low, self._high = np.minimum(self._low, low.min(axis=0)), np.maximum(self._high, high.max(axis=0))
         self._look_at_travel(block, low, high)
-        self._look_at_feed(block, linear, limits)
+        self._look_at_feed(block, linear, high - low > TOLERANCE, limits)
 
     def _fault(self, block: PathBlock, line: int, message: str, kind: str, excess: float, letters: str) -> None:
         self.report(ProgramError(message, file=block.file or self._name, line=int(line)), kind, excess, letters)
@@ -246,15 +249,19 @@ class Validator:
             f"{plain(beyond)} {unit} beyond its travel of {least:g} to {most:g}; shorten the path, or move its origin"
         )
 
-    def _look_at_feed(self, block: PathBlock, linear: np.ndarray, limits: ToolLimits) -> None:
+    def _look_at_feed(self, block: PathBlock, linear: np.ndarray, moves: np.ndarray, limits: ToolLimits) -> None:
+        """`moves` says which axes each segment moves (n × 6)."""
         segments = block.segments
         feeds = ~segments["rapid"]
-        for only in (False, True):
-            name, limit = self._slowest[only]
+        speeds = np.where(moves & self._present, self._velocity, inf)
+        for only, axes in ((False, LINEAR), (True, ROTARY)):
             some = feeds & (linear != only)
-            self._too_fast(block, some, limit, f"{name}, the slowest {'rotary ' * only}axis, can do")
+            slowest = np.argmin(speeds[:, axes], axis=1) + axes.start
+            for axis in np.unique(slowest[some]):
+                who = f"{AXES[axis]}, the slowest {'rotary ' * only}axis that moves, can do"
+                self._too_fast(block, some & (slowest == axis), self._velocity[axis] or inf, who, "axes")
         tool = limits.feed / 60.0
-        self._too_fast(block, feeds & linear, tool, f"the tool table allows tool {block.tool}")
+        self._too_fast(block, feeds & linear, tool, f"the tool table allows tool {block.tool}", "tool")
         way = np.abs(segments["end"] - segments["start"])[:, 3:]
         turning = np.flatnonzero(feeds & linear & np.any(way > TOLERANCE, axis=1))
         if len(turning):
@@ -270,8 +277,11 @@ class Validator:
                     name = AXES[3 + axis]
                     self._fault(block, line, message, f"turn {name}", float(speed[at, axis]), f"F {name}")
 
-    def _too_fast(self, block: PathBlock, some: np.ndarray, limit: float, who: str) -> None:
-        """`limit` in mm/s or degrees/s. The fault is on the line of the word F, for all moves that obey it."""
+    def _too_fast(self, block: PathBlock, some: np.ndarray, limit: float, who: str, kind: str) -> None:
+        """`limit` in mm/s or degrees/s. The fault is on the line of the word F, for all moves that obey it.
+
+        Of the faults of a `kind` on a line the one farthest beyond its limit is kept.
+        """
         rate = block.segments["rate"]
         too_fast = np.flatnonzero(some & (rate > limit * _FASTER))
         if not len(too_fast):
@@ -283,7 +293,7 @@ class Validator:
         for line in np.unique(at_line):
             fastest = float(rate[too_fast[at_line == line]].max())
             message = f"a feed of {plain(fastest * 60)} {unit} is more than {who} ({plain(limit * 60)}); lower it"
-            self._fault(block, line, message, f"feed {who} {unit}", fastest, "F")
+            self._fault(block, line, message, f"feed {kind} {unit}", fastest / limit, "F G1 G2 G3")
 
     def _look_at_spindle(self, event: Event, block: PathBlock, limits: ToolLimits) -> None:
         speed = float(event.value)

@@ -30,7 +30,7 @@ T = 1e-3
 
 @pytest.mark.parametrize("name", ["mini-cnc", "mrmt-oacs"])
 def test_the_machines_can_follow_their_limits(name: str) -> None:
-    """v + τ a + friction is within what ±10 V give, by each axis's model, in both directions, with 3 % to spare."""
+    """v + τ a + friction is within what the converter gives, by each axis's model, both ways, with 3 % to spare."""
     machine = load_machine(name)
     limits = Limits.of(machine)
     assert limits.present.any()

@@ -75,7 +75,7 @@ def test_check_of_an_invalid_program(folder: Path) -> None:
     done = nc("check", "bad.ngc")
     assert done.exit_code == 1
     assert done.stdout.splitlines() == [
-        "bad.ngc:1:1: F800: a feed of 800 mm/min is more than Z, the slowest axis, can do (660); lower it",
+        "bad.ngc:1:1: F800: a feed of 800 mm/min is more than X, the slowest axis that moves, can do (780); lower it",
         "bad.ngc:2:4: X90: X would reach 90 mm (machine coordinates), 15 mm beyond its travel of -75 to 75; "
         "shorten the path, or move its origin",
         "bad.ngc:3:1: G81: canned cycles are outside this dialect; write their moves as G0 and G1",

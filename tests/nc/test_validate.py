@@ -94,9 +94,19 @@ def test_a_valid_program_and_what_is_told_of_it(tmp_path: Path) -> None:
         ("F60\nG0 X70.0001\n(X1) G2 Y-10 J-5\n", (3, 6, "G2"), "on this arc X would reach 75.0001 mm"),
         ("G20\nG0 Z [1+1]\n", (2, 4, "Z [1+1]"), "Z would reach 50.8 mm"),
         ("G0 A0\nA1\n", (2, 1, "A1"), "has no axis A to move (it has X, Y, Z)"),
-        ("F661\nG1 X1\nX2\n", (1, 1, "F661"), "661 mm/min is more than Z, the slowest axis, can do (660)"),
-        ("G93\nG1 X10 F67\n", (2, 8, "F67"), "670 mm/min is more than Z"),
-        ("S1000 M3\nG95\nG1 X1 F0.67\n", (3, 7, "F0.67"), "670 mm/min"),
+        (
+            "F661\nG1 X1\nX2 Z1\n",
+            (1, 1, "F661"),
+            "661 mm/min is more than Z, the slowest axis that moves, can do (660)",
+        ),
+        (
+            "F800\nG1 X1\nX2 Z1\n",
+            (1, 1, "F800"),
+            "800 mm/min is more than Z, the slowest axis that moves, can do (660)",
+        ),
+        ("F781\nG2 X1 Y1 I0.5 J0.5\n", (1, 1, "F781"), "781 mm/min is more than X, the slowest axis that moves"),
+        ("G93\nG1 X10 F79\n", (2, 8, "F79"), "790 mm/min is more than X"),
+        ("S1000 M3\nG95\nG1 Z1 F0.67\n", (3, 7, "F0.67"), "670 mm/min"),
         ("T1 M6\nF401\nG1 X1\n", (2, 1, "F401"), "401 mm/min is more than the tool table allows tool 1 (400)"),
         ("S10001\nM3\n", (2, 1, "M3"), "10001 rev/min is outside of what the spindle does (-10000 to 10000"),
         ("M4\nS10001\n", (2, 1, "S10001"), "10001 rev/min counter-clockwise is outside"),
@@ -117,10 +127,10 @@ def test_each_clause_by_line_and_word(tmp_path: Path, text: str, expected: tuple
 
 
 def test_all_faults_are_told_in_the_order_of_lines(tmp_path: Path) -> None:
-    text = "F700\nG1 X80\nY10\nG1 X0 Y-80\nG1 Y0 A5\nG1 G2 X1\n(later)\nG81 X1\nX1 X2\n#1=[1/0]\nM2\nG999\n"
+    text = "F800\nG1 X80\nY10\nG1 X0 Y-80\nG1 Y0 A5\nG1 G2 X1\n(later)\nG81 X1\nX1 X2\n#1=[1/0]\nM2\nG999\n"
     found = check(tmp_path, text)
     assert [(fault.line, fault.word) for fault in found.faults] == [
-        (1, "F700"),
+        (1, "F800"),
         (2, "X80"),
         (4, "Y-80"),
         (5, "A5"),
@@ -154,8 +164,14 @@ def test_a_rotary_machine_has_its_own_limits(tmp_path: Path) -> None:
     assert check(tmp_path, "G93 G1 X0 A90 F1\nG94 F60 X10\nM2\n", "mrmt-oacs").ok
     found = check(tmp_path, "F181\nG1 A10\nF60\nX1 A100\nM3 S600\nY1\nM2\n", "mrmt-oacs")
     assert [(fault.line, fault.word) for fault in found.faults] == [(1, "F181"), (4, "A100"), (5, "S600"), (6, "Y1")]
-    assert "181 degrees/min is more than A, the slowest rotary axis, can do (180)" in str(found)
+    assert "181 degrees/min is more than A, the slowest rotary axis that moves, can do (180)" in str(found)
     assert "A would turn at 5400 degrees/min to keep up" in str(found)
+
+
+def test_an_axis_that_stands_still_does_not_limit_the_feed(tmp_path: Path) -> None:
+    assert check(tmp_path, "G1 X10 F780\nM2\n").ok
+    assert check(tmp_path, "G1 X10 A5 F100\nM2\n", "mrmt-oacs").ok  # Z does 66 mm/min
+    assert not check(tmp_path, "G1 X10 Z1 F100\nM2\n", "mrmt-oacs").ok
 
 
 def test_a_machine_without_limits_is_refused(tmp_path: Path) -> None:

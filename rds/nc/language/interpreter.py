@@ -30,7 +30,7 @@ from rds.nc.language.words import column_of, fill, line_number, place_of, read_p
 if TYPE_CHECKING:
     from rds.nc.compensation.moves import Stretch
 
-_PROGRAM_NUMBER = re.compile(r"p[0-9]+")
+_PROGRAM_NUMBER = re.compile(r"[po][0-9]+")
 _MOTION_WORD = re.compile(r"(?:n[0-9]+)?(?!o).*?(g40(?![0-9])|[xyz]|m[0-9])")  # of a block that compensation refuses
 
 
@@ -110,9 +110,11 @@ class Interpreter:
                 if wait < 0:
                     wait = self.lane.take(self.control)
                 raw = self.control.source.read()
-                if not raw:
+                if raw:
+                    ended = self._line(raw)
+                else:
                     self._file_ended()
-                ended = self._line(raw)
+                    ended = True
                 if out.items:
                     yield from self._take()
         except ProgramError:
@@ -147,11 +149,18 @@ class Interpreter:
             self.source.go_to(first)
 
     def _file_ended(self) -> None:
+        """Raises ProgramError, but where the last line of the program may be its end."""
         source = self.control.source
         try:
             self.control.check_end()
         except ProgramError as error:
             raise error.at(source.name, source.line) from None
+        if self.options.open_end and not self._percent and source is self.source and not self.control.depth:
+            self._end_here()
+            if self._remark is not None:
+                said = "the program has no M2, M30 or %: its last line is taken for its end (option open-end)"
+                self._remark(ProgramError(said, file=source.name, line=source.line))
+            return
         what = "%" if self._percent else "M2, M30 or % (then with % on the first line, too)"
         raise ProgramError(
             f"the program does not end; write {what} on its last line", file=source.name, line=source.line
@@ -183,6 +192,8 @@ class Interpreter:
             raise self._error(Fault(error.reason, at=word.start(1) if word else -1), raw) from None
 
     def _block(self, text: str) -> bool:
+        if self.options.program_numbers and not self.control.skipping and self._program_number(text):
+            return False
         plain = None if self.control.skipping else read_plain(text)
         if plain is None:
             return self._other(text)
@@ -193,8 +204,6 @@ class Interpreter:
             if out.digits > 9:
                 line_number(text)
             out.n = int(digits)
-        if self.options.program_numbers and self._program_number(text):
-            return False
         block = Block()
         fill(block, words, text)
         return self._execute(block)
@@ -245,12 +254,13 @@ class Interpreter:
         return ended
 
     def _program_number(self, text: str) -> bool:
-        """The option's program number, P001, on the first block."""
+        """The option's program number, P001 or O001, on the first block."""
         if not _PROGRAM_NUMBER.fullmatch(text):
             return False
         if not self._first:
-            raise Fault("a program number stands on the first block; remove it here", "p")
+            raise Fault("a program number stands on the first block; remove it here", at=0)
         self._first = False
+        self.out.digits = self.out.n = 0
         self.out.comment(f"program {text.upper()}")
         return True
 
@@ -263,11 +273,15 @@ class Interpreter:
         self.out.digits = 0
         if self.control.source is not self.source:
             raise Fault("% inside a subroutine; end it with ENDSUB before", at=0)
+        self._end_here()
+        return True
+
+    def _end_here(self) -> None:
+        """End without M2 or M30: modes, spindle and coolant stay as they are."""
         compensation = self.out.compensation
         if compensation is not None:
             self.out.put(compensation.stop(self.out.line))
         self.out.call("FINISH")
-        return True
 
     def _look_behind(self) -> None:
         """Remark on blocks behind the end; a program may also end in a subroutine's file."""

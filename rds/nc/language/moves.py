@@ -10,7 +10,7 @@ from rds.nc.language.canon import ARC, FEED, TRAVERSE
 from rds.nc.language.context import Context, given, rotate
 from rds.nc.language.expressions import Fault
 from rds.nc.language.offsets import home_of, minus, plus
-from rds.nc.language.state import INVERSE_TIME, NO_MOTION, PER_REVOLUTION, PLANES, State
+from rds.nc.language.state import INVERSE_TIME, NO_MOTION, PER_MINUTE, PER_REVOLUTION, PLANES, State
 
 STANDING = 1e-7  # a move shorter than this in X, Y and Z is one of the rotary axes
 SLOWEST_INVERSE = 0.1  # units/min; LinuxCNC makes no slower move in inverse time
@@ -60,12 +60,15 @@ def in_machine_coordinates(m: Context, words: dict[str, float]) -> list[float]:
     return end
 
 
-def check_feed(state: State, words: dict[str, float], key: str) -> None:
-    """Raises Fault when a move by feed has no feed rate."""
+def check_feed(m: Context, words: dict[str, float], key: str) -> None:
+    """Raises Fault when a move by feed has no feed rate, and the machine's default is not to be taken."""
+    state = m.state
     if state.feed_mode == INVERSE_TIME:
         if "f" not in words:
             raise Fault("in inverse time (G93) every move by feed needs F on its line, 1/minutes; add it", key)
     elif state.feed_rate == 0.0:
+        if m.dialect.default_feed and state.feed_mode == PER_MINUTE:
+            return
         unit = "units per revolution" if state.feed_mode == PER_REVOLUTION else "units per minute"
         raise Fault(f"no feed rate is set; write F, in {unit}", key)
     elif state.feed_mode == PER_REVOLUTION and state.speed == 0.0:
@@ -96,7 +99,7 @@ def traverse(m: Context, block: Block) -> None:
 def feed(m: Context, block: Block) -> None:
     """G1."""
     state = m.state
-    check_feed(state, block.words, "g10")
+    check_feed(m, block.words, "g10")
     state.motion = 10
     end = _end(m, block) if block.g else target(state, block.words)
     if state.feed_mode == INVERSE_TIME:
@@ -153,7 +156,7 @@ def arc(m: Context, block: Block, code: int) -> None:
     if not state.arc_allowed:
         raise Fault("the move after G40 must be straight; write G0 or G1 before the arc", key)
     offsets = centre_offsets(words, state, key)
-    check_feed(state, words, key)
+    check_feed(m, words, key)
     end = target(state, words)
     state.motion = code
     first, second, third = AXES_OF[state.plane]

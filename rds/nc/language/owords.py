@@ -52,9 +52,12 @@ def read_word(text: str, at: int, parameters: Parameters, *, scope: str, definin
     if match:
         reader.at = match.end()
     elif not defining:
-        alone = " stands alone (a program number elsewhere); leave it away or" if not reader.peek() else " is followed"
-        said = "" if not reader.peek() else " by no control word;"
-        raise Fault(f"{word.spelled}{alone}{said} write one of {', '.join(_KINDS).upper()} after it", at=at)
+        alone = (
+            " stands alone; as a program number it is an option of the dialect, of the first block (`--with"
+            " program-numbers`): switch it on, leave it away, or"
+        )
+        said = " is followed by no control word;" if reader.peek() else alone
+        raise Fault(f"{word.spelled}{said} write one of {', '.join(_KINDS).upper()} after it", at=at)
     _read_values(word, reader, defining, skipping)
     if not skipping:
         while reader.peek() == "(":

@@ -41,6 +41,7 @@ def judged(result: Result, prepared: Prepared) -> Result:
         columns["path_error"], units["path_error"] = contour(result, prepared, state, "reference")[0], "mm"
     moves = moving(result)
     on_path = moves & (state != State.HOME)
+    linear = any(name in _LINEAR for name in prepared.program.axes)
 
     def worst(values: np.ndarray, line: np.ndarray, where: np.ndarray, unit: str) -> dict[str, Any] | None:
         return _worst(values[where], line[where], result["time"][where], unit) if where.any() else None
@@ -51,7 +52,7 @@ def judged(result: Result, prepared: Prepared) -> Result:
         "certificate": prepared.certificate.to_dict() if prepared.certificate else None,
         "waiting_samples": len(result) - int(moves.sum()),
         "limit_shares": _limit_shares(result, prepared),
-        "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) else None,
+        "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) and linear else None,
         **({"path_error": worst(columns["path_error"], line, on_path, "mm")} | made.about if made is not None else {}),
         "following_error": {
             name: found

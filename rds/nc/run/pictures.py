@@ -16,12 +16,15 @@ from rds.results import Result
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+LINEAR, ROTARY = "XYZ", "ABC"
 _POINTS = 6000  # of a curve in a picture
 _VIEWS = (("XY", "X", "Y"), ("ZX", "X", "Z"), ("YZ", "Y", "Z"))
 _NAMED = 3  # of the worst lines
 _MARKERS = ("o", "s", "D")
 _WORST: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "color": VERMILLION, "zorder": 3}
 _CUT: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1, "label": "cut, as planned"}
+_COLOURS: dict[str, Any] = {"cmap": "viridis", "linewidths": 0, "zorder": 2}
+_LEAST_ERROR = 0.01  # µm, at the end of the scale: less is rounding
 _RAPID: dict[str, Any] = {
     "color": SKY,
     "linewidth": 1.2,
@@ -32,38 +35,63 @@ _RAPID: dict[str, Any] = {
 
 
 def path(result: Result, prepared: Prepared) -> Picture:
-    """The path from up to three sides: rapids dashed as planned, cuts as measured in the colour of their contour error.
+    """The path from up to three sides, and over time of each axis that no side shows: a rotary one, or the only one.
 
-    The worst lines are marked, and named in the legend.
+    Rapids are dashed as planned, cuts as measured in the colour of their contour error. The worst lines are marked, and
+    named in the legend.
     """
     axes = prepared.program.axes
     views = [view for view in _VIEWS if view[1] in axes and view[2] in axes]
+    alone = [name for name in axes if not any(name in view[1:] for view in views)]
+    contour = any(name in LINEAR for name in axes)
     error = result["contour_error"] * 1e3
     planned, rapid, row = _planned(result, prepared)
     at = _thinned(error, np.flatnonzero(~rapid[row] & (result["program_state"] != State.HOME)))
-    picture = Picture(4.6 if len(views) == 1 else 8.0)
-    places = picture.subplots(-(-len(views) // 2), min(len(views), 2) or 1, squeeze=False).ravel()
+    count = len(views) + len(alone)
+    across = 2 if len(views) > 1 else 1
+    rows = -(-count // across)
+    picture = Picture(8.0 if across == 2 and rows == 2 else 3.8 * rows if across == 2 else max(2.8 * rows, 4.6))
+    places = picture.subplots(rows, across, squeeze=False).ravel()
+    edges = _edges(len(rapid))
+    worst = [
+        (f"line {line}: {value:.1f} µm", int(np.searchsorted(result["time"], when)))
+        for line, value, when in (worst_lines(result, error, _NAMED) if contour else ())
+    ]
     drawn: Any = None
-    for place, (title, across, up) in zip(places, views, strict=False):
-        x, y = result[f"{across}_measured"], result[f"{up}_measured"]
-        edges = _edges(len(rapid))
-        u, v = (planned[edges, axes.index(name)] for name in (across, up))
+    most = max(float(error[at].max(initial=0.0)), _LEAST_ERROR)
+
+    def draw(place: Axes, wanted: tuple[np.ndarray, np.ndarray], measured: tuple[np.ndarray, np.ndarray]) -> Any:
         for kind, style in ((False, _CUT), (True, _RAPID)):
-            place.plot(np.where(rapid[edges] == kind, u, np.nan), np.where(rapid[edges] == kind, v, np.nan), **style)
-        drawn = place.scatter(x[at], y[at], c=error[at], s=5.0, cmap="viridis", linewidths=0, zorder=2)
-        for (line, value, when), marker in zip(worst_lines(result, error, _NAMED), _MARKERS, strict=False):
-            k = int(np.searchsorted(result["time"], when))
-            label = f"line {line}: {value:.1f} µm"
+            shown = rapid[edges] == kind
+            place.plot(np.where(shown, wanted[0], np.nan), np.where(shown, wanted[1], np.nan), **style)
+        x, y = measured
+        for (label, k), marker in zip(worst, _MARKERS, strict=False):
             place.plot(x[k], y[k], linestyle="none", marker=marker, label=label, **_WORST)
-        dress(place, f"{up} [mm]", f"{across} [mm]")
+        if not contour:
+            place.plot(x, y, color=BLACK, linewidth=0.9, zorder=2, label="measured")
+            return None
+        return place.scatter(x[at], y[at], c=error[at], vmin=0.0, vmax=most, s=5.0, **_COLOURS)
+
+    for place, (title, across_name, up) in zip(places, views, strict=False):
+        names = (across_name, up)
+        u, v = (planned[edges, axes.index(name)] for name in names)
+        x, y = (result[f"{name}_measured"] for name in names)
+        drawn = draw(place, (u, v), (x, y))
+        dress(place, f"{up} [mm]", f"{across_name} [mm]")
         place.set_aspect("equal", adjustable="datalim")
         place.set_title(title, loc="left", fontsize="medium")
-    for place in places[len(views) :]:
+    sent = _sent_at(result, row, edges)
+    for place, name in zip(places[len(views) :], alone, strict=False):
+        u, v = sent, planned[edges, axes.index(name)]
+        drawn = draw(place, (u, v), (result["time"], result[f"{name}_measured"])) or drawn
+        dress(place, f"{name} [{result.units[f'{name}_measured']}]")
+        place.set_title(f"{name} over time", loc="left", fontsize="medium")
+    for place in places[count:]:
         place.set_axis_off()
     if drawn is not None:
         picture.colorbar(drawn, ax=list(places), label="contour error of the cuts [µm]", shrink=0.8)
-        handles, texts = places[0].get_legend_handles_labels()
-        picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
+    handles, texts = places[0].get_legend_handles_labels()
+    picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
     return picture
 
 
@@ -79,6 +107,13 @@ def _planned(result: Result, prepared: Prepared) -> tuple[np.ndarray, np.ndarray
     count = len(prepared.segment)
     rapid = prepared.path["rapid"][prepared.segment] if len(prepared.path) else np.zeros(count, bool)
     return program.position, rapid, np.clip(np.ceil(result["program_sample"]).astype(int), 0, count - 1)
+
+
+def _sent_at(result: Result, row: np.ndarray, planned: np.ndarray) -> np.ndarray:
+    """Time at which each of the planned samples was sent, s, by the planned sample of each row; nan: never."""
+    reached = np.maximum.accumulate(row)
+    time: np.ndarray = result["time"][np.searchsorted(reached, planned).clip(0, len(row) - 1)]
+    return np.where(planned <= reached[-1], time, np.nan)
 
 
 def along(result: Result, prepared: Prepared) -> Picture:
@@ -98,8 +133,17 @@ def along(result: Result, prepared: Prepared) -> Picture:
         middle.plot(time[edges], values, color=CYCLE[i % 6], linestyle=style, linewidth=1.1, label=f"{name} [{unit}]")
     dress(middle, "|following error|", None)
     legend(middle)
-    bottom.plot(time[edges], _feed(result, prepared.program.axes)[edges], color=CYCLE[0], linewidth=1.1)
-    dress(bottom, "feed [mm/min]")
+    speeds = [
+        (label, _speed(result, found))
+        for label, of in (("feed [mm/min]", LINEAR), ("turning [degrees/min]", ROTARY))
+        if (found := [name for name in prepared.program.axes if name in of])
+    ]
+    several = len(speeds) > 1
+    for i, (label, speed) in enumerate(speeds):
+        style = ("-", (0, (5, 2)))[i]
+        shown = label if several else None
+        bottom.plot(time[edges], speed[edges], color=CYCLE[i], linestyle=style, linewidth=1.1, label=shown)
+    dress(bottom, "speed" if several else speeds[0][0])
     _mark_waits(bottom, result)
     _mark_lines(top, result)
     return picture
@@ -160,7 +204,8 @@ def _thinned(error: np.ndarray, shown: np.ndarray) -> np.ndarray:
     return ordered
 
 
-def _feed(result: Result, axes: tuple[str, ...]) -> np.ndarray:
-    """Speed along the path, mm/min, of the reference in X, Y and Z."""
-    speeds = [result[f"{name}_reference_velocity"] for name in axes if name in "XYZ"]
-    return 60.0 * np.sqrt(sum(speed**2 for speed in speeds)) if speeds else np.zeros(len(result))
+def _speed(result: Result, axes: list[str]) -> np.ndarray:
+    """Speed of the reference in some axes together, per minute."""
+    squares: np.ndarray = sum((result[f"{name}_reference_velocity"] ** 2 for name in axes), np.zeros(len(result)))
+    speed: np.ndarray = 60.0 * np.sqrt(squares)
+    return speed

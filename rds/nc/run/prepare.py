@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,8 @@ def prepare(
             raise InputError(str(validation))
         compiled = open_compiled(place)
     require_room(least_seconds(compiled.blocks()), machine, T, file)
-    return planned(compiled.blocks(), machine, T, file)
+    found = planned(compiled.blocks(), machine, T, file)
+    return replace(found, notes=(*compiled.trailer.get("notes", ()), *found.notes))
 
 
 def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path) -> Prepared:

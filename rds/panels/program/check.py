@@ -10,13 +10,13 @@ from typing import Any
 from rds.core.errors import RdsError
 from rds.machines import Machine
 from rds.nc.active import Follower, Modes
-from rds.nc.check import Setup
+from rds.nc.check import Setup, watched
 from rds.nc.cycle_time import CycleTime, cycle_time
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.parameters import read_parameters
 from rds.nc.language.reading_on import Later
 from rds.nc.run.prepare import least_seconds, require_room
-from rds.nc.toolpath import PathBlock, toolpath
+from rds.nc.toolpath import PathBlock
 from rds.nc.trace import Trace
 from rds.nc.validate import Validation, Validator
 from rds.panels.session.task import Task
@@ -103,7 +103,7 @@ def look(
         return Look((Mark(0, 0, 0, error.reason),))
     kept: list[PathBlock] = []
     try:
-        for block in validator.watch(toolpath(follower.run(), report=validator.report, warn=validator.warn_of_spindle)):
+        for block in validator.watch(watched(follower.run(), validator, setup, validator.report)):
             trace.add(block.segments)
             kept.append(block)
     finally:

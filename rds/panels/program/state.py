@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 PANEL = "program"  # its name among the session's choices
 FIRST = "part.ngc"  # what is open in a folder without programs
 NO_TABLE = ""
+OPTIONS = {  # of the dialect: label and tooltip
+    "block_delete": ("Leave out / blocks", "whether blocks that begin with / are left out"),
+    "program_numbers": ("Program numbers", "the first block may be P001 or O001, and ; ends a block"),
+    "default_feed": ("Default feed", "moves before the first word F have the machine's default feed"),
+    "open_end": ("Open end", "the program may end with its last line, without M2 or M30"),
+}
 
 
 def program_choices(session: Session) -> Choices:
@@ -54,7 +60,8 @@ def _fields(folder: Path) -> Iterable[Field]:
         high=200.0,
     )
     yield Flag("optional_stop", "Stop at M1", "whether M1 waits for Resume", True)
-    yield Flag("block_delete", "Leave out / blocks", "whether blocks that begin with / are left out", False)
+    for name, (label, tip) in OPTIONS.items():
+        yield Flag(name, label, tip, False)
 
 
 def _table_field(folder: Path) -> Choice:
@@ -103,7 +110,7 @@ class Program:
             except InputError as error:
                 self.trouble = str(error)
                 self.choices.set("file", self.text.name)
-        if name in ("file", "tools", "block_delete"):
+        if name in ("file", "tools", *OPTIONS):
             self.look_again()
 
     # the text
@@ -206,7 +213,7 @@ class Program:
         from rds.nc.language.dialect import Dialect
 
         table = str(self.choices["tools"])
-        options = Dialect(block_delete=bool(self.choices["block_delete"]))
+        options = Dialect(**{name: bool(self.choices[name]) for name in OPTIONS})
         return Setup(self.session.folder / table if table else None, options=options)
 
     def refresh(self) -> None:

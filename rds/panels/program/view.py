@@ -17,7 +17,7 @@ from rds.panels.program.operator import Operator
 from rds.panels.program.preview import Preview
 from rds.panels.program.result import ProgramResult
 from rds.panels.program.run import ProgramWork
-from rds.panels.program.state import Program
+from rds.panels.program.state import OPTIONS, Program
 from rds.panels.program.status import status_html
 from rds.panels.program.tool_view import ToolView
 
@@ -55,7 +55,7 @@ class ProgramView:
 
     def _arranged(self) -> widgets.Widget:
         choices = self.program.choices
-        settings = field_group(choices, ["controller", "optional_stop", "block_delete"])
+        settings = field_group(choices, ["controller", "optional_stop", *OPTIONS])
         more = widgets.VBox([settings, self.tools.widget])
         run = widgets.VBox([self.status, self.strip])
         self.tabs = widgets.Tab([self.preview.widget, run, self.result.widget, more], titles=TABS)

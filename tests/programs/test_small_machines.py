@@ -1,0 +1,155 @@
+"""Machines with less than two linear axes, and the programs that the theses print: they run, with sensible pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rds.cli.main import app
+from rds.machines import load_machine
+from rds.nc.axis_plot import plot_axes
+from rds.nc.check import Setup, motion
+from rds.nc.language.dialect import Dialect
+from rds.nc.run.pictures import along, path
+from rds.nc.run.run import PartProgram
+
+AXIS = """
+[axis.{name}]
+node = {node}
+unit = "{unit}"
+travel = [-400.0, 400.0]
+resolution = 0.001
+[axis.{name}.model]
+name = "linear-axis"
+tau = 0.01
+K = {gain}
+[axis.{name}.limits]
+velocity = {velocity}
+acceleration = {acceleration}
+jerk = {jerk}
+"""
+LINEAR = {"unit": "mm", "gain": 1.8, "velocity": 13.0, "acceleration": 200.0, "jerk": 10000.0}
+ROTARY = {"unit": "deg", "gain": 10.0, "velocity": 60.0, "acceleration": 600.0, "jerk": 30000.0}
+PROGRAMS = {
+    "X": "G21 G90 G61 F600\nG0 X4\nG1 X6\nX2\nM2\n",
+    "XC": "G21 G90 G61 F600\nG0 X4\nG1 X6 C10\nC40 F3000\nG0 X0 C0\nM2\n",
+    "C": "G21 G90 G61 F1200\nG0 C10\nG1 C30\nG0 C0\nM2\n",
+}
+P001 = "P001;\nN10 G01 X0 Y0;\nN20 G01 X100 A25 F100 S1000;\nN30 M00;\nN40 M02;\n"
+TABLE_5_2 = "O001  \nN010 G21 G40 G91  \nN020 G0 X70 Y20  \nN030 X-70 Y-20  \nN040 M5\n"
+
+
+def machine(folder: Path, axes: str) -> Path:
+    tables = [
+        AXIS.format(name=name, node=node, **(LINEAR if name in "XYZ" else ROTARY)) for node, name in enumerate(axes, 2)
+    ]
+    file = folder / f"{axes}.toml"
+    file.write_text("sample_period = 0.001\n" + "".join(tables))
+    return file
+
+
+def written(folder: Path, text: str) -> Path:
+    file = folder / "part.ngc"
+    file.write_text(text)
+    return file
+
+
+@pytest.mark.parametrize("axes", PROGRAMS)
+def test_axes_that_no_side_shows_are_drawn_over_time(axes: str, tmp_path: Path) -> None:
+    part = PartProgram(written(tmp_path, PROGRAMS[axes]), str(machine(tmp_path, axes)))
+    result = part.run()
+    assert result.meta["program"]["completed"]
+    assert (result.meta["program"]["contour_error"] is None) == (axes == "C")
+    picture = path(result, part.prepared)
+    places = [place for place in picture.axes if place.get_title(loc="left")]
+    assert [place.get_title(loc="left") for place in places] == [f"{name} over time" for name in axes]
+    for name, place in zip(axes, places, strict=True):
+        planned = np.concatenate([line.get_ydata() for line in place.lines[:2]])
+        reference = result[f"{name}_reference"]
+        assert np.nanmax(planned) == pytest.approx(reference.max()) and np.nanmin(planned) == reference.min()
+        rapid = place.lines[1].get_ydata()
+        assert 0 < np.isfinite(rapid).sum() < len(rapid)
+    speed = along(result, part.prepared).axes[2]
+    drawn = [line.get_ydata().max() for line in speed.lines]
+    fastest = {"X": 780.0, "C": 3600.0}
+    assert drawn == pytest.approx([fastest[name] for name in axes], rel=0.2)
+
+
+def test_the_commands_draw_and_run_one_axis(tmp_path: Path) -> None:
+    part, one = written(tmp_path, PROGRAMS["X"]), machine(tmp_path, "X")
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, ["nc", "run", str(part), "--machine", str(one), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert (out / "program-path.png").stat().st_size > 5000
+    assert CliRunner().invoke(app, ["nc", "plot", str(part), "--machine", str(one)]).exit_code == 0
+    assert (tmp_path / "part-path.png").stat().st_size > 5000
+
+
+def test_the_plot_shows_each_axis_along_the_way(tmp_path: Path) -> None:
+    small = load_machine(str(machine(tmp_path, "XC")))
+    segments = [block.segments for block in motion(written(tmp_path, PROGRAMS["XC"]), small, Setup())]
+    of_x, of_c = plot_axes(segments, small, "part.ngc").axes
+    (rapid, feed) = of_x.lines
+    assert np.nanmax(feed.get_ydata()) == 6.0 and np.nanmax(rapid.get_ydata()) == 6.0
+    assert np.nanmax(feed.get_xdata()) == pytest.approx(4.0 + 2.0 + 30.0)
+    assert np.nanmax(of_c.lines[1].get_ydata()) == 40.0
+
+
+def test_p001_of_the_thesis_runs_and_says_what_is_assumed(tmp_path: Path) -> None:
+    setup = Setup(options=Dialect(program_numbers=True, default_feed=True))
+    for _ in range(2):  # the second time from the compiled form
+        part = PartProgram(written(tmp_path, P001), "mrmt-oacs", setup=setup, sample_period=0.02)
+        (note,) = part.prepared.notes
+        assert "line 2" in note and "the default feed of mrmt-oacs, 66 mm/min, is assumed" in note
+    result = part.run()
+    assert result.meta["program"]["completed"] and note in result.meta["notes"]
+    assert result["X_measured"][-1] == pytest.approx(100.0, abs=0.05)
+    assert result["A_measured"][-1] == pytest.approx(25.0, abs=0.1)
+    assert result["X_reference_velocity"].max() * 60 == pytest.approx(100.0)
+    titles = [place.get_title(loc="left") for place in path(result, part.prepared).axes]
+    assert [title for title in titles if title] == ["ZX", "A over time"]
+
+
+def test_table_5_2_of_the_thesis_runs_and_returns(tmp_path: Path) -> None:
+    setup = Setup(options=Dialect(program_numbers=True, open_end=True))
+    part = PartProgram(written(tmp_path, TABLE_5_2), setup=setup, sample_period=0.01)
+    assert "line 5: the program has no M2, M30 or %" in part.prepared.notes[0]
+    result = part.run()
+    assert result.meta["program"]["completed"]
+    assert result["X_reference"].max() == pytest.approx(70.0) and result["Y_reference"].max() == pytest.approx(20.0)
+    assert result["X_reference"][-1] == pytest.approx(0.0) and result["Y_reference"][-1] == pytest.approx(0.0)
+
+
+def test_a_machine_says_its_default_feed(tmp_path: Path) -> None:
+    own = machine(tmp_path, "XC")
+    own.write_text("default_feed = 90.0\n" + own.read_text())
+    part = written(tmp_path, "G1 X1\nC10\nX2 F100\nM2\n")
+    notes: list[str] = []
+    blocks = list(motion(part, load_machine(str(own)), Setup(options=Dialect(default_feed=True)), notes=notes))
+    rates = np.concatenate([block.segments["rate"] for block in blocks])
+    assert rates == pytest.approx([1.5, 60.0, 100 / 60])  # mm/s, degrees/s of C's limit, and what F says
+    said = "no feed rate is set before this move: the default feed of XC, 90 mm/min, is assumed (option default-feed)"
+    assert notes == [f"line 1: {said}"]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (P001, {"program_numbers": True}, "no feed rate is set"),
+        (TABLE_5_2, {"program_numbers": True}, "the program does not end"),
+        (TABLE_5_2, {"open_end": True}, "--with program-numbers"),
+        ("G0 X1\nO001\nM2\n", {"program_numbers": True}, "a program number stands on the first block"),
+        ("%\nG0 X1\n", {"open_end": True}, "the program does not end"),
+        ("O1 SUB\nG0 X1\n", {"open_end": True}, "not closed before the file's end"),
+        ("G93 G1 X1\nM2\n", {"default_feed": True}, "in inverse time"),
+        ("G95 S100 M3\nG1 X1\nM2\n", {"default_feed": True}, "units per revolution"),
+    ],
+)
+def test_what_the_options_do_not_allow(text: str, options: dict[str, bool], said: str, tmp_path: Path) -> None:
+    from rds.core.errors import RdsError
+
+    with pytest.raises(RdsError, match=said):
+        list(motion(written(tmp_path, text), load_machine("mini-cnc"), Setup(options=Dialect(**options))))
