@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli import nc_make, nc_run
+from rds.cli import nc_bundled, nc_make, nc_run
 from rds.cli.common import Json, print_json, progress_bars, refusals, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
 app.add_typer(nc_make.app, name="make")
-for _command in nc_run.COMMANDS:
+for _command in (*nc_run.COMMANDS, nc_bundled.bundled):
     app.command()(_command)
 
 PICTURES = ("png", "svg", "pdf")

@@ -74,7 +74,7 @@ def test_a_part_program_and_a_faulty_one(open_page: Callable[..., Any], app: App
     (app.folder / "bad.ngc").write_text("G21 G90 F600\nG1 X10 Q\nM2\n")
     page = open_page("Interpolator")
     page.click('button:text-is("Both")')
-    page.click('button:text-is("G-code")')
+    page.click('button:text-is("Your G-code")')
     _type(page, "Part program", "bad.ngc")
     _go(page, '.rds-notice-error:has-text("bad.ngc")')
     _type(page, "Part program", "good.ngc")

@@ -15,6 +15,7 @@ from rds.core.types import ArcSegment
 from rds.interpolators.interpolator import library_interpolator
 from rds.interpolators.path import interpolate
 from rds.interpolators.result import Interpolation
+from rds.nc.bundled import find_bundled
 from rds.panels.interpolator.state import Interpolating
 from rds.panels.session import Session
 from rds.results import open_result
@@ -194,3 +195,19 @@ def test_a_table_of_ones_own_is_kept_when_the_kind_changes(tmp_path: Path) -> No
     panel = make(tmp_path, kind="linear", given="several", rows=own)
     panel.choices.set("kind", "both")
     assert panel.choices["rows"] == own
+
+
+@pytest.mark.parametrize(("kind", "name"), [("linear", "square"), ("circular", "quadrants"), ("both", "pocket")])
+def test_each_kind_has_a_default_program(kind: str, name: str, tmp_path: Path) -> None:
+    panel = make(tmp_path, kind=kind, given="bundled", period=0.01)
+    assert panel.choices["bundled"] == f"{name}.ngc"
+    assert "bundled" in panel.shown and "program" not in panel.shown and "feed" not in panel.shown
+    done = run(panel)
+    said = command(str(find_bundled(name).path), "--period", "0.01")
+    assert said["samples"] == done.samples and said["path_error_mm"] == pytest.approx(done.path_error.max())
+
+
+def test_a_program_of_lines_is_refused_where_arcs_are_interpolated(tmp_path: Path) -> None:
+    panel = make(tmp_path, kind="circular", given="bundled", bundled="square.ngc")
+    with pytest.raises(InputError, match="segment 1 is a line, and interpolation is circular"):
+        run(panel)

@@ -288,3 +288,31 @@ def test_nothing_is_operated_when_nothing_runs(tmp_path: Path) -> None:
     for act in (work.hold, work.resume, work.home, lambda: work.override(1.0)):
         with pytest.raises(InputError, match="no program runs now"):
             act()
+
+
+# bundled programs, and the options of the dialect
+
+
+def test_a_bundled_program_opens_as_a_new_one(tmp_path: Path) -> None:
+    made = program(tmp_path)
+    assert "square.ngc" in made.bundled() and "oacs-p001.ngc" not in made.bundled()
+    made.open("square.ngc")
+    assert made.text.is_new and made.text.changed and "a square of 40 mm" in made.text.text
+    assert looked(made).ok
+    made.save()
+    assert (tmp_path / "square.ngc").is_file() and "square.ngc" not in made.bundled()
+    made.edit("M2\n")
+    made.save()
+    assert program(tmp_path).text.text == "M2\n"  # the folder's own file comes first
+    assert "oacs-p001.ngc" in Program(Session(tmp_path / "other", "mrmt-oacs")).bundled()
+
+
+def test_a_printed_program_needs_its_options(tmp_path: Path) -> None:
+    made = program(tmp_path, "O001", "N020 G1 X7 Y2", "N040 M5")
+    assert not looked(made).ok
+    for name in ("program_numbers", "default_feed", "open_end"):
+        made.choices.set(name, True)
+    found = looked(made)
+    assert found.ok, found.sentence
+    assert [mark.kind for mark in found.marks] == ["warning", "warning"]
+    assert "660 mm/min, is assumed" in found.marks[0].text and found.marks[0].line == 2

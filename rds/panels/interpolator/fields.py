@@ -12,11 +12,13 @@ from rds.core.geometry import PLANES
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.interpolators import DEFAULT, interpolator_module, interpolator_names
 from rds.interpolators.segment_rows import FEED_UNITS, segments_of
+from rds.nc.bundled import bundled
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text
 
 USER = "user"
 LINE, ARC = "line", "arc"
-SINGLE, SEVERAL, PROGRAM = "single", "several", "program"
+SINGLE, SEVERAL, BUNDLED, PROGRAM = "single", "several", "bundled", "program"
+DEFAULT_PROGRAMS = {"linear": "square.ngc", "circular": "quadrants.ngc", "both": "pocket.ngc"}
 NONE = "none"
 ONLY = {LINE: "circular", ARC: "linear"}  # what a line's or an arc's method cannot be
 _STRAIGHT = {"kind": LINE, "end": [30.0, 0.0]}
@@ -47,8 +49,8 @@ def fields() -> Iterable[Field]:
     """All of them but the methods' own options."""
     kinds = {"linear": "Linear", "circular": "Circular", "both": "Both"}
     yield Choice("kind", "Interpolation", "what is interpolated: straight moves, arcs, or both", "circular", kinds)
-    given = {SINGLE: "Single segment", SEVERAL: "Several", PROGRAM: "G-code"}
-    yield Choice("given", "Path", "one segment, a table of them, or a part program", SINGLE, given)
+    given = {SINGLE: "Single segment", SEVERAL: "Several", BUNDLED: "Default G-code", PROGRAM: "Your G-code"}
+    yield Choice("given", "Path", "one segment, a table of them, or a part program: of rds or yours", SINGLE, given)
     yield Choice("segment", "Segment", "a straight move, or an arc", ARC, {LINE: "Line", ARC: "Arc"})
     yield _point("start", "Start X, Y (, Z) [mm]", "where the path begins", "10, 0")
     yield _point("end", "End X, Y (, Z) [mm]", "where it ends; an arc that ends at its start is a full circle", "0, 10")
@@ -57,6 +59,8 @@ def fields() -> Iterable[Field]:
     yield Choice("direction", "Direction", "of the arc, seen from the positive end of the third axis", "ccw", ways)
     yield Choice("plane", "Plane", "in which the arc lies", "XY", {name: name for name in PLANES})
     yield Rows("rows", "Segments", "each begins where the one before ends", [dict(row) for row in ROWS["circular"]])
+    programs = {name: name for name, each in bundled().items() if each.machine == "mini-cnc"}
+    yield Choice("bundled", "Program", "a part program that comes with rds", DEFAULT_PROGRAMS["circular"], programs)
     yield Text("program", "Part program", "a file in your folder", "", "e.g. part.ngc")
     yield Choice("feed_unit", "Unit of the feed rate", "", "mm/min", {unit: unit for unit in FEED_UNITS})
     yield feed("mm/min", 600.0)

@@ -29,7 +29,7 @@ TITLE = "Interpolator"
 SUMMARY = "Turn lines, arcs or a part program into motion, by a method of the library or your own"
 HELP = "interpolation"
 _GROUPS = (
-    ("kind", "given", "segment", "start", "end", "centre", "direction", "plane", "program"),
+    ("kind", "given", "segment", "start", "end", "centre", "direction", "plane", "bundled", "program"),
     ("feed", "feed_unit", "period"),
     ("line_method", "line_file", "line.", "arc_method", "arc_file", "arc."),
     ("acceleration", "acceleration_time", "exact_stop"),

@@ -14,9 +14,12 @@ from rds.core.errors import InputError
 from rds.core.types import ArcSegment, Segment
 from rds.interpolators.segment_rows import FEED_UNITS, segments_of
 from rds.machines import load_machine
+from rds.nc.bundled import find_bundled
 from rds.panels.equipment.build import Builds, Checked
 from rds.panels.interpolator.fields import (
     ARC,
+    BUNDLED,
+    DEFAULT_PROGRAMS,
     LINE,
     NONE,
     PROGRAM,
@@ -73,7 +76,8 @@ class Interpolating:
         if len(roles) < 2:
             idle.add("segment")
         idle |= {"rows"} if chosen["given"] != "several" else set()
-        idle |= {"start", "feed", "feed_unit"} if chosen["given"] == PROGRAM else {"program"}
+        idle |= {"start", "feed", "feed_unit"} if chosen["given"] in (BUNDLED, PROGRAM) else set()
+        idle |= {name for name in (BUNDLED, PROGRAM) if name != chosen["given"]}
         for role in (LINE, ARC):
             if role not in roles:
                 idle |= {name for name in chosen.fields if name.startswith((f"{role}_", f"{role}."))}
@@ -113,7 +117,7 @@ class Interpolating:
     def run(self) -> Task[Interpolation]:
         """Begin to interpolate. InputError for what can be seen to be wrong at once."""
         files, T = self.files(), self.choices["period"]
-        program = self._program_path() if self.choices["given"] == PROGRAM else None
+        program = self._program_path() if self.choices["given"] in (BUNDLED, PROGRAM) else None
         segments = [] if program is not None else self.segments()
         acceleration, chosen = self._acceleration(), self.choices.values()
 
@@ -184,6 +188,8 @@ class Interpolating:
         return make_acceleration(name, **{"time_constant" if name == "exponential" else "time": time})
 
     def _program_path(self) -> Path:
+        if self.choices["given"] == BUNDLED:
+            return find_bundled(self.choices["bundled"]).path
         name = str(self.choices["program"]).strip()
         if not name:
             raise InputError(f"name the part program (in {self.session.folder}); the Program panel writes one")
@@ -202,6 +208,8 @@ class Interpolating:
             self.choices.replace([feed(unit, float(f"{value:.10g}"))])  # the same speed in another unit
         if name in ("line_method", "arc_method"):
             self._fit_options()
+        if name == "kind" and self.choices["bundled"] in DEFAULT_PROGRAMS.values():
+            self.choices.set("bundled", DEFAULT_PROGRAMS[self.choices["kind"]])
         if name == "kind" and self.choices["rows"] in ROWS.values():
             self.choices.set("rows", [dict(row) for row in ROWS[self.choices["kind"]]])
 

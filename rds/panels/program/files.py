@@ -20,7 +20,7 @@ class ProgramFiles:
         self._program, self._notice, self._opened = program, notice, opened
         self._loading = False
         self.list = widgets.Dropdown(
-            options=[program.text.name], description="Program", tooltip="The program that is open"
+            options=[(program.text.name, program.text.name)], description="Program", tooltip="The program that is open"
         )
         self.list.observe(self._chosen, "value")
         self.name = widgets.Text(placeholder="name.ngc", tooltip="A name for a copy, which is open from then on")
@@ -42,7 +42,9 @@ class ProgramFiles:
     def refresh(self) -> None:
         """As things are now."""
         program = self._program
-        names, here = tuple(program.programs()), program.text.name
+        here = program.text.name
+        names = tuple((name, name) for name in program.programs())
+        names += tuple((f"{name} (comes with rds)", name) for name in program.bundled())
         self._loading = True
         try:
             if self.list.options != names:

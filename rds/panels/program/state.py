@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rds.core.errors import InputError, RdsError
 from rds.machines import load_machine
+from rds.nc.bundled import bundled
 from rds.panels.equipment.build import Builds
 from rds.panels.program.text import ProgramText, check_name, programs
 from rds.panels.session.choices import Choices
@@ -118,6 +119,15 @@ class Program:
     def programs(self) -> list[str]:
         """The part programs of the folder, and the one that is open."""
         return sorted({*programs(self.session.folder), self.text.name})
+
+    def bundled(self) -> list[str]:
+        """The bundled programs for this machine that the folder has no file of the name of."""
+        here = set(self.programs())
+        return [
+            name
+            for name, each in bundled().items()
+            if name not in here and each.machine in ("mini-cnc", self.machine.name)
+        ]
 
     def open(self, name: str) -> None:
         """Open another one; InputError where that will not do. What is not saved of this one stays as a draft."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
+from rds.nc.bundled import bundled
 
 ENDINGS = (".ngc", ".nc", ".gcode", ".tap", ".cnc")
 LARGEST = 2 << 20  # bytes of a program that is edited here
@@ -54,7 +55,10 @@ def programs(folder: Path) -> list[str]:
 
 
 class ProgramText:
-    """One file that is edited. InputError for a name that will not do, or a file that cannot be edited here."""
+    """One file that is edited. InputError for a name that will not do, or a file that cannot be edited here.
+
+    A file that is not there begins with the text of the bundled program of its name, or with a small one that runs.
+    """
 
     def __init__(self, folder: Path, name: str):
         check_name(name)
@@ -68,7 +72,8 @@ class ProgramText:
         saved, draft = _read(self.path), _read(self.draft)
         self._digest = _digest(saved)
         self._saved = saved
-        self.text = draft if draft is not None else saved if saved is not None else STARTER
+        begin = bundled()[self.name].text() if self.name in bundled() else STARTER
+        self.text = draft if draft is not None else saved if saved is not None else begin
 
     @property
     def is_new(self) -> bool:
