@@ -42,7 +42,7 @@ def test_it_is_valid_and_runs_in_simulation(program: Bundled, tmp_path: Path) ->
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert found["ok"] and found["warnings"] == [] and found["segments"] > 0
-    part = PartProgram(file, program.machine, sample_period=0.02)  # coarse, to be quick
+    part = PartProgram(file, program.machine, sample_period=0.005)  # coarser than the machine, to be quick
     result = part.run("simulation")
     assert result.meta["program"]["completed"]
     assert result.meta["program"]["contour_error"]["max"] < 0.5  # mm
