@@ -156,14 +156,16 @@ def of_part_program(
         raise InputError("there is no such part program; check the name and the folder", str(file))
     if any(name not in machine.axes for name in _LINEAR):
         raise InputError(f"{machine.name} lacks one of X, Y and Z, all of which an interpolator moves", str(file))
-    programmed = moves_of(motion(file, machine, setup or Setup(), progress), machine, T, MOST_SAMPLES)
+    notes: list[str] = []
+    programmed = moves_of(motion(file, machine, setup or Setup(), progress, notes), machine, T, MOST_SAMPLES)
     due: dict[int, tuple[Happening, ...]] = {}
     for after, event in programmed.events:
         due[after] = (*due.get(after, ()), Happening(0, event.kind, float(event.value), event.line))
     first = due.pop(-1, ())
-    return _made(
+    made = _made(
         file.name, programmed.segments, programmed.lines, due, first, method, machine, _LINEAR, T, spindle=True
     )
+    return replace(made, notes=(*notes, *made.notes))
 
 
 def method_of(words: TomlTable, folder: Path) -> Method:
