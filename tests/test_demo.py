@@ -48,13 +48,23 @@ def test_the_demo(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert done.exit_code == (1 if "missed" in verdicts.values() else 0), done.stderr
     for table, title in zip(
         said["tables"],
-        ["Controller gains and observer parameters", "Tracking error", "Error in steady motion", "Timing at 1 kHz"],
+        [
+            "Controller gains and observer parameters",
+            "Tracking error",
+            "Error in steady motion",
+            "Velocity and its estimate",
+            "Timing at 1 kHz",
+        ],
         strict=True,
     ):
         assert table["title"].startswith(title)
     assert all(row[2] != "nan" for row in said["tables"][2]["rows"])
     assert all((alone / path).is_file() for path in said["files"].values())
+    estimates = {row[0]: float(row[2]) for row in said["tables"][3]["rows"]}
+    assert set(estimates) == {f"{axis} {mode}" for axis in "XYZ" for mode in ("simulation", "emulation")}
+    assert all(0.05 < rms < 0.35 for rms in estimates.values())  # mm/s: what friction does to the observer
     simulated, emulated = (rds.open_result(alone / "out" / mode) for mode in ("simulation", "emulation"))
     assert all((simulated[name] == emulated[name]).all() for name in simulated.columns)
     report = (alone / "out" / "report.html").read_text()
+    assert report.count("signals of the controllers") == 3
     assert "Table 3" in report or "table 3" in report

@@ -1,7 +1,8 @@
-"""What a controller's answer must be: a voltage, or one for each axis, and the next state."""
+"""What a controller's answer must be: a voltage, or one for each axis, the next state, and the signals it declares."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -9,14 +10,31 @@ import numpy as np
 
 from rds.checks import clauses
 from rds.checks.values import is_real
+from rds.core.signals import EXAMPLE, signal_values, signals_wanted
 from rds.core.values import shown
 
 
-def voltage_fault(answer: Any, axes: int = 0) -> tuple[str, str, str] | None:
-    """Clause, what was returned, remedy, if `answer` is no (voltage, next_state); `axes` > 0 for a coupled law."""
-    if not isinstance(answer, tuple | list) or len(answer) != 2:
+def voltage_fault(answer: Any, axes: int = 0, signals: Sequence[str] = ()) -> tuple[str, str, str] | None:
+    """Clause, what was returned, remedy, if `answer` is no (voltage, next_state), or lacks declared `signals`.
+
+    `axes` > 0 for a coupled law.
+    """
+    is_several = isinstance(answer, tuple | list)
+    if signals and is_several and len(answer) == 2:
+        said = f"{shown(answer)}, without the signals {', '.join(signals)}"
+        return clauses.SIGNALS, said, f"{signals_wanted(signals, axes)}, or take `signals` out of the file"
+    if not is_several or len(answer) != (3 if signals else 2):
         return clauses.PAIR, *_no_pair(answer)
-    return _array_fault(answer[0], axes) if axes else _number_fault(answer[0])
+    fault = _array_fault(answer[0], axes) if axes else _number_fault(answer[0])
+    return fault or (_signals_fault(answer[2], axes, signals) if signals else None)
+
+
+def _signals_fault(told: Any, axes: int, signals: Sequence[str]) -> tuple[str, str, str] | None:
+    try:
+        signal_values(told, signals, axes)
+    except ValueError as error:
+        return clauses.SIGNALS, f"signals that will not do: {error}", signals_wanted(signals, axes)
+    return None
 
 
 def _no_pair(answer: Any) -> tuple[str, str]:
@@ -33,6 +51,8 @@ def _no_pair(answer: Any) -> tuple[str, str]:
         return "a coroutine", "write `def`, not `async def`"
     if isinstance(answer, tuple | list):
         remedy = "return two: the voltage, and all of the state as one value, as in `return u, [a, b]`"
+        if len(answer) == 3 and isinstance(answer[2], Mapping):
+            remedy = f"declare the signals beside params, as in {EXAMPLE}"
         return f"{len(answer)} values, {shown(answer)},", remedy
     return shown(answer), "end it with `return voltage, next_state`"
 

@@ -1,4 +1,4 @@
-"""Whether a controller keeps `control(t, r, y, state, params) -> (voltage, next_state)`."""
+"""Whether a controller keeps `control(t, r, y, state, params) -> (voltage, next_state)`, and its signals if any."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
 from rds.core.blame import STUDENT_ERRORS, student_error
 from rds.core.load import wants_state
+from rds.core.signals import declaration_fault
 from rds.core.signature import argument_fault
 from rds.core.types import Controller, Reference
 from rds.core.values import shown
@@ -67,6 +68,7 @@ class _Run:
         self.function = subject.function("control")
         self.T, self.axes, self.budget = sample_period, axes, budget
         self.params: dict[str, Any] = {}
+        self.signals: tuple[str, ...] = ()
         self.calls: list[Call] = []
         self.ns: list[int] = []
         self.sizes: list[int] = []
@@ -79,6 +81,9 @@ class _Run:
         if not isinstance(student.params, Mapping):
             said = f"params is {shown(student.params)}; write it as a dict of defaults, as in {{'gain': 20.0}}"
             return found.fault(clauses.PARAMS, said)
+        if fault := declaration_fault(student.signals):
+            return found.fault(clauses.SIGNALS, fault)
+        self.signals = tuple(student.signals)
         try:
             self.params = copy.deepcopy(dict(student.params))
             self.initial_state = () if student.initial_state is None else copy.deepcopy(student.initial_state)
@@ -125,9 +130,9 @@ class _Run:
             self.busy = busy / max(wall, 1)
             if not self._judge_arguments(before, (t, r, y, state), params) or not self._judge_answer(answer, t):
                 return None
-            voltage, state = answer
+            voltage, state, *told = answer
             try:
-                self.calls.append(Call(before, copy.deepcopy((voltage, state))))
+                self.calls.append(Call(before, copy.deepcopy((voltage, state, *told))))
             except Exception as error:
                 said = (
                     f"next_state {shown(state)} cannot be copied ({error}); keep numbers, lists, dicts and arrays in it"
@@ -158,7 +163,7 @@ class _Run:
         return True
 
     def _judge_answer(self, answer: Any, t: float) -> bool:
-        fault = voltage_fault(answer, self.axes)
+        fault = voltage_fault(answer, self.axes, self.signals)
         if fault is not None:
             clause, said, remedy = fault
             if not self.axes and not self.calls and self._works_with_arrays():
@@ -202,7 +207,7 @@ class _Run:
             )
         except STUDENT_ERRORS:
             return False
-        return voltage_fault(answer, 2) is None
+        return voltage_fault(answer, 2, self.signals) is None
 
     def _judge_states(self) -> None:
         """A state that only grows makes every run end late; a buffer that fills up and stays is nothing to fear."""
@@ -236,7 +241,7 @@ class _Run:
                     return self.found.fault(
                         clauses.RUNS, f"control() failed {given}: {student_error(error, self.source)}"
                     )
-                if fault := voltage_fault(answer, self.axes):
+                if fault := voltage_fault(answer, self.axes, self.signals):
                     return self.found.fault(fault[0], f"control() returned {fault[1]} {given}; {fault[2]}")
         return None
 

@@ -68,7 +68,8 @@ def _student(thing: Any, role: str) -> StudentFile:
     if isinstance(thing, StudentFile):
         return thing
     if isinstance(thing, Controller):
-        return StudentFile(thing.source, {"control": thing.control}, thing.params, thing.initial_state)
+        told = {} if thing.observe is not None else thing.signals  # observed signals are no part of its answer
+        return StudentFile(thing.source, {"control": thing.control}, thing.params, thing.initial_state, told)
     if isinstance(thing, Model):
         return StudentFile(thing.source, _model_functions(thing), thing.params, thing.initial_state)
     if isinstance(thing, str | Path):

@@ -17,7 +17,17 @@ from typing import Any
 
 from rds.controllers.axis_data import axis_data
 from rds.controllers.tuning import pid_gains, set_point_weight
-from rds.controllers.words import BIAS, ERROR_LIMITS, FILTER, GAINS, OUTPUT_LIMIT, limit_or_none, output_limit, retuned
+from rds.controllers.words import (
+    BIAS,
+    ERROR_LIMITS,
+    FILTER,
+    GAINS,
+    OUTPUT_LIMIT,
+    integral_unit,
+    limit_or_none,
+    output_limit,
+    retuned,
+)
 from rds.core.options import read_options
 from rds.core.quantities import Quantity
 from rds.core.types import Controller, Reference, Source
@@ -64,6 +74,16 @@ def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, A
     return law(r[0], r[1], r[2], y, state, params["coefficients"])
 
 
+def known(y, state, following, c):
+    """The integral of the error (mm s), this sample included."""
+    return (following[0],)
+
+
+def observe(y: float, state: Any, following: Any, params: Mapping[str, Any]) -> tuple[float]:
+    """The signals as `known` gives them."""
+    return (following[0],)
+
+
 def make(
     axis_model: Mapping[str, Any], T: float, converter_range: float, *, unit: str = "mm", **options: Any
 ) -> Controller:
@@ -86,4 +106,7 @@ def make(
     )
     retune = partial(retuned, make, dict(axis_model), T, converter_range, unit)
     params = gains | {"coefficients": coefficients}
-    return Controller(control, (0.0, 0.0, 0.0, 0.0), params, Source(NAME), tunable=OPTIONS, retune=retune)
+    start, signals = (0.0, 0.0, 0.0, 0.0), {"integral": integral_unit(unit)}
+    return Controller(
+        control, start, params, Source(NAME), tunable=OPTIONS, retune=retune, signals=signals, observe=observe
+    )

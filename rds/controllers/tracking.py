@@ -54,6 +54,19 @@ def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, A
     return law(r[0], r[1], r[2], y, state, params["coefficients"])
 
 
+def known(y, state, following, c):
+    """The velocity (mm/s) that the observer saw at measured position `y`, `state` being the one before the voltage."""
+    z, started = state
+    if started == 0.0:
+        return (0.0,)
+    return (c[4] * y + z,)
+
+
+def observe(y: float, state: Any, following: Any, params: Mapping[str, Any]) -> tuple[float]:
+    """The signals as `known` gives them."""
+    return (params["L"] * y + state[0] if state[1] else 0.0,)
+
+
 def estimated_velocity(y: float, state: tuple[float, float], params: Mapping[str, Any]) -> float:
     """The velocity (mm/s) that the observer sees at measured position `y` when `state` is handed in with it."""
     z, started = state
@@ -87,7 +100,10 @@ def make(
     coefficients = (1.0 / axis.K, axis.tau / axis.K, g1, g2, L, F, G, H, axis.converter_range)
     params = readable | {"coefficients": coefficients}
     retune = partial(_retuned, dict(axis_model), T, converter_range, pole)
-    return Controller(control, (0.0, 0.0), params, Source(NAME), tunable=TUNABLE, retune=retune)
+    signals = {"velocity": f"{unit}/s"}
+    return Controller(
+        control, (0.0, 0.0), params, Source(NAME), tunable=TUNABLE, retune=retune, signals=signals, observe=observe
+    )
 
 
 def _retuned(

@@ -43,6 +43,11 @@ def output_limit(maxoutput: float, converter_range: float) -> float:
     return min(limit_or_none(maxoutput), converter_range)
 
 
+def integral_unit(unit: str) -> str:
+    """The unit of the integral over time of what is in `unit`: mm·s, (rev/min)·s."""
+    return f"({unit})·s" if "/" in unit else f"{unit}·s"
+
+
 def retuned(
     make: Callable[..., Controller],
     axis_model: Mapping[str, Any],

@@ -11,7 +11,10 @@ Limits = tuple[float, float]  # the lowest and highest position, axis units; inf
 
 
 class Motion(Protocol):
-    """A model in motion, one axis: it holds a state and moves on by one sample at a time."""
+    """A model in motion, one axis: it holds a state and moves on by one sample at a time.
+
+    That of a model which `has_velocity` has an attribute `velocity` as well: the velocity now, mm/s.
+    """
 
     def read(self) -> float:
         """The output now: position in mm (speed in rev/min for a spindle), before the encoder."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import hashlib
 import inspect
@@ -19,6 +20,7 @@ from typing import Any
 from rds.core.blame import STUDENT_ERRORS, student_error, student_line
 from rds.core.errors import ContractError, InputError
 from rds.core.folder_kept import folder_kept
+from rds.core.signals import declaration_fault
 from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
 from rds.core.types import Controller, Reference, Source
 from rds.core.values import own_copy, shown
@@ -33,15 +35,17 @@ _LARGEST = 10_000_000  # bytes; a file of data, not of code
 class StudentFile:
     """What a student handed in: the interface functions by name, and what goes with them.
 
-    `initial_state` is None where the student gave none. One `params` and one `initial_state` serve every
-    function of a file; a model and a controller whose states differ belong in two files. `misfits` are functions
-    that have the name but not the arguments of an interface, such as a helper called `interpolate`, with the reason.
+    `initial_state` is None where the student gave none, `signals` (names with their units) empty where a controller
+    declares none. One `params` and one `initial_state` serve every function of a file; a model and a controller whose
+    states differ belong in two files. `misfits` are functions that have the name but not the arguments of an interface,
+    such as a helper called `interpolate`, with the reason.
     """
 
     source: Source
     functions: Mapping[str, Callable[..., Any]]
     params: Mapping[str, Any] = field(default_factory=dict)
     initial_state: Any = None
+    signals: Mapping[str, str] = field(default_factory=dict)
     misfits: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -68,7 +72,7 @@ class StudentFile:
         if self.initial_state is None and not coupled:
             _needs_no_state(control, merged, self.source)
         state = () if self.initial_state is None else own_copy(self.initial_state, "initial_state", where)
-        return Controller(control, state, merged, self.source, coupled)
+        return Controller(control, state, merged, self.source, coupled, signals=dict(self.signals))
 
 
 def load_student(path: str | Path, validate: bool = True) -> StudentFile:
@@ -102,6 +106,7 @@ def from_function(
     params: Mapping[str, Any] | None = None,
     role: str | None = None,
     validate: bool = True,
+    signals: Mapping[str, str] | None = None,
 ) -> StudentFile:
     """One function, as from a notebook cell, in the `role` of "control", "derivatives", "advance" or "interpolate".
 
@@ -110,6 +115,7 @@ def from_function(
     name = getattr(function, "__name__", type(function).__name__)
     role = role or (name if name in INTERFACES else _role_of(function, name))
     variables = {role: function, "params": {} if params is None else params, "initial_state": initial_state}
+    variables["signals"] = signals
     return _student(variables, _source(name, _source_text(function)), validate)
 
 
@@ -126,8 +132,10 @@ def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> St
     elif {"derivatives", "advance"} & (set(functions) - set(misfits)):
         misfits.pop("output", None)  # next to a model it is meant for it
     fitting = {name: f for name, f in functions.items() if name not in misfits}
-    params, state = variables.get("params"), variables.get("initial_state")
-    student = StudentFile(source, fitting, {} if params is None else params, state, misfits)
+    params, state, signals = (variables.get(name) for name in ("params", "initial_state", "signals"))
+    if not isinstance(signals, Mapping) or "control" not in fitting:
+        signals = {}  # a variable of that name from before there were signals, or a model's
+    student = StudentFile(source, fitting, {} if params is None else params, state, signals, misfits)
     if validate:
         _validate(student)
     return student
@@ -140,11 +148,24 @@ def _validate(student: StudentFile) -> None:
         raise ContractError(
             f"params is {shown(student.params)} ({kind}); it must be a dict of defaults, as in {{'gain': 20.0}}", where
         )
+    if fault := declaration_fault(student.signals):
+        raise ContractError(fault, _place_of("signals", student.source))
     for name, function in student.functions.items():
         if fault := argument_fault(name, function) or _form_fault(name, function):
             code = getattr(inspect.unwrap(function), "__code__", None)
             line = f":{code.co_firstlineno}" if code and student.source.path == code.co_filename else ""
             raise ContractError(fault, f"{student.source.path or student.source.name}{line}")
+
+
+def _place_of(variable: str, source: Source) -> str:
+    """The file, and the line where it last sets `variable`, where that is known."""
+    lines = []
+    if source.path is not None and source.text is not None:
+        for node in ast.parse(source.text).body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            if any(isinstance(target, ast.Name) and target.id == variable for target in targets):
+                lines.append(node.lineno)
+    return f"{source.path or source.name}{f':{lines[-1]}' if lines else ''}"
 
 
 def _form_fault(name: str, function: Callable[..., Any]) -> str | None:

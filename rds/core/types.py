@@ -72,13 +72,15 @@ class Controller:
     `retune`, any number in `params` may be changed and is handed to `control` as it is.
     """
 
-    control: Callable[..., tuple[Any, Any]]
+    control: Callable[..., Any]
     initial_state: Any = ()
     params: Mapping[str, Any] = field(default_factory=dict)
     source: Source = Source("user-defined")
     coupled: bool = False
     tunable: Mapping[str, Quantity] = field(default_factory=dict)
     retune: Callable[[Mapping[str, float]], Mapping[str, Any]] | None = None
+    signals: Mapping[str, str] = field(default_factory=dict)
+    observe: Callable[..., Sequence[float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,7 @@ class Model:
     and T in s. `output(x) -> y` is what the encoder sees (default: the first state).
     `start(T)` gives the model in motion (see `contracts.Motion`); a model with a faster way of running
     hands in its own `motion`. `fitted` is the model file that the numbers came from, if they did.
+    `has_velocity` says that the second state is the axis's velocity, and that its motion has it as `velocity`.
     """
 
     advance: Callable[[Sequence[float], float, float, Mapping[str, Any]], Sequence[float]]
@@ -98,6 +101,7 @@ class Model:
     source: Source = Source("user-defined")
     motion: Callable[[Model, float], Any] | None = None
     fitted: Source | None = None
+    has_velocity: bool = False
 
 
 class Ending(StrEnum):

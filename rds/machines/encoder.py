@@ -30,9 +30,9 @@ def counted(position: float, resolution: float) -> float:
     return round(position / resolution) * resolution if resolution > 0.0 else position
 
 
-def diverged(position: float) -> ContractError:
-    """The error that a model's position is no finite number."""
+def diverged(value: float, what: str = "position") -> ContractError:
+    """The error that a model's position, or another state of it, is no finite number."""
     return ContractError(
-        f"the model's position became {position!r}; it must stay finite: check the model's derivatives() or "
+        f"the model's {what} became {value!r}; it must stay finite: check the model's derivatives() or "
         f"advance(), its time constants against the sample period, and that the loop is stable"
     )

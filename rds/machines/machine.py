@@ -108,6 +108,11 @@ class Axis:
     module: dict[str, Any] = field(default_factory=dict)
     limits: AxisLimits | None = None
 
+    @property
+    def is_spindle(self) -> bool:
+        """Whether its speed is measured, and not a position."""
+        return self.unit == "rev/min"
+
 
 @dataclass(frozen=True)
 class Machine:

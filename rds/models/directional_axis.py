@@ -66,4 +66,4 @@ def make(**params: Any) -> Model:
     for name, option in PARAMETERS.items():
         if name not in values:
             raise InputError(f"{NAME} needs {name} ({option.described})")
-    return Model(advance, (0.0, 0.0), values, source=Source(NAME))
+    return Model(advance, (0.0, 0.0), values, source=Source(NAME), has_velocity=True)

@@ -110,4 +110,5 @@ def make(**params: Any) -> Model:
     for name, option in PARAMETERS.items():
         if name not in values:
             raise InputError(f"linear-axis needs {name} ({option.described})")
-    return Model(advance, (0.0, 0.0), values, source=Source("linear-axis"), motion=LinearAxisMotion)
+    source = Source("linear-axis")
+    return Model(advance, (0.0, 0.0), values, source=source, motion=LinearAxisMotion, has_velocity=True)

@@ -92,6 +92,11 @@ class MachineAxisMotion:
         """Position behind the play, mm."""
         return self._state[0]
 
+    @property
+    def velocity(self) -> float:
+        """Velocity of the motor's side, before the play, mm/s."""
+        return self._state[1]
+
     def write(self, voltage: float) -> None:
         """Move on by one sample of constant `voltage`, V."""
         self._waiting.append(voltage)
@@ -107,4 +112,5 @@ def make(**params: Any) -> Model:
         known = MachineParameters.from_table(params)
     except InputError as error:
         raise InputError(f"{NAME}: {error}") from None
-    return Model(advance, (0.0, 0.0, 0.0), asdict(known), source=Source(NAME), motion=MachineAxisMotion)
+    source, start = Source(NAME), (0.0, 0.0, 0.0)
+    return Model(advance, start, asdict(known), source=source, motion=MachineAxisMotion, has_velocity=True)

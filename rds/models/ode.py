@@ -47,6 +47,7 @@ def ode_model(
         output=_output(output, params or {}, len(start)),
         source=source or Source(_name(derivatives)),
         motion=partial(OdeMotion, step=step),
+        has_velocity=_has_velocity(start, output),
     )
 
 
@@ -69,6 +70,7 @@ def advance_model(
         params=dict(params or {}),
         output=_output(output, params or {}, len(start)),
         source=source or Source(_name(advance)),
+        has_velocity=_has_velocity(start, output),
     )
 
 
@@ -84,10 +86,20 @@ class OdeMotion:
         """The output now: position, mm, unless the model has its own `output`."""
         return self._model.output(self.state) if self._model.output else self.state[0]
 
+    @property
+    def velocity(self) -> float:
+        """The second state: mm/s, unless the model has its own `output`."""
+        return self.state[1]
+
     def write(self, voltage: float) -> None:
         """Move on by one sample of constant `voltage`, V."""
         self.state = self._step(self.state, voltage, self._T, self._model.params, t=self._samples * self._T)
         self._samples += 1
+
+
+def _has_velocity(start: Sequence[float], output: Function | None) -> bool:
+    """Without an `output`, the first states are position and velocity; with one they may be anything."""
+    return output is None and len(start) >= 2
 
 
 def _advance_by_rk4(

@@ -27,7 +27,7 @@ def build(plan: Plan, drivers: Drivers | None) -> Loop:
         hand_out(voltages if plan.saturation else [max(-full_scale, min(full_scale, u)) for u in voltages])
         return voltages
 
-    return loop(plan, read, write, axes.follow)
+    return loop(plan, read, write, axes.follow_plant(plan))
 
 
 # Every period is processed, late or not, so that emulation repeats simulation sample for sample.
@@ -38,6 +38,7 @@ MODE = Mode(
     build,
     drivers="dry run",
     drives=("controller", "signal"),
+    simulates_plant=True,
     line={"color": GREEN, "linewidth": 1.5, "linestyle": (0, (4, 3))},
     layer=2,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import isfinite
+from typing import Any, cast
 
 from rds.core.contracts import Motion
 from rds.core.types import Ending, Model
@@ -62,6 +63,31 @@ class SimulatedAxes:
         self.follow(acting)
         return outputs
 
+    def follow_plant(self, plan: Plan) -> Callable[[Sequence[float]], Sequence[float]]:
+        """`follow` for the plant of a run: it returns the velocities before the move where the plan wants them."""
+        follow, motions = self.follow, [cast(Any, self.motions[i]) for i in plan.plant_velocities]
+        if not motions:
+            return follow
+
+        def follow_and_tell(acting: Sequence[float]) -> Sequence[float]:
+            velocities = [motion.velocity for motion in motions]
+            for velocity in velocities:
+                if not isfinite(velocity):
+                    raise diverged(velocity, "velocity")
+            follow(acting)
+            return velocities
+
+        (motion, *others) = motions
+
+        def follow_one_and_tell(acting: Sequence[float]) -> Sequence[float]:
+            velocity = motion.velocity
+            if not isfinite(velocity):
+                raise diverged(velocity, "velocity")
+            follow(acting)
+            return (velocity,)
+
+        return follow_and_tell if others else follow_one_and_tell
+
 
 class ModelMotion:
     """A model in motion through its `advance`."""
@@ -75,6 +101,11 @@ class ModelMotion:
     def read(self) -> float:
         """The output now."""
         return float(self._output(self._state) if self._output else self._state[0])
+
+    @property
+    def velocity(self) -> float:
+        """The second state, of a model that `has_velocity`."""
+        return float(self._state[1])
 
     def write(self, voltage: float) -> None:
         """Move on by one sample."""

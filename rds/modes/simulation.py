@@ -12,7 +12,7 @@ from rds.modes.parts import SimulatedAxes, at_once, loop
 def build(plan: Plan, drivers: Drivers | None) -> Loop:
     """The loop of a simulation."""
     axes = SimulatedAxes(plan)
-    return loop(plan, axes.measure, at_once, axes.follow)
+    return loop(plan, axes.measure, at_once, axes.follow_plant(plan))
 
 
 MODE = Mode(
@@ -22,6 +22,7 @@ MODE = Mode(
     build,
     drivers="none",
     drives=("controller", "signal"),
+    simulates_plant=True,
     line={"color": ORANGE, "linewidth": 3.0, "alpha": 0.7},
     layer=1,
 )

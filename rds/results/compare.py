@@ -10,6 +10,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.metrics import axis_metrics, fit_percent, metric_notes
+from rds.results.signals import signals_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,13 +23,23 @@ _ON_TIME = 0.01  # of a sample period: how far a time may be from k·T and still
 
 
 @dataclass(frozen=True)
+class SignalComparison:
+    """A signal that the controllers of both results told, on the common samples: b - a, in `unit`."""
+
+    unit: str
+    max_difference: float
+    rms_difference: float
+
+
+@dataclass(frozen=True)
 class AxisComparison:
     """One axis of two results, a and b, on their common samples. Lengths are in `unit`, times in s.
 
     `metrics_a` and `metrics_b` are those of each whole result; `max_difference` and `rms_difference` are of the
     measured responses, b - a; `fit_percent` is that of b's measured response to a's (None where a's never moves).
-    `identical` says that reference, measured, command and voltage, so far as both have them, are equal bit for bit;
-    `first_difference` is the time of the first sample that is not, in one of `differing_columns`.
+    `identical` says that reference, measured, command and voltage, so far as both have them, are equal bit for bit, and
+    the signals that both have; `first_difference` is the time of the first sample that is not, in one of
+    `differing_columns`; `signals` says how far the signals are apart.
     `same_controller` compares the hashes of the controllers' files (the names of library laws, which have none),
     `same_params` their parameters and `same_reference` the references; None where either result does not say.
     """
@@ -47,6 +58,7 @@ class AxisComparison:
     same_reference: bool | None
     same_controller: bool | None
     same_params: bool | None
+    signals: dict[str, SignalComparison]
 
 
 @dataclass(frozen=True, repr=False)
@@ -167,6 +179,12 @@ def _one_axis(
     y_a, y_b = a[measured][at_a], b[measured][at_b]
     difference = np.asarray(y_b - y_a, dtype=float)
     columns = [axis + ending for ending in _ENDINGS if axis + ending in a and axis + ending in b]
+    told = [
+        name
+        for name in signals_of(a, axis)
+        if name in signals_of(b, axis) and a.units[f"{axis}_{name}"] == b.units[f"{axis}_{name}"]
+    ]
+    columns += [f"{axis}_{name}" for name in told]
     differing = {name: _differs(a[name][at_a], b[name][at_b]) for name in columns}
     differing = {name: where for name, where in differing.items() if where.any()}
     firsts = [int(np.argmax(where)) for where in differing.values()]
@@ -185,7 +203,14 @@ def _one_axis(
         same_reference=bool(np.array_equal(a[reference][at_a], b[reference][at_b])) if reference in columns else None,
         same_controller=_same_controller(_controller(a, axis), _controller(b, axis)),
         same_params=_same(_controller(a, axis), _controller(b, axis), "params"),
+        signals={name: _signal(a, b, f"{axis}_{name}", at_a, at_b) for name in told},
     )
+
+
+def _signal(a: Result, b: Result, column: str, at_a: np.ndarray, at_b: np.ndarray) -> SignalComparison:
+    difference = np.asarray(b[column][at_b] - a[column][at_a], dtype=float)
+    rms = math.sqrt(float(np.mean(difference**2)))
+    return SignalComparison(a.units[column], float(np.abs(difference).max()), rms)
 
 
 def _differs(left: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -219,6 +244,13 @@ def _notes(a: Result, b: Result, compared: dict[str, AxisComparison], common: in
     ]
     if common < max(len(a), len(b)):
         notes.append(f"{common} samples are common; the first result has {len(a)}, the second {len(b)}")
+    for axis in compared:
+        for name in signals_of(a, axis):
+            left, right = a.units[f"{axis}_{name}"], b.units.get(f"{axis}_{name}")
+            if right is not None and left != right:
+                notes.append(
+                    f"{axis}_{name} is in {left!r} in the first result and in {right!r} in the second: left out"
+                )
     differing = [name for name, axis in compared.items() if axis.same_reference is False]
     if differing:
         notes.append(f"{', '.join(differing)}: the references differ, so the tracking errors answer different tasks")

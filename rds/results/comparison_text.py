@@ -46,6 +46,11 @@ def findings(axis: AxisComparison) -> list[str]:
         said.append("identical sample for sample")
     else:
         said.append(f"first difference at {number(axis.first_difference)} s, in {', '.join(axis.differing_columns)}")
+    for name, signal in axis.signals.items():
+        found = (
+            f"at most {number(signal.max_difference)} {signal.unit}, RMS {number(signal.rms_difference)} {signal.unit}"
+        )
+        said.append(f"signal {name} differs by {found}")
     said.append(_controller(axis))
     return said
 

@@ -16,6 +16,7 @@ from rds.results import html
 from rds.results.late_samples import total_time
 from rds.results.metrics import ERROR_METRICS, axis_metrics, metric_units
 from rds.results.result import Result
+from rds.results.signals import signals_of
 from rds.results.units import heading
 
 # no script, nothing loaded from outside, even if a text from a student's file slipped through
@@ -163,9 +164,11 @@ def _together(results: Sequence[Result], labels: Sequence[str]) -> str:
 
 
 def _run_section(result: Result, label: str, overview: bytes) -> str:
-    from rds.results import plots_timing
+    from rds.results import plots_signals, plots_timing
 
     pictures = [_image(overview, f"{label}: response, error and voltage")]
+    if any(signals_of(result, axis) for axis in result.axes) and len(result):
+        pictures.append(_image(plots_signals.signals(result).png(), f"{label}: signals of the controllers"))
     if total_time(result) is not None and len(result):
         pictures.append(_image(plots_timing.timing(result).png(), f"{label}: timing"))
     return (

@@ -28,7 +28,8 @@ class Result:
     `columns` maps names to one-dimensional arrays of one length, kept as float64 or int64 and read-only:
     `time` in s, and per axis `X_reference`, `X_reference_velocity`, `X_reference_acceleration`, `X_measured`,
     `X_command` (the controller's answer before the limits, V), `X_voltage` (acting from this sample on, V),
-    `X_modelled` (the model on the same voltages), `X_simulated` (its own closed loop); in the real-time modes
+    `X_modelled` (the model on the same voltages), `X_simulated` (its own closed loop), one such as
+    `X_velocity` for each signal of the controller, `X_plant_velocity` (the simulated plant's); in the real-time modes
     `lateness`, `io`, `compute`, `model` in µs. Any other column is kept as well.
 
     `units` maps names to units; a column without an entry gets the usual unit of its name, or "".
@@ -135,6 +136,12 @@ class Result:
         from rds.results.plots import overview
 
         return overview(self, axis)
+
+    def plot_signals(self, axis: str | None = None) -> Figure:
+        """What the controllers knew, over time: see `plots_signals.signals`. InputError where they told nothing."""
+        from rds.results.plots_signals import signals
+
+        return signals(self, axis)
 
     def compare(self, other: Result) -> Comparison:
         """This result against `other`, sample by sample."""

@@ -14,6 +14,7 @@ _ENDINGS = {
     "_simulated": "mm",
     "_command": "V",
     "_voltage": "V",
+    "_plant_velocity": "mm/s",
 }
 _HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 

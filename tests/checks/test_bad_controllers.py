@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rds.checks import check_controller, clauses
+from rds.core.types import Controller
 
 total = 0.0
 history: list[float] = []
@@ -273,6 +274,68 @@ def test_the_broken_clause_is_named(bad, clause, detail):
     assert not report.ok
     assert clause in [fault.clause for fault in report.faults], str(report)
     assert detail in str(report)
+
+
+def undeclared_signals(t, r, y, state, params):
+    return 0.0, state, {"velocity": 0.0}
+
+
+def test_signals_without_a_declaration_are_told_how_to_declare_them():
+    report = check_controller(undeclared_signals, initial_state=[0.0])
+    assert [fault.clause for fault in report.faults] == [clauses.PAIR]
+    assert 'signals = {"velocity": "mm/s"}' in str(report)
+
+
+def _told(value):
+    return lambda t, r, y, state, params: (0.0, state, {"velocity": value(t)})
+
+
+@pytest.mark.parametrize(
+    ("bad", "detail"),
+    [
+        (lambda t, r, y, state, params: (0.0, state), "without the signals velocity"),
+        (lambda t, r, y, state, params: (0.0, state, [1.0]), "the signals are [1.0]"),
+        (lambda t, r, y, state, params: (0.0, state, {"speed": 1.0}), "lack 'velocity'"),
+        (
+            lambda t, r, y, state, params: (0.0, state, {"velocity": 1.0, "speed": 1.0}),
+            "'speed', which is not declared",
+        ),
+        (_told(lambda t: float("nan") if t > 0.5 else 0.0), "the signal 'velocity' is nan at t = 0.501 s"),
+        (_told(lambda t: np.zeros(2)), "one finite number"),
+        (_told(lambda t: "fast"), "the signal 'velocity' is 'fast'"),
+    ],
+)
+def test_declared_signals_are_kept(bad, detail):
+    report = check_controller(Controller(bad, (), signals={"velocity": "mm/s"}), budget=0.5)
+    assert [fault.clause for fault in report.faults] == [clauses.SIGNALS]
+    assert detail in str(report)
+
+
+def test_a_coupled_law_tells_an_array_of_each_signal():
+    def control(t, r, y, state, params):
+        return np.zeros(2), state, {"velocity": 0.0}
+
+    report = check_controller(Controller(control, (), coupled=True, signals={"velocity": "mm/s"}))
+    assert [fault.clause for fault in report.faults] == [clauses.SIGNALS]
+    assert "an array of 2 finite numbers" in str(report)
+
+
+def test_a_declaration_that_cannot_be_columns_is_a_fault(tmp_path):
+    path = tmp_path / "named_badly.py"
+    path.write_text(
+        "signals = {'measured': 'mm'}\ndef control(t, r, y, state, params): return 0.0, state, {'measured': y}\n"
+    )
+    report = check_controller(path)
+    assert [fault.clause for fault in report.faults] == [clauses.SIGNALS]
+    assert "X_measured" in str(report)
+
+
+def test_signals_by_chance_are_found():
+    def control(t, r, y, state, params):
+        return 0.0, state, {"velocity": random.random()}
+
+    report = check_controller(Controller(control, (), signals={"velocity": "mm/s"}), budget=0.5)
+    assert [fault.clause for fault in report.faults] == [clauses.DETERMINISTIC]
 
 
 def test_one_broken_clause_is_one_fault():

@@ -232,6 +232,20 @@ def test_params_are_handed_in():
     assert check_controller(Controller(with_params, params={"gain": 3.0})).ok
 
 
+def test_signals_that_are_declared_and_told_are_no_fault(tmp_path):
+    path = tmp_path / "with_signals.py"
+    path.write_text(
+        "signals = {'velocity': 'mm/s'}\ninitial_state = [0.0]\n"
+        "def control(t, r, y, state, params):\n"
+        "    return 20.0 * (r.position - y), [y], {'velocity': (y - state[0]) / 1e-3}\n"
+    )
+    assert check_controller(path).ok
+    both = Controller(
+        lambda t, r, y, state, params: (r.position - y, state, {"place": y}), coupled=True, signals={"place": "mm"}
+    )
+    assert check_controller(both).ok
+
+
 def test_a_controller_object_knows_whether_it_is_coupled():
     law = Controller(lambda t, r, y, state, params: (r.position[::-1] - y, state), coupled=True)
     assert check_controller(law, axes=3).ok

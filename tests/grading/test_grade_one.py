@@ -63,6 +63,15 @@ def made(tmp_path: Path) -> Make:
     return make
 
 
+def test_a_submission_with_signals_grades_as_without(made: Make, pool: Pool, tmp_path: Path) -> None:
+    assignment = made(HEAD + SINE + RMS)
+    told = 'signals = {"slope": "mm/s"}\n' + STATEFUL.replace("[error, slope]", '[error, slope], {"slope": slope}')
+    plain, with_signals = (grade_with_runs(assignment, file(tmp_path, text), "ada", pool) for text in (STATEFUL, told))
+    assert plain.grade.score == with_signals.grade.score
+    for name, column in plain.runs[0].result.columns.items():
+        assert np.array_equal(column, with_signals.runs[0].result[name]), name
+
+
 def file(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "handed_in.py"
     path.write_text(text)

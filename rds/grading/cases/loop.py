@@ -53,7 +53,7 @@ def with_parts(
 def run_loop(plan: Plan, meta: dict[str, Any]) -> LoopRun:
     """Run a plan in virtual time. SubmissionError comes through; an axis that runs away ends the run."""
     mode = load_mode(SIMULATION)
-    columns, units = plan.columns(mode.followed)
+    columns, units = plan.columns(mode.followed, mode.simulates_plant)
     recorded = array("d")
     loop = replace(mode.build(plan, None), record=recorded.extend)
     if plan.program is None:

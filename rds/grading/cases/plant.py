@@ -93,7 +93,8 @@ def disturbed(
     if voltage is None and noise is None:
         return model
     made = partial(_Disturbed, voltage=voltage, noise=noise, actual=actual)
-    return replace(model, motion=lambda own, T: made(start(replace(own, motion=model.motion), T)))
+    moved = replace(model, has_velocity=False)  # that of the disturbed motion is not told
+    return replace(moved, motion=lambda own, T: made(start(replace(own, motion=model.motion), T)))
 
 
 class _Disturbed:

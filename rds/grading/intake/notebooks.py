@@ -19,7 +19,7 @@ from rds.grading.intake.needed import needed
 
 LARGEST = 16 << 20  # bytes; pictures are in notebooks too
 LARGEST_CODE = 512 << 10  # bytes, of all cells: the parser takes a thousand times as much memory
-INTERFACE = ("control", "derivatives", "advance", "output", "interpolate", "params", "initial_state")
+INTERFACE = ("control", "derivatives", "advance", "output", "interpolate", "params", "initial_state", "signals")
 _MAGIC = re.compile(r"\s*(?:[%!?]|[\w.]+\?{1,2}\s*$|[A-Za-z_][\w, ]*=\s*[%!])")  # also `files = !ls`
 _RUNS_THE_CELL = ("%%time", "%%capture", "%%prun")  # as if the line were not there
 _LINES = re.compile(r"\r\n|\r|\n")

@@ -66,7 +66,8 @@ def _flat(state: Any) -> np.ndarray:
 
 
 def _answer(controller: Controller, y: float, state: np.ndarray) -> tuple[float, np.ndarray]:
-    u, following = controller.control(0.0, Reference(0.0, 0.0, 0.0), y, tuple(state.tolist()), dict(controller.params))
+    rest = Reference(0.0, 0.0, 0.0)
+    u, following, *_ = controller.control(0.0, rest, y, tuple(state.tolist()), dict(controller.params))
     return float(u), _flat(following)
 
 

@@ -40,12 +40,14 @@ def obstacle(plan: Plan) -> str | None:
             return f"axis {name}: only the library's linear-axis model can be compiled"
         if axis.controller is not None and pure_law(axis) is None:
             return f"axis {name}: only the library's controllers can be compiled"
+        if axis.signals and pure_law(axis, "known") is None:
+            return f"axis {name}: the signals of this controller cannot be compiled"
     return None
 
 
 def run_compiled(plan: Plan) -> Rows:
     """What the loop would have recorded of a simulation, to the last bit. See `obstacle` for what can be compiled."""
-    columns, units = plan.columns(None)
+    columns, units = plan.columns(None, simulates_plant=True)
     rows = np.empty((plan.samples, len(columns)))
     rows[:, 0] = np.arange(plan.samples)
     board = plan.machine.converter
@@ -56,7 +58,7 @@ def run_compiled(plan: Plan) -> Rows:
         start = tuple(float(value) for value in axis.model.initial_state)
         voltage = rows[:, columns.index(f"{name}_voltage")]
         first = columns.index(f"{name}_reference" if axis.controller else f"{name}_measured")
-        table = rows[:, first : columns.index(f"{name}_command") + 1]
+        table = rows[:, first : columns.index(f"{name}_command") + 1 + len(axis.signals)]
         interface = (*output, resolution)
         constants = coefficients(axis.model.params, plan.T)
         if axis.controller is None:
@@ -65,7 +67,9 @@ def run_compiled(plan: Plan) -> Rows:
             reference, law = axis.reference, pure_law(axis)
             assert reference is not None and law is not None
             parts = (reference.position, reference.velocity, reference.acceleration)
-            tracking = controlled(law)
+            tracking = controlled(law, pure_law(axis, "known") if axis.signals else None)
+            plant = f"{name}_plant_velocity"
+            velocity = rows[:, columns.index(plant)] if plant in columns else np.empty(plan.samples)
             tracking(
                 *(np.asarray(part, dtype=float) for part in parts),
                 tuple(axis.controller.params["coefficients"]),
@@ -75,26 +79,34 @@ def run_compiled(plan: Plan) -> Rows:
                 interface,
                 table,
                 voltage,
+                velocity,
             )
     return Rows(columns, units, rows, Ending.DONE, "", {})
 
 
 @lru_cache
-def controlled(law: Callable[..., Any]) -> Callable[..., None]:
-    """The compiled loop of one axis under `law`, filling its columns from the reference to the command, and voltage."""
+def controlled(law: Callable[..., Any], known: Callable[..., Any] | None) -> Callable[..., None]:
+    """The compiled loop of one axis under `law`, filling its columns from the reference to the signals, and others.
+
+    The signals are those that `known` gives of a law that has them; the others are voltage and the plant's velocity.
+    """
     from numba import njit
 
     law, move = njit(law), njit(respond)
+    tell = _telling(known)
     counted, converted = converter.compiled()
 
     @njit
-    def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage):
+    def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage, velocity):
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
         low, high, step, resolution = interface
         for k in range(len(p)):
             y = counted(x, resolution)
-            u, state = law(p[k], v[k], a[k], y, state, coefficients)
+            u, following = law(p[k], v[k], a[k], y, state, coefficients)
+            tell(table, k, y, state, following, coefficients)
+            state = following
+            velocity[k] = w
             table[k, 0] = p[k]
             table[k, 1] = v[k]
             table[k, 2] = a[k]
@@ -106,6 +118,28 @@ def controlled(law: Callable[..., Any]) -> Callable[..., None]:
 
     compiled: Callable[..., None] = simulate
     return compiled
+
+
+def _telling(known: Callable[..., Any] | None) -> Callable[..., None]:
+    """What writes the signals behind the command, compiled; nothing for a law that has none."""
+    from numba import njit
+
+    if known is None:
+
+        @njit
+        def nothing(table, k, y, state, following, coefficients):
+            return None
+
+        return nothing
+    known = njit(known)
+
+    @njit
+    def tell(table, k, y, state, following, coefficients):
+        values = known(y, state, following, coefficients)
+        for i in range(len(values)):
+            table[k, 5 + i] = values[i]
+
+    return tell
 
 
 @lru_cache
@@ -132,11 +166,11 @@ def playing() -> Callable[..., None]:
     return compiled
 
 
-def pure_law(axis: AxisPlan) -> Callable[..., Any] | None:
-    """The pure function behind a library controller."""
+def pure_law(axis: AxisPlan, name: str = "law") -> Callable[..., Any] | None:
+    """The pure function behind a library controller; with "known" that of its signals."""
     assert axis.controller is not None
     control = axis.controller.control
     module = getattr(control, "__module__", "")
     if not module.startswith("rds.controllers.") or axis.controller.coupled:
         return None
-    return getattr(import_module(module), "law", None)
+    return getattr(import_module(module), name, None)

@@ -9,8 +9,9 @@ from typing import Any
 
 from rds.controllers import controller_names, library_controller
 from rds.core.adapt import as_controller, as_model, is_control_system
-from rds.core.errors import InputError
+from rds.core.errors import ContractError, InputError
 from rds.core.load import StudentFile, from_function, from_namespace, load_student
+from rds.core.signals import declaration_fault
 from rds.core.toml_table import TomlTable
 from rds.core.types import Controller, Model
 from rds.machines import Axis
@@ -81,6 +82,8 @@ def make_controller(words: TomlTable, setting: Setting, model: Model) -> Control
             words.place(),
         )
     if isinstance(given, Controller):
+        if fault := declaration_fault(given.signals):
+            raise ContractError(fault, given.source.path or words.place("controller"))
         return given
     if is_control_system(given):
         return as_controller(given, setting.T)
@@ -166,6 +169,8 @@ def _functions(words: TomlTable, key: str, given: dict[str, Any]) -> TomlTable:
     for name in ("control",) if key == "controller" else _FUNCTIONS[1:]:
         table.any(name)
     table.any("initial_state")
+    if key == "controller":
+        table.any("signals")
     return table
 
 

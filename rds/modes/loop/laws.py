@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from rds.core.errors import ContractError
+from rds.core.signals import EXAMPLE, return_line, signal_values, signals_wanted
 from rds.core.types import Controller, Reference
 from rds.core.values import own_copy, shown
 from rds.machines.converter import as_voltage
@@ -67,7 +69,7 @@ def controlled(
     limit: Callable[[Any], float],
     params: dict[str, Any],
 ) -> Law:
-    """One axis under its own controller; records reference, measured position and command voltage.
+    """One axis under its own controller; records reference, measured position, command voltage and its signals.
 
     `params` are the controller's, in a table that may be changed while it runs.
     """
@@ -87,9 +89,54 @@ def controlled(
                 u = as_voltage(u)
             voltages.append(limit(u))
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise BrokenContract(_fault(answer, k * T, name), controller.source.path) from None
+            raise _broken(answer, k * T, name, controller) from None
         row += r
         row += (y, u)
+
+    return _telling(axis, name, controller, reference, T, limit, params) if controller.signals else law
+
+
+def _telling(
+    axis: int,
+    name: str,
+    controller: Controller,
+    reference: ReferenceSamples | LiveReference,
+    T: float,
+    limit: Callable[[Any], float],
+    params: dict[str, Any],
+) -> Law:
+    """`controlled` for a controller with signals: apart, so that one without pays nothing for them."""
+    control, observe = controller.control, controller.observe
+    names = tuple(controller.signals)
+    state = _first_state(controller)
+    p, v, a = reference.columns()
+    make = Reference._make
+
+    def law(k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
+        nonlocal state
+        r = make((p[k], v[k], a[k]))
+        y = positions[axis]
+        answer = control(k * T, r, y, state, params)
+        try:
+            if observe is None:
+                u, following, told = answer if type(answer) is tuple else _pair(answer)
+            else:
+                u, following = answer
+            if type(u) is not float:
+                u = as_voltage(u)
+            voltages.append(limit(u))
+        except (TypeError, ValueError, OverflowError, ContractError):
+            raise _broken(answer, k * T, name, controller) from None
+        if observe is None:
+            values: Sequence[float] = _told(told, names, k * T, name, controller)
+        else:
+            values = observe(y, state, following, params)
+            for value in values:
+                if not isfinite(value):
+                    _told(dict(zip(names, values, strict=True)), names, k * T, name, controller)
+        state = following
+        row += r
+        row += (y, u, *values)
 
     return law
 
@@ -104,9 +151,9 @@ def coupled(
     params: dict[str, Any],
 ) -> Law:
     """Several axes under one controller that gets and gives arrays in axis order; `params` as of `controlled`."""
-    control = controller.control
+    control, signals = controller.control, tuple(controller.signals)
     state = _first_state(controller)
-    n = len(axes)
+    n, owners = len(axes), ", ".join(names)
     # for each part of a reference, one column per axis
     parts = list(zip(*(reference.columns() for reference in references), strict=True))
 
@@ -117,13 +164,16 @@ def coupled(
         y = np.array([positions[axis] for axis in axes])
         answer = control(k * T, r, y.copy(), state, params)
         try:
-            u, state = _pair(answer)
+            u, state, *rest = _pair(answer)
+            if len(rest) != (1 if signals else 0):
+                raise TypeError
             commands = _commands(u, n)
             voltages += [limit(value) for limit, value in zip(limits, commands, strict=True)]
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise BrokenContract(_fault(answer, k * T, ", ".join(names), n), controller.source.path) from None
+            raise _broken(answer, k * T, owners, controller, n) from None
+        told = _told(rest[0], signals, k * T, owners, controller, n) if signals else ()
         for i in range(n):
-            row += (*(of_axes[i] for of_axes in values), float(y[i]), commands[i])
+            row += (*(of_axes[i] for of_axes in values), float(y[i]), commands[i], *(value[i] for value in told))
 
     return law
 
@@ -160,9 +210,39 @@ def _commands(u: Any, n: int) -> list[float]:
     return values
 
 
-def _fault(answer: Any, t: float, axis: str, n: int = 1) -> str:
+def _told(told: Any, names: Sequence[str], t: float, axis: str, controller: Controller, n: int = 0) -> list[Any]:
+    """The values of the signals, in order; for a coupled law of `n` axes a list of each."""
+    try:
+        return signal_values(told, names, n)
+    except ValueError as error:
+        said = f"control() returned signals at t = {t:.3f} s (axis {axis}) that will not do: {error}"
+        raise BrokenContract(f"{said}; {signals_wanted(names, n)}", _line(controller)) from None
+
+
+def _broken(answer: Any, t: float, axis: str, controller: Controller, n: int = 1) -> BrokenContract:
+    """The error of a voltage that is none, or of an answer that has too few or too many parts."""
+    names, is_several = tuple(controller.signals), isinstance(answer, tuple | list)
+    said = f"control() returned {shown(answer, 200)} at t = {t:.3f} s (axis {axis})"
+    if names and controller.observe is None and not (is_several and len(answer) == 3):
+        wanted = signals_wanted(names, n if controller.coupled else 0)
+        return BrokenContract(f"{said}; as signals declares {', '.join(names)}, {wanted}", _line(controller))
+    if not names and is_several and len(answer) == 3 and isinstance(answer[2], Mapping):
+        wanted = "it must return (voltage, next_state), unless the file declares the third part beside params"
+        return BrokenContract(f"{said}; {wanted}, as in {EXAMPLE}", _line(controller))
+    parts = 3 if names and controller.observe is None else 2
+    return BrokenContract(_fault(answer, t, axis, parts, n), controller.source.path)
+
+
+def _line(controller: Controller) -> str | None:
+    """The student's file, and the line of the answer where that can be said."""
+    path = controller.source.path
+    line = return_line(controller.control, path)
+    return path if line is None else f"{path}:{line}"
+
+
+def _fault(answer: Any, t: float, axis: str, parts: int, n: int) -> str:
     wanted = "one finite number in V" if n == 1 else f"{n} finite numbers in V, one for each axis"
-    if not isinstance(answer, tuple | list) or len(answer) != 2:
+    if not isinstance(answer, tuple | list) or len(answer) != parts:
         said = f"control() returned {shown(answer, 200)} at t = {t:.3f} s (axis {axis})"
         return f"{said}; it must return (voltage, next_state) with a finite voltage in V"
     return (

@@ -24,6 +24,8 @@ class Mode:
     real time, in the target process. `followed` names the column of what its models give besides. `drives` says
     what may drive the axes, `modelled` whether models run in it, `validates` whether a run ends with a verdict on them.
 
+    `simulates_plant` says that the axes that are driven are models, so that their true velocity is known.
+
     `label` names it for people, `about` says in a few words what runs. `line` is how a plot draws its response among
     those of other modes, `layer` in which order: a higher one is drawn over a lower one.
     """
@@ -38,6 +40,7 @@ class Mode:
     late: LatePolicy = field(default_factory=LatePolicy)
     modelled: bool = True
     validates: bool = False
+    simulates_plant: bool = False
     line: Mapping[str, Any] | None = None
     layer: int = 0
 

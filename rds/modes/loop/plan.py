@@ -38,6 +38,11 @@ class AxisPlan:
     reference: ReferenceSamples | None = None
     signal: Sequence[float] | None = None  # V at every sample
 
+    @property
+    def signals(self) -> dict[str, str]:
+        """What its controller tells besides the voltage, with the units."""
+        return {} if self.controller is None else dict(self.controller.signals)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -131,6 +136,16 @@ class Plan:
             Tuning(plan.axis.name, plan.controller, plan.axis.unit) for plan in self.axes if plan.controller is not None
         ]
 
+    @property
+    def plant_velocities(self) -> list[int]:
+        """The axes whose model's velocity is recorded where the model is the plant: where a law tells signals.
+
+        An estimate is then held against it; without signals a result has the columns that it always had.
+        """
+        if not any(plan.controller is not None and plan.controller.signals for plan in self.axes):
+            return []
+        return [i for i, plan in enumerate(self.axes) if plan.model.has_velocity and not plan.axis.is_spindle]
+
     def _laws(self, params: list[dict[str, Any]], references: Sequence[ReferenceSamples | LiveReference]) -> list[Law]:
         limit, plans = self.limit(), self.axes
         first = plans[0].controller
@@ -146,10 +161,11 @@ class Plan:
                 laws.append(controlled(i, plan.axis.name, plan.controller, references[i], self.T, limit, params[i]))
         return laws
 
-    def columns(self, followed: str | None) -> tuple[list[str], dict[str, str]]:
+    def columns(self, followed: str | None, simulates_plant: bool = False) -> tuple[list[str], dict[str, str]]:
         """The names of a record's columns in the order of the loop's rows, and their units.
 
-        `followed` names what the loop's models give besides ("modelled"), if they give anything.
+        `followed` names what the loop's models give besides ("modelled"), if they give anything; `simulates_plant`
+        says that they are the plant. InputError if two columns have one name.
         """
         columns = ["sample"]
         units = {"sample": ""}
@@ -162,7 +178,7 @@ class Plan:
             parts = {"measured": unit, "command": "V"}
             if self.controlled:
                 rates = {"reference_velocity": f"{unit}/s", "reference_acceleration": f"{unit}/s²"}
-                parts = {"reference": unit, **rates, **parts}
+                parts = {"reference": unit, **rates, **parts, **plan.signals}
             for part, part_unit in parts.items():
                 columns.append(f"{name}_{part}")
                 units[columns[-1]] = part_unit
@@ -170,6 +186,13 @@ class Plan:
             for plan in self.axes:
                 columns.append(f"{plan.axis.name}_{part}")
                 units[columns[-1]] = part_unit or plan.axis.unit
+        for i in self.plant_velocities if simulates_plant else ():
+            axis = self.axes[i].axis
+            columns.append(f"{axis.name}_plant_velocity")
+            units[columns[-1]] = f"{axis.unit}/s"
+        if len(units) < len(columns):
+            twice = next(name for name in columns if columns.count(name) > 1)
+            raise InputError(f"two columns of the run are called {twice!r}; give the signal another name")
         return columns, units
 
 

@@ -85,7 +85,7 @@ def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = Non
 def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     """A simulation, in this process and in virtual time."""
     mode = load_mode(plan.mode)
-    columns, units = plan.columns(mode.followed)
+    columns, units = plan.columns(mode.followed, mode.simulates_plant)
     recorded = array("d")
     loop = replace(mode.build(plan, None), record=recorded.extend)
     changes = loop.changes
@@ -117,7 +117,8 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
 
 def _in_target(plan: Plan, directory: Path, lock: int, progress: Progress | None, live: Live) -> Rows:
     """A real-time run, in a target process that a recorder starts; `lock` holds the folder."""
-    columns, units = plan.columns(load_mode(plan.mode).followed)
+    mode = load_mode(plan.mode)
+    columns, units = plan.columns(mode.followed, mode.simulates_plant)
     columns[1:1] = TIMING_COLUMNS
     units |= dict.fromkeys(TIMING_COLUMNS, "ns")
     write_whole(directory / PLAN, _dumped(plan), is_own=True)
