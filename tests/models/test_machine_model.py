@@ -70,7 +70,11 @@ def test_a_whole_delay_shifts_the_answer() -> None:
 
 @pytest.mark.parametrize(
     ("params", "said"),
-    [({"tau": 0.01}, "machine parameter K is missing"), ({"tau": 0.0, "K": 1.0}, "tau = 0.0"), ({"tau": 1, "K": 1, "x": 1}, "'x'")],
+    [
+        ({"tau": 0.01}, "machine parameter K is missing"),
+        ({"tau": 0.0, "K": 1.0}, "tau = 0.0"),
+        ({"tau": 1, "K": 1, "x": 1}, "'x'"),
+    ],
 )
 def test_impossible_parameters_are_refused(params: dict[str, float], said: str) -> None:
     with pytest.raises(InputError, match=said):

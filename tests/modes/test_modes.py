@@ -18,15 +18,22 @@ pytestmark = [pytest.mark.realtime, pytest.mark.usefixtures("alone")]
 
 TIMING = {"lateness", "io", "compute", "model", "taken"}
 REFERENCES = {"reference", "reference_velocity", "reference_acceleration"}
-CONTROLLED = REFERENCES | {"measured", "command", "voltage"}
+CONTROLLED = REFERENCES | {"measured", "command", "voltage", "velocity"}  # the last is what the law's observer tells
 COLUMNS = {
-    "simulation": CONTROLLED,
-    "emulation": CONTROLLED,
+    "simulation": CONTROLLED | {"plant_velocity"},
+    "emulation": CONTROLLED | {"plant_velocity"},
     "implementation": CONTROLLED | {"modelled", "simulated"},
     "system-test": {"measured", "command", "voltage"},
     "model-validation": {"measured", "command", "voltage", "modelled"},
 }
-UNITS = {"reference_velocity": "mm/s", "reference_acceleration": "mm/s²", "command": "V", "voltage": "V"}
+UNITS = {
+    "velocity": "mm/s",
+    "plant_velocity": "mm/s",
+    "reference_velocity": "mm/s",
+    "reference_acceleration": "mm/s²",
+    "command": "V",
+    "voltage": "V",
+}
 TRACKING = {"name": "tracking", "gains": [1600.0, -36.6]}
 PERIOD = 0.002  # s: with room for a busy computer
 
