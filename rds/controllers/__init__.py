@@ -20,6 +20,7 @@ LIBRARY = Registry(
         "pid": "rds.controllers.pid",
         "modified-pid": "rds.controllers.modified_pid",
         "tracking": "rds.controllers.tracking",
+        "feedforward": "rds.controllers.feedforward",
     },
 )
 

@@ -126,7 +126,7 @@ def edit(change: str, base: str = GOOD) -> str:
         ("frequency = -1.0", 10, "frequency = -1.0 must be more than 0"),
         ("name = 'traking'", 13, "controller.name = 'traking' is unknown; known: p, pid, .*did you mean 'tracking'"),
         ("name = 3", 13, "controller.name = 3 is unknown"),
-        ("-name", 12, r"controller needs `name` \(p, pid, modified-pid, tracking\) or `file`"),
+        ("-name", 12, r"controller needs `name` \(p, pid, modified-pid, tracking, feedforward\) or `file`"),
         ("gains = [1.0]", 14, "gains = .1.0. must be .g1, g2."),
         ("[model]\nname = 'linear'", 16, "model.name = 'linear' is unknown; known: linear-axis, spindle, machine-axis"),
         (

@@ -46,7 +46,7 @@ def _fields(folder: Path) -> Iterable[Field]:
     yield Text(
         "controller",
         "Controller of the axes",
-        "a name (tracking, p, pid, modified-pid), or a Python file of yours; the spindle has PID",
+        "a name (tracking, feedforward, p, pid, modified-pid), or a Python file of yours; the spindle has PID",
         "tracking",
         "tracking or my_controller.py",
         120,
