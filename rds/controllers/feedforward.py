@@ -35,7 +35,7 @@ COMPENSATION = {
     "backlash": Quantity("play between motor and encoder, its whole width", "mm", low=0.0),
     "backlash_time": Quantity("time constant of crossing the play", "s", above=0.0),
 }
-OPTIONS: Mapping[str, Declaration] = tracking.OPTIONS | COMPENSATION
+OPTIONS: Mapping[str, Declaration] = {**tracking.OPTIONS, **COMPENSATION}
 BACKLASH_TIME = 0.005  # s; chosen: half of the mini CNC's τ
 TUNABLE = tracking.TUNABLE | COMPENSATION
 
@@ -115,6 +115,6 @@ def _retuned(
     axis_model: Mapping[str, Any], T: float, converter_range: float, pole: float, values: Mapping[str, float]
 ) -> Mapping[str, Any]:
     """The parameters after they were changed while it runs. The observer stays: its state is made for its pole."""
-    compensation = {name: values[name] for name in COMPENSATION}
+    compensation: dict[str, Any] = {name: values[name] for name in COMPENSATION}
     gains = [values["g1"], values["g2"]]
     return make(axis_model, T, converter_range, gains=gains, observer_pole=pole, **compensation).params

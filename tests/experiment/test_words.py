@@ -304,7 +304,6 @@ def test_the_same_in_python() -> None:
         ({"axis": ["X", 3]}, "must be a list of axis names"),
         ({"mode": "test"}, "mode = 'test' is unknown"),
         ({"duration": "1"}, "must be a number in s"),
-        ({"duration": None}, "duration is missing"),
         ({"controller": None}, "controller of axis X is missing"),
         ({"controller": 3}, "controller = 3 must be a name"),
         ({"controller": lambda t: 0.0}, "cannot tell which interface"),

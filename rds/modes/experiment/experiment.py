@@ -13,7 +13,7 @@ from rds.core.folder_kept import folder_kept
 from rds.core.toml_table import TomlTable
 from rds.core.types import Ending
 from rds.modes import DEFAULT, load_mode
-from rds.modes.experiment.experiment_file import EXPERIMENT, PATHS
+from rds.modes.experiment.experiment_file import EXPERIMENT, PATHS, is_path
 from rds.modes.experiment.folder import new_folder, require_writable
 from rds.modes.experiment.outcome import outcome
 from rds.modes.experiment.resolve import resolve
@@ -65,7 +65,7 @@ class Experiment:
         compiled: bool = False,
         title: str | None = None,
     ):
-        if duration is None and not (isinstance(reference, Mapping) and reference.get("kind") in PATHS.modules):
+        if duration is None and not is_path(reference):
             duration = 10.0
         given: dict[str, Any] = {
             "title": title,

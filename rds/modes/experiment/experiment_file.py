@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from rds.bus.hub.bus_settings import BITRATE, DATA_BITRATE, RESTART
 from rds.bus.modules.dialects import DEFAULT, dialect_names
@@ -31,6 +32,14 @@ def _model(name: str) -> Table:
 
 _PARAMS = Table("values over those of the file's own `params`", others=Anything("parameter of the file"))
 SIGNAL = Table("how the value changes over time", chosen_by="kind", parts=Parts(signal_kinds, signal_options))
+
+
+def is_path(reference: Any) -> bool:
+    """Whether a reference, as it was given, is one that all axes of the run follow together."""
+    kind = reference.get("kind") if isinstance(reference, Mapping) else None
+    return isinstance(kind, str) and kind in PATHS.modules
+
+
 REFERENCE = Table(
     "what the axis is to follow; kind = path: what all axes of the run follow together",
     chosen_by="kind",

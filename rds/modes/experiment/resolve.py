@@ -19,7 +19,7 @@ from rds.core.quantities import Choice
 from rds.core.toml_table import TomlTable
 from rds.machines import Axis, Machine, load_machine
 from rds.modes import load_mode
-from rds.modes.experiment.experiment_file import AXIS_KEYS, PATHS
+from rds.modes.experiment.experiment_file import AXIS_KEYS, PATHS, is_path
 from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model
 from rds.modes.loop.laws import ReferenceSamples
 from rds.modes.loop.mode import Mode
@@ -85,7 +85,7 @@ def resolve(
 def _path(words: TomlTable, folder: Path, machine: Machine, T: float) -> tuple[InterpolatedProgram | None, str | None]:
     """The path that all axes of the run follow, and the file of its interpolator, if the user wrote one."""
     given = words.any("reference")
-    if not isinstance(given, Mapping) or given.get("kind") not in PATHS.modules:
+    if not is_path(given):
         return None, None
     for key, why in (
         ("signal", "a signal drives the axes without a controller"),

@@ -109,7 +109,7 @@ def dwell_samples(seconds: float, T: float) -> int:
     return ceil(seconds / T - 1e-9)
 
 
-def program_channels(fastest: float) -> list[Channel]:
+def program_channels(fastest: float = 2.0) -> list[Channel]:
     """What may be changed while a program runs, besides the parameters of controllers; `fastest` feed override."""
     switch = partial(Channel, low=0.0, high=1.0, whole=True)
     feed = "feed as a multiple of the programmed one; " + ("rapids only get slower" if fastest > 1.0 else "at most 1")
