@@ -293,7 +293,8 @@ def test_events_and_comments_are_no_damage(tmp_path: Path) -> None:
 
 def test_a_cut_or_damaged_blf_is_refused_with_its_offset(tmp_path: Path) -> None:
     path = tmp_path / "a.blf"
-    write(path, [frame(k % 2048, os.urandom(8), k / 1000) for k in range(8000)])
+    chance = random.Random(1)  # the same in every run: some bytes of a container may change without harm to its text
+    write(path, [frame(k % 2048, chance.randbytes(8), k / 1000) for k in range(8000)])
     whole = path.read_bytes()
     assert len(list(LogFile(path))) == 8000
     for cut in (len(whole) - 100, len(whole) // 2, 150, 20, 3, 0):

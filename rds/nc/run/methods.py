@@ -17,6 +17,7 @@ import numpy as np
 from rds.core.errors import ContractError, InputError
 from rds.interpolators import LIBRARY
 from rds.interpolators.segment_rows import read_segments
+from rds.modes import SIMULATION
 from rds.modes.experiment import Experiment
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import InterpolatedProgram
@@ -90,7 +91,7 @@ def compare_methods(
             table["sample_period"] = sample_period
         try:
             experiment = Experiment.from_table(table)
-            result = experiment.run("simulation")
+            result = experiment.run(SIMULATION)
         except ContractError:
             raise
         except InputError as error:
