@@ -87,7 +87,7 @@ def interpolate(
         notes: list[str] = []
         chosen = _method(method, option, period, notes)
         arcs = None if arc_method is None else _method(arc_method, None, period, notes)
-        filter_ = _acceleration(acceleration, acceleration_time, multipliers, exact_stop)
+        filter_ = acceleration_of(acceleration, acceleration_time, multipliers, exact_stop)
         rests: dict[int, float] = {}
         if file is not None and file.suffix != ".toml":
             programmed = _program(file, machine, period, reading)
@@ -182,9 +182,10 @@ def option_of(text: str) -> tuple[str, Any]:
         return name.strip(), value
 
 
-def _acceleration(
+def acceleration_of(
     name: str | None, time: float | None, multipliers: str | None, exact_stop: bool
 ) -> Acceleration | None:
+    """The filter that a command's options name; InputError for those that go with one which is not given."""
     from rds.core.errors import InputError
     from rds.interpolators.acceleration import make_acceleration
 

@@ -92,6 +92,7 @@ def run(
     Elsewhere `rds nc operate` does the same.
     """
     with refusals(), stdout_kept(json), ends_as_ctrl_c():
+        from rds.cli.interpolate import acceleration_of
         from rds.core.errors import InputError
         from rds.modes import load_mode
         from rds.modes.experiment.folder import new_folder, require_writable
@@ -112,7 +113,7 @@ def run(
                 setup=setup(tools, parameters, with_, max_jumps),
                 controller=None if experiment is not None else controller,
                 interpolator=_interpolator(interpolator, option, look_ahead),
-                acceleration=_acceleration(acceleration, acceleration_time),
+                acceleration=acceleration_of(acceleration, acceleration_time, None, exact_stop),
                 exact_stop=exact_stop,
                 experiment=experiment,
                 mode=mode,
@@ -149,19 +150,6 @@ def _interpolator(name: str | None, options: list[str] | None, look_ahead: int |
         return None
     words: dict[str, Any] = {"interpolator": name, "params": dict(map(option_of, options or ()))}
     return words if look_ahead is None else words | {"look_ahead": look_ahead}
-
-
-def _acceleration(name: str | None, seconds: float | None) -> dict[str, Any] | None:
-    from rds.core.errors import InputError
-
-    if name is None:
-        if seconds is not None:
-            raise InputError(
-                "--acceleration-time goes with --acceleration, which is not given; add --acceleration linear"
-            )
-        return None
-    key = "time_constant" if name == "exponential" else "time"
-    return {"name": name} if seconds is None else {"name": name, key: seconds}
 
 
 def _operated(part: PartProgram, folder: Path, changes: list[tuple[float, str, float]]) -> Result:
@@ -354,13 +342,14 @@ def methods(
 ) -> None:
     """Compare interpolators on a simulated machine: contour error, feed ripple, jerk, and compute time of a sample."""
     with refusals():
+        from rds.cli.interpolate import acceleration_of
         from rds.modes.experiment.folder import require_writable
         from rds.nc.run.methods import compare_methods, methods_report
         from rds.results.reports.write import write
 
         if out is not None:
             require_writable(out)
-        filter_ = _acceleration(acceleration, acceleration_time)
+        filter_ = acceleration_of(acceleration, acceleration_time, None, False)
         with progress_bars() as bar:
             compared = compare_methods(
                 file,

@@ -127,7 +127,16 @@ def loop(
     """The loop of these parts in virtual time, its rows going nowhere."""
     drive = plan.start()
     return Loop(
-        plan.most_samples, _due, read, drive.laws, write, follow, _dropped, _going_on, drive.changes, drive.refers
+        plan.most_samples,
+        _due,
+        read,
+        drive.laws,
+        write,
+        follow,
+        _dropped,
+        _going_on,
+        drive.changes,
+        drive.sets_references,
     )
 
 

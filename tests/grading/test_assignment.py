@@ -79,6 +79,13 @@ def test_what_is_wrong_is_told_with_its_place(old: str, new: str, said: str, tmp
     assert "assignment.toml" in str(error.value)
 
 
+def test_a_path_is_no_reference_of_a_case(tmp_path: Path) -> None:
+    path = 'kind = "path"\nstart = [0.0]\nfeed = 600\nsegment = [{kind = "line", end = [1.0]}]\n'
+    text = HEAD + SINE.replace("duration = 1.0\n", "").split("kind =")[0] + path + RMS
+    with pytest.raises(InputError, match=r"assignment\.toml.*no path for its reference: give `program`"):
+        read_assignment(assignment_in(tmp_path, text))
+
+
 def test_the_line_is_that_of_the_right_table_of_several(tmp_path: Path) -> None:
     second = SINE.replace('"sine"', '"other"').replace("amplitude = 2.0", "amplitude = true")
     text = HEAD + SINE + second + RMS

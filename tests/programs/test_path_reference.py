@@ -23,7 +23,7 @@ from rds.interpolators.path import interpolate
 from rds.machines import load_machine
 from rds.modes.loop.execution import State
 from rds.modes.loop.interpolated import Interpolated
-from rds.nc.run.path import Method, _made
+from rds.nc.run.path import Method, program_of
 from rds.nc.run.run import PartProgram
 
 T = 0.001
@@ -169,7 +169,7 @@ def test_whatever_is_wanted_the_rate_changes_gently(changes: list[tuple[int, Any
     machine = load_machine("mini-cnc")
     path = [LineSegment((0.0, 0.0), (8.0, 6.0), feed)]
     method = Method(library_interpolator("constant-velocity"), make_acceleration("s-shape", time=0.1))
-    made = _made("path", path, [1], {}, (), method, machine, ["X", "Y"], T)
+    made = program_of("path", path, [1], {}, (), method, machine, ["X", "Y"], T)
     follower, wanted, along = Interpolated(made, T), {"override": 1.0, "hold": 0.0}, [0.0]
     at = dict(changes)
     for k in range(60_000):
@@ -333,3 +333,40 @@ def test_a_slow_interpolator_has_missed_and_is_named(here: Path) -> None:
     )
     result = experiment.run("emulation")
     assert result.verdict == "missed" and "the interpolator (" in result.meta["verdict_reason"]
+
+
+def test_the_report_of_a_path_has_its_picture_and_speaks_of_segments(here: Path) -> None:
+    (here / "e.toml").write_text(
+        'axes = ["X", "Y"]\nsample_period = 0.002\n[reference]\nkind = "path"\nfile = "lines.toml"\n'
+        '[controller]\nname = "tracking"\n'
+    )
+    ran = CliRunner().invoke(app, ["run", "e.toml", "--out", "out"])
+    assert ran.exit_code == 0, ran.output
+    text = (here / "out" / "program.html").read_text()
+    assert "off the programmed path, in segment" in text and "at the programmed feed throughout" not in text
+    assert (here / "out" / "program-path.png").is_file()
+
+
+@pytest.mark.parametrize("period", [2e-5, 1e-4])
+def test_a_hold_at_a_short_sample_period_comes_to_rest(period: float) -> None:
+    """A ramp lasts for 20 ms at least, which are more samples than a step of one may otherwise have."""
+    machine = load_machine("mini-cnc")
+    method = Method(library_interpolator("constant-velocity"))
+    made = program_of("path", [LineSegment((0.0,), (8.0,), 5.0)], [1], {}, (), method, machine, ["X"], period)
+    follower = Interpolated(made, period)
+    for _ in range(round(1.0 / period)):
+        follower.advance(0.0, follower.last)
+    assert follower.rate == 0.0 and 0.0 < follower.position[0] < 3.0
+
+
+def test_a_path_at_the_end_of_the_travel_and_in_whole_blu_is_followed(here: Path) -> None:
+    machine = load_machine("mini-cnc")
+    high = machine.axes["X"].travel[1]
+    rows = [{"kind": "arc", "end": [0.0, 0.0], "centre": [high / 2.0, 0.0]}]
+    reference = {"kind": "path", "start": [0.0, 0.0], "feed": 700, "segment": rows}
+    circle = rds.Experiment(axis=["X", "Y"], controller="tracking", sample_period=0.01, reference=reference).run()
+    assert circle["X_reference"].max() == pytest.approx(high, abs=0.01)
+    line = {"kind": "path", "start": [0.0], "feed": 700, "segment": [{"kind": "line", "end": [1.0]}]}
+    line["interpolator"] = "reference-pulse"
+    pulses = rds.Experiment(axis="X", controller="p", sample_period=0.0002, reference=line).run()
+    assert pulses["X_reference"][-1] == 1.0

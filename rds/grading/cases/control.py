@@ -216,6 +216,11 @@ def read(words: TomlTable, folder: Path, machine: str) -> ControlCase:
     files += tuple(_named_files(words, folder))
     words.table["controller"] = replace(_STANDS_IN, coupled=is_coupled)
     plan, known = resolve(words, folder, None, None if prepared is None else prepared.program)
+    if prepared is None and plan.program is not None:
+        raise InputError(
+            "a case has no path for its reference: give `program` (a part program), or a reference of each axis",
+            words.place("reference"),
+        )
     plan, plants = plants_of(plan, words)
     if len({axis.axis.unit for axis in plan.axes}) > 1:
         raise InputError("its axes have different units; grade them in cases of their own", words.place("axes"))

@@ -29,7 +29,7 @@ def obstacle(plan: Plan) -> str | None:
     except ImportError:
         return f"numba is not installed; install it with: {remedy('fast')}"
     if plan.program is not None:
-        return "a part program drives the axes"
+        return "a path or a part program drives the axes"
     if plan.changes:
         return "live values change while it runs"
     if load_mode(plan.mode).real_time:

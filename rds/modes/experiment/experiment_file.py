@@ -19,7 +19,8 @@ from rds.references import signal_kinds, signal_options
 AXIS_KEYS = ("reference", "signal", "controller", "model")
 PATHS = Registry("reference", {"path": "rds.nc.run.path"})
 """Kinds of references that drive all axes of a run together. Each module gives `WORDS` (the table's keys),
-`program(words, folder, machine, axes, T)` and `judged_path(result, program, T)`."""
+`program(words, folder, machine, axes, T)`, `judged_path(result, program, T)`, and
+`save_path_run(result, program, folder, title)`."""
 
 
 def _controller(name: str) -> Table:

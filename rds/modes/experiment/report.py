@@ -9,7 +9,9 @@ from typing import Any
 from rds.core.atomic import write_whole
 from rds.core.types import Ending, Verdict
 from rds.modes.experiment.experiment import Experiment
+from rds.modes.experiment.experiment_file import PATHS
 from rds.modes.experiment.folder import new_folder
+from rds.modes.loop.program import InterpolatedProgram
 from rds.modes.process.host import Progress
 from rds.results import Result
 from rds.results.files import saved_files
@@ -26,7 +28,11 @@ def run_and_save(
     experiment = Experiment.from_toml(path)
     folder = out if out is not None else _new_folder(experiment, mode)
     result = experiment.run(mode, out=folder, progress=progress)
-    return result, save_with_report(result, folder, experiment.title or path.stem)
+    program, title = experiment.plan(mode).program, experiment.title or path.stem
+    if isinstance(program, InterpolatedProgram):
+        files: dict[str, Path] = PATHS.module("path").save_path_run(result, program, folder, title)
+        return result, files
+    return result, save_with_report(result, folder, title)
 
 
 def _new_folder(experiment: Experiment, mode: str | None) -> Path:

@@ -61,7 +61,7 @@ class Follower(Protocol):
     def line(self, sample: int) -> int:
         """The program line of a sample."""
 
-    def shown(self) -> tuple[float, ...]:
+    def columns(self) -> tuple[float, ...]:
         """What else is recorded of where it is."""
 
     def advance(self, wanted: float, until: int) -> None:
@@ -135,7 +135,7 @@ class Execution:
         if shown is State.HOME and self._way is not None:
             rate = self._way.rate
         row += (self._shown_line, self._follower.place, rate, shown)
-        row += self._follower.shown()
+        row += self._follower.columns()
 
     def over(self) -> tuple[Ending, str] | None:
         """How the run ends before its next sample, and why, if it does."""

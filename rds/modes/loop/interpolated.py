@@ -12,41 +12,52 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from itertools import repeat
-from math import ceil, isfinite
+from math import ceil
 
 import numpy as np
 
 from rds.core.errors import ContractError
 from rds.modes.loop.program import Happening, InterpolatedProgram, Row, dwell_samples
-from rds.modes.loop.ramp import EXTRA_SHARPEST, EXTRA_STEEPEST, FURTHEST, SHARPEST, STEEPEST, Ramp
+from rds.modes.loop.ramp import (
+    EXTRA_SHARPEST,
+    EXTRA_STEEPEST,
+    FURTHEST,
+    SHARPEST,
+    SHORTEST,
+    STEEPEST,
+    Paced,
+    Ramp,
+    in_steps,
+)
 
 LEAST_AHEAD = 3  # rows: a ramp that ends at a row may pass more than one of them in a sample
 _SHARE = 0.5  # of an axis's acceleration and jerk for a change of the rate; the path's own motion has the rest
 _LANDS_WITH = 0.25  # of them for ending at a row
-_SHORTEST, _LONGEST = 0.02, 600  # s and samples, of a ramp: a change that takes longer is made in steps
-_FEWEST = 9  # samples of a ramp; a shorter one would go back a little to land on a row
 _FASTEST = 1.5  # times an axis's velocity that a row may ask for: the drive would follow, and nobody meant it
+_ROUNDED = 0.02  # mm that rounding to BLU may add to a row
+_BEYOND = 1e-6  # mm that the last digits of a path may lie beyond the travel
 _UNKNOWN = 1 << 50  # samples: the end is not in sight
 
 
-class Interpolated:
+class Interpolated(Paced):
     """Implements `execution.Follower` for rows that are made on the way; `place` counts rows.
 
     ContractError for a row that no axis could go to: out of its travel, or much faster than it moves.
     """
 
     def __init__(self, program: InterpolatedProgram, T: float):
+        super().__init__()
         self._program, self._T = program, T
         self._lines = program.line
         velocity, acceleration, jerk = np.asarray(program.limits, dtype=float)
-        self._fastest = (_FASTEST * velocity * T).tolist()
-        self._travel = np.asarray(program.travel, dtype=float).tolist()
+        self._velocity = velocity.tolist()
+        self._longest = (_FASTEST * velocity * T + _ROUNDED).tolist()
+        self._travel = [(low - _BEYOND, high + _BEYOND) for low, high in program.travel.tolist()]
         # s and s² that a change of the rate by 1 takes at the largest feed, of the weakest axis
         slow, sharp = program.feed / float(acceleration.min()), program.feed / float(jerk.min())
         self._slow, self._sharp = STEEPEST * slow / _SHARE, SHARPEST * sharp / _SHARE
         landing = (EXTRA_STEEPEST * slow * FURTHEST * T / _LANDS_WITH) ** 0.5
         self._landing = ceil(max(landing, (EXTRA_SHARPEST * sharp * FURTHEST * T / _LANDS_WITH) ** (1.0 / 3.0)) / T)
-        self.place, self.rate = 0.0, 1.0
         zero = [0.0] * len(program.axes)
         self._rows: deque[Row] = deque([(list(program.start), zero, zero, 0)])
         self._first = 0  # the number of the first row that is kept
@@ -58,15 +69,13 @@ class Interpolated:
         self._rests()
         self.position: list[float] = list(program.start)
         self.velocity, self.acceleration = zero, zero
-        self._ramp: Ramp | None = None
-        self._k, self._from = 0, 0.0
         self._fill()
 
     def line(self, sample: int) -> int:
         """The program line of a sample that is kept."""
         return self._lines[self._row(sample)[3]]
 
-    def shown(self) -> tuple[float, ...]:
+    def columns(self) -> tuple[float, ...]:
         """The segment (from 1), and how many rows are made beyond where it is."""
         at = -int(-self.place // 1)
         return self._row(at)[3] + 1, self._first + len(self._rows) - 1 - at
@@ -75,20 +84,10 @@ class Interpolated:
         """One sample period towards the rate `wanted`, and along the path at most to the sample `until`."""
         if self._ramp is None and wanted != self.rate:
             self._begin(min(wanted, 1.0))
-        ramp, slope = self._ramp, 0.0
-        if ramp is None:
-            place = self.place + self.rate
-        else:
-            self._k += 1
-            place = self._from + ramp.passed(self._k)
-            self.rate, slope = ramp.rate(self._k), ramp.slope(self._k) / self._T
-            if self._k == ramp.samples:
-                self.rate, slope, self._ramp = ramp.end, 0.0, None
-                if ramp.end == 1.0:
-                    place = float(round(place))
+        place, slope = self._next_place()
         self.place = min(place, until)
         self._fill()
-        self._evaluate(slope)
+        self._evaluate(slope / self._T)
         if place >= until:
             self.settle(wanted)
 
@@ -101,14 +100,11 @@ class Interpolated:
 
     def _begin(self, wanted: float) -> None:
         """Begin a ramp from the rate now towards `wanted`, as long as the weakest axis needs."""
-        change, samples = wanted - self.rate, 0
-        while samples == 0 or samples > _LONGEST:
-            change *= 1.0 if samples == 0 else (_LONGEST / samples) ** 2
-            size = abs(change)
-            samples = max(ceil(max(_SHORTEST, self._slow * size, (self._sharp * size) ** 0.5) / self._T), _FEWEST)
+        change, samples = in_steps(
+            wanted - self.rate, lambda size: max(SHORTEST, self._slow * size, (self._sharp * size) ** 0.5), self._T
+        )
         end = wanted if change == wanted - self.rate else self.rate + change
-        ramp = Ramp(self.rate, end, max(samples, self._landing) if end == 1.0 else samples)
-        self._ramp, self._k, self._from = ramp.landing(self.place) if end == 1.0 else ramp, 0, self.place
+        self._go_along(Ramp(self.rate, end, max(samples, self._landing) if end == 1.0 else samples))
 
     # --- the rows -------------------------------------------------------------------------------------------------
 
@@ -145,8 +141,6 @@ class Interpolated:
         position, _, _, segment = self._rows[-1]
         sample = self._first + len(self._rows) - 1
         zero = [0.0] * len(position)
-        if not self._due:  # a place of rest all the same: the filter is empty
-            return
         for happening in self._due:
             self.happenings.append(happening._replace(sample=sample))
             if happening.kind == "dwell":
@@ -159,7 +153,7 @@ class Interpolated:
         before = self._rows[-1][0]
         for axis, (value, last) in enumerate(zip(row[0], before, strict=True)):
             low, high = self._travel[axis]
-            if low <= value <= high and abs(value - last) <= self._fastest[axis] and isfinite(value):
+            if low <= value <= high and abs(value - last) <= self._longest[axis]:
                 continue
             name, number = self._program.axes[axis], self._first + len(self._rows)
             where = f"row {number} of the interpolator sends {name} from {last:g} to {value:g} mm"
@@ -169,7 +163,7 @@ class Interpolated:
                 )
             speed = abs(value - last) / self._T
             raise ContractError(
-                f"{where} in one sample, {speed:g} mm/s; it moves at {self._fastest[axis] / _FASTEST / self._T:g} mm/s "
+                f"{where} in one sample, {speed:g} mm/s; it moves at {self._velocity[axis]:g} mm/s "
                 "at most: let each row follow the one before at the segment's feed rate",
                 self._program.about["interpolator"],
             )

@@ -19,8 +19,8 @@ class Loop:
       policy discarded periods.
     - `read() -> positions`: the measured position of each axis, in axis order.
     - `laws`: each is called with (sample, positions, row, voltages); it appends what it wants recorded to the row
-      and its limited voltages to the list. See `loop.laws`. Where `refers`, the first one sets the references of the
-      others.
+      and its limited voltages to the list. See `loop.laws`. Where `sets_references`, the first one sets the
+      references of the others.
     - `write(voltages) -> acting`: hands the voltages out; returns those that act on the axes from this sample on.
     - `follow(acting) -> outputs`: the models move on by one sample (holding the last voltages when none are given);
       returns what is to be recorded of them, as it was at this sample.
@@ -39,7 +39,7 @@ class Loop:
     record: Callable[[list[float]], object]
     finish: Callable[[int], Ending | None]
     changes: LiveChanges | None = None
-    refers: bool = False
+    sets_references: bool = False
     k: int = 0  # the sample to take next, or the one that failed
 
     def run(self, until: int | None = None) -> Ending | None:

@@ -21,7 +21,7 @@ from rds.modes.loop.interpolated import Interpolated
 from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
 from rds.modes.loop.live_values import Channel
 from rds.modes.loop.loop import Law
-from rds.modes.loop.program import COLUMNS, MADE_COLUMNS, InterpolatedProgram, Program, program_channels
+from rds.modes.loop.program import COLUMNS, INTERPOLATED_COLUMNS, InterpolatedProgram, Program, program_channels
 from rds.modes.loop.retimed import Retimed
 from rds.modes.loop.tuning import Tuning
 
@@ -125,7 +125,7 @@ class Plan:
         changes = LiveChanges(
             self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits
         )
-        return Drive([execution.law, *self._laws(params, list(live.values()))], changes, refers=True)
+        return Drive([execution.law, *self._laws(params, list(live.values()))], changes, sets_references=True)
 
     def _tunings(self) -> list[Tuning]:
         """The live parameters of each controller; of one controller, if it drives all axes."""
@@ -170,7 +170,7 @@ class Plan:
         columns = ["sample"]
         units = {"sample": ""}
         if self.program is not None:
-            of_program = COLUMNS | (MADE_COLUMNS if isinstance(self.program, InterpolatedProgram) else {})
+            of_program = COLUMNS | (INTERPOLATED_COLUMNS if isinstance(self.program, InterpolatedProgram) else {})
             columns += of_program
             units |= of_program
         for plan in self.axes:
@@ -202,7 +202,7 @@ class Drive:
 
     laws: list[Law]
     changes: LiveChanges
-    refers: bool = False  # the first of the laws sets the references of the others
+    sets_references: bool = False  # the first of the laws sets the references of the others
 
 
 def dump(plan: Plan) -> bytes:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 OVERRIDE, HOLD, RESUME, HOME, OPTIONAL_STOP = "override", "hold", "resume", "home", "optional_stop"
 COLUMNS = {"program_line": "", "program_sample": "", "program_override": "", "program_state": ""}
-MADE_COLUMNS = {"program_segment": "", "program_buffer": ""}  # of motion that is made while it is carried out
+INTERPOLATED_COLUMNS = {"program_segment": "", "program_buffer": ""}
 
 
 class Happening(NamedTuple):

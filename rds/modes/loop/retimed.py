@@ -17,13 +17,21 @@ from typing import Any
 import numpy as np
 
 from rds.modes.loop.program import Program
-from rds.modes.loop.ramp import EXTRA_SHARPEST, EXTRA_STEEPEST, FURTHEST, SHARPEST, STEEPEST, Ramp
+from rds.modes.loop.ramp import (
+    EXTRA_SHARPEST,
+    EXTRA_STEEPEST,
+    FURTHEST,
+    SHARPEST,
+    SHORTEST,
+    STEEPEST,
+    Paced,
+    Ramp,
+    in_steps,
+)
 
 FREE = 0.997  # up to this rate no limit that the plan keeps can be exceeded
 EXCESS = 0.001  # by which differences of the samples sent may exceed a limit, relative: quintics are no plan
 PATIENCE = 0.5  # s after which somebody who wants it slower gets the gentlest step, wherever the path is
-_FEWEST = 9  # samples of a ramp; from rest, a shorter one would go back a little to land on a sample of the plan
-_SHORTEST, _LONGEST = 0.02, 600  # s and samples, of a ramp: a change that takes longer is made in steps
 _STAY = 8  # samples at a rate above FREE that are checked at once
 _LANDS_WITH = 0.25  # of what acceleration and jerk allow, for ending at a sample of the plan
 _AHEAD = 0.2  # s of the plan whose speed says how long a ramp will have to be
@@ -31,10 +39,11 @@ _AHEAD = 0.2  # s of the plan whose speed says how long a ramp will have to be
 _TRIES = ((1.0, 1.05), (1.0, 1.5), (1.0, 2.2), (1.0, 3.5), (0.3, 1.5), (0.3, 3.5), (0.05, 2.0), (0.05, 5.0))
 
 
-class Retimed:
+class Retimed(Paced):
     """Implements `execution.Follower` for a program; `place` counts samples, and is exact at a rate of 1."""
 
     def __init__(self, program: Program, T: float):
+        super().__init__()
         self._T = T
         self._tables = tuple(
             np.ascontiguousarray(table, dtype=float)
@@ -46,13 +55,10 @@ class Retimed:
         self._n = len(program.axes)
         self.happenings, self.last, self._line = program.happenings, program.samples - 1, program.line
         self._limits = np.asarray(program.limits, dtype=float)
-        self.place, self.rate = 0.0, 1.0
         self.position: list[float] = self._p[: self._n].tolist()
         self.velocity: list[float] = [0.0] * self._n
         self.acceleration: list[float] = [0.0] * self._n
         self._past = [self.position] * 3  # the last samples, for differences
-        self._ramp: Ramp | None = None
-        self._k, self._from = 0, 0.0  # how far the ramp is, and where it began
         self._back = Ramp(1.0, 1.0, 1)  # from a rate above FREE, known to keep the limits
         self._tries = self._sure = 0
         self._rests = True
@@ -61,7 +67,7 @@ class Retimed:
         """The program line of a sample."""
         return int(self._line[sample])
 
-    def shown(self) -> tuple[float, ...]:
+    def columns(self) -> tuple[float, ...]:
         """Nothing else is recorded of it."""
         return ()
 
@@ -69,20 +75,10 @@ class Retimed:
         """One sample period towards the rate `wanted`, and along the path at most to the sample `until`."""
         if self._ramp is None and (wanted != self.rate or _is_watched(self.rate)):
             self._choose(wanted, until)
-        ramp, slope = self._ramp, 0.0
-        if ramp is None:
-            place = self.place + self.rate
-        else:
-            self._k += 1
-            place = self._from + ramp.passed(self._k)
-            self.rate, slope = ramp.rate(self._k), ramp.slope(self._k) / self._T
-            if self._k == ramp.samples:
-                self.rate, slope, self._ramp = ramp.end, 0.0, None
-                if ramp.end == 1.0:
-                    place = float(round(place))
+        place, slope = self._next_place()
         self._rests = self._rests and self.rate == 0.0
         self.place = min(place, until)
-        self._evaluate(self.rate, slope)
+        self._evaluate(self.rate, slope / self._T)
         self._past = [*self._past[1:], self.position]
         if place >= until:
             self.settle(wanted)
@@ -120,7 +116,7 @@ class Retimed:
             self._begin(self._towards(wanted, *_TRIES[-1]))
 
     def _begin(self, ramp: Ramp) -> None:
-        self._ramp, self._k, self._from = _on(ramp, self.place), 0, self.place
+        self._go_along(ramp)
         self._tries = self._sure = 0
 
     def _towards(self, wanted: float, share: float, longer: float) -> Ramp:
@@ -132,19 +128,20 @@ class Retimed:
             float(np.sqrt(EXTRA_STEEPEST * FURTHEST / _LANDS_WITH * T * v / acceleration).max()),
             float(np.cbrt(EXTRA_SHARPEST * FURTHEST / _LANDS_WITH * T * v / jerk).max()),
         )
-        change, samples = share * (wanted - rate), 0
-        while samples == 0 or samples > _LONGEST:
-            change *= 1.0 if samples == 0 else (_LONGEST / samples) ** 2
-            speed = v * abs(change)
-            seconds = max(_SHORTEST, (STEEPEST * speed / acceleration).max(), np.sqrt(SHARPEST * speed / jerk).max())
-            samples = max(ceil(longer * float(seconds) / T), _FEWEST)
+
+        def seconds(size: float) -> float:
+            speed = v * size
+            least = max(SHORTEST, (STEEPEST * speed / acceleration).max(), np.sqrt(SHARPEST * speed / jerk).max())
+            return longer * float(least)
+
+        change, samples = in_steps(share * (wanted - rate), seconds, T)
         return Ramp(rate, wanted if change == wanted - rate else rate + change, max(samples, ceil(landing / T)))
 
     def _share(self, ramps: list[Ramp], until: int) -> float:
         """The largest share of a limit that the samples of these ramps, one after the other, take of any axis."""
         parts, place = [], self.place
         for planned in ramps:
-            ramp = _on(planned, place)
+            ramp = planned.beginning_at(place)
             parts.append(place + ramp.passed(np.arange(1.0, ramp.samples + 1.0)))
             place = float(parts[-1][-1])
         parts.append(place + ramps[-1].end * np.array((1.0, 2.0, 3.0)))  # and on at that rate
@@ -196,11 +193,6 @@ class Retimed:
 def _is_watched(rate: float) -> bool:
     """Whether the limits could be exceeded at this rate: not where the planned samples are sent."""
     return rate > FREE and rate != 1.0
-
-
-def _on(ramp: Ramp, place: float) -> Ramp:
-    """What `ramp` is when it begins at `place`: to a rate of 1, it ends at a sample of the plan."""
-    return ramp.landing(place) if ramp.end == 1.0 else ramp
 
 
 def _quintic(p0: Any, v0: Any, a0: Any, p1: Any, v1: Any, a1: Any, q: Any) -> tuple[Any, Any, Any]:

@@ -55,7 +55,7 @@ class Stopwatch:
             self._ended = now()
             return outputs
 
-        laws = [self._timed(loop.laws[0]), *loop.laws[1:]] if loop.refers else loop.laws
+        laws = [self._timed(loop.laws[0]), *loop.laws[1:]] if loop.sets_references else loop.laws
 
         return replace(
             loop,

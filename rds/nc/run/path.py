@@ -33,6 +33,8 @@ from rds.modes.loop.interpolated import LEAST_AHEAD
 from rds.modes.loop.program import Happening, InterpolatedProgram, Row, Stretch, dwell_samples
 from rds.nc.check import Setup, motion
 from rds.nc.interpolator_segments import program as moves_of
+from rds.nc.run.judge import judged
+from rds.nc.run.prepare import Prepared
 from rds.results import Result
 
 SUFFIX = ".toml"  # of a path file; any other is a part program
@@ -136,8 +138,9 @@ def program(
     if any(segments[0].start):
         segments, lines, rests = [first, *segments], [0, *lines], {0: ()}
         notes = (f"the axes begin at 0: a straight line leads to the start of the path, {segments[1].start}",)
-    made = _made(name, segments, lines, rests, (), method, machine, axes, T)
-    return replace(made, notes=notes), method.interpolator.source.path
+    made = program_of(name, segments, lines, rests, (), method, machine, axes, T)
+    made = replace(made, notes=notes, about={**made.about, "counted_in": "segment"})
+    return made, method.interpolator.source.path
 
 
 def of_part_program(
@@ -162,7 +165,7 @@ def of_part_program(
     for after, event in programmed.events:
         due[after] = (*due.get(after, ()), Happening(0, event.kind, float(event.value), event.line))
     first = due.pop(-1, ())
-    made = _made(
+    made = program_of(
         file.name, programmed.segments, programmed.lines, due, first, method, machine, _LINEAR, T, spindle=True
     )
     return replace(made, notes=(*notes, *made.notes))
@@ -212,7 +215,7 @@ def _inline(words: TomlTable) -> list[Segment]:
     return segments_of(words.read("start"), rows, words.read("feed"), words.read("feed_unit"))
 
 
-def _made(
+def program_of(
     name: str,
     segments: Sequence[Segment],
     lines: Sequence[int],
@@ -348,7 +351,16 @@ def _in_space(point: Sequence[float], order: Sequence[int]) -> list[float]:
 
 def judged_path(result: Result, made: InterpolatedProgram, T: float) -> Result:
     """The result of a run along a path, with its contour error; see `judge.judged`."""
-    from rds.nc.run.judge import judged
-    from rds.nc.run.prepare import Prepared
+    return judged(result, as_prepared(made, Path(made.name), T))
 
-    return judged(result, Prepared(Path(made.name), made, made.path, np.zeros(0, int), T, made.notes))
+
+def save_path_run(result: Result, made: InterpolatedProgram, folder: Path, title: str) -> dict[str, Path]:
+    """Save pictures and reports beside the tables in `folder`, with the path; each file's path by its kind."""
+    from rds.nc.run.report import save_run
+
+    return save_run(result, as_prepared(made, Path(made.name), result.meta["sample_period"]), folder, title)
+
+
+def as_prepared(made: InterpolatedProgram, file: Path, T: float) -> Prepared:
+    """The program as what is prepared and judged; which segment a sample belongs to is known when it has run."""
+    return Prepared(file, made, made.path, np.zeros(0, int), T, made.notes)

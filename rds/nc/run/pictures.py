@@ -53,8 +53,9 @@ def path(result: Result, prepared: Prepared) -> Picture:
     picture = Picture(8.0 if across == 2 and rows == 2 else 3.8 * rows if across == 2 else max(2.8 * rows, 4.6))
     places = picture.subplots(rows, across, squeeze=False).ravel()
     edges = _edges(len(rapid))
+    of = result.meta["program"].get("counted_in", "line")
     worst = [
-        (f"line {line}: {value:.1f} µm", int(np.searchsorted(result["time"], when)))
+        (f"{of} {line}: {value:.1f} µm", int(np.searchsorted(result["time"], when)))
         for line, value, when in (worst_lines(result, error, _NAMED) if contour else ())
     ]
     drawn: Any = None

@@ -26,13 +26,13 @@ _WAITED = {
 }
 
 
-def save_run(result: Result, prepared: Prepared, folder: Path) -> dict[str, Path]:
+def save_run(result: Result, prepared: Prepared, folder: Path, title: str | None = None) -> dict[str, Path]:
     """Save pictures and reports beside the tables in `folder`; each file's path by its kind."""
     written = write(program_report(result, prepared), folder)
     for pattern in ("*.csv", "*.png"):  # a table that an earlier run had and this one has not
         for left in set(folder.glob(f"{KIND}-{pattern}")) - set(written):
             left.unlink(missing_ok=True)
-    files = save_with_report(result, folder, f"{prepared.file.name}, {result.mode}", written)
+    files = save_with_report(result, folder, title or f"{prepared.file.name}, {result.mode}", written)
     return files | {KIND: written[0]} | {path.stem: path for path in written[1:] if path.suffix == ".png"}
 
 
@@ -41,7 +41,7 @@ def program_report(result: Result, prepared: Prepared) -> Report:
     from rds.nc.run.pictures import along, path
 
     about = result.meta["program"]
-    text = _program_lines(prepared.file)
+    text = _program_lines(prepared.file) if about.get("counted_in", "line") == "line" else []
     return Report(
         kind=KIND,
         title=f"{prepared.file.name} on {result.meta.get('machine')}, {result.mode}",
@@ -55,7 +55,7 @@ def program_report(result: Result, prepared: Prepared) -> Report:
         },
         tables=[
             _times(about),
-            *([_contour(result, text)] if about["contour_error"] else []),
+            *([_contour(result, about, text)] if about["contour_error"] else []),
             _following(about, text),
             *([_changes(result)] if result.meta.get("changes") else []),
         ],
@@ -71,29 +71,32 @@ def program_report(result: Result, prepared: Prepared) -> Report:
 
 def findings(about: dict[str, Any]) -> list[str]:
     """What a reader wants to know first, as sentences."""
-    said = []
+    said, of = [], about.get("counted_in", "line")
     if about["contour_error"]:
         worst = about["contour_error"]
         said.append(
-            f"The measured position is at most {worst['max']:.4f} mm off the programmed path, in line {worst['line']} "
+            f"The measured position is at most {worst['max']:.4f} mm off the programmed path, in {of} {worst['line']} "
             f"(t = {worst['time_s']:.3f} s); RMS {worst['rms']:.4f} mm."
         )
     following = about["following_error"]
     for unit in dict.fromkeys(worst["unit"] for worst in following.values()):
         axis, worst = max(
-            ((axis, worst) for axis, worst in following.items() if worst["unit"] == unit), key=lambda of: of[1]["max"]
+            ((axis, worst) for axis, worst in following.items() if worst["unit"] == unit),
+            key=lambda each: each[1]["max"],
         )
         if worst["max"] > 0.0:
-            said.append(f"{axis} follows worst: {worst['max']:.4f} {unit} in line {worst['line']}.")
+            said.append(f"{axis} follows worst: {worst['max']:.4f} {unit} in {of} {worst['line']}.")
     share, kind, axis = max(
         (share, kind, axis) for axis, shares in about["limit_shares"].items() for kind, share in shares.items()
     )
     said.append(f"What was sent to the axes is at most {100.0 * share:.1f} % of a limit ({kind} of {axis}).")
     predicted, moving = about["predicted_s"], about["moving_s"]
     if not about["completed"]:
-        said.append(f"The run ended in line {about['last_line']}, after {about['done_percent']:.1f} % of the program.")
+        said.append(f"The run ended in {of} {about['last_line']}, after {about['done_percent']:.1f} % of the program.")
     elif about["predicted_samples"] == about["moving_samples"]:
         said.append(f"It moved for {moving:.3f} s, as predicted to the sample.")
+    elif "interpolator" in about:
+        said.append(f"It moved for {moving:.3f} s; at the programmed feed throughout it is {predicted:.3f} s.")
     else:
         said.append(f"It moved for {moving:.3f} s instead of {predicted:.3f} s: the override was not 100 % throughout.")
     return said
@@ -110,14 +113,14 @@ def _times(about: dict[str, Any]) -> Table:
     return Table("Cycle time", ["", "time [s]"], rows, digits={"time [s]": 3})
 
 
-def _contour(result: Result, text: list[str]) -> Table:
+def _contour(result: Result, about: dict[str, Any], text: list[str]) -> Table:
     rows = [
         [line, value, when, _line(text, line)]
         for line, value, when in worst_lines(result, result["contour_error"], _WORST)
     ]
     return Table(
         "Where the contour error is largest",
-        ["line", "contour error [mm]", "at [s]", "program"],
+        [about.get("counted_in", "line"), "contour error [mm]", "at [s]", "program"],
         rows,
         "The distance of the measured position to the programmed path, corners uncut. X, Y and Z count.",
         {"contour error [mm]": 4, "at [s]": 3},
@@ -131,7 +134,7 @@ def _following(about: dict[str, Any], text: list[str]) -> Table:
     ]
     return Table(
         "Where each axis follows worst",
-        ["axis", "largest |error|", "unit", "line", "at [s]", "RMS error", "program"],
+        ["axis", "largest |error|", "unit", about.get("counted_in", "line"), "at [s]", "RMS error", "program"],
         rows,
         f"The error is reference minus measured position{_left_out(about)}.",
         {"largest |error|": 4, "at [s]": 3, "RMS error": 4},

@@ -8,8 +8,6 @@ from math import hypot
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
 from rds.machines import Machine, load_machine
@@ -24,8 +22,8 @@ from rds.modes.process.host import Progress
 from rds.modes.process.live import Live
 from rds.nc.check import Setup
 from rds.nc.run.judge import judged
-from rds.nc.run.path import WORDS, method_of, of_part_program
-from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, prepare
+from rds.nc.run.path import WORDS, as_prepared, method_of, of_part_program
+from rds.nc.run.prepare import SPINDLE_UNIT, prepare
 from rds.results import Result
 
 AXES_CONTROLLER = {"name": "tracking"}
@@ -144,7 +142,7 @@ class PartProgram(Experiment):
             how |= {"exact_stop": True} if exact_stop else {}
             method = method_of(TomlTable(how, WORDS), Path.cwd())
             made = of_part_program(Path(file), self._machine, setup, T, method, progress)
-            self.prepared = Prepared(Path(file), made, made.path, np.zeros(0, int), T, made.notes)
+            self.prepared = as_prepared(made, Path(file), T)
         self.plan()
 
     @classmethod
