@@ -15,7 +15,7 @@ DONE := $(VENV)/.installed
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test bench lock clean
+.PHONY: help setup demo test bench pictures lock clean
 
 help: ## list what make can do
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -33,6 +33,9 @@ test: $(DONE) ## ruff, mypy, then the tests
 
 bench: $(DONE) ## measure speed and latency, beside other programs where they are installed (minutes)
 	$(BIN)/python -m benchmarks $(ARGS)
+
+pictures: $(DONE) ## draw the documents' pictures afresh
+	$(BIN)/python tests/pictures.py
 
 lock: ## renew requirements.lock from pyproject.toml (needs uv)
 	@test -n "$(UV)" || { echo "make lock needs uv: https://docs.astral.sh/uv/" >&2; exit 2; }

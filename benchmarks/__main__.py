@@ -1,7 +1,6 @@
 """All benchmarks, each as a table with its targets, or everything as one JSON object.
 
-python -m benchmarks [simulation] [imports] [realtime] [bus] [timed-bus] [cia402] [nc] [desk] [identification]
-                     [robustness] [grading] [panels] [install] [--json]
+python -m benchmarks [SUBJECT ...] [--json]
 """
 
 from __future__ import annotations
@@ -17,14 +16,18 @@ from typing import Any
 from benchmarks import (
     bus,
     cia402,
+    contour,
     desk,
     grading,
     identification,
     imports,
     install,
+    kinematics,
     machine,
     nc,
+    network,
     panels,
+    rate,
     realtime,
     robustness,
     simulation,
@@ -41,10 +44,14 @@ SUBJECTS = {
     "timed-bus": "Four modules on the bus with bit timing: 1 Mbit/s, 1 kHz",
     "cia402": "CiA 402 drives at 1 Mbit/s: our cyclic loop beside the canopen library's",
     "nc": "Part programs: 200,000 lines and arcs, beside rs274 -g",
+    "contour": "A circle of 10 mm under every law, on a machine with everything wrong in it",
     "desk": "Live values and part programs in the loop",
     "identification": "A fit of tau, K, F+ and F- to 10 s at 1 kHz",
+    "rate": "What a path costs, and how fast a loop can be",
     "robustness": "10,000 closed loops with drawn parameters",
+    "network": "A network in the loop: random delay and loss, and what delay costs",
     "grading": "Submissions graded in the sandbox: five criteria of a 10 s run",
+    "kinematics": "A million poses of the 4- and 5-axis mill",
     "panels": "The page of rds app in a browser",
     "install": "What an installation takes",
 }
@@ -98,10 +105,14 @@ def main() -> int:
         "bus": run_bus,
         "timed-bus": run_timed_bus,
         "cia402": run_cia402,
+        "contour": contour.run,
         "desk": desk.run,
         "identification": identification.run,
+        "rate": rate.run,
         "robustness": robustness.run,
+        "network": network.run,
         "grading": lambda: grading.run(peer_python=options.peer_python),
+        "kinematics": kinematics.run,
         "panels": panels.run,
         "install": install.run,
         "nc": lambda: nc.run(peer_python=options.peer_python),

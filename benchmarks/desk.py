@@ -13,8 +13,8 @@ from rds.modes.loop.execution import Execution
 from rds.modes.loop.laws import LiveReference
 from rds.modes.loop.live_values import Channel, LiveValues
 from rds.modes.loop.retimed import Retimed
+from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.prepare import planned
-from rds.nc.toolpath import Event, PathBlock
 
 CHANNELS = 40
 ROUNDS = 7

@@ -17,12 +17,13 @@ from unittest.mock import patch
 
 from benchmarks.figures import Figure, interleaved, ratios
 from benchmarks.nc_peers import PEERS, call, rs274
-from benchmarks.nc_program import write_program
+from benchmarks.nc_program import write_ball, write_program
 from rds.nc import interpret
 from rds.nc.language import fast_lane
 from rds.nc.language.canon_text import text
 
 LINES = 200_000
+TIP_LINES = 100_000
 SHORT = 20_000  # for what is slow
 MEMORY = {"read": (20_000, 200_000, 2_000_000), "plan": (200_000, 400_000)}  # lines; blocks hold up to 65,536 moves
 T = 1e-3  # s
@@ -36,6 +37,7 @@ def run(rounds: int = 5, peer_python: str = sys.executable) -> list[Figure]:
         return [
             *reading(place, rounds, peer_python),
             *planning(place, min(rounds, 3)),
+            *tip_planning(place, min(rounds, 3)),
             *memory(place),
         ]
 
@@ -106,6 +108,27 @@ def planning(place: Path, rounds: int) -> list[Figure]:
             tuple(b / a for a, b in results),
             note=f"{LINES:,} lines, {duration:,.0f} s of motion in samples of {1e3 * T:g} ms",
         ),
+    ]
+
+
+def tip_planning(place: Path, rounds: int) -> list[Figure]:
+    """The same of a program for the tool's tip on a 5-axis machine: to joints, and to samples within their limits."""
+    from rds.machines import load_machine
+    from rds.nc.check import Setup, motion
+    from rds.nc.cycle_time import cycle_time
+
+    file, machine = write_ball(place / "ball.ngc", TIP_LINES), load_machine("xyzac")
+    _ = cycle_time(motion(write_ball(place / "small.ngc", 2000), machine, Setup()), machine)  # compiles
+    to_joints, whole, seconds = [], [], 0.0
+    for _ in range(rounds):
+        to_joints.append(TIP_LINES / _seconds(lambda: sum(map(len, motion(file, machine, Setup())))))
+        started = time.perf_counter()
+        seconds = cycle_time(motion(file, machine, Setup()), machine, T).total
+        whole.append(TIP_LINES / (time.perf_counter() - started))
+    note = f"{TIP_LINES:,} lines of X Y Z A C under G43.4, {seconds:,.0f} s of motion in samples of {1e3 * T:g} ms"
+    return [
+        Figure("five axes: interpret, check and make moves of the joints", "lines/s", tuple(to_joints)),
+        Figure("five axes: the same and plan", "lines/s", tuple(whole), note=note),
     ]
 
 

@@ -7,6 +7,8 @@ import random
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 TABLE = 100.0  # mm
 BODY = 20_000  # lines that are written again and again for longer programs
 
@@ -44,4 +46,20 @@ def write_program(path: Path, lines: int) -> Path:
         file.write("G21 G17 G90 G94 G64 P0.02 F600\n")
         file.writelines(text for _ in range(max(1, lines // BODY)))
         file.write("M2\n")
+    return path
+
+
+def write_ball(path: Path, lines: int) -> Path:
+    """A spiral on a ball with the tool square to it, for xyzac: lines of X Y Z A C under G43.4."""
+    turn = np.linspace(0.0, 21600.0, lines)
+    back_and_forth = np.mod(turn, 1440.0)
+    c = np.where(back_and_forth < 720.0, back_and_forth, 1440.0 - back_and_forth) - 360.0
+    a = np.linspace(20.0, 60.0, lines)
+    flat = 40.0 * np.sin(np.radians(a))
+    x, y, z = flat * np.sin(np.radians(c)), -flat * np.cos(np.radians(c)), 40.0 * (np.cos(np.radians(a)) - 1.0)
+    rows = zip(x.tolist(), y.tolist(), z.tolist(), a.tolist(), c.tolist(), strict=True)
+    with path.open("w") as stream:
+        stream.write("G21 G90 G64 P0.02\nG43.4 H0\nG0 X0 Y0 Z20\nG1 F600\n")
+        stream.writelines(f"X{x:.4f} Y{y:.4f} Z{z:.4f} A{a:.3f} C{c:.3f}\n" for x, y, z, a, c in rows)
+        stream.write("G49\nG0 X0 Y0 Z100\nM2\n")
     return path

@@ -11,11 +11,13 @@ from typing import Any as _Any
 _NAMES = {
     # runs
     "Experiment": "rds.modes.experiment",
+    "steps": "rds.modes.experiment.steps",
     "PartProgram": "rds.nc.run.run",
     "Result": "rds.results",
     "open_result": "rds.results",
     "compare": "rds.results.compare",
     "lsim": "rds.modes.experiment.model_alone",
+    "learn": "rds.modes.experiment.learning",
     # references and voltages
     "sinusoid": "rds.references",
     "square": "rds.references",
@@ -29,8 +31,12 @@ _NAMES = {
     "Machine": "rds.machines.machine",
     "load_machine": "rds.machines",
     "machine_names": "rds.machines",
+    "Kinematics": "rds.machines.kinematics",
+    "verdict": "rds.machines.configuration",
     "Model": "rds.core.types",
     "Controller": "rds.core.types",
+    "library_model": "rds.models",
+    "library_controller": "rds.controllers",
     "Reference": "rds.core.types",
     "LineSegment": "rds.core.types",
     "ArcSegment": "rds.core.types",
@@ -44,14 +50,19 @@ _NAMES = {
     "check_interpolator": "rds.checks",
     # logs, models and designs
     "read_log": "rds.identification.logs.read_log",
+    "Log": "rds.identification.logs.log",
     "shipped_log": "rds.identification.logs.shipped:path",
     "structure": "rds.identification.structures.structures",
     "fit": "rds.identification.fit.fit",
+    "frequency_response": "rds.identification.fit.frequency_response",
     "validate": "rds.identification.validate.validate",
+    "compare_models": "rds.identification.validate.validate",
     "read_model": "rds.identification.fit.model_file",
     "write_model": "rds.identification.fit.model_file",
     "design": "rds.identification.fit.design:design_tracking",
     "robustness": "rds.identification.robustness.study:study",
+    # one function over many items
+    "spread": "rds.core.parallel",
     # grading
     "grade": "rds.grading.batch.run:run_batch",
     # errors

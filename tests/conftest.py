@@ -30,7 +30,7 @@ settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None)
 settings.load_profile("same")
 
-pytest_plugins = ["held_up"]
+pytest_plugins = ["held_up", "skipped"]
 
 HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one

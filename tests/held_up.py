@@ -1,10 +1,10 @@
 """A test that fails while the computer is held up is void, as a verdict on timing is: it is run again, and told.
 
 Real processes, a real bus and a real browser share a few cores. What they are to do within some time can fail because
-others had the processors. So a failure of a test that waits for others (real time, a browser, a process or a thread of
-its file) counts only if it repeats, up to `AGAIN` times, or if nothing had to wait for a processor while it ran. All
-other tests fail at once. Each void try is printed at the end of the run with its failure and with the time that
-processes waited; a run with more of them than `--max-suite-reruns` (pyproject.toml) fails.
+others had the processors. So a failure of a test that waits for others (real time, a browser, a process or a thread
+of its file or of one of its fixtures) counts only if it repeats, up to `AGAIN` times, or if nothing had to wait for a
+processor while it ran. All other tests fail at once. Each void try is printed at the end of the run with its failure
+and with the time that processes waited; a run with more of them than `--max-suite-reruns` (pyproject.toml) fails.
 
 With tests side by side something waits nearly always: there it means that what fails once in many runs is told, and
 does not fail the run. `ARGS="--force-reruns 0"` shows each failure as one.
@@ -32,6 +32,7 @@ _STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # Python's audit ev
 _waited_before = pytest.StashKey[float | None]()
 _started = 0  # processes and threads of this worker
 _started_before: dict[Path, int] = {}  # the first test of a file
+_starters: set[str] = set()  # fixtures that start processes or threads; those of a session serve later files, too
 
 
 def waited() -> float | None:
@@ -83,6 +84,15 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     return report
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[object]) -> Generator[None, object, object]:
+    before = _started
+    made = yield
+    if _started > before:
+        _starters.add(fixturedef.argname)
+    return made
+
+
 def _count() -> None:
     global _started
     _started += 1
@@ -90,7 +100,8 @@ def _count() -> None:
 
 def _waits_for_others(item: pytest.Item) -> bool:
     is_marked = item.get_closest_marker("realtime") is not None or "panels" in item.path.parts
-    return is_marked or _started > _started_before.get(item.path, _started)
+    is_served = not _starters.isdisjoint(getattr(item, "fixturenames", ()))
+    return is_marked or is_served or _started > _started_before.get(item.path, _started)
 
 
 def _was_held_up(item: pytest.Item) -> bool:

@@ -110,4 +110,4 @@ def test_a_machine_is_served_on_the_bus_and_in_the_dialect_of_the_table(
     done = CliRunner().invoke(app, ["machine", "serve", "mrmt-oacs", "--experiment", file])
     assert done.exit_code == 0, done.output
     (words, options) = served[0]
-    assert words[1:4] == ("oacs", "virtual", 0) and options == {"bitrate": 250_000}
+    assert words[1:4] == ("oacs", "virtual", 0) and options == {"bitrate": 250_000, "axes": None}

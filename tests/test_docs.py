@@ -26,6 +26,7 @@ from rds.models.machine_axis import PARAMETERS, MachineParameters
 from rds.modes import mode_names
 from rds.modes.experiment.experiment_file import BUS, EXPERIMENT, TIMING
 from rds.modes.experiment.resolve import resolve
+from rds.network.network_file import NETWORK
 from rds.references import make_signal, signal_kinds
 from rds.references import user as user_signal
 from rds.results.metrics import ERROR_METRICS
@@ -47,6 +48,7 @@ DECLARED = [
     ("", EXPERIMENT),
     ("", TIMING),
     ("", BUS),
+    ("", NETWORK),
     ("converter.", MACHINE.keys["converter"]),
     ("axis.NAME.", AXIS),
     ("", Table("the axis behind the bus", PARAMETERS)),
@@ -77,8 +79,8 @@ def known_keys(**table: Any) -> list[str]:
 )
 def test_keys_of_an_experiment(table: dict[str, Any]) -> None:
     keys = [key for key in known_keys(**table) if key not in ("controller", "model", "reference", "signal")]
-    assert set(keys) - {"axis", "interface", "timing", "bus"} <= NAMED
-    for key in set(keys) & {"interface", "timing", "bus"}:
+    assert set(keys) - {"axis", "interface", "timing", "bus", "network", "error_compensation"} <= NAMED
+    for key in set(keys) & {"interface", "timing", "bus", "error_compensation"}:
         assert f"### `[{key}]`" in TEXT
 
 
@@ -150,8 +152,15 @@ def test_ranges_and_defaults_of_the_tables_are_those_of_the_declarations(prefix:
 
 
 def test_the_bus_protocol() -> None:
-    for identifier in (frames.COMMAND, frames.DRY_COMMAND, frames.SETUP, frames.CALL, frames.ANSWER):
-        assert re.search(rf"^\| 0x{identifier:03x} ", TEXT, re.MULTILINE)
+    for identifier in (
+        frames.MORE_VOLTAGES,
+        frames.COMMAND,
+        frames.DRY_COMMAND,
+        frames.SETUP,
+        frames.CALL,
+        frames.ANSWER,
+    ):
+        assert re.search(rf"^\| 0x{identifier:03X} ", TEXT, re.MULTILINE)
     for bit in frames.Status:
         name = (bit.name or "").lower().replace("_", " ")
         assert f"| {bit.value} | {name} |" in TEXT

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
+import json
+from importlib import import_module
 
 import control
 import numpy as np
 import pytest
 import scipy.signal
+from documents import ROOT, blocks
 
 import rds
 
@@ -16,7 +20,7 @@ TAU, K = 9.943e-3, 1.764
 
 def test_what_there_is() -> None:
     assert dir(rds) == sorted(rds.__all__)
-    assert 38 <= len(rds.__all__) <= 48
+    assert 38 <= len(rds.__all__) <= 56
     for name in rds.__all__:
         thing = getattr(rds, name)
         assert name == "__version__" or (inspect.getdoc(thing) or "").strip(), f"rds.{name} has no docstring"
@@ -26,6 +30,46 @@ def test_what_there_is() -> None:
 def test_an_unknown_name_says_where_to_look() -> None:
     with pytest.raises(AttributeError, match=r"no attribute 'simulate'; dir\(rds\)"):
         rds.simulate  # noqa: B018
+
+
+DOCUMENTS = ["README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))]
+NOTEBOOKS = [f"notebooks/{path.name}" for path in sorted((ROOT / "notebooks").glob("*.ipynb"))]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS + NOTEBOOKS)
+def test_documents_import_from_the_face_or_from_a_room(document: str) -> None:
+    """`import rds` and `from rds.nc import line`: no deeper, and what the face has comes from the face."""
+    for module, name in _imported(document):
+        assert module.count(".") <= 1, f"{document} imports {module}: offer it by rds/__init__.py, or by its room's"
+        assert module == "rds" or name not in rds.__all__, f"{document} imports rds.{name} from {module}"
+        thing = getattr(import_module(module), name) if name else import_module(module)
+        assert thing is not None
+
+
+def test_an_unknown_name_of_a_room_says_what_it_offers() -> None:
+    with pytest.raises(ImportError):
+        from rds.nc import no_such_name  # noqa: F401
+    with pytest.raises(AttributeError, match=r"no attribute 'no_such_name'; it offers circle_error, synchronized"):
+        import_module("rds.network").no_such_name  # noqa: B018
+
+
+def _imported(document: str) -> list[tuple[str, str]]:
+    """The modules of rds that the code of a document imports, each with the name that it takes from there."""
+    if document.endswith(".ipynb"):
+        cells = json.loads((ROOT / document).read_text(encoding="utf-8"))["cells"]
+        code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    else:
+        code = [block.text for block in blocks(document) if block.language == "python"]
+    found = []
+    for text in code:
+        if text.startswith("%%"):
+            continue
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Import):
+                found += [(alias.name, "") for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                found += [(str(node.module), alias.name) for alias in node.names]
+    return [(module, name) for module, name in found if module.partition(".")[0] == "rds"]
 
 
 class TestAModelAlone:

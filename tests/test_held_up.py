@@ -38,9 +38,11 @@ def test_sample():
 """
 
 
-def run(place: Path, waited: float, failures: int, *options: str, starts: bool = True) -> tuple[int, str, int]:
+def run(
+    place: Path, waited: float, failures: int, *options: str, starts: bool = True, sample: str = SAMPLE
+) -> tuple[int, str, int]:
     """Exit code, output and tries of a test that fails so often, while processes wait so many seconds."""
-    text = SAMPLE.replace("WAITED", str(waited)).replace("FAILURES", str(failures)).replace("STARTS", str(starts))
+    text = sample.replace("WAITED", str(waited)).replace("FAILURES", str(failures)).replace("STARTS", str(starts))
     (place / "test_sample.py").write_text(text)
     options = ("-p", "held_up", "-p", "no:cacheprovider", "-rR", "--rerun-show-tracebacks", *options)
     found = subprocess.run(
@@ -77,6 +79,20 @@ def test_one_that_waits_for_nobody_else_is_a_failure_at_once(tmp_path: Path) -> 
     code, out, tries = run(tmp_path, 5.0, 1, starts=False)
     assert (code, tries) == (1, 1)
     assert "this test waits for no other process and no thread" in out
+
+
+def test_one_served_by_a_fixture_of_an_earlier_file_is_void(tmp_path: Path) -> None:
+    """A session's processes were started before the file's first test, and are waited for in it all the same."""
+    (tmp_path / "conftest.py").write_text(
+        "import threading, pytest\n"
+        "@pytest.fixture(scope='session')\n"
+        "def served():\n    threading.Thread(target=int).start()\n"
+    )
+    (tmp_path / "test_earlier.py").write_text("def test_earlier(served):\n    pass\n")
+    sample = SAMPLE.replace("def test_sample()", "def test_sample(served)")
+    code, out, tries = run(tmp_path, 0.25, 1, "test_earlier.py", starts=False, sample=sample)
+    assert (code, tries) == (0, 2)
+    assert "RERUN test_sample.py::test_sample" in out
 
 
 def test_many_void_tries_in_one_run_are_a_failure(tmp_path: Path) -> None:

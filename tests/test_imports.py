@@ -27,22 +27,30 @@ ALLOWED: dict[str, set[str]] = {
     "results": {"core", "modes"},  # see ONLY
     "interpolators": {"core", "machines", "results"},  # see ONLY
     "nc": {"core", "interpolators", "machines"},
-    "bus": {"core", "machines", "models", "results"},  # see ONLY
-    "modes": {"core", "machines", "models", "bus"},
+    "bus": {"core", "machines", "models", "results", "network"},  # see ONLY
+    "network": {"core"},
+    "modes": {"core", "machines", "models", "bus", "network"},
     "results.reports": {"core", "results", "bus"},  # see ONLY
+    "network.loops": {
+        *("core", "network", "controllers", "models", "machines", "modes", "modes.experiment", "results", "bus"),
+    },
     "identification": {
         *("core", "machines", "models", "references", "results", "bus"),  # see ONLY
         *("controllers", "checks", "modes"),  # what a model file is for: a design, a check
     },
     "modes.experiment": {
         *("core", "controllers", "models", "references", "machines", "modes", "results", "bus"),  # see ONLY
-        "identification",  # model files, and what a validation proves
+        *("network", "identification"),  # model files, and what a validation proves
     },
     "identification.robustness": {
         *("core", "controllers", "models", "machines", "results", "identification", "modes", "modes.experiment"),
     },
     "nc.run": {
+        "bus",  # see ONLY
         *("core", "machines", "interpolators", "nc", "modes", "modes.experiment", "results", "results.reports"),
+    },
+    "jobs": {
+        *("core", "bus", "modes", "modes.experiment", "nc.run"),  # see ONLY
     },
     "grading": {
         *("core", "checks", "models", "controllers", "references", "interpolators", "machines", "nc", "nc.run"),
@@ -52,11 +60,26 @@ ALLOWED: dict[str, set[str]] = {
 }
 # Of some rooms, only these modules.
 ONLY = {
-    ("bus", "models"): {"rds.models.machine_axis"},  # the machine's own axis, behind the bus
-    # what a [bus] table may say
+    # the machine's own axes behind the bus, and the profile by which a drive moves one
+    ("bus", "models"): {"rds.models.machine_axis", "rds.models.stepper_axis", "rds.models.profile_drive"},
+    # what a [bus] table may say; and what the modules that are there offer after an exchange
     ("modes.experiment", "bus"): {
         *("rds.bus.hub.bus_settings", "rds.bus.modules.dialects", "rds.bus.medium.fault_file"),
+        *("rds.bus.modules.oacs.events", "rds.bus.modules.oacs.offers", "rds.bus.tools.link"),
     },
+    ("bus", "network"): {"rds.network.clocks"},  # hosts keep the clocks of nodes together
+    # methods A, B and C are those of nodes on a serial line and on CAN
+    ("nc.run", "bus"): {
+        *(f"rds.bus.modules.dcs.{name}" for name in ("buffers", "build", "commands", "host", "methods", "port")),
+        *("rds.bus.modules.segments", "rds.bus.modules.server_process", "rds.bus.hub.bus_settings"),
+        *("rds.bus.modules.dcs", "rds.bus.modules.course", "rds.bus.modules.drift", "rds.bus.tools.link"),
+        *(
+            f"rds.bus.modules.rds.{name}"
+            for name in ("frames", "module", "motion_frames", "motion_host", "motion_port")
+        ),
+        *("rds.bus.modules.rds", "rds.bus.medium.bits"),
+    },
+    ("jobs", "bus"): {"rds.bus.hub.runtime_folder"},  # where the user's sockets are
     ("interpolators", "results"): {"rds.results"},  # their tables
     ("bus", "results"): {"rds.results"},  # what modules record on board comes up as a result
     # which frames are commands and answers; their logs

@@ -1,4 +1,6 @@
-"""The README is true: its files, commands and code are run in order, in an empty folder, as its reader would."""
+"""The README and the first tutorial are true: their files, commands and code are run in order, in an empty folder, as
+their reader would.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +15,19 @@ from importlib import import_module
 from pathlib import Path
 
 import can
+import numpy as np
+import pictures
 import pytest
 from documents import ROOT, Block, blocks, environment, is_real_time, run, save, shorten
 
-BLOCKS = blocks("README.md")
+README = blocks("README.md")
+BLOCKS = [*README, *blocks("docs/first-axis.md")]
+INSTALLATION, HARDWARE = blocks("docs/installation.md"), blocks("docs/hardware.md")
+DOCUMENTS = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", *(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]
+SCREEN = 90  # lines of the README: one screen to the first sine, one to everything else
 ELSEWHERE = (
     "make ",
-    "python3 -m venv",
-    ".venv/bin/pip",
-    ".venv/bin/rds demo",
+    "source ",
     "jupyter lab",
     "rds app",
 )  # not run by this test
@@ -51,7 +57,21 @@ def test_the_first_ten_minutes(alone: Path) -> None:
         if server is not None:
             server.send_signal(signal.SIGINT)
             assert server.wait(60) == 0
-    assert ran >= 11
+    assert ran >= 12
+
+
+def test_the_readme_is_two_screens() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= SCREEN
+    assert re.findall("^## (.*)", text, re.MULTILINE) == ["The first sine", "Everything else"]
+
+
+def test_its_picture_is_what_its_commands_draw() -> None:
+    """Pixel by pixel, but for what another release of matplotlib may do to the edges of letters."""
+    kept, drawn = (np.asarray(image.convert("RGB"), float) for image in pictures.kept_and_drawn("first-sine"))
+    assert kept.shape == drawn.shape
+    assert np.abs(kept - drawn).mean() < 1.0, f"draw it afresh: {pictures.COMMAND}"
+    assert pictures.path("first-sine").stat().st_size < 40_000
 
 
 def test_its_files_are_the_examples() -> None:
@@ -61,7 +81,7 @@ def test_its_files_are_the_examples() -> None:
 
 
 @pytest.mark.parametrize(
-    "block", [b for b in BLOCKS if b.words == "bus"], ids=lambda b: re.findall(r'"(\w+)"', b.text)[0]
+    "block", [b for b in HARDWARE if b.words == "bus"], ids=lambda b: re.findall(r'"(\w+)"', b.text)[0]
 )
 def test_bus_tables_are_what_python_can_takes(block: Block) -> None:
     import tomllib
@@ -74,12 +94,13 @@ def test_bus_tables_are_what_python_can_takes(block: Block) -> None:
 
 def test_make_targets_exist() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = [command.split()[1] for block in BLOCKS for command, _ in _commands(block) if command.startswith("make ")]
-    assert targets == ["demo", "test"]
+    targets = [command for block in [*README, *INSTALLATION] for command, _ in _commands(block)]
+    targets = [command.split()[1] for command in targets if command.startswith("make ")]
+    assert targets == ["setup", "demo", "test"]
     assert all(re.search(rf"^{target}:.*##", makefile, re.MULTILINE) for target in targets)
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/experiments.md"])
+@pytest.mark.parametrize("document", DOCUMENTS)
 def test_links_lead_somewhere(document: str) -> None:
     text = (ROOT / document).read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)\s]+)\)", text):

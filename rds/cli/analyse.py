@@ -13,9 +13,13 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 @writes_files
 def analyse(
     machine: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
-    bitrate: Annotated[int, typer.Option(help="Bit rate, bit/s.", min=1)] = 1_000_000,
-    sample_period: Annotated[float | None, typer.Option(help="Sample period, s; by default the machine's.")] = None,
-    dialect: Annotated[str, typer.Option(help="What the modules speak: rds, oacs or cia402.")] = "rds",
+    bitrate: Annotated[int | None, typer.Option(help="Bit rate of CAN, bit/s (default 1000000).", min=1)] = None,
+    sample_period: Annotated[
+        float | None, typer.Option("--sample-period", "--period", help="Sample period, s; by default the machine's.")
+    ] = None,
+    dialect: Annotated[
+        str, typer.Option(help="What the modules speak: rds, oacs, cia402, or dcs (a serial line).")
+    ] = "rds",
     response_time: Annotated[
         float, typer.Option(help="Longest time from a command's arrival to a module's answer being ready, s.")
     ] = 0.0,
@@ -24,11 +28,34 @@ def analyse(
     error_interval: Annotated[
         float | None, typer.Option(help="One more is disturbed every so many s; alone, --errors 1.")
     ] = None,
+    baud: Annotated[
+        int | None, typer.Option(help="Baud rate of a serial line (default: a table of several).", min=1)
+    ] = None,
+    units: Annotated[int | None, typer.Option(help="Units on a serial line (default: one for each axis).")] = None,
+    fits: Annotated[bool, typer.Option("--fits", help="On CAN: what fits, by bit rate, with margin.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write the timeline and response times as a PNG.")] = None,
     json: Json = False,
 ) -> None:
-    """Bus load, and every message's worst-case response time (Davis, Burns, Bril and Lukkien, 2007)."""
+    """Bus load, and every message's worst-case response time (Davis, Burns, Bril and Lukkien, 2007).
+
+    On a serial line (--dialect dcs): what each method takes of a period, by baud rate, and what fits.
+    """
     with refusals():
+        from rds.core.errors import InputError
+
+        serial = {"--baud": baud, "--units": units}
+        can = {"--bitrate": bitrate, "--response-time": response_time, "--host-jitter": host_jitter, "--errors": errors}
+        can |= {"--error-interval": error_interval, "--fits": fits}
+        wrong = [name for name, value in (can if dialect == "dcs" else serial).items() if value]
+        if wrong:
+            where = "a CAN bus" if dialect == "dcs" else "a serial line (--dialect dcs)"
+            raise InputError(f"{', '.join(wrong)} is for {where}; leave it out")
+        if dialect == "dcs":
+            from rds.cli.analyse_fits import show_serial
+            from rds.machines import load_machine
+
+            met = show_serial(load_machine(machine), baud, units, sample_period, plot, json)
+            raise typer.Exit(0 if met else 1)
         from math import inf
 
         from rds.bus.analysis.analysis_report import analyse as analyse_bus
@@ -38,7 +65,7 @@ def analyse(
         interval = inf if error_interval is None else error_interval
         analysis = analyse_bus(
             load_machine(machine),
-            bitrate,
+            1_000_000 if bitrate is None else bitrate,
             sample_period,
             dialect=dialect,
             response_time=response_time,
@@ -51,10 +78,26 @@ def analyse(
 
             picture, kind = draw(analysis), plot.suffix.removeprefix(".") or "png"
             write_files({plot: lambda stream: picture.savefig(stream, format=kind)})
+        rows = []
+        if fits:
+            from rds.cli.analyse_fits import can_rows
+
+            rows = can_rows(
+                load_machine(machine),
+                sample_period,
+                dialect=dialect,
+                response_time=response_time,
+                host_jitter=host_jitter,
+                errors=analysis.errors,
+            )
     if json:
-        print_json(analysis.to_json())
+        print_json(analysis.to_json() | ({"fits": rows} if fits else {}))
     else:
         typer.echo(str(analysis))
+        if fits:
+            from rds.cli.analyse_fits import show_can
+
+            show_can(rows)
         if plot is not None:
             typer.echo(f"plot: {plot}")
     raise typer.Exit(0 if analysis.met else 1)

@@ -11,6 +11,8 @@ from typing import Annotated, Any
 import typer
 
 BUILTIN = "rds"  # as in rds.bus.tools.link, which takes long to import
+SERIAL = "serial"  # as in rds.bus.hub.bus_settings: a line of units (dialect dcs) where no other dialect is named
+SERIAL_MACHINE = "starmill"
 MACHINE = "mini-cnc"  # whose channel of the built-in bus is meant where nothing is said
 
 Interface = Annotated[
@@ -22,6 +24,7 @@ Channel = Annotated[
         "--channel", "-c", help=f"By default the experiment's; on the built-in bus its machine's name, else {MACHINE}."
     ),
 ]
+Baud = Annotated[int | None, typer.Option(help="With --interface serial: bit/s; by default the experiment's.")]
 Experiment = Annotated[
     Path | None,
     typer.Option(help="An experiment's TOML file, for its \\[bus]: interface, channel, options of the adapter."),
@@ -46,6 +49,18 @@ class ChosenBus:
         from rds.bus.tools.link import bus_name
 
         return bus_name(self.interface, self.channel)
+
+    @property
+    def is_line(self) -> bool:
+        """Whether it is a serial line of units, and no CAN bus."""
+        return self.interface == SERIAL and self.dialect in (None, "dcs")
+
+    def baud(self, given: int | None) -> float:
+        """The baud rate of a line: `given`, else the experiment's. InputError for one that none has."""
+        from rds.bus.hub.bus_settings import BAUD, DEFAULT_BAUD
+
+        asked = self.options.get("baud", DEFAULT_BAUD) if given is None else given
+        return BAUD.check(asked, "baud")
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
@@ -101,11 +116,23 @@ def chosen_bus(interface: str | None, channel: str | None, experiment: Path | No
     """
     table = bus_table_of(experiment, interface, channel)
     where, place, dialect = str(table.get("interface", BUILTIN)), table.get("channel"), table.get("dialect")
+    if where == SERIAL and place is None and dialect in (None, "dcs"):
+        place = SERIAL_MACHINE if experiment is None else _channel_of(experiment)
     if where != BUILTIN:
         from rds.bus.tools.link import bus_options
 
         return ChosenBus(where, place, bus_options(table), dialect)
     return ChosenBus(where, str(place) if place is not None else _channel_of(experiment), {}, dialect)
+
+
+def refuse_baud(place: ChosenBus, baud: int | None) -> None:
+    """InputError for --baud of what is no serial line."""
+    if baud is not None and not place.is_line:
+        from rds.core.errors import InputError
+
+        raise InputError(
+            f"--baud is for serial lines, and this is {place.name}; add --interface serial, or leave it out"
+        )
 
 
 def _channel_of(experiment: Path | None) -> str:

@@ -15,12 +15,22 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stdout
 from functools import wraps
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from rds.core.private_files import keep_process_private, share
+from rds.core.quantities import Quantity
+
+
+def declared(quantity: Quantity, help: str = "") -> Any:
+    """The option of a quantity: its meaning, unit and range, from its declaration. `help` adds to the meaning."""
+    meaning = f"{quantity.described[0].upper()}{quantity.described[1:]}"
+    low, high = (bound if isfinite(bound) else None for bound in (quantity.low, quantity.high))
+    return typer.Option(min=low, max=high, help=f"{meaning}; {help}." if help else f"{meaning}.")
+
 
 Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
 _Shared = Annotated[bool, typer.Option("--shared", help="Let your group read what is written; else only you can.")]

@@ -108,6 +108,11 @@ def show_result(result: Result, files: Mapping[str, Path]) -> None:
         title = "Tracking error" if "mean_error" in present else "Fit of the model"
         show_table(f"{title}, {result.mode}", ["axis", *headings], rows, " ".join(result.notes))
     screen = console()
+    if about := result.meta.get("program"):
+        from rds.nc.run.report import findings
+
+        for sentence in findings(about):
+            screen.print(escape(sentence), soft_wrap=True)
     if result.verdict is not None:
         screen.print(escape(verdict_line(result)))
     for axis, validation in (result.meta.get("validation") or {}).items():
@@ -115,7 +120,7 @@ def show_result(result: Result, files: Mapping[str, Path]) -> None:
         for reason in validation["reasons"]:
             if reason["side"] in ("against", "cannot tell"):
                 screen.print(f"- {reason['side']}: {escape(reason['what'])}", soft_wrap=True)
-    for kind in ("report", "csv"):
+    for kind in ("program", "report", "csv"):
         if kind in files:
             screen.print(f"{kind}: {escape(str(files[kind]))}", soft_wrap=True)
 
@@ -125,9 +130,10 @@ def verdict_line(result: Result) -> str:
     timing: dict[str, Any] = result.meta.get("timing", {})
     environment = result.meta.get("environment", {}).get("sentence", "")
     lateness, compute, io = (timing.get(stage, {}) for stage in ("lateness", "compute", "io"))
+    made = f"interpolate {_pair(timing['interpolate'])}, " if "interpolate" in timing else ""
     return (
         f"timing {result.verdict}: {timing.get('late')} of {timing.get('samples')} samples late; µs at the median and "
-        f"99 %: lateness {_pair(lateness)}, compute {_pair(compute)}, I/O {_pair(io)}"
+        f"99 %: lateness {_pair(lateness)}, {made}compute {_pair(compute)}, I/O {_pair(io)}"
         f"{f' ({environment})' if environment else ''}"
     )
 

@@ -117,8 +117,8 @@ def error_table(results: dict[str, Result]) -> Table:
         "title": f"Tracking error, 5 mm at {FREQUENCY:g} Hz (table 3)",
         "columns": ["axis", "mean |e| [µm]", "std |e| [µm]", "fit of the model [%]"],
         "rows": rows,
-        "note": "The first period is left out. The paper's machine is its authors'; ours differs from the model by "
-        "parameters of its own, Stribeck friction, backlash and delay (machines/mini-cnc.toml).",
+        "note": "The first period is left out. The machine behind the bus differs from table 1's model by parameters "
+        "that were found from the printed table 3 (machines/mini-cnc.toml, examples/paper/identify_mini_cnc.py).",
     }
 
 

@@ -1,4 +1,4 @@
-"""`rds design` and `rds machine from`: what a fitted model is for."""
+"""`rds design` and `rds machine from`: what a fitted model is for, and laws for a loop with delay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 if TYPE_CHECKING:
     from rds.identification.fit.design import Linear
 
-app = typer.Typer(no_args_is_help=True, help="Controllers designed from a fitted model.")
+app = typer.Typer(no_args_is_help=True, help="Controllers designed from a fitted model, or for a loop with delay.")
 
 Model = Annotated[Path, typer.Argument(help="A model file, as `rds fit -o` writes it.")]
 
@@ -57,6 +57,44 @@ def tracking(
     for sentence in designed.left_out:
         typer.echo(f"not in the design: {sentence}")
     typer.echo(f"wrote {out}")
+
+
+@app.command()
+@writes_files
+def lqg(
+    experiment: Annotated[Path, typer.Argument(help="The experiment whose loop it is, a TOML file.")],
+    delay: Annotated[float | None, typer.Option(help="The loop's delay, s; by default the experiment's own.")] = None,
+    delays: Annotated[
+        Path | None, typer.Option(help="Measured delays, as `rds network measure --out` writes them.")
+    ] = None,
+    axis: Annotated[str | None, typer.Option(help="Which axis; by default the experiment's first.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the controller's table, FILE.toml.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write the margins with the delays on top as a PNG.")] = None,
+    json: Json = False,
+) -> None:
+    """LQG control for a loop with a known delay, its gains and its margins against delay and jitter."""
+    with refusals():
+        from rds.core.atomic import write_whole
+        from rds.core.errors import InputError
+        from rds.modes.experiment.experiment import Experiment
+        from rds.network.delays import Delay
+        from rds.network.loops.design import design_lqg
+        from rds.network.trace import read_total
+
+        if delay is not None and delays is not None:
+            raise InputError("give one of --delay and --delays")
+        known = None if delay is None else Delay.named("constant", delay=delay)
+        known = known if delays is None else Delay.recorded(read_total(delays))
+        designed = design_lqg(Experiment.from_toml(experiment), known, axis)
+        if out is not None:
+            write_whole(out, designed.table().encode())
+        if plot is not None:
+            write_whole(plot, designed.plot().png())
+    if json:
+        print_json(designed.to_json())
+        return
+    typer.echo(str(designed))
+    typer.echo(designed.table() if out is None else f"wrote {out}")
 
 
 def _axis(model: Path | None, axis: str | None, machine: str | None) -> Linear:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.buses import Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import Baud, Channel, Experiment, Interface, chosen_bus, refuse_baud
 from rds.cli.common import Json, print_json, refusals
 
 
@@ -14,17 +14,30 @@ def estop(
     reset: Annotated[bool, typer.Option("--reset", help="Release the latch of an emergency stop.")] = False,
     interface: Interface = None,
     channel: Channel = None,
+    baud: Baud = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
-    """Emergency stop of every module on a bus: zero volts, whatever its dialect; exit code 1 if nobody answers."""
+    """Emergency stop of every module on a bus: zero volts, whatever its dialect; exit code 1 if nobody answers.
+
+    With --interface serial: of every unit on a serial line, also while another host commands it.
+    """
     with refusals():
+        from rds.bus.modules.dcs.scan import stop_channel
         from rds.bus.modules.dialects import dialect_names
         from rds.bus.tools.estop import reset_everything, stop_everything
+        from rds.core.errors import InputError
 
         place = chosen_bus(interface, channel, experiment)
-        with place.opened() as bus:
-            acted = reset_everything(bus) if reset else stop_everything(bus)
+        refuse_baud(place, baud)
+        if place.is_line:
+            if reset:
+                raise InputError("units on a serial line latch no emergency stop; leave --reset out, and start again")
+            acted, dialects = stop_channel(str(place.channel), place.baud(baud)), ["dcs"]
+        else:
+            dialects = dialect_names()
+            with place.opened() as bus:
+                acted = reset_everything(bus) if reset else stop_everything(bus)
     if reset:
         if json:
             print_json({"reset": acted})
@@ -36,9 +49,10 @@ def estop(
     elif acted:
         typer.echo(f"emergency stop sent; acknowledged by {', '.join(map(str, acted))}")
     if not acted:
+        asked = f"the dialects {', '.join(dialects)}" if len(dialects) > 1 else f"dialect {dialects[0]}"
         typer.echo(
             f"rds: emergency stop sent on {place.name}, and nobody "
-            f"acknowledged it; asked in the dialects {', '.join(dialect_names())}. If something moves, cut the power",
+            f"acknowledged it; asked in {asked}. If something moves, cut the power",
             err=True,
         )
         raise typer.Exit(1)

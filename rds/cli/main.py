@@ -15,6 +15,7 @@ from rds.bus.tools.mf4 import put_off_asammdf
 from rds.cli import (
     analyse,
     bus,
+    cutting,
     data,
     design,
     docs,
@@ -22,13 +23,19 @@ from rds.cli import (
     excite,
     fault,
     fit,
+    forces,
     grade,
     grade_export,
     grade_run,
     interpolate,
+    jobs,
     jog,
+    learn,
+    machine_watch,
+    machines,
     modules,
     nc,
+    network,
     reports,
     robustness,
     schema,
@@ -48,6 +55,7 @@ from rds.cli.common import (
     stdout_kept,
     writes_files,
 )
+from rds.cli.exchange import Events, Exchange, Yes, only_with_exchange, run_on, runs_json
 from rds.cli.guard import guarded
 from rds.core.errors import InputError
 from rds.core.private_files import keep_process_private
@@ -61,12 +69,17 @@ app = typer.Typer(
     "implementation.",
     epilog="RDS_FILE_LIMITS=4 before a command makes the limits on files four times as large, for one that you trust.",
 )
-machine_app = typer.Typer(no_args_is_help=True, help="Machines: list them, or serve one on a CAN bus.")
+machine_app = typer.Typer(
+    no_args_is_help=True, help="Machines: list, assemble, judge and draw them; serve one on a CAN bus."
+)
 app.add_typer(machine_app, name="machine")
 app.add_typer(modules.module_app, name="module")
 app.add_typer(bus.app, name="bus")
 app.add_typer(nc.app, name="nc")
+app.add_typer(network.app, name="network")
+app.add_typer(jobs.app, name="jobs")
 app.add_typer(data.app, name="data")
+app.add_typer(cutting.app, name="cutting")
 bus.app.command()(analyse.analyse)
 bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
@@ -77,16 +90,23 @@ app.command()(reports.report)
 app.command()(fit.fit)
 app.command()(excite.excite)
 app.command()(validate.validate)
+app.command()(forces.forces)
 app.command("app")(app_page)
 app.command()(docs.docs)
 app.command()(schema.schema)
 app.command()(interpolate.interpolate)
 app.command()(robustness.robustness)
+app.command()(learn.learn)
 app.add_typer(design.app, name="design")
 app.add_typer(grade.app, name="grade")
 grade.app.command()(grade_run.run)
 grade.app.command()(grade_export.export)
 machine_app.command("from")(design.machine_from)
+machine_app.command()(forces.power)
+for command in (machines.new, machines.show, machines.pose, machines.joints, machines.urdf, machines.script):
+    machine_app.command()(command)
+machine_app.command("modules")(machines.modules)
+machine_app.command("watch")(machine_watch.watch)
 
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]
 
@@ -120,6 +140,9 @@ def run(
         typer.Option("--mode", "-m", help=f"Run in this mode instead of the file's own: {', '.join(mode_names())}."),
     ] = None,
     out: Out = None,
+    exchange: Exchange = None,
+    yes: Yes = False,
+    events: Events = None,
     json: Json = False,
 ) -> None:
     """Run an experiment and save its results: tables, plots and a report."""
@@ -127,14 +150,20 @@ def run(
         from rds.modes.experiment.report import exit_code, run_and_save, run_json
 
         say_what_is_replaced(out)
-        with progress_bars() as bar:
-            result, files = run_and_save(experiment, mode, out, bar(mode or "run"))
+        if exchange is None:
+            only_with_exchange(yes, events)
+            with progress_bars() as bar:
+                made = [run_and_save(experiment, mode, out, bar(mode or "run"))]
+        else:
+            made = run_on(experiment, exchange, yes, events, json, mode, out)
+    result, files = made[-1]
     if json:
-        print_json(run_json(result, files))
+        print_json(run_json(result, files) | ({} if exchange is None else runs_json(made)))
     else:
         from rds.cli.console import show_result
 
-        show_result(result, files)
+        for each in made:
+            show_result(*each)
     code = exit_code(result)
     explain(result)
     raise typer.Exit(code)
@@ -142,7 +171,9 @@ def run(
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(help="A .py file with control(), derivatives(), ...; or a model file.")],
+    file: Annotated[
+        Path, typer.Argument(help="A .py file with control(), derivatives(), ...; a model file; a machine.")
+    ],
     sample_period: Annotated[
         float, typer.Option(help="Sample period that a call must fit into, s.", max=1000.0)
     ] = 0.001,
@@ -154,7 +185,9 @@ def check(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Say which interface a file fills, and whether it keeps it."""
+    """Say which interface a file fills, and whether it keeps it; of a machine whether its links make one."""
+    if file.suffix == ".toml" and machines.is_machine(file):
+        machines.check_machine(file, json, axes)
     with refusals(), stdout_kept(json):
         if file.suffix == ".toml":
             from rds.core.errors import InputError
@@ -216,36 +249,52 @@ def machine_serve(
     experiment: Experiment = None,
     dialect: Annotated[
         str | None,
-        typer.Option(help="What the modules speak: rds, oacs or cia402; by default as in \\[bus], or rds."),
+        typer.Option(help="What the modules speak: rds, oacs, cia402 or dcs; by default as in \\[bus], or rds."),
     ] = None,
     bitrate: Annotated[
         int | None, typer.Option(min=1, help="Bit rate, bit/s; without it the built-in bus has no bit timing.")
     ] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML file of faults to inject (built-in bus).")] = None,
+    drift: Annotated[
+        str | None, typer.Option(help="How much too fast clocks of modules go, ppm: X=50,Y=-30 (dialects rds, dcs).")
+    ] = None,
+    axes: Annotated[
+        str | None,
+        typer.Option(help="Only these modules, as in X,Z: end this command and they are unplugged. By default all."),
+    ] = None,
 ) -> None:
-    """Run the machine's axis modules as CAN nodes, until Ctrl-C."""
+    """Run the machine's axis modules as CAN nodes, or as units on a serial line (--dialect dcs), until Ctrl-C."""
     with refusals():
-        from rds.bus.modules.dialects import DEFAULT
+        from rds.bus.modules.dialects import DEFAULT, interface_of
         from rds.bus.modules.serving import serve_machine
         from rds.bus.tools.link import BUILTIN, bus_name, bus_options, default_channel
         from rds.machines import load_machine
 
         machine = load_machine(name)
         table = bus_table_of(experiment, interface, channel)
-        where = str(table.get("interface", BUILTIN))
+        spoken = dialect or table.get("dialect", DEFAULT)
+        where = interface_of(spoken, str(table.get("interface", BUILTIN)))
         place = default_channel(machine, where, table.get("channel"))
 
+        names = None if axes is None else [machine.axis(name.strip()).name for name in axes.split(",")]
+
         def ready() -> None:
-            typer.echo(f"{machine.name}: {', '.join(machine.axes)} on {bus_name(where, place)}; Ctrl-C ends", err=True)
+            typer.echo(
+                f"{machine.name}: {', '.join(names or machine.axes)} on {bus_name(where, place)}; Ctrl-C ends", err=True
+            )
 
         options = bus_options(table)  # its faults are the run's, and [bus.cia402] tells a host of its drives
         if bitrate is not None:
             options["bitrate"] = bitrate
+        if drift is not None:
+            if spoken not in ("rds", "dcs"):
+                raise InputError(f"--drift {drift}: modules of dialect {spoken} have no clock that they tell")
+            options["drift"] = drift
         if faults is not None:
             from rds.bus.medium.fault_file import read_faults
 
             options["faults"] = read_faults(faults)
-        serve_machine(machine, dialect or table.get("dialect", DEFAULT), where, place, ready, **options)
+        serve_machine(machine, spoken, where, place, ready, axes=names, **options)
 
 
 def main() -> None:
@@ -259,7 +308,9 @@ def main() -> None:
     say_notices()
     # a program in a terminal takes keys, which a process group in the background may not
     own = sys.argv[1:2] == ["fit"] and any(word.endswith(".py") for word in sys.argv)
-    if own or sys.argv[1:2] in (["run"], ["robustness"]) or (sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()):
+    asks = "--exchange" in sys.argv and "--yes" not in sys.argv and sys.stdin.isatty()
+    program = sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()
+    if own or (sys.argv[1:2] in (["run"], ["robustness"]) and not asks) or program:
         guarded(_app)
     app()
 

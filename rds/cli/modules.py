@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rds.bus.modules.oacs.pid import MEANINGS
-from rds.cli.buses import Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import Baud, Channel, Experiment, Interface, chosen_bus, refuse_baud
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, writes_files
 
 module_app = typer.Typer(
@@ -38,24 +38,36 @@ def scan(
     force: Annotated[bool, typer.Option("--force", help="With --events: overwrite the file.")] = False,
     interface: Interface = None,
     channel: Channel = None,
+    baud: Baud = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
-    """List the modules on a bus: number, type, dialect, version, state. Numbers used twice are refused."""
+    """List the modules on a bus: number, type, dialect, version, state. Numbers used twice are refused.
+
+    With --interface serial: the units on a serial line.
+    """
     with refusals():
         _check_watch(watching, events=events, modules=modules, seconds=seconds, force=force or None)
         if force and events is None:
             raise _refused("--force overwrites the file of --events, which is not given")
         place = chosen_bus(interface, channel, experiment)
+        refuse_baud(place, baud)
         if watching:
+            if place.is_line:
+                raise _refused("--watch is for distributed modules on CAN; units on a serial line do not come and go")
             from rds.cli.watch import watch
 
             with place.opened() as bus:
                 watch(bus, json, events, modules, seconds, force)
             return
-        from rds.bus.tools.scan import scan_all
+        if place.is_line:
+            from rds.bus.modules.dcs.scan import scan_channel
 
-        rows = scan_all(place.interface, place.channel, **place.options)
+            rows = scan_channel(str(place.channel), place.baud(baud))
+        else:
+            from rds.bus.tools.scan import scan_all
+
+            rows = scan_all(place.interface, place.channel, **place.options)
     if json:
         print_json({"channel": place.channel, "interface": place.interface, "modules": rows})
         return
@@ -350,6 +362,9 @@ def folder_for(out: Path | None, force: bool) -> Path:
     return out
 
 
+_SIDES = ("mounted_by", "carries_on")  # of a module, to its neighbours
+
+
 def show_info(found: Mapping[str, Any]) -> None:
     """The download and the tuning, as `module.info().as_dict()` has them."""
     from rds.cli.console import cell, show_table
@@ -360,9 +375,10 @@ def show_info(found: Mapping[str, Any]) -> None:
     speed = unit if unit == "rev/min" else f"{unit}/min"
     units |= dict.fromkeys(("least_speed", "clockwise_speed", "counterclockwise_speed"), speed)
     left = {"number", "unit", "matrix", "tuning"}
+    sides = {side: "{gender} {kind} {size:g} mm".format(**found[side]) for side in _SIDES if found.get(side)}
     rows = [
-        [name.replace("_", " "), cell("–" if value == "" else value), units.get(name, "")]
-        for name, value in found.items()
+        [name.replace("_", " "), cell("–" if value in ("", None) else value), units.get(name, "")]
+        for name, value in {**found, **sides}.items()
         if name not in left
     ]
     show_table(f"Module {found['number']}", ["what", "value", "unit"], rows)

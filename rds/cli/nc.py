@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli import nc_bundled, nc_make, nc_run
-from rds.cli.common import Json, print_json, progress_bars, refusals, writes_files
+from rds.cli import nc_bundled, nc_make, nc_methods, nc_run
+from rds.cli.common import Json, declared, print_json, progress_bars, refusals, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
+from rds.core.shared_quantities import SAMPLE_PERIOD
 
 if TYPE_CHECKING:
     from rds.nc.check import Setup
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
 app.add_typer(nc_make.app, name="make")
-for _command in (*nc_run.COMMANDS, nc_bundled.bundled):
+for _command in (*nc_run.COMMANDS, nc_methods.methods, nc_bundled.bundled):
     app.command()(_command)
 
 PICTURES = ("png", "svg", "pdf")
@@ -48,9 +49,10 @@ def check(
         from rds.machines import load_machine
         from rds.nc.check import check_program
 
-        what = setup(tools, parameters, with_, max_jumps)
+        of = load_machine(machine)
+        what = setup(tools, parameters, with_, max_jumps).on(of)
         with progress_bars() as bar:
-            result, compiled = check_program(file, load_machine(machine), what, bar("check"))
+            result, compiled = check_program(file, of, what, bar("check"))
         proved, pictures = _prove(file, what) if proof else (None, [])
     gouges = len(proved.gouges()) if proved else 0
     if json:
@@ -81,7 +83,7 @@ def _prove(file: Path, what: Setup) -> tuple[Proof | None, list[Path]]:
     pictures = []
     for number in range(len(proved.stretches)):
         path = file.with_name(f"{file.stem}-proof{f'-{number + 1}' if number else ''}.png")
-        _save(proved.plot(number), path)
+        save_picture(proved.plot(number), path)
         pictures.append(path)
     return proved, pictures
 
@@ -171,11 +173,13 @@ def plot(
         from rds.nc.axis_plot import has_no_side, plot_axes
         from rds.nc.check import followed, watched
         from rds.nc.plots import plot as draw
+        from rds.nc.tool_centre import shown
         from rds.nc.trace import Trace
         from rds.nc.validate import Validator
 
         path = out or file.with_name(f"{file.stem}-path.png")
-        of, what = load_machine(machine), setup(tools, parameters, with_, max_jumps)
+        of = load_machine(machine)
+        what = setup(tools, parameters, with_, max_jumps).on(of)
         validator = Validator(of, what.tool_list(), str(file))
         trace, flat = Trace(), has_no_side(of)
         segments = []
@@ -186,8 +190,8 @@ def plot(
                 if flat:
                     segments.append(block.segments)
                 else:
-                    trace.add(block.segments)
-        _save(plot_axes(segments, of, file.name) if flat else draw(trace, of, file.name), path)
+                    trace.add(shown(block.segments, of))
+        save_picture(plot_axes(segments, of, file.name) if flat else draw(trace, of, file.name), path)
         result = validator.result()
     if not result.ok:
         count = len(result.faults) + result.more
@@ -200,7 +204,7 @@ def plot(
         typer.echo(f"picture: {path}")
 
 
-def _save(figure: Any, path: Path) -> None:
+def save_picture(figure: Any, path: Path) -> None:
     """Whole or not at all."""
     from rds.core.atomic import write_files
     from rds.core.errors import InputError
@@ -219,15 +223,13 @@ def time(
     parameters: Parameters = None,
     with_: With = None,
     max_jumps: MaxJumps = None,
-    sample_period: Annotated[
-        float | None, typer.Option(help="Sample period, s; by default the machine's.", min=1e-6, max=1000.0)
-    ] = None,
+    sample_period: Annotated[float | None, declared(SAMPLE_PERIOD, "by default the machine's")] = None,
     profile: ProfileName = "planned",
     json: Json = False,
 ) -> None:
     """Predict a program's cycle time, with the planner that runs it: at feed, in rapids, in dwells, for each tool.
 
-    Another --profile is for comparison: `rds nc run` runs the planned one.
+    `rds nc run` takes the same --profile.
     """
     with refusals():
         from rds.machines import load_machine

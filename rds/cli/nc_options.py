@@ -19,7 +19,8 @@ With = Annotated[
     typer.Option(
         "--with",
         metavar="OPTION",
-        help="Of the dialect: block-delete, gr, program-numbers, default-feed, open-end, inch-machine or any-exit.",
+        help="Of the dialect: block-delete, gr, program-numbers, default-feed, open-end, ncc, inch-machine, any-exit, "
+        "tcp; or correction: of the assembly errors in the machine's links.",
     ),
 ]
 ProfileName = Annotated[
@@ -31,7 +32,10 @@ MaxJumps = Annotated[
         min=1, help="Calls and jumps back after which a program is taken for endless (default 1000000).", metavar="N"
     ),
 ]
-DIALECT = ("block-delete", "gr", "program-numbers", "default-feed", "open-end", "inch-machine", "any-exit")
+DIALECT = (
+    *("block-delete", "gr", "program-numbers", "default-feed", "open-end", "ncc", "inch-machine", "any-exit", "tcp"),
+)
+CORRECTION = "correction"
 
 
 def setup(
@@ -42,10 +46,13 @@ def setup(
     from rds.nc.check import Setup
     from rds.nc.language.dialect import Dialect
 
-    for name in options or ():
+    correct = CORRECTION in (options or ())
+    options = [name for name in options or () if name != CORRECTION]
+    for name in options:
         if name not in DIALECT:
-            raise InputError(f"--with {name!r} is no option of the dialect; there are {', '.join(DIALECT)}")
-    given: dict[str, Any] = {name.replace("-", "_"): True for name in options or ()}
+            known = ", ".join((*DIALECT, CORRECTION))
+            raise InputError(f"--with {name!r} is no option of the dialect; there are {known}")
+    given: dict[str, Any] = {name.replace("-", "_"): True for name in options}
     if max_jumps is not None:
         given["max_jumps"] = max_jumps
-    return Setup(tools, parameters, Dialect(**given))
+    return Setup(tools, parameters, Dialect(**given), correct)

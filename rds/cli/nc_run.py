@@ -11,6 +11,7 @@ import typer
 
 from rds.cli.common import (
     Json,
+    declared,
     ends_as_ctrl_c,
     explain,
     print_json,
@@ -20,12 +21,14 @@ from rds.cli.common import (
     stdout_kept,
     writes_files,
 )
-from rds.cli.nc_options import MaxJumps, Parameters, Program, Tools, With, setup
+from rds.cli.exchange import Events, Exchange, Yes, only_with_exchange, runs_json, through_exchanges
+from rds.cli.nc_options import MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
+from rds.core.shared_quantities import FEED_OVERRIDE
 from rds.modes import DEFAULT, mode_names
 
 if TYPE_CHECKING:
     from rds.cli.keys import Keys
-    from rds.nc.run.run import PartProgram, ProgramRun, Status
+    from rds.nc.run.run import ProgramRun, Status
     from rds.results import Result
 
 _HELP = "space hold and go on, + and - feed, h home, q stop"
@@ -53,7 +56,7 @@ def run(
     parameters: Parameters = None,
     with_: With = None,
     max_jumps: MaxJumps = None,
-    override: Annotated[float, typer.Option(help="Feed, per cent of the programmed one.", min=0, max=200)] = 100.0,
+    override: Annotated[float, declared(FEED_OVERRIDE)] = 100.0,
     controller: Annotated[
         str | None,
         typer.Option(help="Of the position axes: a name, your .py file, or an experiment's .toml (default tracking)."),
@@ -63,7 +66,11 @@ def run(
         typer.Option(help="Make the samples in the loop: a method of the library, or your .py with interpolate()."),
     ] = None,
     option: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Of --interpolator: blu=0.001, a file's params.")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Of --interpolator: blu=0.001; with --method: noise=0.001, bitrate=500000, drift=X:80.",
+        ),
     ] = None,
     acceleration: Annotated[
         str | None, typer.Option(help="Filter on top of --interpolator: linear, exponential or s-shape.")
@@ -77,21 +84,83 @@ def run(
     look_ahead: Annotated[
         int | None, typer.Option(help="Rows that --interpolator makes before they are needed (default 3).", min=3)
     ] = None,
+    profile: ProfileName = "planned",
+    cut: Annotated[
+        Path | None, typer.Option(help="A file of the cut and its [limits]: the feed is lowered so that they are kept.")
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            help="By nodes on a serial line or CAN: A, B, C, C-thesis, B-free, C-free, several with commas, or all."
+        ),
+    ] = None,
+    motion: Annotated[
+        str | None, typer.Option(help="With --method: plan (default), or constant, the thesis's motion without ramps.")
+    ] = None,
+    rapids: Annotated[
+        str | None, typer.Option(help="With --motion constant: together (default), or each axis at its own speed.")
+    ] = None,
+    baud: Annotated[
+        int | None, typer.Option(help="With --method on a serial line: baud rate (default 115200).")
+    ] = None,
+    channel: Annotated[
+        str | None, typer.Option(help="With --method: a serial port, or a served machine (default: one for this run).")
+    ] = None,
     optional_stop: Annotated[bool, typer.Option("--optional-stop/--no-optional-stop", help="Whether M1 stops.")] = True,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for the results (default: a new one under runs/).")
     ] = None,
+    exchange: Exchange = None,
+    yes: Yes = False,
+    events: Events = None,
     json: Json = False,
 ) -> None:
     """Run a program on all axes and the spindle; report following and contour error by program line.
 
-    The motion is the planned one, with look-ahead; `rds nc time --profile` compares others. With --interpolator, a
-    method of the library or your own makes the samples while the axes move.
+    The motion is planned with look-ahead, or by another --profile, at whose corners a limit may be passed. With
+    --interpolator, a method of the library or your own makes the samples while the axes move.
 
     In a terminal, while it runs in real time: space holds and goes on, + and - change the feed, h moves home, q stops.
     Elsewhere `rds nc operate` does the same.
     """
     with refusals(), stdout_kept(json), ends_as_ctrl_c():
+        if method is not None:
+            given = {
+                "--override": override != 100.0,
+                "--controller": controller,
+                "--interpolator": interpolator,
+                "--acceleration": acceleration,
+                "--acceleration-time": acceleration_time,
+                "--exact-stop": exact_stop,
+                "--look-ahead": look_ahead,
+                "--profile": profile != "planned",
+                "--cut": cut,
+                "--no-optional-stop": not optional_stop,
+                "--exchange": exchange,
+                "--yes": yes,
+                "--events": events,
+            }
+            from rds.cli.nc_serial import by_method
+
+            by_method(
+                given,
+                file,
+                method,
+                machine,
+                mode,
+                motion,
+                rapids,
+                baud,
+                channel,
+                option,
+                out,
+                json,
+                setup(tools, parameters, with_, max_jumps),
+            )
+            return
+        from rds.cli.nc_serial import only_with_method
+
+        only_with_method({"--motion": motion, "--rapids": rapids, "--baud": baud, "--channel": channel})
         from rds.cli.interpolate import acceleration_of
         from rds.core.errors import InputError
         from rds.modes import load_mode
@@ -100,6 +169,8 @@ def run(
         from rds.nc.run.report import save_run
         from rds.nc.run.run import PartProgram
 
+        if exchange is None:
+            only_with_exchange(yes, events)
         if override < _LEAST_OVERRIDE:
             said = f"--override {override:g} never moves, or as good as never; begin with {_LEAST_OVERRIDE:g} or more"
             raise InputError(f"{said}, and hold with space or `rds nc operate --hold`")
@@ -115,6 +186,8 @@ def run(
                 interpolator=_interpolator(interpolator, option, look_ahead),
                 acceleration=acceleration_of(acceleration, acceleration_time, None, exact_stop),
                 exact_stop=exact_stop,
+                profile=profile,
+                cut=cut,
                 experiment=experiment,
                 mode=mode,
                 progress=bar("check"),
@@ -124,16 +197,28 @@ def run(
         say_what_is_replaced(folder)
         changes = [(0.0, "override", override / 100.0)] if override != 100.0 else []
         changes += [] if optional_stop else [(0.0, "optional_stop", 0.0)]
-        if load_mode(plan.mode).real_time:
-            result = _operated(part, folder, changes)
+        runs = [(part.prepared, folder)]
+
+        def go(part: Any, running: Any) -> Result:
+            runs.append((part.prepared, running.folder))
+            return _operated(running)
+
+        if exchange is not None:
+            results = through_exchanges(part, exchange, yes, events, json, mode, folder, go, changes)
+            del runs[0]
+        elif load_mode(plan.mode).real_time:
+            results = [_operated(part.start(out=folder, changes=changes))]
         else:
             with progress_bars() as bar:
-                result = part.run(out=folder, changes=changes, progress=bar(plan.mode))
-        files = save_run(result, part.prepared, folder)
+                results = [part.run(out=folder, changes=changes, progress=bar(plan.mode))]
+        made = [(result, save_run(result, *each)) for result, each in zip(results, runs, strict=True)]
+    result, files = made[-1]
     if json:
-        print_json({**run_json(result, files), "program": result.meta["program"], "changes": result.meta["changes"]})
+        told = {"program": result.meta["program"], "changes": result.meta["changes"]}
+        print_json(run_json(result, files) | told | ({} if exchange is None else runs_json(made)))
     else:
-        _show(result, files)
+        for each in made:
+            _show(*each)
     explain(result)
     raise typer.Exit(exit_code(result))
 
@@ -152,14 +237,14 @@ def _interpolator(name: str | None, options: list[str] | None, look_ahead: int |
     return words if look_ahead is None else words | {"look_ahead": look_ahead}
 
 
-def _operated(part: PartProgram, folder: Path, changes: list[tuple[float, str, float]]) -> Result:
+def _operated(running: ProgramRun) -> Result:
     """A real-time run with somebody at the keyboard, or a line on stderr for each change of state."""
     from rds.cli.keys import keyboard
 
-    running = part.start(out=folder, changes=changes)
     with keyboard() as keys:
         if keys is None:
-            _watch(running, folder)
+            assert running.folder is not None
+            _watch(running, running.folder)
         else:
             _operate(running, keys)
     return running.wait()
@@ -228,6 +313,8 @@ def _line(status: Status, running: ProgramRun) -> str:
         f"{name} {value:.0f} rev/min" if running.units.get(f"{name}_measured") == "rev/min" else f"{name} {value:.3f}"
         for name, value in status.measured.items()
     )
+    if status.tip:
+        axes += "  tip " + " ".join(f"{name}{value:.3f}" for name, value in status.tip.items())
     predicted = running.plan.samples * running.plan.T
     try:
         override = f"{running.desk['override']:.0%}"
@@ -258,6 +345,8 @@ def _show(result: Result, files: dict[str, Path]) -> None:
     title = f"{about['file']} on {result.meta['machine']}, {result.mode}"
     show_table(title, ["error of", "largest", "in line", "at [s]", "RMS"], rows)
     screen = console()
+    if force := about.get("cutting_force"):
+        typer.echo(f"cutting force: at most {force['max']:.1f} N, in line {force['line']}")
     for sentence in findings(about):
         screen.print(sentence, markup=False, soft_wrap=True)
     if result.verdict is not None:
@@ -272,9 +361,7 @@ def operate(
     resume: Annotated[bool, typer.Option("--resume", help="Go on after a hold, M0, M1 or a tool change.")] = False,
     home: Annotated[bool, typer.Option("--home", help="End the program where it is, and move home.")] = False,
     stop: Annotated[bool, typer.Option("--stop", help="Come to rest on the path, and end.")] = False,
-    override: Annotated[
-        float | None, typer.Option(help="Feed, per cent of the programmed one.", min=0, max=200)
-    ] = None,
+    override: Annotated[float | None, declared(FEED_OVERRIDE)] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Any live value, as X.Pgain=30.")
     ] = None,
@@ -318,62 +405,4 @@ def _pair(text: str) -> tuple[str, float]:
         raise InputError(f"--set {text!r} must be NAME=VALUE with a number, as in --set X.Pgain=30") from None
 
 
-@writes_files
-def methods(
-    file: Annotated[Path, typer.Argument(help="A path file (.toml) or a part program.")],
-    add: Annotated[
-        list[Path] | None, typer.Option(help="Your .py file with interpolate(), beside the library's; can be repeated.")
-    ] = None,
-    machine: Annotated[
-        str, typer.Option("--machine", help="A machine's name, or the path of its TOML file.")
-    ] = "mini-cnc",
-    controller: Annotated[str, typer.Option(help="Of the position axes: a name, or your .py file.")] = "tracking",
-    acceleration: Annotated[
-        str | None, typer.Option(help="Filter on top of each: linear, exponential or s-shape.")
-    ] = None,
-    acceleration_time: Annotated[
-        float | None, typer.Option(help="How long the velocity rises, s; of exponential its time constant.")
-    ] = None,
-    period: Annotated[float | None, typer.Option(help="Sample period, s (default the machine's).")] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder for the table, the picture and a page.")
-    ] = None,
-    json: Json = False,
-) -> None:
-    """Compare interpolators on a simulated machine: contour error, feed ripple, jerk, and compute time of a sample."""
-    with refusals():
-        from rds.cli.interpolate import acceleration_of
-        from rds.modes.experiment.folder import require_writable
-        from rds.nc.run.methods import compare_methods, methods_report
-        from rds.results.reports.write import write
-
-        if out is not None:
-            require_writable(out)
-        filter_ = acceleration_of(acceleration, acceleration_time, None, False)
-        with progress_bars() as bar:
-            compared = compare_methods(
-                file,
-                add or (),
-                machine=machine,
-                controller=controller,
-                acceleration=filter_,
-                sample_period=period,
-                progress=bar("methods"),
-            )
-        settings = {"machine": machine, "controller": controller, "acceleration": acceleration}
-        made = methods_report(compared, file, settings)
-        files = write(made, out) if out is not None else []
-    if json:
-        print_json({**made.to_json(), "files": [str(path) for path in files]})
-        return
-    from rds.cli.console import cell, show_table
-
-    for table in made.tables:
-        show_table(table.title, table.columns, [[cell(value) for value in row] for row in table.shown()], table.note)
-    for sentence in made.findings:
-        typer.echo(f"- {sentence}")
-    if files:
-        typer.echo(f"page: {files[0]}")
-
-
-COMMANDS: tuple[Callable[..., Any], ...] = (run, operate, methods)
+COMMANDS: tuple[Callable[..., Any], ...] = (run, operate)

@@ -89,6 +89,7 @@ def _machine() -> Any:
     from rds.machines.machine import AXIS, MACHINE
     from rds.models import model_module, model_names
     from rds.models.machine_axis import PARAMETERS
+    from rds.models.stepper_axis import PARAMETERS as STEPPER
 
     parameters: Mapping[str, Any] = {}
     for name in model_names():
@@ -98,7 +99,7 @@ def _machine() -> Any:
     keys = {
         **AXIS.keys,
         "model": replace(model, keys={**model.keys, **parameters}, others=None),
-        "machine": replace(behind, keys=PARAMETERS, others=None),
+        "machine": replace(behind, keys=STEPPER | PARAMETERS, others=None),
     }
     axes = MACHINE.keys["axis"]
     assert isinstance(axes, Table)

@@ -1,7 +1,8 @@
 """Control laws, one per file, by name.
 
 Each file has `law`, a pure function on floats and tuples of floats (numba compiles it as it stands),
-`control`, the fixed interface over it, and `make`, which checks the options and fills in tuned gains.
+`control`, the fixed interface over it, and `make`, which checks the options and fills in tuned gains. The laws for
+loops with delay (`lqg`, `smith`) keep voltages that are on their way: they have no `law`, and are not compiled.
 """
 
 from __future__ import annotations
@@ -21,6 +22,10 @@ LIBRARY = Registry(
         "modified-pid": "rds.controllers.modified_pid",
         "tracking": "rds.controllers.tracking",
         "feedforward": "rds.controllers.feedforward",
+        "zero-phase": "rds.controllers.zero_phase",
+        "cascade": "rds.controllers.cascade",
+        "lqg": "rds.controllers.lqg",
+        "smith": "rds.controllers.smith",
     },
 )
 

@@ -47,7 +47,7 @@ def law(position, velocity, acceleration, y, state, c):
     (-1.0, 1.0, or 0.0 before it has moved), and the shift of the motor in its play (mm).
     """
     z, started, direction, shift = state
-    inverse_gain, inertia, g1, g2, L, F, G, H, limit, plus, minus, half_play, share, T = c
+    inverse_gain, inertia, g1, g2, L, F, G, H, limit, plus, minus, half_play, share, T, weight = c
     if started == 0.0:
         z = -L * y  # the axis starts at rest, wherever it stands
     if velocity > 0.0:
@@ -64,7 +64,8 @@ def law(position, velocity, acceleration, y, state, c):
         known += plus
     elif direction < 0.0:
         known += minus
-    u = inertia * (acceleration + g1 * (position - y) + g2 * (velocity - (L * y + z))) + inverse_gain * velocity + known
+    pull = weight * acceleration + g1 * (position - y) + g2 * (velocity - (L * y + z))
+    u = inertia * pull + inverse_gain * velocity + known
     if u > limit:
         u = limit
     elif u < -limit:
@@ -105,6 +106,7 @@ def make(
         0.5 * values["backlash"],
         -expm1(-T / values["backlash_time"]),
         T,
+        1.0,  # of the reference's acceleration; zero_phase.py has another one
     )
     params = {**base.params, **values, "coefficients": coefficients}
     retune = partial(_retuned, dict(axis_model), T, converter_range, base.params["observer_pole"])

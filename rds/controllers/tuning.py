@@ -63,3 +63,19 @@ def set_point_weight(axis: AxisData) -> float:
     alone, with 2 % of overshoot. Spindle: 1, as its PI does not overshoot.
     """
     return 1.0 if axis.spindle else 1.0 / (1.0 + 2.0 * DAMPING * SLOW_POLE)
+
+
+def cascade_gains(axis: AxisData, resistance: float, speed_filter: float | None = None) -> dict[str, float]:
+    """Gains of the servo cascade: Kpp (1/s), Kp, Ki, Kd, the speed's filter (s) and the speed feedforward.
+
+    The current amplifier leaves the speed an integrator, τ v̇ = K R i, behind a delay σ: half a period for the hold,
+    up to one more for the bus, half a period for the difference of positions, and the filter. The lag of its back-EMF
+    makes τ + σ of τ. Kp places the crossover at ω = 1/(4 σ), Ki = Kp ω/20 gives the two poles a damping of 2.2, so
+    that a step of the speed overshoots by less than 5 %. Kpp = ω/4: four times slower than the speed loop.
+    """
+    time = speed_filter if speed_filter is not None else 0.0 if axis.spindle else lag(axis) / 8.0
+    sigma = (1.5 if axis.spindle else 2.0) * axis.T + time
+    omega = 0.25 / sigma
+    Kp = omega * (axis.tau + sigma) / (axis.K * resistance)
+    gains = {"Kp": Kp, "Ki": Kp * omega / 20.0, "Kd": 0.0, "speed_filter": time}
+    return gains if axis.spindle else gains | {"Kpp": omega / 4.0, "speed_feedforward": 1.0}

@@ -15,3 +15,16 @@ BLACK, ORANGE, SKY, GREEN, BLUE, VERMILLION, PURPLE = (
     "#CC79A7",
 )
 GREY = "#8A8A8A"
+OCHRE = "#B87400"  # the orange, darker: a thin line of it can be seen on white
+
+# One colour for each quantity of a run, on every plot, on the page and in print.
+QUANTITIES = {
+    "reference": GREY,
+    "measured": BLUE,
+    "modelled": VERMILLION,
+    "simulated": GREEN,
+    "error": PURPLE,
+    "contour error": PURPLE,
+    "voltage": OCHRE,
+    "target": OCHRE,
+}

@@ -13,7 +13,8 @@ Limits = tuple[float, float]  # the lowest and highest position, axis units; inf
 class Motion(Protocol):
     """A model in motion, one axis: it holds a state and moves on by one sample at a time.
 
-    That of a model which `has_velocity` has an attribute `velocity` as well: the velocity now, mm/s.
+    That of a model which `has_velocity` has an attribute `velocity` as well: the velocity now, mm/s. Of what a model
+    has `told`, too.
     """
 
     def read(self) -> float:
@@ -21,6 +22,13 @@ class Motion(Protocol):
 
     def write(self, voltage: float) -> None:
         """Move on by one sample period with a constant `voltage` in V."""
+
+    @property
+    def dead_time(self) -> float:
+        """The model's own delay, s: `write` keeps it, `move` leaves it to its caller."""
+
+    def move(self, voltage: float, time: float) -> None:
+        """Move on by `time` s, at most a sample period, with a constant `voltage` in V that acts at once."""
 
 
 @dataclass

@@ -37,7 +37,7 @@ def lock_memory() -> bool:
 
         unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
         what = current | future if unlimited or os.geteuid() == 0 else current
-        return ctypes.CDLL(None, use_errno=True).mlockall(what) == 0
+        return bool(ctypes.CDLL(None, use_errno=True).mlockall(what) == 0)
     except (ImportError, OSError, AttributeError):
         return False
 
@@ -53,7 +53,7 @@ def set_timer_slack(nanoseconds: int = 1) -> bool:
     try:
         import ctypes
 
-        return ctypes.CDLL(None, use_errno=True).prctl(set_slack, ctypes.c_ulong(nanoseconds), 0, 0, 0) == 0
+        return bool(ctypes.CDLL(None, use_errno=True).prctl(set_slack, ctypes.c_ulong(nanoseconds), 0, 0, 0) == 0)
     except (ImportError, OSError, AttributeError):
         return False
 
@@ -66,6 +66,6 @@ def end_with_parent() -> bool:
     try:
         import ctypes
 
-        return ctypes.CDLL(None, use_errno=True).prctl(set_death_signal, ctypes.c_ulong(kill), 0, 0, 0) == 0
+        return bool(ctypes.CDLL(None, use_errno=True).prctl(set_death_signal, ctypes.c_ulong(kill), 0, 0, 0) == 0)
     except (ImportError, OSError, AttributeError):
         return False

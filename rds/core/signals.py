@@ -21,9 +21,11 @@ TAKEN = (
     "measured",
     "command",
     "voltage",
+    "target",
     "modelled",
     "simulated",
     "plant_velocity",
+    "plant_current",
     "actual",
     "error",
 )
@@ -79,10 +81,10 @@ def signal_values(told: Any, names: Sequence[str], axes: int = 0) -> list[Any]:
     return [_numbers(told[name], name, axes) for name in names]
 
 
-def signals_wanted(names: Sequence[str], axes: int = 0) -> str:
+def signals_wanted(names: Sequence[str], axes: int = 0, command: str = "voltage") -> str:
     """What a controller that declares signals must return, in words."""
     each = f"an array of {axes} finite numbers, one for each axis" if axes else "one finite number"
-    return f"it must return (voltage, next_state, {{{', '.join(f'{name!r}: ...' for name in names)}}}), each {each}"
+    return f"it must return ({command}, next_state, {{{', '.join(f'{name!r}: ...' for name in names)}}}), each {each}"
 
 
 def return_line(function: Callable[..., Any], path: str | None) -> int | None:

@@ -21,6 +21,17 @@ class Reference(NamedTuple):
     acceleration: float  # mm/s²
 
 
+class Measured(float):
+    """A measured position that came over a network: a number with its `age`, whole samples, at the sample of the law.
+
+    `age` is 0 for the measurement of this sample; it grows by one with each sample in which nothing newer came. A law
+    that wants to know asks `getattr(y, "age", 0)`: without a network a measurement is a plain float.
+    """
+
+    __slots__ = ("age",)
+    age: int
+
+
 @dataclass(frozen=True, slots=True)
 class LineSegment:
     """A straight move. `start` and `end` hold one position per axis, mm; `feed_rate` is in mm/s."""
@@ -70,6 +81,7 @@ class Controller:
     `tunable` are those of its parameters that may be changed while it runs, with what each means and its bounds, and
     `retune(values of all of them)` gives the parameters that follow from new values, or raises InputError. Without
     `retune`, any number in `params` may be changed and is handed to `control` as it is.
+    One that is not `repeatable` answers differently when a run is gone through again, such as a person's loop.
     """
 
     control: Callable[..., Any]
@@ -81,6 +93,7 @@ class Controller:
     retune: Callable[[Mapping[str, float]], Mapping[str, Any]] | None = None
     signals: Mapping[str, str] = field(default_factory=dict)
     observe: Callable[..., Sequence[float]] | None = None
+    repeatable: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,6 +105,7 @@ class Model:
     `start(T)` gives the model in motion (see `contracts.Motion`); a model with a faster way of running
     hands in its own `motion`. `fitted` is the model file that the numbers came from, if they did.
     `has_velocity` says that the second state is the axis's velocity, and that its motion has it as `velocity`.
+    `told` names other attributes of its motion, with their units, that are recorded where the model is the plant.
     """
 
     advance: Callable[[Sequence[float], float, float, Mapping[str, Any]], Sequence[float]]
@@ -102,6 +116,7 @@ class Model:
     motion: Callable[[Model, float], Any] | None = None
     fitted: Source | None = None
     has_velocity: bool = False
+    told: Mapping[str, str] = field(default_factory=dict)
 
 
 class Ending(StrEnum):

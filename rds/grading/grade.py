@@ -27,6 +27,7 @@ class Band(StrEnum):
     FULL = "full"
     PARTIAL = "partial"
     NONE = "none"
+    REVIEW = "review"  # it could not be measured: somebody has to look; never a zero
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class CriterionScore:
     sentence: str
     visible: bool = True  # whether the student may see the value and the bands before grades are out
     case: str = ""  # the case that decided it
+    gate: str = ""  # the heading of the criterion that it requires, where that took points
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,11 @@ class Grade:
     late_days: float = 0.0
     notes: tuple[str, ...] = ()  # such as what it printed, capped
     details: Mapping[str, Any] = field(default_factory=dict)  # per case: its columns' file, budget figures
+
+    @property
+    def for_review(self) -> tuple[CriterionScore, ...]:
+        """What could not be measured: points are given in proportion to the others, until somebody has looked."""
+        return tuple(score for score in self.criteria if score.band is Band.REVIEW)
 
     def to_json(self) -> dict[str, Any]:
         """In JSON's own types, whole: `from_json` gives the same grade back."""

@@ -10,7 +10,23 @@ from __future__ import annotations
 
 from types import ModuleType
 
+from rds.core.face import face
 from rds.core.registry import Registry
+
+__getattr__, __dir__ = face(
+    __name__,
+    {
+        "BLEND": "motion.segments",
+        "Certificate": "motion.certificate",
+        "Limits": "motion.limits",
+        "arc": "motion.segments",
+        "certified": "motion.certificate",
+        "chain": "motion.segments",
+        "line": "motion.segments",
+        "make_acceleration": "acceleration",
+        "plan": "motion.planner",
+    },
+)
 
 DEFAULT = "constant-velocity"
 LIBRARY = Registry(

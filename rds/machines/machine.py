@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
 from rds.core.quantities import Items, Quantity, Table, Text
 from rds.core.shared_quantities import NODE, SAMPLE_PERIOD
 from rds.core.toml_table import TomlTable
-from rds.machines.module_table import MODULE
+from rds.machines.link_table import LINKS, TOOL, WORK, ChainEnd, Link, read_links
+from rds.machines.module_table import CARRIES_ON, INTERFACE, MODULE, MOUNTED_BY
+
+if TYPE_CHECKING:
+    from rds.machines.kinematics import Kinematics
 
 _RANGE, _BITS = 10.0, 12  # of a machine whose file says nothing
 VOLTAGE_RANGE = Quantity("the output board's range, ±", "V", above=0.0, high=1000.0, default=_RANGE)
@@ -39,6 +44,7 @@ LIMITS = Table(
     },
     needed=("velocity", "acceleration", "jerk"),
 )
+SLOT = Quantity("place of its voltage in cyclic commands; by default its place among the axes", "", 1, 8, whole=True)
 AXIS = Table(
     "an axis of the machine",
     {
@@ -52,11 +58,17 @@ AXIS = Table(
             others=PARAMETER,
             needed=("name",),
         ),
+        "slot": SLOT,
         "limits": LIMITS,
         "machine": Table("the axis behind the bus, for `rds machine serve`", others=PARAMETER),
         "module": MODULE,
     },
     needed=("node", "travel", "resolution"),
+)
+POWER = Table(
+    "supply of the modules' motors, for `rds machine power`",
+    {"voltage": Quantity("its voltage", "V", above=0.0), "current": Quantity("what it bears", "A", above=0.0)},
+    needed=("voltage", "current"),
 )
 MACHINE = Table(
     "A machine: its axes, its converter and its sample period.",
@@ -66,7 +78,11 @@ MACHINE = Table(
         "sample_period": SAMPLE_PERIOD,
         "default_feed": DEFAULT_FEED,
         "converter": Table("digital-to-analogue converter", {"range": VOLTAGE_RANGE, "bits": BITS}),
+        "power": POWER,
         "axis": Table("axes by name, in the order of their voltages in the command frame", others=AXIS),
+        "link": LINKS,
+        "tool": TOOL,
+        "work": WORK,
     },
     needed=("sample_period", "axis"),
 )
@@ -78,6 +94,14 @@ class Converter:
 
     range: float = _RANGE
     bits: int = _BITS
+
+
+@dataclass(frozen=True)
+class Power:
+    """The supply of the modules' motors: V, A."""
+
+    voltage: float
+    current: float
 
 
 @dataclass(frozen=True)
@@ -107,6 +131,7 @@ class Axis:
     machine: dict[str, float] = field(default_factory=dict)
     module: dict[str, Any] = field(default_factory=dict)
     limits: AxisLimits | None = None
+    slot: int | None = None  # from 1; None: its place among the axes
 
     @property
     def is_spindle(self) -> bool:
@@ -119,6 +144,8 @@ class Machine:
     """A machine: its axes by name, its converter, its sample period in s, and the file it was read from.
 
     `default_feed` (mm/min) is that of part programs that give none; None: what the slowest linear axis can do.
+    `links`, `tool` and `work` say how the axes move the tool relative to the work; without links it is a machine whose
+    axes are all that is known.
     """
 
     name: str
@@ -128,6 +155,27 @@ class Machine:
     axes: dict[str, Axis]
     path: str
     default_feed: float | None = None
+    power: Power | None = None
+    links: tuple[Link, ...] = ()
+    tool: ChainEnd | None = None
+    work: ChainEnd | None = None
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """How its joints move the tool relative to the work; of a machine without links the identity.
+
+        InputError for links that make no chain. Needs scipy.
+        """
+        from rds.machines.kinematics import kinematics_of
+
+        return kinematics_of(self)
+
+    @cached_property
+    def slots(self) -> dict[str, int]:
+        """The place of each axis's voltage in cyclic commands, from 0."""
+        return {
+            name: place if axis.slot is None else axis.slot - 1 for place, (name, axis) in enumerate(self.axes.items())
+        }
 
     def axis(self, name: str) -> Axis:
         """The axis called `name`; InputError names the ones there are."""
@@ -151,10 +199,11 @@ def load_machine(name: str) -> Machine:
         raise InputError(
             f"there is no machine {name!r}; known machines: {', '.join(machine_names())}, or the path of a .toml file"
         )
-    return _machine(TomlTable.open(path, MACHINE))
+    return machine_from(TomlTable.open(path, MACHINE))
 
 
-def _machine(table: TomlTable) -> Machine:
+def machine_from(table: TomlTable) -> Machine:
+    """The machine that a table of a file describes; InputError where it describes none."""
     tables = table.inner("axis")
     if tables is None or not tables.table:
         raise InputError("needs at least one [axis.NAME] table", table.path)
@@ -163,6 +212,7 @@ def _machine(table: TomlTable) -> Machine:
     if len(set(nodes)) != len(nodes):
         raise InputError(f"two axes share a node; nodes are {nodes}", table.path)
     converter = table.inner_or_empty("converter")
+    links, tool, work = read_links(table, axes)
     made = Machine(
         name=table.read("name", Path(table.path).stem),
         title=table.read("title"),
@@ -171,9 +221,17 @@ def _machine(table: TomlTable) -> Machine:
         axes=axes,
         path=table.path,
         default_feed=table.read("default_feed", None),
+        power=_power(table.inner("power")),
+        links=links,
+        tool=tool,
+        work=work,
     )
     for each in (converter, table):
         each.done()
+    slots = made.slots
+    if len(set(slots.values())) != len(slots):
+        said = ", ".join(f"{name} {slot + 1}" for name, slot in slots.items())
+        raise InputError(f"two axes share a slot, and so a voltage; slots are {said}", table.path)
     return made
 
 
@@ -192,17 +250,36 @@ def _axis(name: str, tables: TomlTable) -> Axis:
         resolution=table.read("resolution"),
         model=_values(model),
         machine=_values(table.inner("machine")),
-        module={key: module.read(key) for key in MODULE.keys if key in module},
+        module={key: _of_module(module, key) for key in MODULE.keys if key in module},
         limits=_limits(table.inner("limits")),
+        slot=table.read("slot", None),
     )
     for each in (module, table):
         each.done()
     return made
 
 
+def _of_module(module: TomlTable, key: str) -> Any:
+    if key not in (MOUNTED_BY, CARRIES_ON):
+        return module.read(key)
+    side = module.inner(key)
+    assert side is not None
+    read = {each: side.read(each) for each in INTERFACE.keys}
+    side.done()
+    return read
+
+
 def _values(table: TomlTable | None) -> dict[str, Any]:
     """The values of a model's table: a name, and parameters that the model itself knows."""
     return {} if table is None else {key: table.read(key) for key in table.table}
+
+
+def _power(table: TomlTable | None) -> Power | None:
+    if table is None:
+        return None
+    power = Power(**{key: table.read(key) for key in POWER.keys})
+    table.done()
+    return power
 
 
 def _limits(table: TomlTable | None) -> AxisLimits | None:

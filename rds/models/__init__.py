@@ -5,8 +5,17 @@ from __future__ import annotations
 from types import ModuleType
 from typing import Any
 
+from rds.core.face import face
 from rds.core.registry import Registry
 from rds.core.types import Model
+
+__getattr__, __dir__ = face(
+    __name__,
+    {
+        "StepperAxis": "stepper_axis",
+        "StepperParameters": "stepper_axis",
+    },
+)
 
 LIBRARY = Registry(
     "model",
@@ -15,6 +24,9 @@ LIBRARY = Registry(
         "spindle": "rds.models.spindle",
         "machine-axis": "rds.models.machine_model",
         "directional-axis": "rds.models.directional_axis",
+        "position-drive": "rds.models.position_drive",
+        "profile-drive": "rds.models.profile_drive",
+        "dc-motor-axis": "rds.models.dc_motor_axis",
     },
 )
 

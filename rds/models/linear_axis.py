@@ -86,11 +86,13 @@ def coefficients(params: Mapping[str, Any], T: float) -> tuple[float, ...]:
 class LinearAxisMotion:
     """The axis in motion in a loop with a fixed sample period: `contracts.Motion`."""
 
-    __slots__ = ("_constants", "position", "velocity")
+    __slots__ = ("_constants", "_parameters", "_tau", "position", "velocity")
+    dead_time = 0.0
 
     def __init__(self, model: Model, T: float):
         self.position, self.velocity = (float(value) for value in model.initial_state)
         self._constants = coefficients(model.params, T)
+        self._tau, self._parameters = model.params["tau"], self._constants[3:]
 
     def read(self) -> float:
         """Position, mm."""
@@ -99,6 +101,13 @@ class LinearAxisMotion:
     def write(self, voltage: float) -> None:
         """Move on by one sample of constant `voltage`, V."""
         self.position, self.velocity = respond(self.position, self.velocity, voltage, *self._constants)
+
+    def move(self, voltage: float, time: float) -> None:
+        """Move on by `time` s of constant `voltage`, V."""
+        gone = -expm1(-time / self._tau)
+        self.position, self.velocity = respond(
+            self.position, self.velocity, voltage, time, 1.0 - gone, self._tau * gone, *self._parameters
+        )
 
 
 def make(**params: Any) -> Model:

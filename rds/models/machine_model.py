@@ -79,12 +79,13 @@ def advance(x: Sequence[float], u: float, T: float, params: Mapping[str, Any]) -
 class MachineAxisMotion:
     """The axis in motion in a loop with a fixed sample period: `contracts.Motion`."""
 
-    __slots__ = ("_constants", "_state", "_waiting")
+    __slots__ = ("_constants", "_state", "_waiting", "dead_time")
 
     def __init__(self, model: Model, T: float):
         carriage, velocity, position = model.initial_state[:3]
         self._state = float(carriage), float(velocity), float(position)
         self._constants = coefficients(model.params, T)
+        self.dead_time = float(model.params["delay"])
         whole, _ = split_delay(model.params["delay"], T)
         self._waiting = deque([0.0] * (whole + 2), maxlen=whole + 2)  # oldest first: before, now, ...
 
@@ -101,6 +102,10 @@ class MachineAxisMotion:
         """Move on by one sample of constant `voltage`, V."""
         self._waiting.append(voltage)
         self._state = sampled(*self._state, self._waiting[0], self._waiting[1], *self._constants)
+
+    def move(self, voltage: float, time: float) -> None:
+        """Move on by `time` s of constant `voltage`, V, which acts without the model's own delay."""
+        self._state = sampled(*self._state, 0.0, voltage, time, 0.0, *self._constants[2:])
 
 
 def make(**params: Any) -> Model:

@@ -77,10 +77,13 @@ def advance_model(
 class OdeMotion:
     """A student's model in motion, which knows the time since the run began: `contracts.Motion`."""
 
+    dead_time = 0.0
+
     def __init__(self, model: Model, T: float, step: Function):
         self.state = tuple(float(value) for value in model.initial_state)
         self._model, self._T, self._step = model, T, step
         self._samples = 0
+        self._into = 0.0  # s: how far `move` has come since a sample began
 
     def read(self) -> float:
         """The output now: position, mm, unless the model has its own `output`."""
@@ -95,6 +98,13 @@ class OdeMotion:
         """Move on by one sample of constant `voltage`, V."""
         self.state = self._step(self.state, voltage, self._T, self._model.params, t=self._samples * self._T)
         self._samples += 1
+
+    def move(self, voltage: float, time: float) -> None:
+        """Move on by `time` s of constant `voltage`, V."""
+        self.state = self._step(self.state, voltage, time, self._model.params, t=self._samples * self._T + self._into)
+        self._into += time
+        if self._into >= self._T * (1.0 - 1e-9):
+            self._samples, self._into = self._samples + 1, 0.0
 
 
 def _has_velocity(start: Sequence[float], output: Function | None) -> bool:

@@ -58,11 +58,12 @@ def advance(x: Sequence[float], u: float, T: float, params: Mapping[str, Any]) -
 class SpindleMotion:
     """The spindle in motion in a loop with a fixed sample period: `contracts.Motion`."""
 
-    __slots__ = ("_constants", "_waiting", "speed")
+    __slots__ = ("_constants", "_tau", "_waiting", "dead_time", "speed")
 
     def __init__(self, model: Model, T: float):
         self.speed = float(model.initial_state[0])
         self._constants = coefficients(model.params, T)
+        self._tau, self.dead_time = model.params["tau"], float(model.params["delay"])
         whole, _ = split_delay(model.params["delay"], T)
         self._waiting = deque([0.0] * (whole + 2), maxlen=whole + 2)  # oldest first: before, now, ...
 
@@ -74,6 +75,11 @@ class SpindleMotion:
         """Move on by one sample of constant `voltage`, V."""
         self._waiting.append(voltage)
         self.speed = sampled(self.speed, self._waiting[0], self._waiting[1], *self._constants)
+
+    def move(self, voltage: float, time: float) -> None:
+        """Move on by `time` s of constant `voltage`, V, which acts without the spindle's own delay."""
+        K, offset, _, _ = self._constants
+        self.speed = sampled(self.speed, 0.0, voltage, K, offset, 1.0, exp(-time / self._tau))
 
 
 def make(**params: Any) -> Model:

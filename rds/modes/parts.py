@@ -11,6 +11,7 @@ from rds.core.types import Ending, Model
 from rds.machines.encoder import diverged, encoder
 from rds.modes.loop.loop import Loop
 from rds.modes.loop.plan import Plan
+from rds.modes.networked import Links
 
 
 class SimulatedAxes:
@@ -39,7 +40,8 @@ class SimulatedAxes:
                 write(voltage)
             return ()
 
-        self.measure, self.follow = measure, follow
+        self.measure = measure
+        self.follow: Callable[[Sequence[float]], tuple[()]] = follow
         if len(reads) == 1:  # the most frequent case by far, and twice as fast without the loops
             (read,), (write,) = reads, writes
 
@@ -64,20 +66,21 @@ class SimulatedAxes:
         return outputs
 
     def follow_plant(self, plan: Plan) -> Callable[[Sequence[float]], Sequence[float]]:
-        """`follow` for the plant of a run: it returns the velocities before the move where the plan wants them."""
-        follow, motions = self.follow, [cast(Any, self.motions[i]) for i in plan.plant_velocities]
-        if not motions:
+        """`follow` for the plant of a run: it returns what the plan wants recorded, as it is before the move."""
+        follow = self.follow
+        told = [(cast(Any, self.motions[i]), part) for i, part, _ in plan.plant_columns]
+        if not told:
             return follow
 
         def follow_and_tell(acting: Sequence[float]) -> Sequence[float]:
-            velocities = [motion.velocity for motion in motions]
-            for velocity in velocities:
-                if not isfinite(velocity):
-                    raise diverged(velocity, "velocity")
+            values = [getattr(motion, part) for motion, part in told]
+            for value, (_, part) in zip(values, told, strict=True):
+                if not isfinite(value):
+                    raise diverged(value, part)
             follow(acting)
-            return velocities
+            return values
 
-        (motion, *others) = motions
+        ((motion, first), *others) = told
 
         def follow_one_and_tell(acting: Sequence[float]) -> Sequence[float]:
             velocity = motion.velocity
@@ -86,13 +89,14 @@ class SimulatedAxes:
             follow(acting)
             return (velocity,)
 
-        return follow_and_tell if others else follow_one_and_tell
+        return follow_and_tell if others or first != "velocity" else follow_one_and_tell
 
 
 class ModelMotion:
     """A model in motion through its `advance`."""
 
     __slots__ = ("_T", "_advance", "_output", "_params", "_state")
+    dead_time = 0.0
 
     def __init__(self, model: Model, T: float):
         self._advance, self._output, self._params, self._T = model.advance, model.output, dict(model.params), T
@@ -111,6 +115,10 @@ class ModelMotion:
         """Move on by one sample."""
         self._state = self._advance(self._state, voltage, self._T, self._params)
 
+    def move(self, voltage: float, time: float) -> None:
+        """Move on by `time` s."""
+        self._state = self._advance(self._state, voltage, time, self._params)
+
 
 def start(model: Model, T: float) -> Motion:
     """A model in motion with samples of `T` s."""
@@ -123,9 +131,15 @@ def loop(
     read: Callable[[], Sequence[float]],
     write: Callable[[Sequence[float]], Sequence[float]],
     follow: Callable[[Sequence[float]], Sequence[float]],
+    links: Links | None = None,
 ) -> Loop:
-    """The loop of these parts in virtual time, its rows going nowhere."""
+    """The loop of these parts in virtual time, its rows going nowhere.
+
+    With a network between them, that of the plan, unless `links` are handed in.
+    """
     drive = plan.start()
+    if plan.network is not None:
+        read, write, follow = (links or Links(plan)).around(read, write, follow)
     return Loop(
         plan.most_samples,
         _due,
@@ -138,6 +152,20 @@ def loop(
         drive.changes,
         drive.sets_references,
     )
+
+
+def simulated_loop(
+    plan: Plan,
+    axes: SimulatedAxes,
+    read: Callable[[], Sequence[float]],
+    write: Callable[[Sequence[float]], Sequence[float]],
+) -> Loop:
+    """The loop of a run whose plant is simulated: behind a network, voltages change at any time within a sample."""
+    if plan.network is None:
+        return loop(plan, read, write, axes.follow_plant(plan))
+    links = Links(plan)
+    axes.follow = links.moving(axes.motions)
+    return loop(plan, read, write, axes.follow_plant(plan), links)
 
 
 def at_once(voltages: Sequence[float]) -> Sequence[float]:

@@ -6,13 +6,13 @@ from rds.modes import SIMULATION
 from rds.modes.loop.loop import Loop
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import Plan
-from rds.modes.parts import SimulatedAxes, at_once, loop
+from rds.modes.parts import SimulatedAxes, at_once, simulated_loop
 
 
 def build(plan: Plan, drivers: Drivers | None) -> Loop:
     """The loop of a simulation."""
     axes = SimulatedAxes(plan)
-    return loop(plan, axes.measure, at_once, axes.follow_plant(plan))
+    return simulated_loop(plan, axes, axes.measure, at_once)
 
 
 MODE = Mode(

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rds.core.face import face
 
 if TYPE_CHECKING:
     from rds.nc.language.dialect import Dialect as Dialect
     from rds.nc.language.errors import ProgramError as ProgramError
     from rds.nc.language.interpreter import interpret as interpret
 
-_HOMES = {"Dialect": "language.dialect", "ProgramError": "language.errors", "interpret": "language.interpreter"}
-
-__all__ = ["Dialect", "ProgramError", "interpret"]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__, __dir__ = face(
+    __name__,
+    {
+        "Dialect": "language.dialect",
+        "ProgramError": "language.errors",
+        "Setup": "check",
+        "ToolCentre": "tool_centre",
+        "arc": "paths.arcs",
+        "canon_text": "language.canon_text:text",
+        "check_program": "check",
+        "interpret": "language.interpreter",
+        "line": "paths.lines",
+        "machine_motion": "check:motion",
+        "open_compiled": "compiled_file",
+        "outline": "paths.outlines",
+        "part_program": "paths.program",
+        "picture": "paths.pictures",
+        "program_time": "cycle_time:cycle_time",
+        "proof": "compensation.proof",
+        "read_drawing": "paths.drawing",
+    },
+)

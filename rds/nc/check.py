@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -14,18 +14,23 @@ from rds.core.errors import InputError
 from rds.core.installed import version
 from rds.machines import Machine
 from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_compiled, write_compiled
+from rds.nc.configuration import configured
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.dialect import Dialect
+from rds.nc.language.errors import ProgramError
 from rds.nc.language.interpreter import interpret
 from rds.nc.language.parameters import read_parameters
-from rds.nc.language.reading_on import Later
+from rds.nc.language.reading_on import Later, faults_never_run
 from rds.nc.language.tools import Tool, read_tools
-from rds.nc.toolpath import PathBlock, Report, raise_it, toolpath
+from rds.nc.path_block import PathBlock
+from rds.nc.tool_centre import ToolCentre, has_tool_centre
+from rds.nc.toolpath import Report, raise_it, toolpath
 from rds.nc.validate import Validation, Validator
 
 Item = MotionBlock | Call
 Progress = Callable[[int, int], None]
 _MOST_NOTES, _LONGEST_NOTE = 5, 300  # of a program, characters: they stand in the last line of the compiled form
+_LARGEST_READ_TWICE = 4 << 20  # bytes; larger programs are made by machines, and their subroutines are called
 _LONGEST_NAME = 200  # bytes, of a subroutine that may have a file
 _CALLS = re.compile(rb"(?:o|gr)\s*(?:<\s*([^>\n]+?)\s*>|(\d+))", re.IGNORECASE)
 
@@ -37,6 +42,13 @@ class Setup:
     tools: Path | None = None
     parameters: Path | None = None
     options: Dialect = field(default_factory=Dialect)
+    correct: bool = False  # for the assembly errors in the machine's links
+
+    def on(self, machine: Machine) -> Setup:
+        """The same on a machine: one whose links have rotary axes reads G43.4."""
+        if self.options.tcp or not has_tool_centre(machine):
+            return self
+        return replace(self, options=replace(self.options, tcp=True))
 
     def tool_list(self) -> list[Tool]:
         """The tools of the table; none without one. Raises ProgramError for a table that is wrong."""
@@ -60,7 +72,8 @@ def motion(
 
     `notes`, when given, gets at the end what is no fault and worth a look, by line.
     """
-    validator = Validator(machine, setup.tool_list(), str(program))
+    setup = setup.on(machine)
+    validator = validator_of(program, machine, setup)
     for block in watched(
         followed(setup.interpret(program, validator.warn), program, progress), validator, setup, raise_it
     ):
@@ -80,7 +93,20 @@ def watched(items: Iterable[Item], validator: Validator, setup: Setup, report: R
         warn=validator.warn_of_spindle,
         default_feed=validator.default_feed if setup.options.default_feed else None,
         assume=validator.warn_of_feed,
+        tool_centre=_tool_centre(validator.machine, setup),
     )
+
+
+def _tool_centre(machine: Machine, setup: Setup) -> ToolCentre | InputError | None:
+    """What moves for the tip go through; the InputError of a machine that has none, raised if it is to be corrected."""
+    if not (setup.correct or setup.options.tcp):
+        return None
+    try:
+        return ToolCentre(machine, setup.correct)
+    except InputError as error:
+        if setup.correct:
+            raise
+        return error
 
 
 def notes_of(validation: Validation) -> list[str]:
@@ -96,13 +122,17 @@ def check_program(
     A program with faults leaves none, and one of before is removed. Raises InputError for files that cannot be read or
     written, and where the place of the compiled form is taken by a file that is none.
     """
+    setup = setup.on(machine)
     header = describe(program, machine, setup)
     place = beside(program)
     if place.exists() and not is_ours(place):
         raise InputError("is where the compiled program would go, and is none; rename or move it", str(place))
-    validator = Validator(machine, setup.tool_list(), str(program))
+    validator = validator_of(program, machine, setup)
     items = followed(setup.interpret(program, validator.warn), program, progress)
     blocks = validator.watch(watched(items, validator, setup, validator.report))
+    if program.stat().st_size <= _LARGEST_READ_TWICE:
+        for fault in faults_never_run(program, setup.options):
+            validator.warn(in_dead_code(fault))
     try:
         write_files({place: write_compiled(header, _while_valid(blocks, validator), lambda: _summary(validator))})
     except _Faulty:
@@ -111,11 +141,25 @@ def check_program(
         if validator.stopped is not None:
             later = Later(validator.stopped, setup.options)
             for fault in later.faults():
-                validator.report(fault)
+                validator.report(fault, f"{fault.column}: {fault.reason}")
             validator.read_on = later.some
         place.unlink(missing_ok=True)
         return validator.result(), None
     return validator.result(), place
+
+
+def in_dead_code(fault: ProgramError) -> ProgramError:
+    said = f"{fault.reason} (in a subroutine that nothing calls)"
+    return ProgramError(said, file=fault.file, line=fault.line, column=fault.column, word=fault.word)
+
+
+def validator_of(program: Path, machine: Machine, setup: Setup) -> Validator:
+    """What looks at the program: with the travel that a script at its head leaves. ProgramError for another chain."""
+    narrowed, remarks = configured(program, machine, setup.options)
+    validator = Validator(narrowed, setup.tool_list(), str(program))
+    for remark in remarks:
+        validator.warn(remark)
+    return validator
 
 
 class _Faulty(Exception):
@@ -160,7 +204,8 @@ def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:
         "machine_sha256": file_sha256(Path(machine.path)),
         "tools_sha256": file_sha256(setup.tools) if setup.tools else None,
         "parameters_sha256": file_sha256(setup.parameters) if setup.parameters else None,
-        "options": asdict(setup.options),
+        "options": asdict(setup.on(machine).options),
+        "correct": setup.correct,
     }
 
 

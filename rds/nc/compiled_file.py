@@ -20,7 +20,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.interpolators.motion.segments import SEGMENT
-from rds.nc.toolpath import Event, PathBlock
+from rds.nc.path_block import Event, PathBlock
 
 MAGIC = b"RDS compiled part program 1\n"
 _STORED = SEGMENT.newbyteorder("<")

@@ -15,7 +15,7 @@ from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.profiles import motion_of
 from rds.interpolators.motion.samples import SampleBlock
 from rds.machines import Machine
-from rds.nc.toolpath import PathBlock
+from rds.nc.path_block import PathBlock
 
 
 @dataclass

@@ -1,8 +1,8 @@
-"""A part program as segments for interpolators: X, Y and Z in machine coordinates, and where the axes rest."""
+"""A part program as segments for interpolators: the linear axes in machine coordinates, and where the axes rest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil, pi
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +14,7 @@ from rds.core.types import ArcSegment, LineSegment, Segment
 
 if TYPE_CHECKING:
     from rds.machines import Machine
-    from rds.nc.toolpath import Event, PathBlock
+    from rds.nc.path_block import Event, PathBlock
 
 MOST = 2_000_000  # samples of a program, which are held in memory
 _RESTING = {"dwell": "dwell (G4)", "stop": "stop (M0, M1, M60)", "tool": "tool change (M6)"}
@@ -34,15 +34,21 @@ class Programmed(NamedTuple):
     events: list[tuple[int, Event]]
 
 
-def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) -> Programmed:
+def program(
+    blocks: Iterator[PathBlock], machine: Machine, T: float, most: int, axes: Sequence[str] = ("X", "Y", "Z")
+) -> Programmed:
     """The moves of a checked program in machine coordinates, rapids at the speed of the slowest axis.
+
+    Points have a position for each of `axes`, which are X, Y and Z, or those of them that the machine has.
 
     Raises InputError for a program that moves rotary axes, moves nothing, or takes more than `most` samples of `T` s.
     """
     from rds.interpolators.motion.limits import Limits
     from rds.interpolators.motion.planner import PASSING
+    from rds.interpolators.motion.segments import AXES
 
     fastest = Limits.of(machine).velocity
+    columns = [AXES.index(name) for name in axes]
     segments: list[Segment] = []
     lines: list[int] = []
     events: list[tuple[int, Event]] = []
@@ -57,12 +63,12 @@ def program(blocks: Iterator[PathBlock], machine: Machine, T: float, most: int) 
                 continue
             if np.any(row["start"][3:] != row["end"][3:]):
                 raise InputError(
-                    "it moves a rotary axis; interpolators take X, Y and Z: `rds nc` plans all axes",
+                    "it moves a rotary axis; interpolators take X, Y and Z: planned motion moves all axes",
                     f"line {row['line']}",
                 )
             rate = _rapid(row, fastest) if row["rapid"] else float(row["rate"])
             samples = _counted(samples + row["length"] / rate / T + 1.0, most, T)
-            segments += _segments(row, rate)
+            segments += _segments(row, rate, columns)
             lines += [int(row["line"])] * (len(segments) - len(lines))
             made.append(len(segments) - 1)
         for event in block.events:
@@ -93,11 +99,12 @@ def _counted(samples: float, most: int, T: float) -> float:
     return samples
 
 
-def _segments(row: np.ndarray, rate: float) -> list[Segment]:
-    start, end = row["start"][:3], row["end"][:3]
+def _segments(row: np.ndarray, rate: float, columns: list[int]) -> list[Segment]:
+    start, end, middle = (row[name][columns] for name in ("start", "end", "centre"))
     if row["plane"] < 0:
         return [LineSegment(tuple(start.tolist()), tuple(end.tolist()), rate)]
-    plane = tuple(PLANES.values())[int(row["plane"])]
+    first, second = tuple(PLANES.values())[int(row["plane"])]  # both there, or the check has refused the arc
+    plane = columns.index(first), columns.index(second)
     count = max(1, ceil(abs(row["sweep"]) / _TURN))
     turns = count - 1  # whole turns first, each of them a segment of its own
     pieces: list[Segment] = []
@@ -107,7 +114,7 @@ def _segments(row: np.ndarray, rate: float) -> list[Segment]:
         if k < turns:
             there[:] = start + (end - start) * (2 * pi * (k + 1) / abs(row["sweep"]))
             there[list(plane)] = start[list(plane)]
-        a, b, centre = (tuple(point.tolist()) for point in (here, there, row["centre"]))
+        a, b, centre = (tuple(point.tolist()) for point in (here, there, middle))
         pieces.append(ArcSegment(a, b, centre, rate, bool(row["sweep"] < 0), plane))
         here = there
     return pieces

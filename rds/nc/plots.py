@@ -35,6 +35,7 @@ def plot(trace: Trace, machine: Machine | None = None, title: str = "") -> Pictu
     picture = Picture(9.4)
     places = picture.add_gridspec(2, 2, height_ratios=[1.0, 0.9])
     points = trace.points
+    machine = None if trace.of_tip else machine  # the travel is that of the joints
     travel = _travel(machine)
     beyond = _beyond(points, travel)
     whole = _shows_box(trace, travel)
@@ -151,7 +152,8 @@ def _title(trace: Trace, title: str, machine: Machine | None, whole: bool) -> st
         f"{name} {plain(low)} to {plain(high)}"
         for name, low, high in zip(AXES[:3], trace.low, trace.high, strict=False)
     ]
-    lines.append(f"machine coordinates, mm: {', '.join(reach)}")
+    place = "the tool's tip, on the work" if trace.of_tip else "machine coordinates"
+    lines.append(f"{place}, mm: {', '.join(reach)}")
     turning = [
         f"{name} {plain(trace.low[axis])} to {plain(trace.high[axis])}°"
         for axis, name in enumerate(AXES)

@@ -8,16 +8,18 @@ length offset. The motion begins with all axes at machine zero, in G64 without P
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
 from math import inf
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
+from rds.core.errors import InputError
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT
-from rds.nc.language.canon import RATE, Call, MotionBlock
+from rds.nc.language.canon import FEED, MOTION, RATE, Call, MotionBlock
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import Frame, only_rotary, segments_of
+from rds.nc.path_block import DefaultFeed, Event, PathBlock
+from rds.nc.tool_centre import ToolCentre
 
 BLOCK_SEGMENTS = 65536  # a PathBlock is handed on when it has at least so many
 MODES = {"EXACT_PATH": EXACT_PATH, "EXACT_STOP": EXACT_STOP, "CONTINUOUS": BLEND}
@@ -31,47 +33,41 @@ WITHOUT_EFFECT = {
     "START_CHANGE",
     "PALLET_SHUTTLE",
     "FINISH",
+    "TURN_PROBE_ON",
+    "TURN_PROBE_OFF",
+    "RELOAD_TOOLDATA",
+    "SET_TOOL_TABLE_ENTRY",
 }
+# Calls that nothing here carries out, and that spoil nothing: told once each.
+PASSED_OVER = {
+    "LOG": "(LOG, ...) writes no file here",
+    "LOGOPEN": "(LOGOPEN, ...) opens no file here",
+    "LOGAPPEND": "(LOGAPPEND, ...) opens no file here",
+    "LOGCLOSE": "(LOGCLOSE) closes no file here",
+    "WAIT": "M66 waits for no input here, and #5399 keeps its value",
+    "ENABLE_ADAPTIVE_FEED": "there is no adaptive feed here",
+    "DISABLE_ADAPTIVE_FEED": "there is no adaptive feed here",
+    "ENABLE_FEED_HOLD": "the operator's feed hold works all the same",
+    "DISABLE_FEED_HOLD": "the operator's feed hold works all the same",
+}
+# Each by the call that switches it on again. Cycles and threads do both within a line, which needs no word.
+OVERRIDES_OFF = {"ENABLE_FEED_OVERRIDE": "DISABLE_FEED_OVERRIDE", "ENABLE_SPEED_OVERRIDE": "DISABLE_SPEED_OVERRIDE"}
+# Why no machine here does what a call wants, and what to write instead.
+BEYOND = {
+    "ORIENT_SPINDLE": "the spindle here cannot stop at an angle (M19, G87); leave it out, or bore with G85 or G86",
+    "RIGID_TAP": "the axes here do not follow the spindle back (G33.1); tap with G84, or cut the thread with G33",
+    **dict.fromkeys(
+        (
+            *("SET_MOTION_OUTPUT_BIT", "CLEAR_MOTION_OUTPUT_BIT", "SET_AUX_OUTPUT_BIT", "CLEAR_AUX_OUTPUT_BIT"),
+            *("SET_MOTION_OUTPUT_VALUE", "SET_AUX_OUTPUT_VALUE"),
+        ),
+        "the machine has no such output (M62 to M68); leave the word out, or switch coolant (M7, M8, M9)",
+    ),
+}
+CURVE_ERROR = 0.001  # mm: a spline becomes chords that are no further from it
+MOST_CHORDS = 4096  # of one spline
 
 Report = Callable[[ProgramError], None]
-
-
-class Event(NamedTuple):
-    """What happens after the segment `after` of its block (−1: before the first), by the program's line `line`.
-
-    Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0, M60) or 1 (M1, optional);
-    "tool" its number; "coolant" "flood on", "flood off", "mist on" or "mist off"; "end" 0 (M2, M30, or the last line).
-    """
-
-    after: int
-    kind: str
-    value: float | str
-    line: int
-
-
-class DefaultFeed(NamedTuple):
-    """What a machine moves at by feed where no word F says more (option default-feed of the dialect)."""
-
-    machine: str
-    linear: float  # mm/min
-    rotary: float  # degrees/min, of moves of A, B, C alone
-
-
-@dataclass(frozen=True)
-class PathBlock:
-    """Segments (dtype SEGMENT) in machine coordinates, and the events among them, all of one file and one tool.
-
-    `feed_lines` gives for each segment the line whose word F it obeys (0: one in another file).
-    """
-
-    segments: np.ndarray
-    events: list[Event] = field(default_factory=list)
-    file: str = ""
-    tool: int = 0
-    feed_lines: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
-
-    def __len__(self) -> int:
-        return len(self.segments)
 
 
 def raise_it(fault: ProgramError) -> NoReturn:
@@ -86,15 +82,17 @@ def toolpath(
     warn: Report = lambda _: None,
     default_feed: DefaultFeed | None = None,
     assume: Report = lambda _: None,
+    tool_centre: ToolCentre | InputError | None = None,
 ) -> Iterator[PathBlock]:
     """The machine's motion for a stream of canonical calls, block by block; memory does not grow with its length.
 
     What no machine can do (an arc in a plane that the rotation tilts, a feed per revolution of a standing spindle, a
     call that nothing here carries out) goes to `report` as a ProgramError; if that returns, the path goes on. What is
     allowed and hardly meant (a spindle started at S0) goes to `warn`. `default_feed` is that of moves without a feed
-    rate, and the first of them goes to `assume`.
+    rate, and the first of them goes to `assume`. `tool_centre` makes joints' moves of those for the tool's tip; an
+    InputError says why the machine has none.
     """
-    converter = _Converter(report, warn, default_feed, assume)
+    converter = _Converter(report, warn, default_feed, assume, tool_centre)
     try:
         for item in items:
             if isinstance(item, MotionBlock):
@@ -110,20 +108,62 @@ def toolpath(
     yield from converter.ready()
 
 
+def curve(points: np.ndarray, order: int, error: float) -> np.ndarray:
+    """Places (n, 2) on a NURBS with control points (n, 3: x, y, weight), whose chords are within `error` of it.
+
+    Its knots are evenly spaced and `order`-fold at both ends (LinuxCNC's), evaluated by de Boor's recurrence.
+    """
+    count = len(points)
+    knots = np.concatenate([np.zeros(order - 1), np.arange(count - order + 2), np.full(order - 1, count - order + 1.0)])
+    weighted = np.column_stack([points[:, :2] * points[:, 2:], points[:, 2]])
+    chords = 8 * (count - order + 1)
+    while True:
+        where = np.linspace(0.0, count - order + 1.0, 2 * chords + 1)
+        found = _de_boor(weighted, knots, order, where)
+        middles = 0.5 * (found[:-2:2] + found[2::2])
+        if np.hypot(*(found[1::2] - middles).T).max() <= error or chords >= MOST_CHORDS:
+            return found[::2]
+        chords *= 2
+
+
+def _de_boor(weighted: np.ndarray, knots: np.ndarray, order: int, where: np.ndarray) -> np.ndarray:
+    spans = np.clip(np.searchsorted(knots, where, side="right") - 1, order - 1, len(weighted) - 1)
+    found = weighted[spans[:, None] + np.arange(1 - order, 1)]
+    for level in range(1, order):
+        for j in range(order - 1, level - 1, -1):
+            low = knots[spans + 1 - order + j]
+            part = ((where - low) / (knots[spans + 1 + j - level] - low))[:, None]
+            found[:, j] = (1.0 - part) * found[:, j - 1] + part * found[:, j]
+    return found[:, -1, :2] / found[:, -1, 2:]
+
+
 class _Converter:
     """Gathers rows while nothing changes that matters to them, then makes segments of them at once."""
 
-    def __init__(self, report: Report, warn: Report, default_feed: DefaultFeed | None, assume: Report):
+    def __init__(
+        self,
+        report: Report,
+        warn: Report,
+        default_feed: DefaultFeed | None,
+        assume: Report,
+        tool_centre: ToolCentre | InputError | None,
+    ):
         self._report, self._warn = report, warn
         self._default_feed, self._assume = default_feed, assume
         self._assumed = False
         self._frame = Frame()
         self._mode, self._tolerance, self._collinear = BLEND, inf, 0.0
         self._per_revolution = False
+        self._pitch = 0.0  # of a thread being cut, program units per turn; 0: none
+        self._told: set[str] = set()  # names of calls that were passed over, and told
+        self._off: dict[str, tuple[str, int]] = {}  # where overrides were locked that are so still
         self._speed = 0.0  # rev/min, as last said
         self._turning = 0  # +1 clockwise, −1 counter-clockwise
         self._tool = self._selected = 0
-        self._position = np.zeros(6)
+        self._position = self._joints = np.zeros(6)  # as programmed, and of the joints
+        self._tool_centre, self._for_tip = tool_centre, False
+        if isinstance(tool_centre, ToolCentre):
+            self._position = tool_centre.joints_meant(self._joints)
         self._rate = (0.0, 0.0)  # program units/min (per revolution) and mm/min
         self._rate_line = 0
         self._file = ""
@@ -151,6 +191,8 @@ class _Converter:
     def end(self) -> None:
         """A program without M2 or M30 ends with its last line."""
         self._convert()
+        for name in tuple(self._off):
+            self._override_was_off(name)
         if not self._ended:
             self._event("end", 0.0, self._last_line)
         self.flush()
@@ -168,12 +210,36 @@ class _Converter:
         self._last_line = call.line or self._last_line
         if call.name in WITHOUT_EFFECT:
             return
+        if call.name in OVERRIDES_OFF.values():
+            self._off.setdefault(call.name, (call.file or self._file, call.line))
+            return
+        if call.name in OVERRIDES_OFF:
+            self._override_was_off(OVERRIDES_OFF[call.name], call.line)
+            return
+        if call.name in PASSED_OVER:
+            self._pass_over(call.name, PASSED_OVER[call.name], call.file or self._file, call.line)
+            return
         self._convert()
         action = _ACTIONS.get(call.name)
         if action is None:
-            self._fault(call, f"{call.name} is nothing that a machine here can do; leave its word out")
+            said = f"{call.name} is nothing that a machine here can do; leave its word out"
+            self._fault(call, BEYOND.get(call.name, said))
         else:
             action(self, call)
+
+    def _override_was_off(self, name: str, until: int | None = None) -> None:
+        """Tell of an override that the program locked, unless a cycle did so within the line `until`."""
+        file, line = self._off.pop(name, ("", until))
+        if line != until:
+            self._pass_over(
+                "override", "M49, M50 P0 and M51 P0 lock no override of the operator's here", file, line or 0
+            )
+
+    def _pass_over(self, key: str, why: str, file: str, line: int) -> None:
+        if key not in self._told:
+            self._told.add(key)
+            said = f"{why}; leave it out, or run the program where it is done"
+            self._warn(ProgramError(said, file=file, line=line))
 
     def _in_file(self, name: str) -> None:
         if name != self._file:
@@ -229,9 +295,19 @@ class _Converter:
         still &= moving
         if still.any():
             self._no_feed(int(segments["line"][np.argmax(still)]))
-        self._segments.append(segments[moving])
-        self._feed_lines.append(rate_lines[moving])
-        self._count += int(moving.sum())
+        segments, rate_lines = segments[moving], rate_lines[moving]
+        centre = self._tool_centre
+        if len(segments) and isinstance(centre, ToolCentre) and (self._for_tip or centre.correct):
+            segments, owner = centre.chords(segments, self._joints, self._complain, not self._for_tip)
+            rate_lines = rate_lines[owner]
+        if len(segments):
+            self._joints = segments["end"][-1].copy()
+        self._segments.append(segments)
+        self._feed_lines.append(rate_lines)
+        self._count += len(segments)
+
+    def _complain(self, line: int, message: str) -> None:
+        self._report(ProgramError(message, file=self._file, line=line))
 
     def _take_default(self, feed: DefaultFeed, segments: np.ndarray, still: np.ndarray) -> None:
         rotary = only_rotary(segments[still]) & ((segments["length"][still] > 0.0) | (feed.linear == 0.0))
@@ -263,7 +339,10 @@ class _Converter:
         linear = np.concatenate(([self._rate[1]], rows["values"][:, 0] * self._frame.unit))[last]
         lines = np.concatenate(([self._rate_line], rows["line"])).astype(np.int32)[last]
         self._rate, self._rate_line = (float(plain[-1]), float(linear[-1])), int(lines[-1])
-        scale = (self._speed * abs(self._turning) if self._per_revolution else 1.0) / 60.0
+        if self._pitch:
+            plain, linear = np.full(len(rows), self._pitch), np.full(len(rows), self._pitch * self._frame.unit)
+        turning = self._per_revolution or self._pitch
+        scale = (self._speed * abs(self._turning) if turning else 1.0) / 60.0
         return linear * scale, plain * scale, lines
 
     # what single calls do
@@ -284,7 +363,21 @@ class _Converter:
         self._frame.rotation = float(call.args[0])
 
     def _tool_length(self, call: Call) -> None:
+        centre = self._tool_centre
         self._frame.set_tool_length(call.args)
+        if isinstance(centre, ToolCentre):
+            centre.length = float(call.args[2]) * self._frame.unit
+        if self._for_tip and isinstance(centre, ToolCentre):
+            self._frame.set_tool_length((0.0,) * 6)
+            self._position = centre.begin(self._joints)
+
+    def _tool_centre_point(self, call: Call) -> None:
+        if not isinstance(self._tool_centre, ToolCentre):
+            self._fault(call, str(self._tool_centre or "this machine has no links, which G43.4 needs; use G43"))
+            return
+        self._for_tip = bool(call.args[0])
+        if not self._for_tip:
+            self._position = self._tool_centre.joints_meant(self._joints)
 
     def _motion_mode(self, call: Call) -> None:
         self._mode = MODES[call.args[0]]
@@ -298,6 +391,27 @@ class _Converter:
 
     def _feed_mode(self, call: Call) -> None:
         self._per_revolution = bool(call.args[-1])
+
+    def _synchronize(self, call: Call) -> None:
+        self._pitch = float(call.args[0])
+
+    def _end_synchronizing(self, call: Call) -> None:
+        self._pitch = 0.0
+
+    def _rows_of(self, call: Call, ends: np.ndarray) -> None:
+        """Moves by feed to places in program coordinates (one row each, X Y Z A B C)."""
+        rows = np.zeros(len(ends), MOTION)
+        rows["kind"], rows["line"] = FEED, call.line
+        rows["values"][:, :6] = ends
+        self.take(MotionBlock(rows, call.file or self._file))
+
+    def _spline(self, call: Call) -> None:
+        _, order, points, held = call.args
+        places = curve(np.array(points), order, CURVE_ERROR / self._frame.unit)[1:]
+        self._rows_of(call, np.hstack([places, np.tile(held, (len(places), 1))]))
+
+    def _probe(self, call: Call) -> None:
+        self._rows_of(call, np.array([call.args[6:12]]))
 
     def _dwell(self, call: Call) -> None:
         self._event("dwell", float(call.args[0]), call.line)
@@ -338,6 +452,10 @@ class _Converter:
         self._tool = self._selected  # its argument is the row of the tool table
         self._event("tool", float(self._tool), call.line)
 
+    def _rename_tool(self, call: Call) -> None:
+        self._hand_on()
+        self._tool = int(call.args[1])
+
     def _stop(self, call: Call) -> None:
         self._event("stop", 1.0 if call.name.startswith("OPTIONAL") else 0.0, call.line)
 
@@ -356,9 +474,15 @@ _ACTIONS: dict[str, Callable[[_Converter, Call], Any]] = {
     "SET_G92_OFFSET": _Converter._g92,
     "SET_XY_ROTATION": _Converter._rotate,
     "USE_TOOL_LENGTH_OFFSET": _Converter._tool_length,
+    "TOOL_CENTRE_POINT": _Converter._tool_centre_point,
     "SET_MOTION_CONTROL_MODE": _Converter._motion_mode,
     "SET_NAIVECAM_TOLERANCE": _Converter._naive_cam,
     "SET_FEED_MODE": _Converter._feed_mode,
+    "START_SPEED_FEED_SYNC": _Converter._synchronize,
+    "STOP_SPEED_FEED_SYNCH": _Converter._end_synchronizing,
+    "NURBS_FEED": _Converter._spline,
+    "STRAIGHT_PROBE": _Converter._probe,
+    "CHANGE_TOOL_NUMBER": _Converter._rename_tool,
     "DWELL": _Converter._dwell,
     "SET_SPINDLE_SPEED": _Converter._set_speed,
     "START_SPINDLE_CLOCKWISE": _Converter._clockwise,

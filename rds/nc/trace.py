@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rds.interpolators.motion.segments import in_plane
+from rds.interpolators.motion.segments import JOINTS, in_plane
 from rds.nc.extent import extents
-from rds.nc.toolpath import PathBlock
+from rds.nc.path_block import PathBlock
 
 RAPID, STRAIGHT, CURVED = 0, 1, 2
 STEP = 0.04  # rad of an arc from point to point
@@ -28,6 +28,7 @@ class Trace:
         self.start = np.zeros(3)
         self.end = np.zeros(3)
         self._kept: dict[int, list[np.ndarray]] = {RAPID: [], STRAIGHT: [], CURVED: []}
+        self.of_tip = False  # X, Y, Z are the tool's tip on the work, at least of some of it
         self._count = 0
         self._last = -1
 
@@ -48,6 +49,7 @@ class Trace:
         """Append segments (dtype SEGMENT)."""
         if not len(segments):
             return
+        self.of_tip |= bool((segments["tip"] != JOINTS).any())
         kinds = np.where(segments["rapid"], RAPID, np.where(segments["plane"] >= 0, CURVED, STRAIGHT))
         before = np.concatenate(([self._last], kinds[:-1]))
         points, owner = sample(segments)

@@ -15,17 +15,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rds.interpolators.motion.limits import Limits
-from rds.interpolators.motion.segments import AXES
+from rds.interpolators.motion.segments import AXES, JOINTS, MOVED
 from rds.machines import Machine
 from rds.nc.extent import extents
 from rds.nc.fault_columns import at_their_words
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import only_rotary
-from rds.nc.toolpath import DefaultFeed
+from rds.nc.path_block import DefaultFeed
+from rds.nc.tool_centre import slowed
 
 if TYPE_CHECKING:
     from rds.nc.language.tools import Tool
-    from rds.nc.toolpath import Event, PathBlock
+    from rds.nc.path_block import Event, PathBlock
 
 TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
 LONGEST_DWELL = 3600.0  # s; chosen: more is a P in milliseconds
@@ -127,6 +128,7 @@ class Validator:
 
     def __init__(self, machine: Machine, tools: Iterable[Tool] = (), name: str = ""):
         self._machine, self._name = machine, name
+        self._slowed = False  # a move for the tip is slowed down by a joint
         self._tools = limits_of(tools)
         limits = Limits.of(machine)
         self._present = limits.present
@@ -164,6 +166,11 @@ class Validator:
         slowest = [60.0 * self._velocity[some][self._present[some]].min(initial=inf) for some in (LINEAR, ROTARY)]
         linear, rotary = (float(speed) if speed < inf else 0.0 for speed in slowest)
         return DefaultFeed(self._machine.name, self._machine.default_feed or linear, rotary)
+
+    @property
+    def machine(self) -> Machine:
+        """The machine that the program is for."""
+        return self._machine
 
     @property
     def ok(self) -> bool:
@@ -206,13 +213,14 @@ class Validator:
         if not len(segments):
             return
         self._segments += len(segments)
-        linear = ~only_rotary(segments)
+        linear = np.where(segments["tip"] == JOINTS, ~only_rotary(segments), segments["tip"] == MOVED)
         self._cutting += float(segments["length"][linear & ~segments["rapid"]].sum())
         self._rapid += float(segments["length"][linear & segments["rapid"]].sum())
         low, high = extents(segments)
         self._low, self._high = np.minimum(self._low, low.min(axis=0)), np.maximum(self._high, high.max(axis=0))
         self._look_at_travel(block, low, high)
         self._look_at_feed(block, linear, high - low > TOLERANCE, limits)
+        self._look_at_tip(block)
 
     def _fault(self, block: PathBlock, line: int, message: str, kind: str, excess: float, letters: str) -> None:
         self.report(ProgramError(message, file=block.file or self._name, line=int(line)), kind, excess, letters)
@@ -252,7 +260,9 @@ class Validator:
     def _look_at_feed(self, block: PathBlock, linear: np.ndarray, moves: np.ndarray, limits: ToolLimits) -> None:
         """`moves` says which axes each segment moves (n × 6)."""
         segments = block.segments
-        feeds = ~segments["rapid"]
+        allowed = f"the tool table allows tool {block.tool}"
+        self._too_fast(block, ~segments["rapid"] & linear, limits.feed / 60.0, allowed, "tool")
+        feeds = ~segments["rapid"] & (segments["tip"] == JOINTS)
         speeds = np.where(moves & self._present, self._velocity, inf)
         for only, axes in ((False, LINEAR), (True, ROTARY)):
             some = feeds & (linear != only)
@@ -260,8 +270,6 @@ class Validator:
             for axis in np.unique(slowest[some]):
                 who = f"{AXES[axis]}, the slowest {'rotary ' * only}axis that moves, can do"
                 self._too_fast(block, some & (slowest == axis), self._velocity[axis] or inf, who, "axes")
-        tool = limits.feed / 60.0
-        self._too_fast(block, feeds & linear, tool, f"the tool table allows tool {block.tool}", "tool")
         way = np.abs(segments["end"] - segments["start"])[:, 3:]
         turning = np.flatnonzero(feeds & linear & np.any(way > TOLERANCE, axis=1))
         if len(turning):
@@ -276,6 +284,18 @@ class Validator:
                     line = segments["line"][turning[at]]
                     name = AXES[3 + axis]
                     self._fault(block, line, message, f"turn {name}", float(speed[at, axis]), f"F {name}")
+
+    def _look_at_tip(self, block: PathBlock) -> None:
+        """The planner slows a move for the tip down to what each joint can do; a reader is told of the first one."""
+        if self._slowed or (found := slowed(block.segments, self._velocity)) is None:
+            return
+        self._slowed = True
+        line, axis, share = found
+        message = (
+            f"the tip is slower than its feed where a joint can do no more: here {AXES[axis]} would have to do "
+            f"{share:.3g} times its velocity"
+        )
+        self.warn(ProgramError(message, file=block.file or self._name, line=line), "F G1 G2 G3")
 
     def _too_fast(self, block: PathBlock, some: np.ndarray, limit: float, who: str, kind: str) -> None:
         """`limit` in mm/s or degrees/s. The fault is on the line of the word F, for all moves that obey it.

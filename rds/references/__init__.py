@@ -17,6 +17,7 @@ from rds.core.quantities import Table
 from rds.references.broadband import chirp, multisine
 from rds.references.periodic import constant, sinusoid, square, triangle
 from rds.references.signal import Signal, sample, sample_voltage
+from rds.references.speed import speed
 from rds.references.staircase import staircase
 from rds.references.user import user
 
@@ -31,6 +32,7 @@ __all__ = [
     "signal_kinds",
     "signal_options",
     "sinusoid",
+    "speed",
     "square",
     "staircase",
     "triangle",
@@ -47,6 +49,7 @@ _KINDS: Mapping[str, Callable[..., Signal]] = MappingProxyType(
         "multisine": multisine,
         "chirp": chirp,
         "staircase": staircase,
+        "speed": speed,
     }
 )
 

@@ -3,6 +3,7 @@
 Light to import: pandas, pyarrow and matplotlib are imported by the functions that need them.
 """
 
+from rds.core.face import face
 from rds.results.compare import AxisComparison, Comparison, compare
 from rds.results.files import save_all, save_result
 from rds.results.metrics import axis_metrics, metric_notes, metric_units
@@ -22,3 +23,5 @@ __all__ = [
     "save_result",
     "write_report",
 ]
+
+__getattr__ = face(__name__, {"make_report": "reports", "write": "reports.write"})[0]

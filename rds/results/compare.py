@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.results.metrics import axis_metrics, fit_percent, metric_notes
+from rds.results.metrics import axis_metrics, fit_percent, metric_notes, moving
 from rds.results.signals import signals_of
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rds.results.result import Result
 
 # what a run is made of, sample by sample: two runs are identical where all of these are that both have
-_ENDINGS = ("_reference", "_measured", "_command", "_voltage")
+_ENDINGS = ("_reference", "_measured", "_command", "_voltage", "_target")
 _ON_TIME = 0.01  # of a sample period: how far a time may be from k·T and still be sample k
 
 
@@ -77,6 +77,22 @@ class Comparison:
             axis.identical and axis.samples == len(self.a) for axis in self.axes.values()
         )
 
+    @property
+    def contour(self) -> dict[str, tuple[float, float]]:
+        """Of runs along a path: largest and RMS contour error, and path error of what was commanded: a, b.
+
+        In mm, over the samples in which each moves; only what both results have.
+        """
+        found = {}
+        for column, name in (("contour_error", "contour error"), ("path_error", "path error (commanded)")):
+            if column not in self.a or column not in self.b:
+                continue
+            errors = [np.asarray(of[column])[moving(of)] for of in (self.a, self.b)]
+            if all(len(each) for each in errors):
+                found[f"largest {name}"] = (float(errors[0].max()), float(errors[1].max()))
+                found[f"RMS {name}"] = (_rms(errors[0]), _rms(errors[1]))
+        return found
+
     def difference(self, axis: str) -> tuple[np.ndarray, np.ndarray]:
         """Time in s and the difference of the measured responses of `axis`, b - a, at the common samples."""
         at_a, at_b = common_samples(self.a, self.b)
@@ -93,6 +109,7 @@ class Comparison:
                 name: {key: value for key, value in asdict(axis).items() if key != "axis"}
                 for name, axis in self.axes.items()
             },
+            **({"contour": {name: list(both) for name, both in self.contour.items()}} if self.contour else {}),
             "notes": list(self.notes),
         }
 
@@ -115,6 +132,10 @@ class Comparison:
         from rds.results.comparison_text import fragment
 
         return fragment(self)
+
+
+def _rms(errors: np.ndarray) -> float:
+    return math.sqrt(float(np.mean(errors**2)))
 
 
 def compare(a: Result, b: Result) -> Comparison:
@@ -195,7 +216,7 @@ def _one_axis(
         metrics_a=metrics[0],
         metrics_b=metrics[1],
         max_difference=float(np.abs(difference).max()),
-        rms_difference=math.sqrt(float(np.mean(difference**2))),
+        rms_difference=_rms(difference),
         fit_percent=fit_percent(y_a, y_b),
         identical=not differing,
         first_difference=float(a["time"][at_a][min(firsts)]) if firsts else None,

@@ -66,24 +66,34 @@ def _controller(axis: AxisComparison) -> str:
     )
 
 
+def contour_rows(comparison: Comparison) -> list[list[Any]]:
+    """The contour and path errors of runs along a path, mm; none for other runs."""
+    return [[heading(name, "mm"), a, b, b - a] for name, (a, b) in comparison.contour.items()]
+
+
 def text(comparison: Comparison) -> str:
     """The whole comparison in plain text, columns aligned."""
     lines: list[str] = []
     columns = ["", *labels(comparison), "b - a"]
     for axis in comparison.axes.values():
-        cells = [columns, *([row[0], *map(number, row[1:])] for row in rows(axis))]
-        widths = [max(len(row[i]) for row in cells) for i in range(4)]
-        lines.append(f"Axis {axis.axis}")
-        for row in cells:
-            padded = [
-                row[0].ljust(widths[0]),
-                *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
-            ]
-            lines.append("  " + "  ".join(padded).rstrip())
+        lines += [f"Axis {axis.axis}", *_aligned(columns, rows(axis))]
         lines += [f"  {finding}" for finding in findings(axis)]
         lines.append("")
+    if found := contour_rows(comparison):
+        lines += ["Contour", *_aligned(columns, found), ""]
     lines += [f"Note: {note}" for note in comparison.notes]
     return "\n".join(lines).rstrip()
+
+
+def _aligned(columns: list[str], found: list[list[Any]]) -> list[str]:
+    """The lines of a table, each column as wide as it must be."""
+    cells = [columns, *([row[0], *map(number, row[1:])] for row in found)]
+    widths = [max(len(row[i]) for row in cells) for i in range(4)]
+    lines = []
+    for row in cells:
+        right = [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        lines.append("  " + "  ".join([row[0].ljust(widths[0]), *right]).rstrip())
+    return lines
 
 
 def fragment(comparison: Comparison) -> str:
@@ -93,4 +103,6 @@ def fragment(comparison: Comparison) -> str:
         table(columns, rows(axis), f"Axis {axis.axis}", "; ".join(findings(axis)) + ".")
         for axis in comparison.axes.values()
     ]
+    if found := contour_rows(comparison):
+        parts.append(table(columns, found, "Contour"))
     return "".join(parts) + notes_list(comparison.notes)

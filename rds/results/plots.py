@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rds.core.colours import QUANTITIES
 from rds.core.errors import InputError
-from rds.core.figure import BLUE, GREY, RESPONSES, VERMILLION, WIDTH, Picture, dress, legend, quantity
+from rds.core.figure import GREY, RESPONSES, VERMILLION, WIDTH, Picture, dress, legend, quantity
+from rds.core.types import Ending
 from rds.results.late_samples import late_samples
 from rds.results.metrics import settled, tracking_error
 from rds.results.units import heading
@@ -66,6 +68,9 @@ def _grid(result: Result, axis: str | None, panels: list[_Panel]) -> Picture:
                 axes.set_axis_off()
                 continue
             panel.draw(axes, result, name)
+            if result.meta.get("ending") == Ending.FAULT and len(result["time"]):
+                # the last sample before the student's code failed
+                axes.axvline(result["time"][-1], color=VERMILLION, linewidth=1.6, label="fault")
             # what all columns share is said once; it may reach over the columns to its right
             if column == 0 or panel.own_legend:
                 legend(axes, columns=5)
@@ -113,7 +118,7 @@ def _draw_error(axes: Axes, result: Result, axis: str) -> None:
     assert difference is not None  # by _has_error
     time, used = result["time"], settled(result, axis)
     unit = result.units.get(f"{axis}_measured", "")
-    axes.plot(time, difference, color=BLUE, linewidth=0.9)
+    axes.plot(time, difference, color=QUANTITIES["error"], linewidth=1.1)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     for value, name, style in _means(difference[used]):
         axes.plot(time[used][[0, -1]], [value, value], color=VERMILLION, linewidth=1.3, linestyle=style)
@@ -129,17 +134,19 @@ def _means(difference: np.ndarray) -> list[tuple[float, str, str]]:
 
 
 def _has_voltage(result: Result, axis: str) -> bool:
-    return f"{axis}_voltage" in result or f"{axis}_command" in result
+    return any(f"{axis}_{part}" in result for part in ("voltage", "target", "command"))
 
 
 def _draw_voltage(axes: Axes, result: Result, axis: str) -> None:
-    sent, asked = f"{axis}_voltage", f"{axis}_command"
-    limit = result.meta.get("voltage_range")
+    acting = "target" if f"{axis}_target" in result else "voltage"
+    sent, asked = f"{axis}_{acting}", f"{axis}_command"
+    limit = result.meta.get("voltage_range") if acting == "voltage" else None
     if asked in result:
         axes.plot(result["time"], result[asked], color=GREY, linewidth=2.4, alpha=0.55, label="command")
     if sent in result:
         # constant over each sample: drawn as the staircase that it is
-        axes.plot(result["time"], result[sent], color=BLUE, linewidth=1.1, drawstyle="steps-post", label="voltage")
+        style: dict[str, Any] = {"color": QUANTITIES["voltage"], "linewidth": 1.1, "drawstyle": "steps-post"}
+        axes.plot(result["time"], result[sent], label=acting, **style)
     if limit:
         for sign in (1, -1):
             label = f"limit ±{limit:g} V" if sign > 0 else None
@@ -147,7 +154,7 @@ def _draw_voltage(axes: Axes, result: Result, axis: str) -> None:
         # a command far beyond the limits would flatten what the axis got
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, -1.6 * limit), min(high, 1.6 * limit))
-    dress(axes, f"{axis} voltage [{result.units.get(sent, 'V')}]")
+    dress(axes, f"{axis} {acting} [{result.units.get(sent, 'V')}]")
 
 
 def _mark_late(axes: Axes, result: Result) -> None:

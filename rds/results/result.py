@@ -27,9 +27,10 @@ class Result:
 
     `columns` maps names to one-dimensional arrays of one length, kept as float64 or int64 and read-only:
     `time` in s, and per axis `X_reference`, `X_reference_velocity`, `X_reference_acceleration`, `X_measured`,
-    `X_command` (the controller's answer before the limits, V), `X_voltage` (acting from this sample on, V),
-    `X_modelled` (the model on the same voltages), `X_simulated` (its own closed loop), one such as
-    `X_velocity` for each signal of the controller, `X_plant_velocity` (the simulated plant's); in the real-time modes
+    `X_command` (the controller's answer before the limits, V), `X_voltage` (acting from this sample on, V; `X_target`
+    where a drive closes a loop of its own: a position or a velocity), `X_modelled` (the model on the same voltages),
+    `X_simulated` (its own closed loop), one such as `X_velocity` for each signal of the controller,
+    `X_plant_velocity` (the simulated plant's); in the real-time modes
     `lateness`, `io`, `compute`, `model` in µs. Any other column is kept as well.
 
     `units` maps names to units; a column without an entry gets the usual unit of its name, or "".

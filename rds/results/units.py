@@ -15,6 +15,7 @@ _ENDINGS = {
     "_command": "V",
     "_voltage": "V",
     "_plant_velocity": "mm/s",
+    "_plant_current": "A",
 }
 _HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 

@@ -312,3 +312,10 @@ def test_schedules_keep_the_rules(releases: list[tuple[int, int]]) -> None:
         assert slot.start >= slot.released
         if other.released <= slot.start < other.start:  # it was waiting and did not go
             assert (slot.message, slot.released) <= (other.message, other.released)
+
+
+def test_five_axes_have_a_frame_more_before_the_command() -> None:
+    table = {message.name: message for message in messages_of(load_machine("xyzac"))}
+    assert len(table) == 7 and table["command"].after == "voltages 5 to 8"
+    assert table["voltages 5 to 8"].identifier < table["command"].identifier
+    assert len(messages_of(load_machine("mini-cnc"))) == 5

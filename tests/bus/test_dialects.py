@@ -10,11 +10,12 @@ from uuid import uuid4
 
 import pytest
 
-from rds.bus.modules.dialects import dialect_names, is_served, server_module
+from rds.bus.modules.dialects import SERIAL_DIALECTS, dialect_names, is_served, server_module
 from rds.core.errors import InputError
 from rds.machines import Machine, load_machine
 
-MACHINES = {"rds": "mini-cnc", "oacs": "mrmt-oacs", "cia402": "mini-cnc"}
+MACHINES = {"rds": "mini-cnc", "oacs": "mrmt-oacs", "cia402": "mini-cnc", "dcs": "starmill"}
+CAN = [name for name in dialect_names() if name not in SERIAL_DIALECTS]
 
 
 @pytest.fixture
@@ -24,9 +25,10 @@ def served() -> Iterator[Callable[[str], tuple[Machine, str]]]:
 
         def start(dialect: str) -> tuple[Machine, str]:
             machine, channel = load_machine(MACHINES[dialect]), uuid4().hex
+            interface = "serial" if dialect in SERIAL_DIALECTS else "virtual"
             stop, ready = threading.Event(), threading.Event()
             serve = import_module(server_module(dialect)).serve
-            thread = threading.Thread(target=lambda: serve(machine, "virtual", channel, ready=ready.set, stop=stop))
+            thread = threading.Thread(target=lambda: serve(machine, interface, channel, ready=ready.set, stop=stop))
             thread.start()
             stack.callback(thread.join, 30.0)
             stack.callback(stop.set)
@@ -36,16 +38,23 @@ def served() -> Iterator[Callable[[str], tuple[Machine, str]]]:
         yield start
 
 
-@pytest.mark.parametrize("there", dialect_names())
+@pytest.mark.parametrize("there", CAN)
 def test_only_the_dialect_that_is_there_is_served(there: str, served: Callable[[str], tuple[Machine, str]]) -> None:
     machine, channel = served(there)
     assert is_served(there, machine, "virtual", channel)
-    for other in set(dialect_names()) - {there}:
+    for other in set(CAN) - {there}:
         with pytest.raises(InputError) as told:
             is_served(other, machine, "virtual", channel)
         assert f'speaks {there}, not {other}: set [bus] dialect = "{there}"' in str(told.value)
 
 
+def test_a_serial_line_is_asked_in_its_own_dialect(served: Callable[[str], tuple[Machine, str]]) -> None:
+    machine, channel = served("dcs")
+    assert is_served("dcs", machine, "serial", channel)
+    assert not is_served("dcs", machine, "virtual", channel)
+
+
 @pytest.mark.parametrize("dialect", dialect_names())
 def test_an_empty_channel_serves_nothing(dialect: str) -> None:
-    assert not is_served(dialect, load_machine("mini-cnc"), "virtual", uuid4().hex)
+    interface = "serial" if dialect in SERIAL_DIALECTS else "virtual"
+    assert not is_served(dialect, load_machine("mini-cnc"), interface, uuid4().hex)

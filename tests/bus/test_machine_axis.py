@@ -53,9 +53,9 @@ def test_sticks_until_breakaway(name: str) -> None:
     for friction in (p.friction_plus, p.friction_minus):
         edge = friction * (1 + p.stribeck) / p.K
         axis = MachineAxis(p)
-        axis.command(edge * 0.999, at=0.0)
+        axis.command(edge * 0.999 - p.offset, at=0.0)
         assert axis.advance(1e6) == 0.0 and axis.velocity == 0.0
-        axis.command(edge * 1.001, at=1e6)
+        axis.command(edge * 1.001 - p.offset, at=1e6)
         axis.advance(1e6 + 0.1)
         assert axis.velocity * friction > 0
 
@@ -71,7 +71,7 @@ def reference(p: MachineParameters, commands: list[tuple[float, float]], end: fl
 
     for n in range(round(end / h)):
         if waiting and waiting[0][0] + p.delay <= (n + 0.5) * h:
-            voltage = waiting.pop(0)[1]
+            voltage = waiting.pop(0)[1] + p.offset  # of the amplifier, once it has a command
         left, pull = h, p.K * voltage
         while left > 0:
             if v == 0.0 and p.friction_minus * (1 + p.stribeck) <= pull <= p.friction_plus * (1 + p.stribeck):
@@ -128,7 +128,7 @@ def test_never_leaves_the_play_nor_the_possible_speed(voltage: float, name: str)
     axis.command(-voltage, 0.013)
     for k in range(40):
         axis.advance(k * 0.0007)
-        assert abs(axis.velocity) <= p.K * abs(voltage)
+        assert abs(axis.velocity) <= p.K * (abs(voltage) + abs(p.offset))
         assert abs(axis.output() - axis.position) <= p.backlash / 2 + 1e-15
 
 

@@ -132,6 +132,58 @@ def test_without_a_machine_table_the_machine_is_its_model() -> None:
     assert machine_parameters(axis).K == 1.5
 
 
-def test_a_fifth_axis_has_no_slot() -> None:
-    with pytest.raises(InputError, match="number 5"):
-        make(slot=4)
+def test_a_ninth_axis_has_no_slot() -> None:
+    with pytest.raises(InputError, match="number 9"):
+        make(slot=8)
+
+
+def numbered(number: int, *voltages: float) -> bytes:
+    return frames.number_voltages(command(*voltages), number)
+
+
+def running(slot: int) -> AxisModule:
+    """A module that is set up, and has heard two commands of one host, half a period per number."""
+    module = make(slot)
+    module.receive(frames.SETUP, frames.encode_setup(T), 100.0)
+    for k in (0, 1):
+        module.receive(frames.MORE_VOLTAGES, numbered(1 + 2 * k, 1.0), 100.0 + k * T - 1e-4)
+        module.receive(frames.COMMAND, numbered(1 + 2 * k, 5.0), 100.0 + k * T)
+    return module
+
+
+def test_the_fifth_axis_takes_the_voltage_before_the_tick_of_the_same_number() -> None:
+    module = running(slot=4)
+    at = 100.0 + 2 * T
+    assert module.receive(frames.MORE_VOLTAGES, numbered(5, -3.0), at - 1e-4) == [], "it is no tick"
+    (answer,) = decode(module.receive(frames.COMMAND, numbered(5, 9.0), at))
+    assert answer.ticks == 3 and answer.status == Status.ENABLED
+    module.motion.advance(at + T / 2)
+    assert module.motion.voltage == pytest.approx(-3.0, abs=1e-3)
+    assert frames.MORE_VOLTAGES in module.hears and frames.MORE_VOLTAGES not in make(slot=3).hears
+    (dry,) = decode(module.receive(frames.DRY_COMMAND, numbered(7, 9.0), at + T))
+    assert dry.status == Status.DRY_RUN
+
+
+@pytest.mark.parametrize("before", [None, 3], ids=["lost", "of another tick"])
+def test_without_its_voltage_the_one_before_lasts_two_and_a_half_periods(before: int | None) -> None:
+    module = running(slot=4)
+    if before is not None:
+        module.receive(frames.MORE_VOLTAGES, numbered(before, 7.0), 100.0 + T + 1e-4)
+    for k in (2, 3):
+        (answer,) = decode(module.receive(frames.COMMAND, numbered(1 + 2 * k, 9.0), 100.0 + k * T))
+        assert answer.kind == Kind.ANSWER and answer.ticks == k + 1
+    assert module.motion.voltage == pytest.approx(1.0, abs=1e-3)
+    assert module.expires == pytest.approx(100.0 + 3.5 * T)
+    assert module.expire(100.0 + 3.6 * T) == [] and module.motion.voltage == 0.0
+
+
+def test_a_tick_by_hand_stops_the_fifth_axis_too() -> None:
+    """As the emergency stop and a replayed log end: zero volts in one frame."""
+    module = make(slot=7)
+    module.receive(frames.MORE_VOLTAGES, command(0, 0, 0, 4.0), 100.0)
+    module.receive(frames.COMMAND, command(), 100.0)
+    module.motion.advance(100.0005)
+    assert module.motion.voltage == pytest.approx(4.0, abs=1e-3)
+    module.receive(frames.COMMAND, command(), 100.001)
+    module.motion.advance(100.0015)
+    assert module.motion.voltage == 0.0

@@ -14,13 +14,14 @@ import can
 import pytest
 
 from rds.bus.hub.faults import Faults
-from rds.bus.modules.dialects import dialect_names, server_module
+from rds.bus.modules.dialects import SERIAL_DIALECTS, dialect_names, server_module
 from rds.bus.modules.serving import serve_machine
 from rds.core.errors import InputError
 from rds.machines import load_machine
 
 MACHINE = load_machine("mini-cnc")
-pytestmark = [pytest.mark.realtime, pytest.mark.parametrize("dialect", dialect_names())]
+CAN = [name for name in dialect_names() if name not in SERIAL_DIALECTS]  # a serial line: tests/serial_line
+pytestmark = [pytest.mark.realtime, pytest.mark.parametrize("dialect", CAN)]
 
 
 def wait_until(condition: Callable[[], Any], seconds: float = 30.0) -> None:

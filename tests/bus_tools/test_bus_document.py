@@ -21,7 +21,7 @@ TOOLS = {"monitor", "record", "replay", "serve-socketcand"}
 SHOWN = [line.split("#")[0].split()[2:] for line in TEXT.splitlines() if line.startswith("rds bus ")]
 
 
-@pytest.mark.parametrize("block", [block.text for block in blocks(DOCUMENT) if "rds.bus." in block.text])
+@pytest.mark.parametrize("block", [block.text for block in blocks(DOCUMENT) if "from rds.bus" in block.text])
 def test_python_runs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     log = LogWriter(tmp_path / "run.log")

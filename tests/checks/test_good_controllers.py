@@ -251,7 +251,7 @@ def test_a_controller_object_knows_whether_it_is_coupled():
     assert check_controller(law, axes=3).ok
 
 
-@pytest.mark.parametrize("name", ["p", "pid", "modified-pid", "tracking"])
+@pytest.mark.parametrize("name", ["p", "pid", "modified-pid", "tracking", "cascade"])
 def test_the_library_keeps_its_own_interface(name):
     from rds.controllers import library_controller
 

@@ -15,7 +15,6 @@ import can
 import pytest
 
 from rds.bus.modules.cia402.codes import Nmt, State
-from rds.bus.modules.cia402.follow import follow
 from rds.bus.modules.cia402.host import Cia402Drivers
 from rds.bus.modules.cia402.node import DriveNode
 from rds.bus.modules.cia402.scan import scan
@@ -118,9 +117,7 @@ def test_csp_leads_along_positions_and_csv_along_velocities(machine: Machine, se
     wide = {"axis": {"X": {"write": [[0x6065, 0, 20000]]}}}
     with drivers(machine, channel, ["X"], cia402={"mode": "csp"} | wide) as host:
         host.start()
-        rows = [[sin(2 * pi * 0.5 * k * T)] for k in range(75)]
-        done = follow(host, rows, lambda k: time.sleep(T))  # the next is not hastened where this one came late
-        last = [measured[0] for _, measured in done]
+        last = [cycle(host, sin(2 * pi * 0.5 * k * T))[0][0] for k in range(75)]
         assert max(last) == pytest.approx(1.0, abs=0.1) and min(last) == pytest.approx(-1.0, abs=0.2)
     wait_for(lambda: nodes[0].drive.state is State.SWITCH_ON_DISABLED)
     with drivers(machine, channel, ["X"], cia402={"mode": "csv"}) as host:

@@ -247,3 +247,16 @@ def test_a_change_of_mode_under_power_stands_still(rig: Rig) -> None:
     rig.write(0x6060, Mode.CYCLIC_VELOCITY, 1)
     assert rig.read(0x6061) == Mode.CYCLIC_VELOCITY
     assert rig.drive.state is State.OPERATION_ENABLED
+
+
+def test_the_current_limit_bounds_the_voltage_above_the_back_emf(rig: Rig) -> None:
+    """What accelerates the axis is K times it over τ: from rest at most limit · K/τ."""
+    rig.write(0x60FF, 0, 4)
+    servo = rig.drive.servo
+    servo.current_limit = 0.8
+    rig.ready(Mode.CYCLIC_VELOCITY)
+    for _ in range(60):
+        rig.cycle(5000)
+        emf = servo.axis.velocity * servo._emf
+        assert abs(servo.axis.voltage - emf) <= 0.8 + 0.1  # the speed changes between two instants of the loop
+    assert servo.velocity > 0.0

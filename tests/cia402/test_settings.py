@@ -35,7 +35,9 @@ def test_an_eds_is_found_beside_the_machine_file_or_here(machine: Machine, tmp_p
 
 def test_the_documented_example_is_accepted(machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (Path(__file__).parents[2] / "docs" / "cia402.md").read_text(encoding="utf-8")
-    table = tomllib.loads(text.split("```toml\n")[1].split("```")[0])["bus"]["cia402"]
+    table = tomllib.loads(text.split("### A bought drive on SocketCAN")[1].split("```toml\n")[1].split("```")[0])[
+        "bus"
+    ]["cia402"]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "servo-drive.eds").write_text("")
     settings = read_settings(table, machine, ["X", "Y"])
@@ -69,7 +71,7 @@ def test_the_documented_example_is_accepted(machine: Machine, tmp_path: Path, mo
         ({"mode": ["csp"]}, "'cst', 'csp', 'csv'"),
         ({"axis": {"X": {"write": 5}}}, "[index, sub-index, value]"),
         ({"axis": {"X": {"write": [5]}}}, "[index, sub-index, value]"),
-        ({"axis": {"X": {"mode": "pp"}}}, "'cst', 'csp', 'csv'"),
+        ({"axis": {"X": {"mode": "pv"}}}, "'cst', 'csp', 'csv'"),
         ({"axis": {"X": {"home": 1.0}}}, "give its method as well"),
         ({"axis": {"X": {"homing": 17, "home": 1e9}}}, "beyond what a drive can count"),
         ({"axis": {"X": {"homing": 17, "home": "left"}}}, "must be a number"),

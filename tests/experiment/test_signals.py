@@ -122,7 +122,7 @@ def test_a_spindle_and_a_model_with_an_output_of_its_own_have_no_plant_velocity(
     assert "X_plant_velocity" not in experiment({"name": "pid"}, model=own).run("simulation")
 
 
-@pytest.mark.parametrize("name", ["tracking", "pid", "modified-pid"])
+@pytest.mark.parametrize("name", ["tracking", "pid", "modified-pid", "cascade"])
 def test_compiled_signals_are_those_of_the_loop_to_the_last_bit(name):
     pytest.importorskip("numba")
     plan = experiment({"name": name}, duration=0.5).plan("simulation")

@@ -136,6 +136,7 @@ def test_what_is_the_same_for_everybody_is_run_once(tmp_path: Path, monkeypatch:
         return run(case, *arguments)
 
     monkeypatch.setattr(ControlCase, "run", counted)
+    monkeypatch.setattr("rds.grading.assignment.check_assignment.audit", lambda *_: ([], []))  # runs of its own
     same, varied = check_assignment(assignment, TrustedFiles(), 5).criteria
     assert same.least == same.largest and varied.least is not None and varied.largest is not None
     assert varied.least < varied.largest

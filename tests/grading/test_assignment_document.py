@@ -26,7 +26,19 @@ NAMED = set(re.findall(r"`\"?([\w.-]+)\"?`", TEXT)) | set(
     re.findall(r"\[{1,2}(?:case\.|criterion\.)?([\w]+)\]{1,2}", TEXT)
 )
 # what an experiment's keys are is told in docs/experiments.md
-OF_EXPERIMENTS = {"mode", "controller", "bus", "timing", "compiled", "signal", "model", "interface", "saturation"}
+OF_EXPERIMENTS = {
+    "mode",
+    "controller",
+    "bus",
+    "network",
+    "timing",
+    "compiled",
+    "signal",
+    "model",
+    "interface",
+    "saturation",
+    "error_compensation",
+}
 
 
 def known_keys(text: str, folder: Path) -> set[str]:

@@ -12,7 +12,7 @@ import pytest
 from rds.grading.grade import Status
 from rds.grading.sandbox import Pool
 from tests.grading.attacked import HONEST, SAMPLES, Machine, Outcome, run
-from tests.grading.attacks import SHORT, Attack, changing, leaving, looking, lying, taking
+from tests.grading.attacks import PATIENT, Attack, changing, leaving, looking, lying, taking
 
 Written = Callable[..., Path]
 KINDS = (changing, leaving, looking, lying, taking)
@@ -30,7 +30,7 @@ def honest(pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def before(pool: Pool, honest: Path) -> Outcome:
     """What it answers when nobody has attacked anything yet."""
-    found = run(pool, honest, SHORT)
+    found = run(pool, honest, PATIENT)
     assert (found.status, len(set(found.answers))) == (Status.OK, SAMPLES)
     return found
 
@@ -74,4 +74,4 @@ def test_an_attack_ends_with_a_reason_and_nobody_else_notices(
     if found.answers:
         assert found.output.startswith("inside\n")
     assert machine.fault() == ""
-    assert run(pool, honest, SHORT) == before
+    assert run(pool, honest, PATIENT) == before

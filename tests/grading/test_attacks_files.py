@@ -12,7 +12,7 @@ import pytest
 from rds.grading.grade import Status
 from rds.grading.sandbox import Pool
 from tests.grading.attacked import HONEST, run
-from tests.grading.attacks import SHORT
+from tests.grading.attacks import PATIENT, SHORT
 
 Written = Callable[..., Path]
 
@@ -39,12 +39,12 @@ def test_what_is_no_file_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "submission_of_somebody.py"
-    before = run(pool, written(HONEST, ""), SHORT)
+    before = run(pool, written(HONEST, ""), PATIENT)
     PLACES[name](path)
     found = run(pool, path, SHORT)
     assert (found.status, found.answers) == (Status.REFUSED, [])
     assert found.reason
-    assert run(pool, written(HONEST, ""), SHORT) == before
+    assert run(pool, written(HONEST, ""), PATIENT) == before
 
 
 @pytest.mark.parametrize("name", ["a\nb.py", "\x1b[2J.py", "-rf.py", "$(id).py", "a'; import os.py", "é\u202e.py"])

@@ -12,7 +12,7 @@ from rds.core.types import LineSegment
 from rds.grading.grade import Status
 from rds.grading.sandbox import Pool, SubmissionError
 from tests.grading.attacked import HONEST, Machine, Outcome, run
-from tests.grading.attacks import CONTROL, INSIDE, SHORT, in_control
+from tests.grading.attacks import CONTROL, INSIDE, PATIENT, SHORT, in_control
 
 Written = Callable[..., Path]
 
@@ -90,7 +90,7 @@ def before(either: Pool, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
     """Somebody else's submission, what it answers, and the computer before the first attack."""
     path = tmp_path_factory.mktemp("next") / "submission.py"
     path.write_text(HONEST)
-    found = run(either, path, SHORT)
+    found = run(either, path, PATIENT)
     assert found.status is Status.OK
     return path, found, Machine(either)
 
@@ -99,7 +99,7 @@ def unchanged(pool: Pool, before: tuple[Path, Outcome, Machine]) -> None:
     """Nobody else has noticed anything."""
     path, found, machine = before
     assert machine.fault() == ""
-    assert run(pool, path, SHORT) == found
+    assert run(pool, path, PATIENT) == found
 
 
 @pytest.mark.parametrize("name", IN_SAMPLES)

@@ -15,7 +15,7 @@ import rds
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.batch.grade_one import grade, grade_with_runs
-from rds.grading.grade import Band, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.sandbox import Pool
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 
@@ -202,6 +202,53 @@ def test_points_that_need_others(made: Make, tmp_path: Path) -> None:
     assert (
         bound.criteria[1].value == 0.0 and "counts only where points are earned for rms" in bound.criteria[1].sentence
     )
+
+
+MARGIN = """
+[[criterion]]
+name = "margin"
+kind = "phase-margin"
+cases = ["step", "sine"]
+points = 10
+full = 50
+none = 20
+unit = "°"
+"""
+TWO_CASES = HEAD + STEP + SINE + RMS + MARGIN.replace("[[", 'requires = ["margin"]\n[[')
+GAIN = "def control(t, r, y, state, params):\n    return {gain} * (r.position - y) + 0.567 * r.velocity, state\n"
+
+
+def test_a_gate_takes_by_degrees_and_only_in_its_own_case(made: Make, tmp_path: Path) -> None:
+    """Half of a degree beyond the bound takes a part; a law that is wild in the step alone keeps its sine."""
+
+    def rms(law: str) -> CriterionScore:
+        found = grade(made(TWO_CASES), file(tmp_path, law), "ada", TrustedFiles())
+        return next(score for score in found.criteria if score.name == "rms")
+
+    assert rms(GAIN.format(gain=40.0)).gate == ""
+    low = rms(GAIN.format(gain=260.0))  # 24 degrees
+    assert low.gate == "margin" and 0.0 < low.score < 10.0 and "of that count" in low.sentence
+    assert rms(GAIN.format(gain=900.0)).score == 0.0
+    wild = GAIN.format(gain="(900.0 if r.velocity == 0.0 and r.position == 1.0 else 40.0)")
+    assert rms(wild).score == 10.0
+
+
+def test_what_cannot_be_measured_is_for_a_review_and_no_zero(made: Make, tmp_path: Path) -> None:
+    coarse = "from math import floor\n" + GAIN.format(gain=40.0).replace("- y)", "- floor(y / 0.1) * 0.1)")
+    found = grade(made(TWO_CASES), file(tmp_path, coarse), "ada", TrustedFiles())
+    (review,) = found.for_review
+    assert review.name == "margin" and review.value is None and "could not be measured" in review.sentence
+    others = [score for score in found.criteria if score.name != "margin"]
+    share = sum(each.score for each in others) / sum(each.max_score for each in others)
+    assert review.score == pytest.approx(10.0 * share) and share > 0.1
+    assert all(not score.gate for score in others)
+
+
+def test_a_hard_link_is_refused(made: Make, tmp_path: Path) -> None:
+    path = file(tmp_path, STATEFUL)
+    (tmp_path / "other.py").hardlink_to(path)
+    found = grade(made(HEAD + SINE + RMS), path, "ada", TrustedFiles())
+    assert found.status is Status.REFUSED and "hard link" in found.reason
 
 
 def test_weights_and_lateness(made: Make, tmp_path: Path) -> None:

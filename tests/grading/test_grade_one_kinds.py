@@ -117,6 +117,9 @@ def test_functions_are_called_and_judged_here(tmp_path: Path, pool: Pool) -> Non
     assert some.criteria[0].sentence.endswith(" Not passed: double([1.0, 2.0]), word(), truth().")
     (folder / "cheat.py").write_text(equal + "def double(x): return E()\nword = truth = lambda: E()\n")
     assert both(read_assignment(folder), folder / "cheat.py", pool).score == 0.0
+    (folder / "none.py").write_text("def other(x): return x\n")
+    none = both(read_assignment(folder), folder / "none.py", pool)
+    assert none.status is Status.FAILED_TO_LOAD and "double(), truth(), word()" in none.reason
 
 
 def test_a_part_program_on_coupled_axes_is_judged_by_its_contour(tmp_path: Path, pool: Pool) -> None:

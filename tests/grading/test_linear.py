@@ -13,7 +13,7 @@ from rds.core.types import Model
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.trusted import TrustedFiles
 from rds.grading.batch.grade_one import Opened
-from rds.grading.criteria.linear import PULSE, LinearLoop, linear_loop
+from rds.grading.criteria.linear import LinearLoop, NoLoop
 from rds.identification.robustness.margins import linear_law, loop_margins
 from rds.models import library_model
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
@@ -45,7 +45,7 @@ def control(t, r, y, state, params):
 }
 
 
-def found_in(folder: Path, law: str, plant: str = "") -> tuple[LinearLoop | str, Assignment]:
+def found_in(folder: Path, law: str, plant: str = "") -> tuple[LinearLoop | NoLoop, Assignment]:
     assignment = read_assignment(assignment_in(folder, TEXT.replace("{plant}", plant), law))
     opened = Opened(folder / "solution.py", assignment, TrustedFiles())
     try:
@@ -53,7 +53,7 @@ def found_in(folder: Path, law: str, plant: str = "") -> tuple[LinearLoop | str,
     finally:
         opened.close()
     assert linear is not None
-    return linear, assignment
+    return linear[0], assignment
 
 
 @pytest.mark.parametrize("plant", ["", 'plant = "machine"'])
@@ -85,22 +85,13 @@ def test_damping_of_proportional_control_is_that_of_its_second_order_loop(tmp_pa
     "law, why",
     [
         ("def control(t, r, y, state, params):\n    return 1200.0 * (r.position - y), state\n", "not stable"),
-        ("def control(t, r, y, state, params):\n    return 0.5 * r.velocity, state\n", "no loop|not come to rest"),
+        ("def control(t, r, y, state, params):\n    return 0.5 * r.velocity, state\n", "no loop"),
         (
             "def control(t, r, y, state, params):\n    return (8.0 if y < r.position else -8.0), state\n",
-            "not answer in proportion|not come to rest",
+            "switches",
         ),
     ],
 )
 def test_what_has_no_linear_loop_has_no_margins(law: str, why: str, tmp_path: Path) -> None:
-    import re
-
     found, _ = found_in(tmp_path, law)
-    assert isinstance(found, str) and re.search(why, found), found
-
-
-def test_a_law_that_quantizes_what_it_sees_has_no_linear_loop() -> None:
-    time = np.arange(2000)
-    gone = np.exp(-time / 100.0)
-    runs = [(k * gone + (0.3 * np.sin(time) if k else 0.0), 0.01 * k * gone) for k in (0.0, PULSE, -2.0 * PULSE)]
-    assert "in proportion" in str(linear_loop(runs, 0.001))
+    assert isinstance(found, NoLoop) and found.is_known and why in found.why, found

@@ -10,7 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.grading.batch.similarity import GRAM, LEAST_COMMON, LEAST_SCORE, WINDOW, fingerprints, similar_pairs
+from rds.grading.batch.similarity import (
+    GRAM,
+    LEAST_COMMON,
+    LEAST_SCORE,
+    WINDOW,
+    fingerprints,
+    identical_files,
+    similar_pairs,
+)
 from rds.grading.batch.similarity_table import pairs_html
 
 LAW = '''"""PD control with a filtered derivative."""
@@ -130,6 +138,24 @@ def test_pairs_are_those_of_a_comparison_one_by_one(values: list[set[int]]) -> N
     pairs = similar_pairs(found)
     assert {(pair.first, pair.second, pair.score, pair.common) for pair in pairs} == expected
     assert all(sum(last - first + 1 for first, last in pair.first_lines) == pair.common for pair in pairs)
+
+
+def test_the_same_file_is_always_told_also_when_most_of_a_class_have_it() -> None:
+    given = [(f"s{n:02}", LAW.encode() if n < 7 else f"x{n} = {n}".encode()) for n in range(12)]
+    (group,) = identical_files(given, {"solution.py": b"other"})
+    assert group.students == tuple(f"s{n:02}" for n in range(7)) and group.source == ""
+    (group,) = identical_files(given, {"solution.py": LAW.encode()})
+    assert group.source == "solution.py"
+    assert "solution.py" in pairs_html([], [group]) and "s06" in pairs_html([], [group])
+    assert identical_files([("ada", b"x"), ("ben", b"y")], {"my.py": b"y"})[0].students == ("ben",)
+
+
+def test_a_solution_that_was_handed_out_is_named_as_the_source() -> None:
+    found = prints(ada=LAW, ben=disguised(LAW), cy=OTHER)
+    (pair,) = similar_pairs(found, sources={"solution.py": fingerprints(LAW.encode()), "b.py": {}})
+    assert pair.source == "solution.py"
+    (pair,) = similar_pairs(found, sources={"solution.py": fingerprints(OTHER.encode())})
+    assert pair.source == ""
 
 
 def test_the_table_escapes_names() -> None:

@@ -185,3 +185,32 @@ def test_a_notebook_can_be_tried_before_it_is_handed_in(tmp_path: Path, pool: Po
     (tmp_path / "broken.ipynb").write_text("{")
     with pytest.raises(InputError, match=r"broken\.ipynb: it is no notebook"):
         self_check(task, tmp_path / "broken.ipynb", "ada", pool)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        'q = params\nq["Kp"] = 30.0',
+        'for d in [params]:\n    d["Kp"] = 30.0',
+        'def inner(p):\n    p["Kp"] = 30.0\ndef outer(p):\n    inner(p)\nouter(params)',
+        'def set_to(k):\n    params["Kp"] = k\ndef tune():\n    set_to(30.0)\ntune()',
+        "from scipy.optimize import minimize_scalar\n"
+        'def cost(k):\n    params["Kp"] = 30.0\n    return k * k\nminimize_scalar(cost)',
+        'def local():\n    q = params\n    q["Kp"] = 30.0\nlocal()',
+        "dict.update(params, Kp=30.0)",
+        'from operator import setitem\nsetitem(params, "Kp", 30.0)',
+        'params |= {"Kp": 30.0}',
+        'from contextlib import nullcontext\nwith nullcontext(params) as p:\n    p["Kp"] = 30.0',
+        "class Tuner:\n    def __init__(self, p):\n        self.p = p\n"
+        '    def go(self):\n        self.p["Kp"] = 30.0\nt = Tuner(params)\nt.go()',
+        "from scipy.optimize import minimize_scalar\n"
+        "best = minimize_scalar(lambda k: (k - 30.0) ** 2)\nparams['Kp'] = float(round(best.x))",
+        'from types import SimpleNamespace\nheld = SimpleNamespace(p=params)\nheld.p["Kp"] = 30.0',
+    ],
+)
+def test_a_gain_that_is_set_in_any_ordinary_way_is_graded(cell: str) -> None:
+    head = 'params = {"Kp": 1.0}\n\ndef control(t, r, y, state, params):\n    return params["Kp"] * y, state'
+    run = "import rds\nexperiment = rds.Experiment(controller=control, params=params)\nexperiment.duration = 2.0"
+    found = made(head, cell, run)
+    assert found["params"] == {"Kp": 30.0}
+    assert "experiment" not in found

@@ -99,7 +99,6 @@ def test_words_are_kept_apart_and_named_where_a_number_should_be(tmp_path: Path)
         ("just,words\nno,numbers\n", "no lines of numbers"),
         ("a,b\n1,2\n3\n5,6\n", r"line 3: it has 1 cells"),
         ("a,b\n1,2\n3,4\n5,6,7\n8,9\n", r"line 4: it has 3 cells"),
-        ("a,a\n1,2\n3,4\n", "two columns are headed 'a'"),
         ("a,b\0\n1,2\n", "null bytes"),
     ],
 )
@@ -110,11 +109,24 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str, sentence: str) -
         read_csv(path)
 
 
-def test_utf_16_is_refused_with_a_remedy(tmp_path: Path) -> None:
-    path = tmp_path / "bad.csv"
-    path.write_text("a,b\n1,2\n", encoding="utf-16")
-    with pytest.raises(InputError, match=r"utf-16; save it as CSV \(UTF-8\)"):
+def test_utf_16_as_spreadsheets_save_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "wide.txt"
+    path.write_text("time [s]\tx [µm]\n" + "".join(f"{k}\t{k / 2}\n" for k in range(50)), encoding="utf-16")
+    table = read_csv(path)
+    assert table.path == path and table.columns["x"].unit == "µm" and table.columns["x"].values[-1] == 24.5
+    assert "read as utf-16" in table.findings[0].what
+    path.write_text("a\tb\n1\t2\n3\n5\t6\n", encoding="utf-16")
+    with pytest.raises(InputError, match=r"^\S*wide.txt, line 3: it has 1 cells"):
         read_csv(path)
+
+
+def test_columns_with_the_same_heading_are_numbered(tmp_path: Path) -> None:
+    path = tmp_path / "twice.csv"
+    path.write_text("a,x [mm],x [mm],x [V]\n1,2,3,4\n3,4,5,6\n")
+    table = read_csv(path)
+    assert list(table.columns) == ["a", "x", "x (2)", "x (3)"] and table.columns["x (2)"].values[1] == 5.0
+    (said,) = [finding.what for finding in table.findings if finding.kind == "headings"]
+    assert "'x (2)'" in said
 
 
 def test_half_a_file_loses_its_cut_line_and_says_so(tmp_path: Path) -> None:

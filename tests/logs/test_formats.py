@@ -182,7 +182,10 @@ def test_describe_without_a_map_drafts_one_and_says_that_it_is_a_draft(tmp_path:
     code, out, _ = rds("data", "describe", path)
     assert code == 1 and "nothing gives its unit" in out and "[axis.axis.position]" in out
     code, out, err = rds("data", "describe", path, "--write-map")
-    assert code == 0 and "a draft: check every line" in err
+    assert code == 2 and "a draft" in err and "unit = '?' is the draft's mark" in err
+    draft = tmp_path / "log.csv.map.toml"
+    for unit in ("s", "V", "mm"):  # which the file does not tell, and no draft invents
+        draft.write_text(draft.read_text().replace('unit = "?"', f'unit = "{unit}"', 1))
     assert rds("data", "describe", path)[0] == 0
     code, _, err = rds("data", "describe", path, "--write-map")
     assert code == 2 and "exists already" in err
@@ -195,7 +198,8 @@ def test_a_draft_with_columns_that_nothing_tells_asks_for_them(tmp_path: Path) -
     assert code == 2 and "log.csv.map.toml, a draft" in err
     assert "column = '?' is the draft's mark for what the file does not tell: name one of its columns" in err
     draft = tmp_path / "log.csv.map.toml"
-    draft.write_text(draft.read_text().replace("?", "p1", 1).replace("?", "p2", 1))
+    for mark, said in (("column", "p1"), ("unit", "V"), ("column", "p2"), ("unit", "mm")):
+        draft.write_text(draft.read_text().replace(f'{mark} = "?"', f'{mark} = "{said}"', 1))
     assert rds("data", "describe", path)[0] == 0
 
 

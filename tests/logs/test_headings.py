@@ -12,6 +12,7 @@ from rds.core.errors import InputError
 from rds.identification.logs.csv_headings import name_and_unit
 from rds.identification.logs.read_log import read_log
 from rds.identification.logs.tables import read_table
+from rds.identification.logs.units import unit_of_name
 
 T = np.arange(400)  # ms
 U, X = np.sin(0.03 * T), 3.0 * np.cos(0.03 * T)
@@ -68,6 +69,22 @@ def written(folder: Path, name: str, head: str, columns: Sequence[np.ndarray], m
 )
 def test_name_and_unit_of_a_heading(cell: str, name: str, unit: str | None) -> None:
     assert name_and_unit(cell) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("velocity_mm_s", "mm/s"),
+        ("speed_deg_s", "deg/s"),
+        ("feed_mm_per_min", "mm/min"),
+        ("rate_rev_min", "rev/min"),
+        ("position_mm", "mm"),
+        ("time_s", "s"),
+        ("state", None),
+    ],
+)
+def test_a_unit_at_the_end_of_a_name(name: str, unit: str | None) -> None:
+    assert unit_of_name(name) == unit
 
 
 def test_a_labview_measurement(tmp_path: Path) -> None:

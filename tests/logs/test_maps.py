@@ -152,6 +152,12 @@ def test_what_is_in_doubt_is_not_guessed(tmp_path: Path, headings: tuple[str, ..
 def test_the_draft_is_a_map_that_can_be_pasted(tmp_path: Path) -> None:
     path = write(tmp_path / "log.csv", axis())
     (tmp_path / "log.csv.map.toml").write_text(draft(read_table(path)))
+    with pytest.raises(InputError, match="unit = '\\?' is the draft's mark for what the file does not tell"):
+        read_log(path)
+    text = draft(read_table(path))
+    for unit in ("s", "V", "mm"):
+        text = text.replace('unit = "?"', f'unit = "{unit}"', 1)
+    (tmp_path / "log.csv.map.toml").write_text(text)
     (log,) = read_log(path)
     assert np.allclose(log.position, axis()["position"], atol=1e-11)
 

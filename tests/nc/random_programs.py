@@ -22,6 +22,10 @@ _MODES = _words(
     "G17 G18 G19 G90 G91 G91 G90 G91.1 G90.1 G91.1 G94F50 G95F1 G94F20 G93 G61 G61.1 G64 G54 G55 G59.3 G59 G59.1"
     " G80G0 G40 G49 G92.1 G92.2 G92.3 G28.1 G30.1 M3 M4 M5 M7 M8 M9 M0 M1 M60"
 )
+_MORE_MODES = _words(
+    "G98 G99 G98 G99 G7 G8 G96S50D200 G96S20 G97S300 M48 M49 M50P0 M51P1 M52P1 M53P0 M19R30 M62P1 M63P2 M64P0 M65P3"
+    " M67E1Q2 M68E0Q-3 M66P1L0 M66E1 M70 M71 M70 M72 G43.2H1 G5.3 G10L1P2Z3"
+)
 _WRONG = _words(
     "X Y1Y2 G0G1 G90G91 M3M4 X+-5 X1.2.3 X. X1e5 D5 H1 Q1 L2 P1 R5 I1 K2 G1.5 G2.05 M99999 M-1 G-1 T99 T2.5 S-1 F-1"
     " X[1 X1] X[1+] X[/2] X#0 X#6000 #5400=1 #1= #1 % X(1)2 (unclosed (a(b)c) X[1/0] Xsqrt[-1] Xacos[2] Xln[0]"
@@ -102,6 +106,54 @@ def arc(r: Random) -> str:
     if r.random() < 0.2:
         words.append("F200")
     return line(r, words)
+
+
+_EACH = {"G73": "Q", "G74": "P", "G82": "P", "G83": "Q", "G84": "P", "G86": "P", "G87": "IJK", "G88": "P", "G89": "P"}
+_GIVEN = {"Q": ["2", "5", ".7"], "P": ["0.5", "1", "0"], "I": ["1", "-2"], "J": ["0", "3"], "K": ["2", "-1"]}
+
+
+def cycle(r: Random) -> str:
+    """A line of a canned cycle, in each plane, whole or leaving words to the line before."""
+    code = r.choice(["G73", "G74", "G81", "G81", "G82", "G83", "G83", "G84", "G85", "G86", "G87", "G88", "G89", ""])
+    tapping = code in ("G74", "G84")  # in other planes rs274 goes elsewhere
+    plane, deep = (
+        ("G17", "Z") if tapping else r.choice([("", "Z"), ("", "Z"), ("G17", "Z"), ("G18", "Y"), ("G19", "X")])
+    )
+    words = [plane, code, f"{deep}{r.choice(['-5', '-2.5', '-10', number(r)])}", f"R{r.choice(['2', '1', '30', '-1'])}"]
+    words += [letter + r.choice(_GIVEN[letter]) for letter in _EACH.get(code, "") if r.random() < 0.9]
+    words += axes(r, "".join(letter for letter in "XYZ" if letter != deep), 0.6)
+    if r.random() < 0.2:
+        words.append(f"L{r.choice(['1', '2', '3', '0'])}")
+    if code and r.random() < 0.1:
+        words.insert(0, r.choice(["M3", "M4", "G91", "G90", "G98", "G99"]))
+    words = [word for word in words if word and r.random() < 0.96]
+    first = "M3 F100\n" if code in ("G84", "G86", "G87", "G88") and r.random() < 0.8 else ""
+    return first + line(r, words)
+
+
+def rare(r: Random) -> str:
+    """Polar ends, shifts, threads, splines, probing, and modes besides the usual."""
+    way = r.randrange(8)
+    if way == 0:
+        return line(r, [r.choice(["G0", "G1", "G17 G0"]), f"@{number(r)}", f"^{number(r)}", *axes(r, "Z", 0.2)])
+    if way == 1:
+        return line(r, [r.choice(["G0", "G1", "G17 G1"]), r.choice(["@", "^"]) + number(r)])
+    if way == 2:
+        return line(r, ["G52", *axes(r)])
+    if way == 3:
+        return "M3\n" + line(r, [r.choice(["G33", "G33", "G33.1"]), "K1.5", *axes(r, "XYZ", 0.5)])
+    if way == 4:
+        taper = r.choice(["", "E2 L3", "E1 L1", "E.5 L2"])
+        more = r.choice(["", "Q29.5", "R2", "H2 Q30", "R1.5"])
+        return f"M4 G8\nG76 P1.5 Z{number(r)} I{r.choice(['-1', '2'])} J.3 K1.1 {taper} {more}"
+    if way == 5:
+        first = "G17 G94 F100\n"
+        return first + r.choice(
+            ["G5 X1 Y2 I1 J1 P-1 Q1", "G5.1 X3 Y1 I2 J0", "G5.2 X1 Y1 P1\nX2 Y0 P2\nX3 Y3 P1\nG5.3"]
+        )
+    if way == 6:
+        return line(r, [r.choice(["G38.2", "G38.3", "G38.4", "G38.5"]), *axes(r, "XYZ", 0.5)])
+    return line(r, [r.choice(_MORE_MODES) for _ in range(r.choice([1, 1, 2]))])
 
 
 def modes(r: Random, units: bool) -> str:
@@ -188,8 +240,12 @@ def blocks(r: Random, units: bool, depth: int, labels: Iterator[int], breaks: bo
         way = r.randrange(100)
         if way < 32:
             lines.append(straight(r))
-        elif way < 52:
+        elif way < 40:
             lines.append(arc(r))
+        elif way < 47:
+            lines.append(cycle(r))
+        elif way < 52:
+            lines.append(rare(r))
         elif way < 66:
             lines.append(modes(r, units))
         elif way < 84:

@@ -28,8 +28,10 @@ def copied(program: Bundled, folder: Path) -> Path:
 
 def test_there_are_those_of_the_paper_and_of_the_theses() -> None:
     assert set(PROGRAMS) == {
-        f"{name}.ngc" for name in ("square", "circle", "quadrants", "pocket", "dcs-table-5-2", "oacs-p001")
+        f"{name}.ngc"
+        for name in ("square", "circle", "quadrants", "pocket", "pyramid", "hemisphere", "dcs-table-5-2", "oacs-p001")
     }
+    assert PROGRAMS["pyramid.ngc"].machine == "starmill"
     assert PROGRAMS["oacs-p001.ngc"].machine == "mrmt-oacs"
     with pytest.raises(InputError, match="there are circle, dcs-table-5-2"):
         find_bundled("star")
@@ -66,6 +68,8 @@ def test_the_shapes_are_what_their_titles_say() -> None:
     middle = arcs["centre"][:, :2] + 0.5 * (arcs["start"] + arcs["end"])[:, :2] - arcs["centre"][:, :2]
     sides = np.sign(middle - arcs["centre"][:, :2]).astype(int).tolist()
     assert sides[:4] == [[1, 1], [-1, 1], [-1, -1], [1, -1]]
+    strokes = [row["end"] - row["start"] for row in path("pyramid") if row["start"][2] == -6.0 and row["end"][2] == 0.0]
+    assert len(strokes) == 24 and all(np.all(stroke[:3] != 0.0) for stroke in strokes)  # three axes at once
     pocket = path("pocket")
     cut = pocket[~pocket["rapid"]]
     assert np.ptp(cut["end"][:, 0]) == 40.0 and np.ptp(cut["end"][:, 1]) == 30.0 and cut["end"][-1, 2] == -1.0

@@ -47,15 +47,12 @@ STRICTER = {
     "R with a cutter's diameter": "G41.1 D1 R3\nM2",
     "L with a cutter's number": "G41 L3\nM2",
     "G92.1 while the cutter is compensated": "G41.1 D1 G92.1\nM2",
-    "a program number": "O1000\nM2",
     "a name that is not closed": "o<p1 call [4]\nM2",
     "a character 0": "G0 X1 \x00Y2\nM2",
     "another subroutine's end": "o1 sub\no2 endsub\no1 endsub\no1 call\nM2",
     "RETURN under another subroutine's name": "o1 sub\no1 endsub\no2 sub\no1 return\no2 endsub\no2 call\nM2",
-    "words outside of the dialect": "M48\nM2",
-    "a word outside of the dialect": "G97 S100\nM2",
+    "a plane of axes that there are not": "G17.1\nM2",
     "an active comment": "(py,1)\nM2",
-    "a comment that opens a file": "(PROBEOPEN p.txt)\nM2",
 }
 # Refused by rs274 or run otherwise, and right here.
 BETTER = {

@@ -39,7 +39,7 @@ G0 X0 Y0
 G1 X-3
 M2
 """
-BAD = "F800\nG1 X90\nG81 X1\nX1 X2\nM2\n"
+BAD = "F800\nG1 X90\nG12 X1\nX1 X2\nM2\n"
 TOOLS = "T1 P1 Z1 D4\nT2 P2 D6\n"
 
 
@@ -78,7 +78,8 @@ def test_check_of_an_invalid_program(folder: Path) -> None:
         "bad.ngc:1:1: F800: a feed of 800 mm/min is more than X, the slowest axis that moves, can do (780); lower it",
         "bad.ngc:2:4: X90: X would reach 90 mm (machine coordinates), 15 mm beyond its travel of -75 to 75; "
         "shorten the path, or move its origin",
-        "bad.ngc:3:1: G81: canned cycles are outside this dialect; write their moves as G0 and G1",
+        "bad.ngc:3:1: G12: G12 mills a circular pocket clockwise on other controls; "
+        "write the circle as G2 with I and J",
         "bad.ngc:4:4: X2: two X words on one line; leave one",
         "bad.ngc: not run from line 3 on: the words after it were only read",
         "bad.ngc: mini-cnc can't run it: 4 faults",
@@ -89,7 +90,7 @@ def test_check_of_an_invalid_program(folder: Path) -> None:
     assert [(fault["line"], fault["column"], fault["word"]) for fault in found["faults"]] == [
         (1, 1, "F800"),
         (2, 4, "X90"),
-        (3, 1, "G81"),
+        (3, 1, "G12"),
         (4, 4, "X2"),
     ]
 
@@ -159,7 +160,7 @@ def test_canon_of_an_invalid_program(folder: Path) -> None:
     done = nc("canon", "bad.ngc")
     assert done.exit_code == 2
     assert done.stdout.splitlines()[-1].endswith("STRAIGHT_FEED(90.0000, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000)")
-    assert "rds: bad.ngc:3:1: G81:" in done.stderr
+    assert "rds: bad.ngc:3:1: G12:" in done.stderr
     done = nc("canon", "bad.ngc", "--json")
     assert (done.exit_code, done.stdout) == (2, "")
 

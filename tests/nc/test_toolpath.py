@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, LINE, XY, YZ, ZX, point_at
 from rds.nc.language.canon import ARC, FEED, MOTION, RATE, TRAVERSE, Call, MotionBlock
 from rds.nc.language.errors import ProgramError
-from rds.nc.toolpath import PathBlock, toolpath
+from rds.nc.path_block import PathBlock
+from rds.nc.toolpath import toolpath
 
 
 def rows(*moves: tuple[Any, ...], file: str = "") -> MotionBlock:
@@ -137,7 +138,7 @@ def test_feed_per_revolution_follows_the_spindle() -> None:
     [
         ((Call("SET_FEED_MODE", (0, 1)), rows((RATE, 2, 0.1), (FEED, 3, 1.0), file="p.ngc")), "stands still"),
         ((rows((FEED, 3, 1.0), file="p.ngc"),), "no feed rate"),
-        ((Call("NURBS_FEED", (), 3, file="p.ngc"),), "NURBS_FEED"),
+        ((Call("CLAMP_AXIS", (), 3, file="p.ngc"),), "CLAMP_AXIS"),
         (
             (
                 Call("SET_XY_ROTATION", (10.0,)),
@@ -237,3 +238,23 @@ def test_how_the_stream_is_cut_into_blocks_changes_nothing(made: list[tuple[int,
     for segment in whole.segments:
         way = segment["end"] - segment["start"]
         assert segment["length"] == pytest.approx(sqrt(sum(way[:3] ** 2)) or sqrt(sum(way[3:] ** 2)))
+
+
+@pytest.mark.parametrize(
+    ("calls", "lines"),
+    [
+        ((("DISABLE", 4), ("ENABLE", 4)), []),  # a cycle's or a thread's own
+        ((("DISABLE", 2),), [2]),
+        ((("DISABLE", 2), ("ENABLE", 5)), [2]),
+        ((("DISABLE", 2), ("DISABLE", 4), ("ENABLE", 4)), [2]),
+        ((("DISABLE", 4), ("ENABLE", 4), ("DISABLE", 6), ("ENABLE", 8), ("DISABLE", 9)), [6]),  # told once
+    ],
+)
+@pytest.mark.parametrize("of", ["FEED", "SPEED"])
+def test_an_override_that_the_program_locks_is_told_at_its_line(
+    of: str, calls: tuple[tuple[str, int], ...], lines: list[int]
+) -> None:
+    told: list[ProgramError] = []
+    list(toolpath([Call(f"{does}_{of}_OVERRIDE", line=line) for does, line in calls], warn=told.append))
+    assert [fault.line for fault in told] == lines
+    assert all("M49, M50 P0 and M51 P0 lock no override" in str(fault) for fault in told)

@@ -127,7 +127,7 @@ def test_each_clause_by_line_and_word(tmp_path: Path, text: str, expected: tuple
 
 
 def test_all_faults_are_told_in_the_order_of_lines(tmp_path: Path) -> None:
-    text = "F800\nG1 X80\nY10\nG1 X0 Y-80\nG1 Y0 A5\nG1 G2 X1\n(later)\nG81 X1\nX1 X2\n#1=[1/0]\nM2\nG999\n"
+    text = "F800\nG1 X80\nY10\nG1 X0 Y-80\nG1 Y0 A5\nG1 G2 X1\n(later)\nG12 X1\nX1 X2\n#1=[1/0]\nM2\nG999\n"
     found = check(tmp_path, text)
     assert [(fault.line, fault.word) for fault in found.faults] == [
         (1, "F800"),
@@ -135,11 +135,31 @@ def test_all_faults_are_told_in_the_order_of_lines(tmp_path: Path) -> None:
         (4, "Y-80"),
         (5, "A5"),
         (6, "G2"),
-        (8, "G81"),
+        (8, "G12"),
         (9, "X2"),
     ]
     assert found.stopped is not None and found.stopped.line == 6
     assert "not run from line 6 on" in str(found) and "7 faults" in str(found)
+
+
+def test_all_faults_of_a_line_are_told(tmp_path: Path) -> None:
+    found = check(tmp_path, "G1 G2 X1 X2 G12 F60\nU1 V2 $H\nG0 X1 X2 (not closed\nM2\n")
+    assert [(fault.line, fault.word) for fault in found.faults] == [
+        *((1, word) for word in ("G2", "X2", "G12")),
+        *((2, word) for word in ("U1", "V2", "$")),
+        (3, "("),
+    ]
+
+
+def test_subroutines_that_nothing_calls_are_read(tmp_path: Path) -> None:
+    text = (
+        "o1 sub\nG12 X1\no1 endsub\n o2 SUB\nG0 X1 U2\no5.19 if [1]\no2 endsub\no3 sub\nG0 X1\no3 endsub\no3 call\nM2\n"
+    )
+    found = check(tmp_path, text)
+    assert found.ok
+    assert [(warning.line, warning.word) for warning in found.warnings] == [(2, "G12"), (5, "U2"), (6, "O5.19")]
+    assert "in a subroutine that nothing calls" in str(found)
+    assert not check(tmp_path, text.replace("o2 endsub", "o2 endsub\no2 call")).ok
 
 
 def test_moves_back_from_outside_are_no_faults_of_their_own(tmp_path: Path) -> None:

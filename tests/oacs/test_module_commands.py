@@ -89,7 +89,7 @@ def test_refusals_say_what_and_why(serve: Serve, rds: Rds) -> None:
     serve("X")
     absent = refused(rds("module", 7, "info"))
     assert absent.startswith("rds: module 7: nobody answers with this number") and "rds scan" in absent
-    assert "number 99 must be from 2 to 15" in refused(rds("module", 99, "info"))
+    assert "number 99 must be from 2 to 14" in refused(rds("module", 99, "info"))
     assert "outside its travel" in refused(rds("module", 4, "move", "--by", 400))
     assert "neither is given: move by a distance with --by, or to a point with --to" in refused(
         rds("module", 4, "move")

@@ -72,6 +72,7 @@ def test_codes_are_those_of_the_words(message: str, field: str, enum: type[IntEn
 
 def test_identifiers_are_those_of_the_frames() -> None:
     wanted = {
+        "MoreVoltages": frames.MORE_VOLTAGES,
         "CycleCommand": frames.COMMAND,
         "DryCommand": frames.DRY_COMMAND,
         "SetUp": frames.SETUP,
@@ -85,7 +86,10 @@ def test_identifiers_are_those_of_the_frames() -> None:
     assert not cyclic & ours
 
 
-@given(st.lists(st.floats(-10, 10), min_size=4, max_size=4), st.sampled_from(["CycleCommand", "DryCommand"]))
+@given(
+    st.lists(st.floats(-10, 10), min_size=4, max_size=4),
+    st.sampled_from(["CycleCommand", "DryCommand", "MoreVoltages"]),
+)
 def test_commands_agree_bit_by_bit(voltages: list[float], name: str) -> None:
     message = DATABASE.get_message_by_name(name)
     data = frames.encode_voltages(voltages)

@@ -99,7 +99,7 @@ def test_errors_name_identifier_bytes_and_field(identifier: int, data: bytes, to
         ("Command", {"Code": 3, "Move": 77}, "Move of Command = 77 is unknown"),
         ("Command", {"Code": 3, "Move": 1, "Value": 256}, r"Value of Command = 256 is outside 0 to 255"),
         ("Command", {"Code": 5, "Parameter": 1, "ParameterValue": float("nan")}, "must be a number"),
-        ("Reply", {"Code": 3, "BoardID": 1}, "BoardID of Reply = 1 is outside 2 to 15"),
+        ("Reply", {"Code": 3, "BoardID": 1}, "BoardID of Reply = 1 is outside 2 to 14"),
         ("Greeting", {}, "no message 'Greeting'"),
     ],
 )

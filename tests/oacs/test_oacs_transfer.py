@@ -19,15 +19,23 @@ from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.transfer import (
     JOINTS,
     LENGTH,
+    LENGTH_2,
+    SIDES,
     ModuleDescription,
     decode_description,
     encode_description,
 )
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
+from rds.machines.library import Interface
 
 X = read_modules(load_machine("mrmt-oacs"))["X"].describe(12345)
 positive = st.floats(0, 2.0**20, width=32)
+
+
+def sides(name: str) -> st.SearchStrategy[Interface | None]:
+    kinds, sizes = st.text("abc XYZ", min_size=1, max_size=16), st.floats(0.5, 1e4, width=32)
+    return st.none() | st.builds(Interface, st.just(name), kinds, sizes, st.sampled_from(SIDES[1:]))
 
 
 @st.composite
@@ -53,6 +61,9 @@ def descriptions(draw: st.DrawFn) -> ModuleDescription:
         12.0,
         ((c, -s, 0.0, shift[0]), (s, c, 0.0, shift[1]), (0.0, 0.0, 1.0, shift[2]), (0.0, 0.0, 0.0, 1.0)),
         draw(st.sampled_from(JOINTS)),
+        draw(sides("mounted_by")),
+        draw(sides("carries_on")),
+        draw(st.sampled_from(["", "RangeArm"])),
     )
 
 
@@ -109,7 +120,28 @@ def test_impossible_modules_are_refused(changes: dict[str, object], told: str) -
 
 
 def test_a_newer_version_is_told_so() -> None:
-    with pytest.raises(MachineError, match="version 2, this program reads version 1; update"):
+    with pytest.raises(MachineError, match="version 3, this program reads versions 1 and 2; update"):
+        decode_description(b"\x03" + encode_description(X)[1:])
+
+
+def test_both_versions_are_read() -> None:
+    """A module without interfaces sends the bytes of version 1, and a host that knows version 2 reads them."""
+    first, second = X, read_modules(load_machine("mrmt-oacs"))["Z"].describe(7)
+    assert (first.version, second.version) == (1, 2)
+    assert len(encode_description(first)) == LENGTH and len(encode_description(second)) == LENGTH_2
+    told = decode_description(encode_description(second))
+    assert told.mounted_by == Interface("mounted_by", "column foot", 250.0, "female")
+    assert (told.carries_on, told.accessory) == (Interface("carries_on", "bolted head", 120.0, "male"), "RangeArm")
+    before = decode_description(encode_description(first))
+    assert (before.mounted_by, before.carries_on, before.accessory) == (None, None, "")
+    for changes, why in (
+        ({"accessory": "a range arm that is long"}, "12 printable"),
+        ({"mounted_by": Interface("mounted_by", "", 1.0, "male")}, "kind = '' of mounted_by"),
+        ({"carries_on": Interface("carries_on", "bolted", 0.0, "male")}, "must have a size above 0"),
+    ):
+        with pytest.raises(InputError, match=why):
+            encode_description(replace(X, **changes))  # type: ignore[arg-type]
+    with pytest.raises(MachineError, match="has 128 bytes; version 2 has 188"):
         decode_description(b"\x02" + encode_description(X)[1:])
 
 

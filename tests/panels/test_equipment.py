@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import email
+import shutil
 import socket
 import tomllib
 from collections.abc import Callable
@@ -233,18 +234,47 @@ def test_earlier_runs_are_reopened_and_laid_over(at: Callable[..., Equipment]) -
         control.page.wait_for_selector(".rds-figure canvas:visible")
     control.tab("Earlier runs")
     control.press("Open")
-    control.sees("choose a run in the list first")
-    runs = control.page.locator("select[multiple]:visible")
-    runs.select_option(index=[0])
-    control.press("Open")
+    control.sees("tick a run in the table first")
+    row = control.page.locator(".rds-runs tbody tr")
+    row.nth(0).locator(".rds-runs-open").click()
     control.saved()
     control.tab("Earlier runs")
-    runs.select_option(index=[0, 1])
+    assert "Pgain 10 → 20" in row.nth(0).inner_text() and "mm" in row.nth(0).inner_text()
+    row.nth(0).locator("input[type=text]").fill("the better one")
+    control.page.keyboard.press("Tab")
+    row.nth(0).locator(".rds-runs-star").click()
+    control.page.wait_for_selector('.rds-runs-star[aria-pressed="true"]')
+    row.nth(1).locator("input[type=checkbox]").check()
+    control.press("What differs")
+    control.page.wait_for_selector('.rds-main td:text-is("Pgain"):visible')
+    assert row.nth(0).locator("input[type=text]").input_value() == "the better one"
     control.press("Open")
     control.sees("2 runs over each other")
     control.page.wait_for_selector(".rds-figure canvas:visible")
     assert control.page.locator(".rds-figure .jupyter-matplotlib:visible").count() == 1
     assert control.page.locator(".widget-tab-contents table:visible tbody tr").count() == 2
+
+    control.tab("Earlier runs")
+    row.nth(0).locator("input[type=checkbox]").uncheck()
+    control.press("As ghost")
+    control.sees("stands behind the live strip, dotted")
+    control.tab("Live")
+    strip = control.page.locator("[data-lanes]:visible")
+    control.page.wait_for_selector('[data-ghost$="X simulation"]')
+    assert strip.get_attribute("data-lanes") == "3"
+    control.press("error")
+    control.page.wait_for_selector('[data-lanes="2"]')
+    control.press("Cursors")
+    said = control.page.wait_for_selector('.rds-strip-read th:has-text("B − A")').inner_text()
+    control.page.locator('input[aria-label="cursor A"]').press("ArrowLeft")
+    control.page.wait_for_function(
+        "(said) => !document.querySelector('.rds-strip-read').innerText.includes(said)", arg=said
+    )
+    with control.page.expect_download() as saved:
+        control.press("Save picture")
+    assert (
+        Path(saved.value.path()).read_bytes().startswith(b"\x89PNG") and saved.value.suggested_filename == "strip.png"
+    )
 
 
 def test_the_panel_as_a_file(at: Callable[..., Equipment], app: Any) -> None:
@@ -321,3 +351,20 @@ def test_the_machine_moves_with_the_strip(at: Callable[..., Equipment]) -> None:
     scrub = control.page.locator('input[aria-label="time shown"]')
     scrub.evaluate("(box) => { box.value = 250; box.dispatchEvent(new Event('input')) }")
     control.sees("at 1.24 s: X 4.9")  # a sine of 5 mm and 0.2 Hz is near its top then
+
+
+def test_two_axes_follow_a_circle_under_one_controller(at: Callable[..., Equipment], app: App) -> None:
+    shutil.copy(Path(__file__).parents[2] / "examples" / "cross_coupled.py", app.folder)
+    control = at()
+    control.choose("System", "X and Y")
+    control.choose("Reference", "Circle of X and Y")
+    control.type("Radius", "0.5")
+    control.choose("Motion", "tustin")
+    control.choose("Controller", "User-defined")
+    control.type("File of the controller", "cross_coupled.py")
+    control.field("One controller for all axes").locator("input").check()
+    assert (control.run() / "program.html").is_file()
+    control.sees("off the programmed path")
+    assert control.page.locator(".rds-figure:visible").count() == 2  # the path, and the axes over time
+    control.choose("System", "X axis")
+    assert not control.field("One controller for all axes").count()

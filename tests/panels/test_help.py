@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
-from rds.panels.help.build import _local, help_pages, page_file, sources
+from rds.panels.help.build import _local, contents, help_pages, page_file, sources
 from rds.panels.registry import PANELS
 from rds.results.serve import OWN_SCRIPT, FolderServer
 
@@ -51,8 +51,29 @@ def test_every_panel_names_a_page_that_exists() -> None:
 
 
 def test_links_to_other_files_of_the_checkout_become_text() -> None:
-    text = _local("see [a](examples/x.toml), [b](docs/bus.md#x), [c](#here), [d](https://e.org)", {"bus"})
-    assert text == "see a, [b](bus.md#x), [c](#here), [d](https://e.org)"
+    text = _local("[a](examples/x.toml), [b](docs/bus.md#x), [c](#here), [d](https://e.org)", {"bus"})
+    assert text == "a, [b](bus.md#x), [c](#here), [d](https://e.org)"
+
+
+def test_pictures_are_shown(pages: Path) -> None:
+    assert _local("![a sine](docs/pictures/first-sine.png)", set()) == "![a sine](first-sine.png)"
+    assert "first-sine.png" in (pages / "readme.html").read_text()
+    assert (pages / "_images" / "first-sine.png").is_file()
+
+
+def test_the_documents_have_an_order() -> None:
+    """docs/index.md names each once, under what kind of document it is; pages and their navigation follow it."""
+    documents = sources()
+    order = contents(documents["index"].read_text(encoding="utf-8"))
+    assert list(order) == ["Start", "Tutorials", "How to", "Reference", "Why"]
+    named = [name for names in order.values() for name in names]
+    assert sorted([*named, "index"]) == sorted(documents), "name each document once in docs/index.md"
+
+
+def test_the_navigation_beside_a_page_has_that_order(pages: Path) -> None:
+    text = (pages / "bus.html").read_text()
+    places = [text.index(heading) for heading in (">Start<", ">Tutorials<", ">How to<", ">Reference<", ">Why<")]
+    assert places == sorted(places)
 
 
 def test_a_folder_with_other_things_is_not_replaced(tmp_path: Path) -> None:

@@ -61,16 +61,18 @@ def recorded(folder: Path) -> int:
     return len(open_result(folder)) if (folder / "record.rds").is_file() else 0
 
 
-def test_a_run_outlives_a_reload_and_a_second_page_finds_the_machine_in_use_and_can_stop_it(
+def test_a_run_outlives_a_reload_and_is_taken_up_there_and_in_a_second_page_which_can_stop_it(
     begin: Callable[..., Any], open_page: Callable[..., Any]
 ) -> None:
     app, page, folder = begin(LONG)
     second = open_page("Equipment control", on=app)
     page.reload()  # its kernel goes on until the run is kept
-    for each in (page, second):
-        each.wait_for_selector('.rds-notice:has-text("a run goes on")')
-    second.click('button:visible:text-is("Run")')
-    second.wait_for_selector(':text("in use by another page")')
+    for each in (page, second):  # the reloaded page begins where the run is, not at its menu
+        each.wait_for_selector('.rds-notice:has-text("goes on, which was begun elsewhere")')
+        each.wait_for_selector(".rds-strip canvas:visible")
+        each.wait_for_selector(".rds-live-values .rds-field:visible")
+        each.wait_for_selector('.rds-work button:text-is("Stop"):visible')
+        assert each.locator('button:visible:text-is("Run")').is_disabled()
     before = wait_for(lambda: recorded(folder))
     wait_for(lambda: recorded(folder) > before + 500)  # the loop goes on, too
     second.click("button.rds-stop")
@@ -78,10 +80,11 @@ def test_a_run_outlives_a_reload_and_a_second_page_finds_the_machine_in_use_and_
     result = open_result(folder)
     assert result.meta["ending"] == "machine lost" and len(result) > before + 500
     assert (result["time"] == np.arange(len(result)) * 0.001).all()  # no sample is missing
-    page.click('.rds-nav button:text-is("Equipment control")')
+    for each in (page, second):  # its end is told, and what was said of its going on is gone
+        each.wait_for_selector('.rds-main .rds-notice:has-text("ended early"):visible')
+        assert each.locator('.rds-notice:has-text("begun elsewhere"):visible').count() == 0
     page.click('.lm-TabBar-tab:visible:has-text("Earlier runs")')
-    earlier = page.locator("select[multiple]:visible option").first
-    assert earlier.inner_text().endswith(folder.name.partition("-")[2].partition("-")[2])
+    page.wait_for_selector(f'.rds-runs tr[data-run="{folder.name}"]')
 
 
 def test_a_kernel_that_dies_leaves_the_record_and_no_claim(

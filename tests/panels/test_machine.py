@@ -16,6 +16,9 @@ def press(page: Any, text: str) -> None:
     page.click(f'button:visible:text-is("{text}")')
 
 
+MODULE = '.rds-field:visible:has(.rds-label:has-text("Module")) select'
+
+
 def tab(page: Any, title: str) -> None:
     page.click(f'.rds-tabs [role="tab"]:has-text("{title}")')
 
@@ -36,6 +39,9 @@ def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_pag
     page.wait_for_selector("caption:has-text('What they say of themselves')")
     tab(page, "2 Configuration")
     page.wait_for_selector('.rds-notice-good:visible:has-text("this order makes a machine")')
+    press(page, "Add oacs-range-arm")
+    page.wait_for_selector('b:visible:text-is("5")')  # places of four modules and the arm
+    page.wait_for_selector(".rds-figure canvas:visible, .rds-figure img:visible")
     page.locator('button:visible:text-is("▼")').first.click()
     page.wait_for_selector('.rds-notice-error:visible:has-text("the tool (module 5) must be the first")')
     page.locator('button:visible:text-is("▲")').nth(1).click()
@@ -47,12 +53,12 @@ def test_modules_are_found_configured_stepped_and_watched(own_app: App, open_pag
     page.wait_for_selector("td:visible:has-text('met')")
     press(page, "Listen")
     tab(page, "3 Controllers")
-    modules = page.locator('.widget-dropdown:has-text("Module") select').element_handle()
+    modules = page.locator('.widget-dropdown:visible:has-text("Module") select').element_handle()
     one = "(box) => box.selectedOptions[0]?.label.startsWith('2:')"  # of them, before any choice
     page.wait_for_function(one, arg=modules)
-    page.select_option('.widget-dropdown:has-text("Module") select', "4: LinrXa")
+    page.select_option('.widget-dropdown:visible:has-text("Module") select', "4: LinrXa")
     press(page, "Step")
-    page.wait_for_selector(".rds-figure canvas, .rds-figure img")
+    page.wait_for_selector(".rds-figure canvas:visible, .rds-figure img:visible")
     tab(page, "Bus")
     page.wait_for_selector("td:visible:has-text('Reply')")
     page.click('button:text-is("Dark")')
@@ -67,3 +73,30 @@ def test_a_gain_that_cannot_be_is_refused_beside_its_field(open_page: Callable[.
     field.fill("-1")
     field.press("Enter")
     page.wait_for_selector('.rds-refusal:has-text("Kp must be from 0 to 1e+06 duty/count, not -1")')
+
+
+def mount(page: Any, place: int, name: str) -> None:
+    page.select_option(MODULE, **name_of(page, name))
+    press(page, "Mount")
+    page.wait_for_selector(f'b:visible:text-is("{place}")')
+
+
+def name_of(page: Any, name: str) -> Any:
+    """The words of a module of the library, as the list has them."""
+    return {"label": page.locator(f"{MODULE} option", has_text=f": {name}, ").first.inner_text()}
+
+
+def test_a_machine_is_put_together_by_hand(own_app: App, open_page: Callable[..., Any]) -> None:
+    page = open_page("Machine", on=own_app)
+    tab(page, "By hand")
+    mount(page, 1, "oacs-drill")
+    mount(page, 2, "oacs-x")
+    page.wait_for_selector('.rds-notice-error:visible:has-text("does not fit on")')
+    page.locator('button:visible:text-is("Remove")').nth(1).click()
+    page.wait_for_selector('.rds-notice-error:visible:has-text("nothing would move")')
+    for place, each in enumerate(("oacs-range-arm", "oacs-z", "oacs-x"), start=2):
+        mount(page, place, each)
+    page.wait_for_selector('.rds-notice-good:visible:has-text("these modules make a machine")')
+    press(page, "Write file")
+    page.wait_for_selector('.rds-notice-good:visible:has-text("wrote by-hand.toml")')
+    assert 'module = "oacs-range-arm"' in (own_app.folder / "by-hand.toml").read_text()

@@ -20,9 +20,9 @@ from rds.modes.loop.execution import Execution, State
 from rds.modes.loop.laws import LiveReference
 from rds.modes.loop.program import program_channels
 from rds.modes.loop.retimed import EXCESS, Retimed
+from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.contour import contour_error
 from rds.nc.run.prepare import Prepared, planned
-from rds.nc.toolpath import Event, PathBlock
 
 T = 0.001
 MACHINE = load_machine("mini-cnc")

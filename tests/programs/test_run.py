@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 import rds
 from rds.cli.main import app
+from rds.core.errors import InputError
 from rds.modes.loop.execution import State
 from rds.modes.loop.retimed import EXCESS
 from rds.nc.run.prepare import prepare
@@ -54,6 +55,54 @@ def same(a: rds.Result, b: rds.Result) -> bool:
 
 def test_the_same_program_gives_the_same_samples(part: Path) -> None:
     assert same(PartProgram(part).run(), PartProgram(part).run())
+
+
+@pytest.mark.parametrize("profile", ["trapezoid", "blended"])
+def test_other_profiles_run_as_they_are_planned(part: Path, profile: str) -> None:
+    """The motion is another one: it breaks the jerk, which it does not promise to keep."""
+    program = PartProgram(part, profile=profile)
+    result = program.run(changes=[(0.0, "optional_stop", 0.0)])
+    assert program.prepared.certificate is not None and program.prepared.certificate.ok
+    shares = result.meta["program"]["limit_shares"]
+    assert max(share["jerk"] for share in shares.values()) > 2.0
+    with pytest.raises(InputError, match="plans the motion, and an interpolator makes it"):
+        PartProgram(part, profile=profile, interpolator="tustin")
+
+
+COUPLED = """import numpy as np
+params = {"Kp": 25.0, "K": [1.764, 1.882, 1.594]}
+
+
+def control(t, r, y, state, params):
+    assert r.position.shape == y.shape == (3,)
+    return (r.velocity + params["Kp"] * (r.position - y)) / np.array(params["K"]), state
+"""
+
+
+def test_a_coupled_controller_drives_the_axes_beside_the_spindles_own(part: Path) -> None:
+    """What it does is what three single ones do; its parameters are live once."""
+    (part.parent / "coupled.py").write_text(COUPLED)
+    program = PartProgram(part, controller={"file": str(part.parent / "coupled.py"), "coupled": True})
+    names = {channel.name for channel in program.plan().channels()}
+    assert "controller.Kp" in names and "X.Kp" not in names and any(name.startswith("spindle.") for name in names)
+    result = program.run()
+
+    def alone(t: float, r: Any, y: float, state: Any, params: Any) -> Any:
+        return (r.velocity + 25.0 * (r.position - y)) / 1.764, state
+
+    one = PartProgram(part, controller=alone).run()
+    assert np.array_equal(result["X_measured"], one["X_measured"])
+    assert np.array_equal(result["spindle_measured"], one["spindle_measured"])
+
+
+def test_a_comparison_has_the_contour_errors(part: Path) -> None:
+    one, other = PartProgram(part).run(), PartProgram(part, controller="p").run()
+    compared = rds.compare(one, other)
+    largest, rms = (compared.contour[f"{kind} contour error"] for kind in ("largest", "RMS"))
+    assert largest[0] == pytest.approx(one.meta["program"]["contour_error"]["max"])
+    assert rms[1] == pytest.approx(other.meta["program"]["contour_error"]["rms"])
+    assert "largest contour error [mm]" in str(compared) and "Contour" in compared._repr_html_()
+    assert compared.to_json()["contour"]["RMS contour error"] == list(rms)
 
 
 def test_the_predicted_time_is_the_executed_one(part: Path) -> None:
@@ -163,7 +212,7 @@ def test_words_that_do_not_go_with_a_program_are_refused(part: Path, tmp_path: P
 def test_what_is_too_long_is_told_before_it_is_planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "slow.ngc"
     file.write_text("G21 G94\nG1 X50 F0.01\nM2\n")
-    monkeypatch.setattr("rds.nc.run.prepare.plan", lambda *_: pytest.fail("it was planned"))
+    monkeypatch.setattr("rds.nc.run.prepare.motion_of", lambda *_, **__: pytest.fail("it was planned"))
     with pytest.raises(rds.InputError, match=r"at least 300000 s \(83\.3 h\), .* about 2\.9e\+02 GB of memory"):
         PartProgram(file)
     file.write_text("G21 G94\nG1 X50 F1\nM2\n")

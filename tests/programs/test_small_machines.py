@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rds.cli.main import app
+from rds.core.errors import InputError
 from rds.machines import load_machine
 from rds.nc.axis_plot import plot_axes
 from rds.nc.check import Setup, motion
@@ -98,6 +99,36 @@ def test_the_plot_shows_each_axis_along_the_way(tmp_path: Path) -> None:
     assert np.nanmax(of_c.lines[1].get_ydata()) == 40.0
 
 
+@pytest.mark.parametrize(
+    ("axes", "text", "end"),
+    [("X", PROGRAMS["X"], {"X": 2.0}), ("XC", "G21 G90 F600\nG1 X4\nM2\n", {"X": 4.0})],
+)
+def test_an_interpolator_moves_the_linear_axes_that_there_are(
+    axes: str, text: str, end: dict[str, float], tmp_path: Path
+) -> None:
+    part = PartProgram(written(tmp_path, text), str(machine(tmp_path, axes)), interpolator="constant-velocity")
+    result = part.run()
+    assert result.meta["program"]["completed"] and result.axes == list(end)
+    assert {name: result[f"{name}_reference"][-1] for name in end} == end
+    assert path(result, part.prepared).axes and along(result, part.prepared).axes
+
+
+def test_an_interpolator_s_arc_lies_in_the_plane_of_the_axes_that_there_are(tmp_path: Path) -> None:
+    text = "G21 G90 G18 F600\nG1 X2\nG3 X0 Z2 I-2 K0\nM2\n"
+    part = PartProgram(written(tmp_path, text), str(machine(tmp_path, "XZ")), interpolator="tustin")
+    result = part.run()
+    assert result.meta["program"]["path_error"]["max"] < 0.01 and result["Z_reference"][-1] == 2.0
+    planned = PartProgram(part.prepared.file, str(tmp_path / "XZ.toml")).run()
+    assert planned["X_reference"].min() == pytest.approx(result["X_reference"].min(), abs=0.01)
+
+
+def test_an_interpolator_refuses_rotary_moves(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"line 3: it moves a rotary axis; .*planned motion moves all axes"):
+        PartProgram(written(tmp_path, PROGRAMS["XC"]), str(machine(tmp_path, "XC")), interpolator="tustin")
+    with pytest.raises(InputError, match="has none of X, Y and Z"):
+        PartProgram(written(tmp_path, PROGRAMS["C"]), str(machine(tmp_path, "C")), interpolator="tustin")
+
+
 def test_p001_of_the_thesis_runs_and_says_what_is_assumed(tmp_path: Path) -> None:
     setup = Setup(options=Dialect(program_numbers=True, default_feed=True))
     for _ in range(2):  # the second time from the compiled form
@@ -140,7 +171,6 @@ def test_a_machine_says_its_default_feed(tmp_path: Path) -> None:
     [
         (P001, {"program_numbers": True}, "no feed rate is set"),
         (TABLE_5_2, {"program_numbers": True}, "the program does not end"),
-        (TABLE_5_2, {"open_end": True}, "--with program-numbers"),
         ("G0 X1\nO001\nM2\n", {"program_numbers": True}, "a program number stands on the first block"),
         ("%\nG0 X1\n", {"open_end": True}, "the program does not end"),
         ("O1 SUB\nG0 X1\n", {"open_end": True}, "not closed before the file's end"),

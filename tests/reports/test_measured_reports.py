@@ -15,6 +15,7 @@ from thesis_data import (
     MOVE_TIMES,
     RECONFIGURATION,
     VIBRATION,
+    VIBRATION_20MM,
     save,
 )
 
@@ -155,6 +156,13 @@ def test_readings_to_g(tmp_path: Path) -> None:
 def test_the_converter_cannot_have_had_the_5_v_of_the_text(tmp_path: Path) -> None:
     report = make_report("vibration", [save(tmp_path / "rest.csv", AT_REST)], {"reference": "5"})
     assert "at rest the sensor shows 3.75 g in all, where gravity alone is 1 g" in report.findings[1]
+
+
+def test_vibration_of_drilling_20_mm_is_that_of_table_p37(tmp_path: Path) -> None:
+    assert {len(readings) for readings in VIBRATION_20MM.values()} == {161}
+    table = make_report("vibration", [save(tmp_path / "p37.csv", VIBRATION_20MM)]).table("Acceleration")
+    assert table.column("RMS about mean [g]") == pytest.approx([0.098, 0.075, 0.163], abs=5e-4)
+    assert table.column("peak to peak [g]") == pytest.approx([0.752, 0.557, 1.133], abs=5e-4)
 
 
 def test_vibration_in_g_and_in_parts(tmp_path: Path) -> None:

@@ -19,6 +19,16 @@ from rds.results.reports import KINDS, Report, make_report, option_table, option
 
 MOVE = {"distance": "80", "counts_per_unit": "169"}
 LOG = "time_s,id,data\n0,001,01\n0.002,000,0102\n0.003,000,0103\n"
+SPEED = "time [s],X_reference_velocity [mm/s],X_measured [mm]\n" + "".join(
+    f"{0.01 * k:.2f},6.0,{0.06 * k:.6f}\n" for k in range(200)
+)
+FACE = {"x_mm": [0, 10, 0, 10, 5], "y_mm": [0, 0, 10, 10, 5], "z_mm": [16.60, 16.61, 16.63, 16.64, 16.70]}
+PATH = (
+    "segment,line,rapid,plane,start_x_mm,start_y_mm,start_z_mm,end_x_mm,end_y_mm,end_z_mm,centre_x_mm,centre_y_mm,"
+    "centre_z_mm,sweep_deg\n0,2,1,-1,0,0,0,70,20,0,0,0,0,0\n1,3,0,-1,70,20,0,0,20,0,0,0,0,0\n"
+    "2,4,0,-1,0,20,0,0,0,0,0,0,0,0\n"
+)
+GAUGES = "time_s,x_mm,y_mm,z_mm,segment\n0,0,0,0,0\n1,20,20,0,0\n3,70,20,0,1\n4,0,20,0,1\n5,0,10,0,2\n6,0,0,0,2\n"
 DATA: dict[str, tuple[Any, dict[str, str]]] = {
     "accuracy": (COUNTS_X, MOVE),
     "moves": (MOVE_TIMES, {}),
@@ -26,12 +36,19 @@ DATA: dict[str, tuple[Any, dict[str, str]]] = {
     "current": (CURRENT_X, {}),
     "vibration": (VIBRATION, {"windows": "rest=1-5, work=6-11"}),
     "reconfiguration": (RECONFIGURATION, {}),
+    "speed": (SPEED, {"pulse": "0.005"}),
+    "flatness": (FACE, {"tolerance": "0.1"}),
+    **dict.fromkeys(("return-error", "unsynchronized-rapids", "path-error"), ((GAUGES, PATH), {})),
 }
 
 
 def report_of(kind: str, tmp_path: Path, name: str = "data.csv") -> Report:
     table, options = DATA[kind]
     path = tmp_path / name
+    if isinstance(table, tuple):
+        path.write_text(table[0])
+        (tmp_path / "path.csv").write_text(table[1])
+        return make_report(kind, [path, tmp_path / "path.csv"], options)
     if isinstance(table, str):
         path.write_text(table)
     else:
@@ -60,7 +77,7 @@ def test_every_report_is_written_whole(kind: str, tmp_path: Path) -> None:
 def test_every_report_is_json(kind: str, tmp_path: Path) -> None:
     report = report_of(kind, tmp_path)
     read = json.loads(json.dumps(report.to_json(), allow_nan=False))
-    assert read["kind"] == kind and read["findings"] and read["sources"] == ["data.csv"]
+    assert read["kind"] == kind and read["findings"] and read["sources"][0] == "data.csv"
     assert [table["title"] for table in read["tables"]] == [table.title for table in report.tables]
 
 
@@ -145,6 +162,8 @@ BAD = [
     ("current", "time_s,cw_A\n0,1\n0,2\n1,2\n", "line 3, column 'time_s': time '0' is not after", {}),
     ("current", "cw_A\n1\n2\n3\n", "not a range of readings", {"windows": "a=1"}),
     ("vibration", "x_adc\n" + "500\n" * 5 + "1024\n", "line 7, column 'x_adc': '1024' is no reading of 10 bits", {}),
+    ("flatness", "x_mm,y_mm\n1,2\n", "there is no column z_mm; a face needs", {}),
+    ("flatness", "x_mm,y_mm,z_mm\n1,1,1\n2,2,1\n3,3,1\n4,4,2\n", "all readings are on one line", {}),
     ("vibration", "x_adc\n500\n501\n", "needs at least 5", {}),
     ("vibration", "x_mV\n" + "500\n" * 5, "are in adc or g", {}),
     ("reconfiguration", "event,module\nremoved,X\n", "no column 'time'", {}),

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rds.identification.robustness.margins import LinearLaw, loop_margins, margins_of, open_loop
+from rds.core.linear_law import Law
+from rds.identification.robustness.margins import loop_margins, margins_of, open_loop
 from rds.models import library_model
 
 T = 0.001  # s
-NONE = np.zeros(0)
 
 
 def axis(tau: float, K: float) -> Any:
@@ -19,9 +19,9 @@ def axis(tau: float, K: float) -> Any:
     return library_model("linear-axis", tau=tau, K=K)
 
 
-def proportional(gain: float) -> LinearLaw:
+def proportional(gain: float) -> Law:
     """V/mm."""
-    return LinearLaw(np.zeros((0, 0)), NONE, NONE, -gain)
+    return Law.gain(-gain)
 
 
 def test_the_gain_margin_counts_less_gain_too() -> None:
@@ -29,7 +29,7 @@ def test_the_gain_margin_counts_less_gain_too() -> None:
     import control
 
     tau, P, Ki, D = 0.07239, 58.04, 1678.7, 1.8035  # s, V/mm, V/(mm s), V s/mm; K = 1 (mm/s)/V
-    law = LinearLaw(np.diag([1.0, 0.0]), np.array([T, 1.0]), np.array([-Ki, D / T]), -(P + D / T + Ki * T))
+    law = Law(np.diag([1.0, 0.0]), np.array([[T], [1.0]]), np.array([[-Ki, D / T]]), -(P + D / T + Ki * T))
     found = loop_margins(law, [axis(tau, 1.0)], T)[0]
     plant = control.tf([1.0], [tau, 1.0, 0.0]).sample(T)
     pid = control.tf([P + D / T + Ki * T, -(P + 2 * D / T), D / T], [1.0, -1.0, 0.0], T)

@@ -18,7 +18,7 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.identification.robustness import study
 from rds.identification.robustness.draws import Spread, draws
-from rds.identification.robustness.margins import linear_law, loop_margins
+from rds.identification.robustness.margins import law_about_rest, loop_margins
 from rds.identification.robustness.report import write_study
 from rds.identification.robustness.summary import sentences, summaries, to_json
 from rds.identification.robustness.uncertain import uncertain
@@ -121,11 +121,11 @@ def test_draws_have_the_covariance_of_the_estimate() -> None:
 def test_margins_are_those_of_python_control(tmp_path: Path, controller: Any) -> None:
     import control
 
-    law = linear_law(experiment(tmp_path, controller=controller).plan().axes[0].controller)
+    law = law_about_rest(experiment(tmp_path, controller=controller).plan().axes[0].controller)
     assert law is not None
     gain, phase, modulus, radius = loop_margins(law, [library_model("linear-axis", **X)], 0.001)[0]
     axis = control.ss([[0.0, 1.0], [0.0, -1 / X["tau"]]], [[0.0], [X["K"] / X["tau"]]], [[1.0, 0.0]], 0.0)
-    feedback = control.ss(law.A, law.B[:, None], law.C[None, :], law.D, dt=0.001)
+    feedback = control.ss(law.F, law.G, law.H, law.D, dt=0.001)
     loop = -control.series(axis.sample(0.001), feedback)
     wanted = control.stability_margins(loop)
     assert gain == pytest.approx(20 * np.log10(wanted[0]), abs=0.02)
@@ -134,7 +134,7 @@ def test_margins_are_those_of_python_control(tmp_path: Path, controller: Any) ->
 
 
 def test_a_delay_takes_its_phase(tmp_path: Path) -> None:
-    law = linear_law(experiment(tmp_path).plan().axes[0].controller)
+    law = law_about_rest(experiment(tmp_path).plan().axes[0].controller)
     assert law is not None
     models = [library_model("machine-axis", **X, delay=delay) for delay in (0.0, 0.002, 0.0025)]
     found = loop_margins(law, models, 0.001)

@@ -362,7 +362,8 @@ def test_a_fault_in_a_simulation(experiment: Maker, alone: Path, fault: str) -> 
     what, said = FAULTS[fault]
     with pytest.raises(rds.ContractError, match=said):
         experiment(at_once(1.0, what)).run(out=alone / "run")
-    assert not (alone / "run").exists()
+    kept = rds.open_result(alone / "run")
+    assert kept.meta["ending"] == "fault" and kept["time"][-1] < 1.0
 
 
 @pytest.mark.parametrize(

@@ -48,11 +48,11 @@ def test_the_loop_has_the_poles_that_were_placed(tmp_path_factory: pytest.TempPa
 
 
 def test_margins_are_those_of_the_robustness_study(tmp_path: Path) -> None:
-    from rds.identification.robustness.margins import linear_law, loop_margins
+    from rds.identification.robustness.margins import law_about_rest, loop_margins
     from rds.models import library_model
 
     made = design(tmp_path).now()
-    law = linear_law(library_controller("tracking", X, 0.001, 10.0))
+    law = law_about_rest(library_controller("tracking", X, 0.001, 10.0))
     assert law is not None
     model = library_model("linear-axis", tau=X["tau"], K=X["K"])
     assert list(made.margins.values()) == loop_margins(law, [model], 0.001)[0].tolist()

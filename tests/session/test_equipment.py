@@ -82,7 +82,7 @@ def test_parameters_are_those_of_the_library_with_their_units(tmp_path: Path) ->
     from rds.controllers import controller_module
 
     equipment = Equipment(Session(tmp_path), "control")
-    for name in ("p", "pid", "modified-pid"):
+    for name in ("cascade", "p", "pid", "modified-pid"):
         choose(equipment, controller=name)
         assert equipment.parameters == [f"controller.{option}" for option in controller_module(name).OPTIONS]
     assert equipment.choices.fields["controller.Pgain"].unit == "V/mm"
@@ -98,6 +98,9 @@ def test_parameters_are_those_of_the_library_with_their_units(tmp_path: Path) ->
         ("control", {"controller": "tracking", "controller__pole": -20.0, "controller__pole_imaginary": 0.0}),
         ("control", {"controller": "user", "controller_file": "mine.py", "offset": 1.0}),
         ("control", {"shape": "user", "shape_file": "2*sin(t)+t"}),
+        ("control", {"shape": "chirp", "signal__highest": 5.0, "controller": "smith", "controller__law": "p"}),
+        ("control", {"shape": "speed", "signal__points": "[[0.0, 0.0], [0.4, 5.0]]", "controller": "cascade"}),
+        ("model", {"shape": "staircase", "amplitude": 1.0, "signal__steps": 3}),
         ("model", {"shape": "user", "shape_file": "3*(t > 0.1)", "system": "spindle"}),
         ("model", {"shape": "square", "amplitude": 1.5, "sample_period": 0.002}),
     ],
@@ -116,6 +119,20 @@ def test_file_and_python_are_the_panels_run_sample_for_sample(tmp_path: Path, ki
     for again in (from_file, namespace["result"]):
         for name in run.result.columns:
             assert np.array_equal(run.result[name], again[name]), name
+
+
+def test_an_option_that_is_no_number_is_written_as_in_a_file(tmp_path: Path) -> None:
+    equipment = choose(Equipment(Session(tmp_path), "control"), controller="feedforward")
+    assert equipment.table()["controller"] == {"name": "feedforward", "observer_pole": -320.0}
+    choose(equipment, controller__poles="[[-30.0, 10.0], [-30.0, -10.0]]")
+    assert equipment.table()["controller"]["poles"] == [[-30.0, 10.0], [-30.0, -10.0]]
+    with pytest.raises(InputError, match=r"poles.*is not a value as in a file"):
+        equipment.choices.set("controller.poles", "[-30, ")
+    with pytest.raises(InputError, match=r"law.*is unknown; known"):
+        choose(equipment, controller="smith", controller__law="fly")
+    choose(equipment, shape="constant")
+    assert equipment.table()["reference"] == {"kind": "constant", "value": 1.0}
+    assert not {"amplitude", "frequency", "offset"} & {*equipment.shown}
 
 
 def test_params_of_a_students_file_can_be_set_before_a_run(tmp_path: Path) -> None:

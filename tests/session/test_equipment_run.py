@@ -42,14 +42,14 @@ def test_a_simulation_leaves_its_files_and_its_traces(tmp_path: Path) -> None:
 def test_a_run_that_is_being_saved_is_not_cut_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
 
-    def save(result: object, folder: Path, title: str) -> dict[str, Path]:
+    def save(result: object, program: object, folder: Path, title: str) -> dict[str, Path]:
         for early in folder.glob("result.*"):
             early.unlink()
         (folder / "record.rds").touch()  # as a loop against the clock leaves it
         seen.extend(kept.state for kept in Session(tmp_path).runs())
         return {}
 
-    monkeypatch.setattr("rds.panels.equipment.run.save_with_report", save)
+    monkeypatch.setattr("rds.panels.equipment.run.save_run", save)
     equipment = Equipment(Session(tmp_path), "control")
     equipment.choices.set("duration", 0.01)
     run = equipment.run().start()

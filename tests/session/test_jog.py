@@ -71,6 +71,18 @@ def test_a_hold_that_is_not_renewed_ends(jog: Jog) -> None:
     assert jog.positions["Y"] == jog.positions["Z"] == 0.0
 
 
+def test_a_machine_with_steppers_is_started_on_a_serial_line_and_moves(alone: Path) -> None:
+    jog = Jog(Session(alone, "starmill"))
+    task = jog.begin()
+    assert task.wait(PATIENCE) and task.error is None, task.error
+    try:
+        assert jog.dialect == "dcs" and set(jog.speeds) == {"spindle"}
+        hold_until(jog, 1.0)
+        wait_for(lambda: not jog.moving)
+    finally:
+        jog.end()
+
+
 def test_steps_go_as_far_as_they_say_and_not_out_of_the_travel(jog: Jog) -> None:
     jog.choices.set("step", "0.1")
     jog.step("Y", -1)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +14,8 @@ from hypothesis import strategies as st
 from rds.bus.modules.oacs.module_data import read_modules
 from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
-from rds.panels.machine.configuration import directions, faults, first_order, moved, write_machine
+from rds.machines.assembly import first_order, judged
+from rds.panels.machine.configuration import directions, moved, write_machine
 from rds.panels.machine.monitor import BusMonitor, parse_filter
 from rds.panels.machine.state import MachineDesk
 from rds.panels.session import Session
@@ -49,20 +51,41 @@ def desk(alone: Path) -> Iterator[MachineDesk]:
     made.end()
 
 
+def test_units_on_a_serial_line_are_started_and_found(alone: Path) -> None:
+    made = MachineDesk(Session(alone, "mini-cnc"))
+    assert made.bus[0] == "rds"
+    made.choices.set("machine", "starmill")
+    assert made.choices["dialect"] == "dcs" and made.bus == ("serial", "starmill")
+    with pytest.raises(MachineError, match="no module answers on serial:starmill; start the simulated modules"):
+        done(made.scan())
+    done(made.start())
+    try:
+        assert [row["id"] for row in done(made.scan())] == [2, 3, 4, 5]
+    finally:
+        made.end()
+    made.choices.set("machine", "mini-cnc")
+    assert made.choices["dialect"] == "rds" and made.bus == ("rds", "mini-cnc")
+
+
 # configuration
 
 
 def test_the_thesis_s_machine_is_viable_from_its_tool_on_and_can_be_read_again(tmp_path: Path) -> None:
     data = described()
-    order = first_order(data)
-    assert order == [5, 2, 3, 4]
-    assert faults(order, data) == []
-    shifts = {number: direction.round(9).tolist() for number, (_, direction) in directions(order, data).items()}
-    assert shifts == {2: [0, 0, 1], 3: [0, 0, 1], 4: [1, 0, 0]}
+    order = [5, "oacs-range-arm", 2, 4, 3]
+    assert first_order(data) == order, "Z says which accessory it carries"
+    assert judged(order, data).ok
+    shifts = {name: direction.round(9).tolist() for name, (_, direction) in directions(order, data).items()}
+    assert shifts == {"Z": [0, 0, 1], "A": [0, 0, 1], "X": [1, 0, 0]}
     machine = load_machine(str(write_machine(tmp_path, "mine.toml", order, data)))
     own = load_machine("mrmt-oacs")
     assert {axis.node: axis.travel for axis in machine.axes.values()} == {a.node: a.travel for a in own.axes.values()}
     assert machine.axis("X").resolution == pytest.approx(1 / 169)
+    q = own.kinematics.random(10)
+    by_name = [machine.kinematics.joints.index(name) for name in own.kinematics.joints]
+    again = np.empty_like(q)
+    again[:, by_name] = q
+    np.testing.assert_allclose(machine.kinematics.forward(again), own.kinematics.forward(q), atol=1e-9)
     with pytest.raises(InputError, match="there is such a file already"):
         write_machine(tmp_path, "mine.toml", order, data)
     with pytest.raises(InputError, match="plain name"):
@@ -71,16 +94,26 @@ def test_the_thesis_s_machine_is_viable_from_its_tool_on_and_can_be_read_again(t
 
 def test_what_makes_no_machine_is_said(tmp_path: Path) -> None:
     data = described()
+
+    def faults(order: list[int | str], data: dict[int, dict[str, Any]]) -> list[str]:
+        return [fault.text for fault in judged(order, data).faults]
+
     assert "must be the first" in faults([2, 5, 3, 4], data)[0]
     assert "one tool; there are 0" in faults([2, 3, 4], data)[0]
     assert "one axis at least" in faults([5], data)[0]
     assert "scan" in faults([], data)[0]
+    assert "module 9 is not on the bus" in faults([5, 9], data)[0]
     twice = data | {6: data[4] | {"number": 6}}
-    assert [fault.split(";")[0] for fault in faults([5, 2, 3, 4, 6], twice)] == [
-        "2 modules are called X",
-        "module 6 (X) shifts the tool in a direction in which the modules before it do already: leave it out, or mount "
-        "it in another direction",
-    ]
+    assert [fault.split(";")[0] for fault in faults([5, 2, 3, 4, 6], twice)] == ["2 modules are called X"]
+    unknown = {number: each | {"type_text": f"Own{number}"} for number, each in data.items()}
+    assert judged([5, "oacs-range-arm", 2, 4, 3], unknown).ok, "what the library does not know it does not refuse"
+    other = unknown[2] | {"carries_on": {"kind": "bolted", "size": 120.0, "gender": "male"}}
+    assert (
+        "does not fit on 'Z' (male bolted 120 mm (carries_on))"
+        in (faults([5, "oacs-range-arm", 2, 4, 3], data | {2: other})[0])
+    )
+    assert "'A' (oacs-a: male work table 200 mm (table)) does not fit on 'X'" in faults([5, 2, 3, 4], data)[0]
+    assert "does not fit on 'X'" in faults([5, 2, "oacs-range-arm", 4, 3], data)[0]
     with pytest.raises(InputError, match="must be the first"):
         write_machine(tmp_path, "mine.toml", [2, 5, 3, 4], data)
     assert not (tmp_path / "mine.toml").exists()

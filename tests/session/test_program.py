@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from rds.core.errors import InputError
 from rds.nc.active import Follower, modes_at
+from rds.panels.interpolator.motion import MADE
 from rds.panels.program.check import Look
 from rds.panels.program.state import Program
 from rds.panels.program.text import ProgramText
@@ -255,6 +256,47 @@ def test_a_run_saves_the_program_and_has_its_results_in_a_folder(
     kept = work.result["contour_error"]
     assert rows[:, -1] == pytest.approx(kept[:: round(0.01 / work.result.sample_period)])
     assert len(work.new_rows()) == 0
+
+
+def test_an_interpolator_makes_the_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rds.panels.program.run.save_run", lambda result, prepared, folder: None)
+    made = program(tmp_path, "G21 G90", "G1 X2 F600", "G2 X0 Y0 I-1 J0", "M2")
+    assert looked(made).ok and set(MADE) <= made.idle()
+    made.choices.set("interpolator", "tustin")
+    assert made.idle() == {"interpolator_file"}
+    work = made.run().start()
+    assert work.wait(PATIENCE) and work.error is None and work.result is not None
+    assert work.result.meta["program"]["interpolator"] == "tustin"
+    assert work.result.meta["program"]["acceleration"]["name"] == "s-shape"
+    kept = work.result["contour_error"][:: round(0.01 / work.result.sample_period)]
+    assert work.new_rows()[:, -1] == pytest.approx(kept)
+    made.choices.set("override", 150.0)
+    with pytest.raises(InputError, match="above 100 % goes with planned motion"):
+        made.run()
+    made.choices.set("override", 100.0)
+    made.choices.set("interpolator", "user")
+    assert "interpolator_file" not in made.idle()
+    with pytest.raises(InputError, match="interpolator's file is not there"):
+        made.run()
+    (tmp_path / "mine.py").write_text("def interpolate(segment, T, params):\n    yield from ()\n    return 3\n")
+    made.choices.set("interpolator_file", "mine.py")
+    work = made.run().start()
+    assert work.wait(PATIENCE) and isinstance(work.error, InputError) and "mine.py" in str(work.error)
+
+
+def test_one_controller_for_all_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rds.panels.program.run.save_run", lambda result, prepared, folder: None)
+    made = program(tmp_path, "G21 G90", "G1 X1 F600", "M2")
+    assert looked(made).ok
+    made.choices.set("coupled", True)
+    with pytest.raises(InputError, match="tracking is for single axes"):
+        made.run()
+    (tmp_path / "all.py").write_text("def control(t, r, y, state, params):\n    return 20 * (r.position - y), state\n")
+    made.choices.set("controller", "all.py")
+    work = made.run().start()
+    assert work.wait(PATIENCE) and work.error is None and work.result is not None
+    assert work.result["X_measured"][-1] == pytest.approx(1.0, abs=0.2)
+    assert work.result.meta["controller"]["X"]["name"] == work.result.meta["controller"]["Y"]["name"] == "all.py"
 
 
 def test_what_cannot_run_is_refused_before_anything_is_written(tmp_path: Path) -> None:

@@ -120,5 +120,6 @@ def test_bad_options_are_refused_with_a_remedy(options, fault):
 
 
 def test_kinds_are_listed():
-    assert signal_kinds() == ["square", "triangle", "sinusoid", "user", "constant", "multisine", "chirp", "staircase"]
+    kinds = ["square", "triangle", "sinusoid", "user", "constant", "multisine", "chirp", "staircase", "speed"]
+    assert signal_kinds() == kinds
     assert make_signal("sinusoid", amplitude=5, frequency=0.2).settings["phase"] == 0.0

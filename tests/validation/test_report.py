@@ -104,7 +104,8 @@ def test_a_student_s_file_and_others_against_it(tmp_path: Path) -> None:
     data = saved(tmp_path, "data", square(4.0))
     (tmp_path / "mine.py").write_text(STUDENT)
     answer = rds(tmp_path / "mine.py", data, "--against", model_file(tmp_path / "m.toml"), "--json")
-    assert json.loads(answer.stdout)["purpose"] == "simulating the velocity"  # without friction, the position drifts
+    assert json.loads(answer.stdout)["verdict"] == "not valid" and answer.exit_code == 1
+    assert "its gain is" in json.loads(answer.stdout)["sentence"]  # without friction, it is too fast
     (ranking,) = json.loads(answer.stdout)["comparison"].values()
     assert [row["name"] for row in ranking["ranks"]] == ["m", "mine.py"]
     assert ranking["ranks"][0]["aicc_weight"] > 0.999

@@ -40,7 +40,7 @@ def test_the_true_model_is_valid_on_data_of_another_signal() -> None:
     assert a.free_run is not None and a.free_run.fit_percent > 99.9
     assert a.free_run.rmse < 0.5e-3  # mm: half a step of the encoder
     assert a.voltage is not None and a.voltage.relative_percent is not None and a.voltage.relative_percent < 3.0
-    assert found.verdict.sentence == "model is valid for fresh (up to 7.17 mm/s and 4.2 V)."
+    assert found.verdict.sentence == "model is valid for fresh (up to 7.17 mm/s, 4.2 V and 11 Hz)."
     first, *reasons = str(found).splitlines()
     assert first == found.verdict.sentence and len(reasons) == len(found.verdict.reasons)
     sides = [line.split(":")[0] for line in reasons]
@@ -130,6 +130,25 @@ def test_the_fit_s_own_data_prove_nothing_and_are_known_by_file_and_by_content()
     assert "same-data" not in kinds(other, "cannot tell")
 
 
+def test_the_fit_s_own_data_are_known_with_noise_resampled_and_thinned_out() -> None:
+    first = log(FRESH)
+    seen = candidate(share=1e-4, fitted_on=(fitted_stretch(first),))
+    draw = np.random.default_rng(3)
+    noisy = log(FRESH, first.position + STEP * draw.integers(-1, 2, len(FRESH)), name="noisy")
+    every = slice(None, None, 2)
+    half = replace(first, time=first.time[every], command=FRESH[every], position=first.position[every], name="half")
+    t = first.time[:-1] + 0.37 * T
+    between = np.interp(t, first.time, first.position)
+    resampled = replace(first, time=t, command=FRESH[:-1], position=between, resolution=None, name="resampled")
+    later = replace(noisy, time=noisy.time + 100.0, name="later")
+    for data in (noisy, half, resampled, later, noisy.part(1000, 7000)):
+        found = validate(seen, data)
+        assert "same-data" in kinds(found, "cannot tell") and found.verdict.word is Word.UNTOLD, data.name
+        assert found.assessments[data.name].overlap.share > 0.9 and "the same motion" in str(found)
+    other = square(8.0, 3.0, 0.72)
+    assert "same-data" not in kinds(validate(seen, log(other, name="other")), "cannot tell")
+
+
 def test_the_rest_of_a_file_of_which_a_part_was_fitted_is_new() -> None:
     whole = log(FRESH, sha256="ab" * 32)
     half = candidate(share=1e-4, fitted_on=(fitted_stretch(whole.part(0, 4000)),))
@@ -178,7 +197,8 @@ def test_a_closed_loop_hides_no_delay() -> None:
     assert estimate.parameters["tau"].low > 1.1 * X["tau"]
     assert any("predictions 100 samples ahead are" in warning for warning in estimate.warnings)
     found = validate(estimate, logs[1])
-    assert "structure-held" in kinds(found, "against") and "is not shown" in found.verdict.sentence
+    assert {"structure-held", "delay"} <= kinds(found, "against") and "delay is 2.9" in found.verdict.sentence
+    assert found.verdict.word is Word.NOT and found.exit_code == 1
     right = validate(fit(logs[:1], axis), logs[1])
     assert "structure-held" not in kinds(right, "against")
 
@@ -282,7 +302,7 @@ def test_several_logs_have_the_verdict_of_the_worst() -> None:
 
 def test_bands_move_the_verdict_and_unknown_ones_are_refused() -> None:
     strict = validate(candidate(X | {"K": 1.85}), log(FRESH), bands=Bands(fit_percent=99.0))
-    mild = validate(candidate(X | {"K": 1.85}), log(FRESH), bands=Bands(fit_percent=50.0))
+    mild = validate(candidate(X | {"K": 1.85}), log(FRESH), bands=Bands(fit_percent=50.0, gain_percent=10.0))
     assert strict.verdict.word is Word.NOT and mild.verdict.word is Word.PARTLY
     with pytest.raises(InputError, match="there is no band 'fit'; the bands are fit_percent"):
         Bands.read({"fit": 90.0})

@@ -11,7 +11,7 @@ from rds.bus.analysis.messages import Message, in_order, messages_of
 from rds.bus.analysis.response_times import NS, Errors, Response, responses
 from rds.bus.analysis.schedule import Slot, occupied, one_cycle
 from rds.bus.medium.bits import INTERFRAME
-from rds.bus.modules.dialects import DEFAULT, check_dialect
+from rds.bus.modules.dialects import DEFAULT, SERIAL_DIALECTS, check_dialect
 from rds.core.errors import InputError
 from rds.machines.machine import Machine
 
@@ -126,6 +126,10 @@ def analyse(
     can't be.
     """
     check_dialect(dialect)
+    if dialect in SERIAL_DIALECTS:
+        raise InputError(
+            f"dialect {dialect} has no CAN frames: `rds bus analyse --dialect {dialect}` analyses its line"
+        )
     period = machine.sample_period if sample_period is None else sample_period
     if dialect == "cia402":
         from rds.bus.modules.cia402.messages import messages_of_drives

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from rds.bus.medium.bits import Bits, frame_bits, least_bits, most_bits
@@ -130,15 +130,16 @@ def messages_of(
 ) -> list[Message]:
     """What goes over a machine's bus in each sample period: the command, and each module's answer to it.
 
-    The command is released by the host's clock, `host_jitter` s late at most. Answers are released by its arrival, at
-    each module `response_time` s later at most; their deadline is the end of the sample period, when the next command
-    is due. The data are those of a machine at rest. Set-up and call are left out: they are sent before a run.
+    A machine of five to eight axes has the frame with their voltages before the command. The first frame is released by
+    the host's clock, `host_jitter` s late at most. Answers are released by the command's arrival, at each module
+    `response_time` s later at most; their deadline is the end of the sample period, when the next command is due. The
+    data are those of a machine at rest. Set-up and call are left out: they are sent before a run.
 
-    Raises InputError for a machine with more axes than a command has slots.
+    Raises InputError for a machine with more axes than commands have slots.
     """
     period = machine.sample_period if sample_period is None else sample_period
-    if len(machine.axes) > frames.SLOTS:
-        raise InputError(f"{len(machine.axes)} axes; one command carries {frames.SLOTS} voltages", machine.path)
+    if len(machine.axes) > frames.MOST_AXES:
+        raise InputError(f"{len(machine.axes)} axes; commands carry {frames.MOST_AXES} voltages", machine.path)
     command = Message(
         name="command",
         identifier=frames.COMMAND,
@@ -166,4 +167,7 @@ def messages_of(
         )
         for axis in machine.axes.values()
     ]
-    return in_order([command, *answers])
+    if len(machine.axes) <= frames.SLOTS:
+        return in_order([command, *answers])
+    more = replace(command, name="voltages 5 to 8", identifier=frames.MORE_VOLTAGES)
+    return in_order([more, replace(command, after=more.name, jitter=0.0), *answers])

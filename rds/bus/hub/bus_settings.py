@@ -15,6 +15,19 @@ BITRATE = Quantity(
 )
 DATA_BITRATE = Quantity("bit rate of the fast part of CAN FD frames", "bit/s", 10_000, 8_000_000, whole=True)
 RESTART = Quantity("time until the host comes back from bus off", "ms", 0, 3_600_000, whole=True)
+# a serial line (dialect dcs); the rest of it belongs to a line that a run starts itself
+SERIAL = "serial"
+DEFAULT_BAUD = 115_200
+BAUD = Quantity("baud rate; a byte takes ten bits", "bit/s", 300, 10_000_000, default=DEFAULT_BAUD, whole=True)
+NOISE = Quantity("share of the bytes in which noise turns a bit", "", 0.0, 1.0)
+_LINE = {
+    "baud": BAUD,
+    "noise": NOISE,
+    "seed": Quantity("seed of the noise", "", 0, whole=True),
+    "gap": Quantity("silence that ends half a frame", "s", 1e-4, 1.0),
+}
+OF_OWN_LINE = ("noise", "seed", "drift", "gap", "trace")  # what only a line that is simulated here has
+_OF_SERIAL = ("interface", "channel", "dialect", "checksum", *_LINE, "drift", "trace")
 OPTIONS = ("bitrate", "data_bitrate", "name", "error_frames", "restart_ms")
 
 # what drivers, servers and scans are told beside an adapter's options: a key of this name would be taken for it
@@ -30,6 +43,21 @@ def bus_fault(table: Mapping[str, Any]) -> tuple[str, str] | None:
         return ours[0], f"cannot be said: {ours[0]} is no option of a bus, but a word of our own; remove it"
     if "cia402" in table and table.get("dialect") != "cia402":
         return "cia402", 'is for drives: add `dialect = "cia402"` to [bus], or remove it'
+    return None
+
+
+def serial_fault(table: Mapping[str, Any]) -> tuple[str, str] | None:
+    """The key of a serial line's `[bus]` table that cannot be, and why; None if there is none."""
+    for key, value in table.items():
+        if key not in _OF_SERIAL:
+            return key, f"is no option of a serial line; it takes {', '.join(_OF_SERIAL)}"
+        fault = _LINE[key].fault(value) if key in _LINE else None
+        if key == "checksum" and not isinstance(value, bool):
+            fault = "must be true or false (whether frames carry a checksum)"
+        if fault is not None:
+            return key, fault
+    if table.get("interface", SERIAL) != SERIAL:
+        return "interface", f'must be "{SERIAL}": dialect dcs is spoken on serial lines'
     return None
 
 

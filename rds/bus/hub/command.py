@@ -7,7 +7,8 @@ import os
 import sys
 import time
 
-from rds.bus.hub.address import lock_file, runtime_directory
+from rds.bus.hub.address import lock_file
+from rds.bus.hub.runtime_folder import runtime_directory
 from rds.core.errors import MachineError
 
 _LONGEST = 400  # bytes of a holder's name

@@ -16,7 +16,8 @@ from collections.abc import Sequence
 from types import FrameType
 
 from rds.bus.hub.address import Address
-from rds.bus.hub.hub_loop import LINGER, QUEUE, STALL, Hub, log
+from rds.bus.hub.hub_loop import LINGER, QUEUE, STALL, Hub
+from rds.bus.hub.hub_nodes import log
 from rds.core.private_files import keep_process_private
 
 PRIORITY = 70  # below the target's 80, above the modules' 60

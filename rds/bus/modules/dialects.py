@@ -6,42 +6,64 @@ A dialect is a folder beside this file. Its server module has `serve(machine, in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from rds.bus.hub.bus_settings import SERIAL
 from rds.core.contracts import Drivers
 from rds.core.errors import InputError
 from rds.machines.machine import Machine
 
 if TYPE_CHECKING:  # where the type checker proves that every dialect keeps the contract
     from rds.bus.modules.cia402.host import Cia402Drivers
+    from rds.bus.modules.dcs.drivers import DcsDrivers
     from rds.bus.modules.oacs.drivers import OacsDrivers
     from rds.bus.modules.rds.drivers import AxisDrivers
 
-    _CHECKED: tuple[type[Drivers], ...] = (AxisDrivers, OacsDrivers, Cia402Drivers)
+    _CHECKED: tuple[type[Drivers], ...] = (AxisDrivers, OacsDrivers, Cia402Drivers, DcsDrivers)
 
 _DRIVERS = {
     "rds": ("rds.bus.modules.rds.drivers", "AxisDrivers"),
     "oacs": ("rds.bus.modules.oacs.drivers", "OacsDrivers"),
     "cia402": ("rds.bus.modules.cia402.host", "Cia402Drivers"),
+    "dcs": ("rds.bus.modules.dcs.drivers", "DcsDrivers"),
 }
 _SERVERS = {
     "rds": "rds.bus.modules.rds.server",
     "oacs": "rds.bus.modules.oacs.server",
     "cia402": "rds.bus.modules.cia402.server",
+    "dcs": "rds.bus.modules.dcs.server",
 }
 _IDENTIFIERS = {
     "rds": "rds.bus.modules.rds.frames",
     "oacs": "rds.bus.modules.oacs.messages",
     "cia402": "rds.bus.modules.cia402.codes",
+    "dcs": "rds.bus.modules.dcs.frames",
 }
+_COMMANDS = {"cia402": "rds.bus.modules.cia402.settings"}  # where a dialect commands by other things than voltages
 DEFAULT = "rds"
+SERIAL_DIALECTS = ("dcs",)  # not on CAN: their interface is "serial"
 
 
 def dialect_names() -> list[str]:
     """The dialects there are; the first is the cyclic frames of `rds.bus.modules.rds.frames`."""
     return list(_DRIVERS)
+
+
+def interface_of(dialect: str, interface: str) -> str:
+    """The interface that a dialect is spoken on, where the built-in bus stands for "none was said"."""
+    return SERIAL if dialect in SERIAL_DIALECTS and interface == "rds" else interface
+
+
+def bus_interface(machine: Machine, bus: Mapping[str, Any]) -> str:
+    """The interface that a `[bus]` table says; where it says none, that on which the machine's modules are.
+
+    A machine whose axes have a motor in [axis.NAME.module] has units on a serial line.
+    """
+    if "interface" not in bus and "dialect" not in bus and any(a.module.get("motor") for a in machine.axes.values()):
+        return SERIAL
+    return interface_of(str(bus.get("dialect", DEFAULT)), str(bus.get("interface", "rds")))
 
 
 def check_dialect(dialect: str) -> None:
@@ -61,6 +83,18 @@ def identifiers(dialect: str) -> tuple[tuple[int, int, str], ...]:
     return table
 
 
+def commands(dialect: str, machine: Machine, axes: Sequence[str], bus: Mapping[str, Any]) -> dict[str, str]:
+    """What each axis is commanded by over this bus: "voltage", or a target for a loop that its drive closes.
+
+    Such are "velocity", "position", and "profile" for positions that the drive goes to by a profile of its own.
+    InputError for a table of the dialect in `bus` that will not do.
+    """
+    if dialect not in _COMMANDS:
+        return dict.fromkeys(axes, "voltage")
+    commanded: dict[str, str] = import_module(_COMMANDS[dialect]).commands(bus.get(dialect) or {}, machine, axes)
+    return commanded
+
+
 def open_drivers(
     dialect: str, machine: Machine, axes: Sequence[str], sample_period: float, dry_run: bool, bus: dict[str, Any]
 ) -> Drivers:
@@ -77,7 +111,7 @@ def is_served(dialect: str, machine: Machine, interface: str, channel: str | Non
     """
     if _answers(dialect, machine, interface, channel, **options):
         return True
-    rest = [other for other in _DRIVERS if other != dialect]
+    rest = [] if dialect in SERIAL_DIALECTS else [other for other in _DRIVERS if other != dialect]
     others = [other for other in rest if _answers(other, machine, interface, channel, **options)]
     if not others:
         return False
@@ -102,6 +136,10 @@ def find_dialect(
 
 
 def _answers(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:
+    if dialect in SERIAL_DIALECTS:
+        from rds.bus.modules.dcs.calling import find_units
+
+        return interface == SERIAL and bool(find_units(machine, channel, **options))
     if dialect == "cia402":
         from rds.bus.modules.cia402.scan import scan
 

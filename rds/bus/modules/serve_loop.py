@@ -105,10 +105,11 @@ def serve_nodes(
         machine.axis(name)
     nodes = [] if nodes is None else nodes
     try:
-        for slot, axis in enumerate(machine.axes.values()):
+        for axis in machine.axes.values():
             if axes is None or axis.name in axes:
+                slot = machine.slots[axis.name]
                 nodes.append(make_node(slot, axis, partial(open_bus, interface, channel, node=axis.name, **options)))
-        with _as_process(stop), _injected(channel, faults):
+        with as_process(stop), _injected(channel, faults):
             if ready is not None:
                 ready()
             keep_on = _until(stop, orphaned, afterlife, nodes)
@@ -133,7 +134,7 @@ def _injected(channel: str | None, faults: Sequence[Fault]) -> Iterator[None]:
 
 
 @contextmanager
-def _as_process(stop: threading.Event) -> Iterator[None]:
+def as_process(stop: threading.Event) -> Iterator[None]:
     """Where the whole process is the machine's: be on time, and end when told."""
     if threading.current_thread() is not threading.main_thread():
         yield

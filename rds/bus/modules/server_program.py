@@ -28,6 +28,7 @@ def run(
     description: str,
     arguments: Sequence[str] | None = None,
     lines: queue.SimpleQueue[str] | None = None,
+    interface: str = BUILTIN,
 ) -> int:
     """`python -m MODULE MACHINE [options]`, with the function `serve` of a dialect. Lines on stdin go to `lines`.
 
@@ -35,7 +36,7 @@ def run(
     """
     parser = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
     parser.add_argument("machine")
-    parser.add_argument("--interface", default=BUILTIN)
+    parser.add_argument("--interface", default=interface)
     parser.add_argument("--channel", default=None)
     parser.add_argument("--axes", "--modules", default=None, help="names, separated by commas (default: all)")
     parser.add_argument("--faults", default=None, metavar="FILE", help="schedule of faults, TOML")

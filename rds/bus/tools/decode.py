@@ -61,6 +61,9 @@ def cyclic(identifier: int, data: bytes) -> Decoded | None:
             voltages = frames.decode_voltages(identifier, data)
             name = "command" if identifier == frames.COMMAND else "dry command"
             return Decoded(name, {f"slot {i}": f"{volts:+.3f} V" for i, volts in enumerate(voltages)})
+        if identifier == frames.MORE_VOLTAGES:
+            voltages = frames.decode_voltages(identifier, data)
+            return Decoded("more voltages", {f"slot {i}": f"{volts:+.3f} V" for i, volts in enumerate(voltages, 4)})
         if identifier == frames.SETUP:
             return Decoded("set-up", {"period": f"{frames.decode_setup(identifier, data) * 1e3:g} ms"})
         if identifier == frames.CALL and not data:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rds.bus.hub.bus_settings import SERIAL
 from rds.bus.tools.beyond import OPTION, refuse_network
 from rds.core.errors import InputError, MachineError
 from rds.machines.machine import Machine
@@ -27,8 +28,10 @@ def bus_options(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def default_channel(machine: Machine, interface: str, channel: str | None) -> str | None:
-    """The channel that was asked for, else the machine's name on the built-in bus, else the interface's own default."""
-    return channel if channel is not None or interface != BUILTIN else machine.name
+    """The channel that was asked for, else the machine's name on the built-in bus and a serial line, else none: the
+    interface has a default of its own.
+    """
+    return channel if channel is not None or interface not in (BUILTIN, SERIAL) else machine.name
 
 
 def open_bus(

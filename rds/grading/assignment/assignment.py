@@ -147,8 +147,6 @@ def _criteria(words: TomlTable, kind: str, cases: Mapping[str, Case]) -> tuple[C
             if name not in found:
                 known = ", ".join(found)
                 raise table.fault("requires", f"names {name!r}, which is no criterion; there are {known}")
-            if found[name].requires:
-                raise table.fault("requires", f"names {name!r}, which itself requires another; name that one")
     used = {name for criterion in found.values() for name in criterion.cases}
     for table, name in zip(words.tables("case"), cases, strict=True):
         if name not in used:
@@ -192,7 +190,7 @@ def _secret(words: TomlTable) -> str:
             "drawn from it",
             words.place("secret"),
         )
-    return secret
+    return str(secret)
 
 
 def _limits(words: TomlTable | None) -> Limits:

@@ -11,6 +11,7 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.core.private_files import write_private
 from rds.grading.assignment.assignment import Assignment
+from rds.grading.assignment.audit import audit
 from rds.grading.batch.grade_one import Opener, grade, grade_with_runs
 from rds.grading.batch.scratch import scratch
 from rds.grading.cases.case import COUNTS
@@ -90,10 +91,12 @@ def check_assignment(
     pool: Opener,
     seeds: int = SEEDS,
     progress: Callable[[int, int], None] | None = None,
+    audited: bool = True,
 ) -> AssignmentCheck:
     """Grade the reference solution for `seeds` students, and what does nothing. InputError without a solution.
 
-    Work is counted for `WORK_SEEDS` of them.
+    Work is counted for `WORK_SEEDS` of them. Where it is `audited`, honest designs and cheats are tried as well,
+    which takes a minute and more.
     """
     solution = assignment.path(assignment.solution)
     if solution is None:
@@ -115,6 +118,10 @@ def check_assignment(
     if progress:
         progress(seeds + 1, seeds + 1)
     _notes(assignment, found)
+    if audited and not found.faults:  # else the designs would be blamed for what the solution is
+        faults, notes = audit(assignment, pool, grades[0])
+        found.faults += faults
+        found.notes += notes
     rows = tuple(_row(assignment, number, grades, idle) for number in range(len(assignment.criteria)))
     for row in rows:
         if row.idle:
@@ -182,7 +189,13 @@ def _params(assignment: Assignment) -> dict[str, Any]:
 
 def _notes(assignment: Assignment, found: _Found) -> None:
     visible = {case.name for case in assignment.cases if case.is_visible}
+    shown = {each.name for each in assignment.criteria if each.is_visible and set(each.cases) <= visible}
     for criterion in assignment.criteria:
+        if criterion.name in shown and (gates := [name for name in criterion.requires if name not in shown]):
+            found.faults.append(
+                f"{criterion.title}: it is visible, but requires {', '.join(gates)}, which students cannot see: the "
+                "hand-out would promise points that are then taken; require a visible criterion, or hide this one"
+            )
         if criterion.is_visible and not set(criterion.cases) <= visible:
             found.notes.append(f"{criterion.title}: it is visible, but a case of it is hidden: the hand-out lacks it")
     if assignment.self_check == "blind":

@@ -66,7 +66,7 @@ def _table(assignment: Assignment) -> dict[str, Any]:
             "no criterion can be shown: each is hidden, or measured on a hidden case; make one visible",
             str(assignment.folder),
         )
-    table = _plain(read_toml(assignment.folder / FILE)[0])
+    table: dict[str, Any] = _plain(read_toml(assignment.folder / FILE)[0])
     cases = {case for name in shown for case in _criterion(assignment, name).cases}
     table.pop("solution", None)
     hidden = [criterion for criterion in assignment.criteria if criterion.name not in shown]

@@ -16,7 +16,7 @@ from rds.grading.intake.single import as_python
 
 _FARTHEST = 200  # % of the band, to either side: how far a hidden criterion's margin is told
 _COARSE = 5  # % of the band: a hidden value is not told any finer
-WORDS = {Band.FULL: "pass", Band.PARTIAL: "partly", Band.NONE: "fail"}
+WORDS = {Band.FULL: "pass", Band.PARTIAL: "partly", Band.NONE: "fail", Band.REVIEW: "review"}
 
 
 @dataclass(frozen=True)

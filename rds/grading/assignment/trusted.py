@@ -57,6 +57,12 @@ class TrustedFile:
             raise SubmissionError(Status.FAILED_TO_LOAD, f"{path.name}: it defines no {kind}")
 
     @property
+    def defines(self) -> tuple[str, ...]:
+        """The names of what can be called in it."""
+        with self._blamed():
+            return tuple(name for name, value in _functions(self._path).items() if callable(value))
+
+    @property
     def counts(self) -> Counts:
         """Its calls; events are counted in the sandbox only."""
         return Counts(self._calls, refused="work is counted in the sandbox only")
@@ -110,7 +116,7 @@ class TrustedFile:
         self._calls = 0
         with self._blamed():
             student = self._load()
-            given = iterate(student.functions["interpolate"](segment, T, student.parameters(params)))
+            given = iterate(student.functions["interpolate"](segment, T, student.parameters() | dict(params)))
             if isinstance(given, str):
                 raise InputError(f"interpolate() returned {given}")
             for row in given:

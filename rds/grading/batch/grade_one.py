@@ -20,8 +20,8 @@ from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.late_rules import days_late
 from rds.grading.assignment.unit_tests import UnitTest, failing
 from rds.grading.cases.case import Answers, Case, CaseRun
-from rds.grading.criteria.criterion import Criterion
-from rds.grading.criteria.measuring import NotMeasured
+from rds.grading.criteria.criterion import GATE, Criterion
+from rds.grading.criteria.measuring import NotKnown, NotMeasured
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.sandbox.errors import SubmissionError
 from rds.grading.sandbox.limits import Limits
@@ -75,7 +75,7 @@ class Opened:
         """The submission as a module of functions."""
         return self._get("functions", 0)
 
-    def _get(self, kind: str, number: int) -> Any:
+    def _get(self, kind: str, number: int) -> Answers:
         if (kind, number) not in self._subjects:
             try:
                 made = self._stack.enter_context(self._pool.open(self._path, self._assignment.limits, kind))
@@ -83,7 +83,8 @@ class Opened:
                 self._printed += error.printed
                 raise
             self._subjects[kind, number] = made
-        return self._subjects[kind, number]
+        answers: Answers = self._subjects[kind, number]
+        return answers
 
     @property
     def output(self) -> str:
@@ -180,6 +181,8 @@ class _Work:
         self._failing: dict[str, list[UnitTest]] = {}  # by criterion: its tests that do not pass
         self._untested: dict[str, str] = {}  # by criterion: why its tests came to no end
         self._stopped: Status | None = None
+        self._shares: dict[str, dict[str, float | None]] = {}  # of the points, by criterion and case; None: unknown
+        self._unknown: dict[str, str] = {}  # by criterion: why it could not be measured
 
     def go(self, path: Path, pool: Opener, is_hidden: bool) -> None:
         """Run what is visible, or what is hidden, of the cases and unit tests that the criteria need."""
@@ -219,11 +222,20 @@ class _Work:
                     return
         for criterion in tested:
             try:
+                self._needs_a_function(opened)
                 self._failing[criterion.name] = failing(criterion.tests, opened)
             except SubmissionError as error:
                 self._untested[criterion.name] = self._blame(error, f"{criterion.title}: ", self._hides(criterion))
                 if self._stopped:
                     return
+
+    def _needs_a_function(self, opened: Opened) -> None:
+        """SubmissionError where functions are handed in, and the file has none of those that are tested."""
+        names = {test.function for criterion in self.assignment.criteria for test in criterion.tests}
+        shown = sorted({t.function for c in self.assignment.criteria if not self._hides(c) for t in c.tests})
+        if self.assignment.kind == "functions" and names.isdisjoint(opened.functions().defines):
+            said = ", ".join(f"{name}()" for name in shown) or "the functions that the assignment asks for"
+            raise SubmissionError(Status.FAILED_TO_LOAD, f"it defines none of what is asked for: {said}")
 
     def _run(self, case: Case, opened: Opened) -> None:
         needs = {need for criterion in self.criteria if case.name in criterion.cases for need in criterion.needs}
@@ -257,10 +269,28 @@ class _Work:
         """Of all criteria, in their order."""
         found = {criterion.name: self._score(criterion) for criterion in self.criteria}
         for criterion in self.criteria:
-            missed = [name for name in criterion.requires if name in found and found[name].band is Band.NONE]
-            if missed and found[criterion.name].band is not Band.NONE:
-                found[criterion.name] = criterion.without(found[criterion.name], found[missed[0]].title)
+            gates = {name: self._passes(name, criterion.cases) for name in criterion.requires if name in found}
+            name = min(gates, key=lambda each: gates[each], default="")
+            if name and gates[name] < 1.0 and found[criterion.name].band not in (Band.NONE, Band.REVIEW):
+                found[criterion.name] = criterion.gated(found[criterion.name], found[name].title, gates[name])
+        known = [score for score in found.values() if score.band is not Band.REVIEW]
+        most = sum(score.max_score for score in known)
+        share = sum(score.score for score in known) / most if most else 0.0
+        for criterion in self.criteria:
+            score = found[criterion.name]
+            if score.band is Band.REVIEW:
+                found[criterion.name] = criterion.unknown(self._unknown[criterion.name], score.case, share)
         return tuple(found.values())
+
+    def _passes(self, name: str, cases: Sequence[str]) -> float:
+        """How much of their points the criterion `name` leaves those that require it in these cases, 0 to 1.
+
+        Where it is itself measured in some of the cases, these count, else all of its own. What could not be measured
+        takes nothing.
+        """
+        shares = self._shares[name]
+        common = [shares[case] for case in cases if case in shares] or list(shares.values())
+        return min((1.0 if share is None else min(share / GATE, 1.0) for share in common), default=1.0)
 
     def _ended(self) -> str:
         return self.reason if self._stopped is None else _ENDED.get(self._stopped, str(self._stopped))
@@ -270,18 +300,36 @@ class _Work:
         if criterion.tests:
             return self._score_tests(criterion)
         worst: tuple[float, str] | None = None
+        nothing: tuple[str, str] | None = None
+        unknown: tuple[str, str] | None = None
+        shares = self._shares.setdefault(criterion.name, {})
         for name in criterion.cases:
             case = self.assignment.case(name)
             runs = [run for run in self.runs if run.case == name]
             if name in self._failed or len(runs) < case.runs:
-                return criterion.nothing(self._failed.get(name) or self._ended(), name)
+                nothing = nothing or (self._failed.get(name) or self._ended(), name)
+                shares[name] = 0.0
+                continue
+            found: list[float] = []
             for run in runs:
                 try:
                     value = criterion.measure(run)
+                except NotKnown as error:
+                    unknown = unknown or (str(error), name)
+                    continue
                 except NotMeasured as error:
-                    return criterion.nothing(str(error), name)
+                    nothing = nothing or (str(error), name)
+                    found.append(0.0)
+                    continue
+                found.append(criterion.bands.share(value))
                 if worst is None or criterion.worse(value, worst[0]):
                     worst = value, name
+            shares[name] = min(found, default=None)
+        if nothing is not None:
+            return criterion.nothing(*nothing)
+        if unknown is not None and (worst is None or criterion.bands.band(worst[0]) is not Band.NONE):
+            self._unknown[criterion.name] = unknown[0]
+            return criterion.unknown(*unknown, 0.0)
         assert worst is not None  # every criterion has a case, every case a run
         return criterion.score(*worst)
 
@@ -289,8 +337,10 @@ class _Work:
         """The share of tests passed, and which are not."""
         missed = self._failing.get(criterion.name)
         if missed is None:
+            self._shares[criterion.name] = {"": 0.0}
             return criterion.nothing(self._untested.get(criterion.name) or self._ended())
         share = 100.0 * (len(criterion.tests) - len(missed)) / len(criterion.tests)
+        self._shares[criterion.name] = {"": criterion.bands.share(share)}
         score = criterion.score(float(f"{share:.9g}"), "")
         if not missed:
             return score

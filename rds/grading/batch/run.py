@@ -19,7 +19,7 @@ from rds.grading.batch.journal import Journal
 from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.queue import Queued, keep, queued, ungraded
 from rds.grading.batch.record import FILE, check_same, read_record, record_of
-from rds.grading.batch.similarity import Pair, fingerprints, similar_pairs
+from rds.grading.batch.similarity import Identical, Pair, fingerprints, identical_files, similar_pairs
 from rds.grading.batch.similarity_table import pairs_html, pairs_json
 from rds.grading.batch.work import CODE, FEEDBACK, Answer, Task, graded, setup_of
 from rds.grading.feedback.class_files import write_class_files
@@ -82,9 +82,9 @@ def run_batch(
             say(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
         batch.go(todo, jobs, scheduler, progress)
         grades = batch.grades()
-        pairs = _pairs(read, rows, jobs)
-        write_whole(out / SIMILARITY, pairs_json(pairs))
-        everybody, similar = list(grades.values()), pairs_html(pairs)
+        pairs, identical = _pairs(read, rows, jobs)
+        write_whole(out / SIMILARITY, pairs_json(pairs, identical))
+        everybody, similar = list(grades.values()), pairs_html(pairs, identical)
         about = f"{len(everybody)} submissions, handed in as {intake.layout}"
         write_class_files(out, read.title, everybody, seconds=batch.seconds, similar=similar, about=about)
         outcome = BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
@@ -108,15 +108,18 @@ def _missing(_: int) -> Answer:
     return Answer(missing=available() or "")
 
 
-def _pairs(assignment: Assignment, rows: Sequence[Queued], jobs: int | None) -> list[Pair]:
-    """Submissions that are alike. Parsed in other processes, which may crash."""
+def _pairs(assignment: Assignment, rows: Sequence[Queued], jobs: int | None) -> tuple[list[Pair], list[Identical]]:
+    """Submissions that are alike, and those that are the same. Parsed in other processes, which may crash."""
     given = [(each.row.student, each.code) for each in rows if each.code]
-    template = assignment.path(assignment.template)
-    if template is not None and template.suffix == ".py":
-        given.append(("", template.read_bytes()))
-    done = spread(fingerprints, [code for _, code in given], jobs=jobs, retries=0, time_limit=_PATIENCE)
-    found = {student: outcome.value or {} for (student, _), outcome in zip(given, done, strict=True)}
-    return similar_pairs(found, [found.pop("", {})])
+    names = (assignment.template, assignment.solution)
+    own = {name: (assignment.folder / name).read_bytes() for name in names if name is not None}
+    parsed = {name: code for name, code in own.items() if name.endswith(".py")}
+    codes = [code for _, code in given] + list(parsed.values())
+    done = [outcome.value or {} for outcome in spread(fingerprints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)]
+    found = {student: prints for (student, _), prints in zip(given, done, strict=False)}
+    sources = dict(zip(parsed, done[len(given) :], strict=True))
+    template = sources.pop(assignment.template or "", {})
+    return similar_pairs(found, [template], sources), identical_files(given, own)
 
 
 def _check_free(out: Path, resume: bool) -> None:

@@ -37,6 +37,33 @@ class Pair:
     common: int
     first_lines: tuple[Lines, ...]
     second_lines: tuple[Lines, ...]
+    source: str = ""  # what the instructor has that both took it from, as far as that is known
+
+
+@dataclass(frozen=True)
+class Identical:
+    """Students whose files are the same to the last byte, their SHA-256, and the instructor's file that it also is."""
+
+    students: tuple[str, ...]
+    sha256: str
+    source: str = ""
+
+
+def identical_files(given: Iterable[tuple[str, bytes]], own: Mapping[str, bytes]) -> list[Identical]:
+    """Groups of students with the same file, the largest first, however many of a class they are.
+
+    `own` are the instructor's files by name; a single student who handed in one of these is a group, too.
+    """
+    groups: dict[str, list[str]] = {}
+    for student, code in given:
+        groups.setdefault(hashlib.sha256(code).hexdigest(), []).append(student)
+    names = {hashlib.sha256(code).hexdigest(): name for name, code in own.items()}
+    found = [
+        Identical(tuple(sorted(students)), sha256, names.get(sha256, ""))
+        for sha256, students in groups.items()
+        if len(students) > 1 or sha256 in names
+    ]
+    return sorted(found, key=lambda group: (-len(group.students), group.students))
 
 
 def fingerprints(code: bytes) -> Fingerprints:
@@ -62,8 +89,16 @@ def fingerprints(code: bytes) -> Fingerprints:
     return chosen
 
 
-def similar_pairs(found: Mapping[str, Fingerprints], template: Iterable[Fingerprints] = ()) -> list[Pair]:
-    """The pairs of students whose programs are alike, the most alike first. `found` is by student."""
+def similar_pairs(
+    found: Mapping[str, Fingerprints],
+    template: Iterable[Fingerprints] = (),
+    sources: Mapping[str, Fingerprints] | None = None,
+) -> list[Pair]:
+    """The pairs of students whose programs are alike, the most alike first. `found` is by student.
+
+    `sources` are what the instructor has of it, such as a solution: the one that holds most of what a pair has in
+    common, and half of it at least, is named.
+    """
     known = {value for prints in template for value in prints}
     spread = Counter(value for prints in found.values() for value in prints)
     if len(found) >= _CLASS:
@@ -93,7 +128,11 @@ def similar_pairs(found: Mapping[str, Fingerprints], template: Iterable[Fingerpr
         score = common / min(len(own[first]), len(own[second]))
         if common >= LEAST_COMMON and score >= LEAST_SCORE:
             which = tuple(numbers)
-            pairs.append(Pair(first, second, score, common, lines(first, which), lines(second, which)))
+            both = [value for number in numbers for value in parts[number]]
+            named = [(sum(value in prints for value in both), name) for name, prints in (sources or {}).items()]
+            most, source = max(named, default=(0, ""))
+            source = source if most >= LEAST_SCORE * common else ""
+            pairs.append(Pair(first, second, score, common, lines(first, which), lines(second, which), source))
     return sorted(pairs, key=lambda pair: (-pair.score, pair.first, pair.second))
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     import numpy as np
 
-    from rds.grading.criteria.linear import LinearLoop
+    from rds.grading.criteria.linear import LinearLoop, NoLoop
     from rds.grading.sandbox.counts import Counts
     from rds.results import Result
 
@@ -24,6 +24,9 @@ class Answers(Protocol):
 
     @property
     def output(self) -> str: ...
+
+    @property
+    def defines(self) -> tuple[str, ...]: ...
 
     @property
     def counts(self) -> Counts: ...
@@ -65,7 +68,7 @@ class CaseRun:
     result: Result
     fault: str = ""
     counts: Counts | None = None
-    linear: LinearLoop | str | None = None  # or why there is none
+    linear: tuple[LinearLoop | NoLoop, ...] | None = None  # of each axis
     facts: Mapping[str, Any] | None = None  # of the case: when a disturbance begins, the converter's limits, ...
     rows: np.ndarray | None = None
 

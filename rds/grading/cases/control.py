@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,8 @@ from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
-from rds.grading.criteria.linear import PULSE, LinearLoop, linear_loop
-from rds.grading.criteria.same_loop import begin_of, difference, force, free_stretch
+from rds.grading.criteria.linear import LinearLoop, NoLoop, linear_loop
+from rds.grading.criteria.pushed import begin_of, force, free_stretch
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
 from rds.identification.robustness.draws import Spread
@@ -33,7 +33,7 @@ from rds.nc.check import Setup, motion
 from rds.nc.run.judge import judged
 from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, planned
 
-_NOT_HERE = ("mode", "controller", "bus", "timing", "compiled", "signal")
+_NOT_HERE = ("mode", "controller", "bus", "network", "timing", "compiled", "signal")
 _STANDS_IN = Controller(lambda t, r, y, state, params: (0.0, state))
 
 
@@ -65,8 +65,8 @@ class ControlCase:
 
     @property
     def can_be_linearized(self) -> bool:
-        """Whether there is one axis, with a model whose linear part is known, and no program."""
-        return len(self.plan.axes) == 1 and self.prepared is None and linear_model(self.plants[0].base) is not None
+        """Whether each axis has a law of its own, and a model whose linear part is known."""
+        return not self.is_coupled and all(linear_model(plant.base) is not None for plant in self.plants)
 
     @property
     def is_drawn(self) -> bool:
@@ -74,7 +74,7 @@ class ControlCase:
         return bool(self.noise) or any(plant.spread.names for plant in self.plants)
 
     def run(self, submitted: Submitted, seed: int, number: int, needs: Iterable[str] = ()) -> CaseRun:
-        """The closed loop of run `number`; the linearized loop takes three more runs of the same motion."""
+        """The closed loop of run `number`; the linearized loop takes one more run of the same motion."""
         plan, subjects = self.plan, self._begin(submitted)
         models = [drawn_model(plant, seed, number) for plant in self.plants]
         actual: list[list[float]] = [[] for _ in models]
@@ -120,19 +120,20 @@ class ControlCase:
         seed: int,
         number: int,
         actual: list[list[float]] | None = None,
-        force: np.ndarray | None = None,
+        forces: Sequence[np.ndarray] | None = None,
     ) -> list[Model]:
-        """The models of run `number` with their disturbance, `force` (V) and noise.
+        """The models of run `number` with their disturbance, `forces` (V, of each axis) and noise.
 
         `actual` is given the positions before the noise, of each axis.
         """
         voltage = None if self.disturbance is None else self.disturbance.voltage
-        if force is not None:
-            voltage = force if voltage is None else voltage + force
+        voltages = [voltage] * len(models)
+        if forces is not None:
+            voltages = [own if voltage is None else voltage + own for own in forces]
         return [
             disturbed(
                 model,
-                voltage,
+                voltages[axis],
                 noise_of(self.noise, self.plan.samples, seed, self.name, number, axis),
                 actual[axis].append if self.noise and actual is not None else None,
             )
@@ -141,7 +142,7 @@ class ControlCase:
 
     def _linear_or_why(
         self, submitted: Submitted, models: list[Model], done: LoopRun, seed: int, number: int
-    ) -> LinearLoop | str:
+    ) -> tuple[LinearLoop | NoLoop, ...]:
         """As `_linear`; what breaks its interface only there loses its margins, and not the run that it has done."""
         try:
             return self._linear(submitted, models, done, seed, number)
@@ -149,52 +150,41 @@ class ControlCase:
             if error.status is not Status.BROKE_CONTRACT:
                 raise
             said = f": {error.reason}" if self.is_visible else ""  # it could be what it saw of a hidden case
-            return f"where it was linearized, or under a force, it broke its interface{said}"
+            return (NoLoop(f"under a force on the axis, it broke its interface{said}", True),)
 
     def _linear(
         self, submitted: Submitted, models: list[Model], done: LoopRun, seed: int, number: int
-    ) -> LinearLoop | str:
-        """The loop of run `number`, which is `done`, linearized, and whether that is the loop of this run."""
-        name, plan = self.plan.names[0], self.plan
+    ) -> tuple[LinearLoop | NoLoop, ...]:
+        """The loop of each axis in run `number`, which is `done`, linearized: from one more run, under a force."""
+        plan, low_high = self.plan, voltage_limits(self.plan)
         if done.fault:
-            return done.fault
-        u, y = done.result[f"{name}_command"], done.result[f"{name}_measured"]
-        limit = voltage_limits(plan)[1]
-        stretch = free_stretch(u, y, limit)
-        loop = self._ideal(submitted, models, stretch[0])
-        if isinstance(loop, str):
-            return loop
-        drawn = part_seed(seed, self.name, number, "force")
-        pushed = force(models[0], u, (plan.machine.converter.range, limit), stretch, drawn)
+            return (NoLoop(done.fault, True),)
+        limit, stretches, forces = low_high[1], [], []
+        for axis, (name, model) in enumerate(zip(plan.names, models, strict=True)):
+            u, y = done.result[f"{name}_command"], done.result[f"{name}_measured"]
+            stretches.append(free_stretch(u, y, limit))
+            drawn = part_seed(seed, self.name, number, "force", *([axis] if axis else []))
+            forces.append(force(model, u, (plan.machine.converter.range, limit), stretches[-1], drawn))
         laws = self._laws(self._begin(submitted))
-        again = run_loop(with_parts(plan, laws, self._disturbed(models, seed, number, force=pushed)), {})
+        again = run_loop(with_parts(plan, laws, self._disturbed(models, seed, number, forces=forces)), {})
         if again.fault:
-            return f"under a force on the axis, {again.fault}"
-        same = again.result[f"{name}_command"][: (begin := begin_of(stretch, plan.samples))] == u[:begin]
-        if not same.all():
-            t = plan.T * int(np.argmin(same))
-            return f"at t = {t:.3f} s it answered the same samples otherwise in a second run: there is no one loop"
-        part = slice(*stretch)
-        with np.errstate(over="ignore"):  # of voltages that no converter has
-            voltage = again.result[f"{name}_command"][part] - u[part]
-        return difference(loop, voltage, again.result[f"{name}_measured"][part] - y[part]) or loop
-
-    def _ideal(self, submitted: Submitted, models: list[Model], free_from: int) -> LinearLoop | str:
-        """The loop linearized on the ideal plant, by pulses when the law is at no limit (from `free_from` on)."""
-        model, samples = linear_model(models[0]), self.plan.samples
-        assert model is not None  # by `can_be_linearized`, which the assignment has checked
-        at = min(max(samples // 10, free_from + samples // 50), samples // 3)
-        runs: list[LoopRun] = []
-        for size in (0.0, PULSE, -2.0 * PULSE):
-            pulse = np.zeros(samples)
-            pulse[at] = size
-            laws = self._laws(self._begin(submitted))
-            runs.append(run_loop(with_parts(self.plan, laws, [disturbed(model, pulse, None)], ideal=True), {}))
-        if fault := next((run.fault for run in runs if run.fault), ""):
-            return f"the linearized loop is not stable: {fault}"
-        name = self.plan.names[0]
-        moves = [(run.result[f"{name}_command"][at:], run.result[f"{name}_measured"][at:]) for run in runs]
-        return linear_loop(moves, self.plan.T)
+            return (NoLoop(f"under a force on the axis, {again.fault}", True),)
+        found = []
+        for name, model, stretch in zip(plan.names, models, stretches, strict=True):
+            begin, ideal = begin_of(stretch, plan.samples), linear_model(model)
+            assert ideal is not None  # by `can_be_linearized`, which the assignment has checked
+            u, y = done.result[f"{name}_command"], done.result[f"{name}_measured"]
+            same = again.result[f"{name}_command"][:begin] == u[:begin]
+            if not same.all():
+                t = plan.T * int(np.argmin(same))
+                why = f"at t = {t:.3f} s it answered the same samples otherwise in a second run: there is no one loop"
+                return (NoLoop(why, True),)
+            part = slice(begin, stretch[1])
+            with np.errstate(over="ignore"):  # of voltages that no converter has
+                voltage = again.result[f"{name}_command"][part] - u[part]
+            position = again.result[f"{name}_measured"][part] - y[part]
+            found.append(linear_loop(voltage, position, u[part], limit, ideal, plan.T))
+        return tuple(found)
 
 
 def read(words: TomlTable, folder: Path, machine: str) -> ControlCase:

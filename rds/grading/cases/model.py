@@ -24,7 +24,7 @@ from rds.modes.loop.plan import Plan
 from rds.results import Result
 
 _LARGEST = 1e100  # of an output, in the axis's unit: beyond it sums of squares are no numbers
-_NOT_HERE = ("mode", "controller", "bus", "timing", "compiled", "reference")
+_NOT_HERE = ("mode", "controller", "bus", "network", "timing", "compiled", "reference")
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def disturbed(
     if voltage is None and noise is None:
         return model
     made = partial(_Disturbed, voltage=voltage, noise=noise, actual=actual)
-    moved = replace(model, has_velocity=False)  # that of the disturbed motion is not told
+    moved = replace(model, has_velocity=False, told={})  # that of the disturbed motion is not told
     return replace(moved, motion=lambda own, T: made(start(replace(own, motion=model.motion), T)))
 
 

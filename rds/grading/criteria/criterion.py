@@ -19,6 +19,7 @@ from rds.grading.criteria.measuring import NotMeasured
 from rds.grading.grade import Band, CriterionScore
 
 DIGITS = 9  # of a value: so many are the same on every computer
+GATE = 0.25  # of the points of a required criterion: with so many it takes nothing from those that require it
 
 
 @dataclass(frozen=True)
@@ -69,13 +70,25 @@ class Criterion:
         """No value, no points."""
         return self._scored(0.0, None, Band.NONE, f"{self.meaning} could not be measured: {why.rstrip('.')}.", case)
 
-    def without(self, score: CriterionScore, title: str) -> CriterionScore:
-        """The same value without points, because the criterion called `title` earned none."""
-        assert score.value is not None  # there was a band to lose
-        share = self.bands.share(score.value)
-        sentence = self._sentence(score.value, score.band, share, "would earn")
-        said = f"{sentence.rstrip('.')}; it counts only where points are earned for {title}."
-        return replace(score, score=0.0, band=Band.NONE, sentence=said)
+    def unknown(self, why: str, case: str, share: float) -> CriterionScore:
+        """No value, but perhaps one to be had: `share` of the points until somebody has looked."""
+        said = f"{self.meaning} could not be measured: {why.rstrip('.')}. This is for a review by your instructor"
+        said += f"; until then it counts as the rest of your work does, {100 * share:.3g} % of the points."
+        return self._scored(share * self.max_score, None, Band.REVIEW, said, case)
+
+    def gated(self, score: CriterionScore, title: str, factor: float) -> CriterionScore:
+        """The same with `factor` of its points, because the criterion called `title` earned too little."""
+        points = float(f"{factor * score.score:.{DIGITS}g}")
+        if score.value is None:
+            return replace(score, score=points, band=score.band if points else Band.NONE, gate=title)
+        sentence = self._sentence(score.value, score.band, self.bands.share(score.value), "would earn").rstrip(".")
+        if not points:
+            said = f"{sentence}; it counts only where points are earned for {title}."
+            return replace(score, score=0.0, band=Band.NONE, sentence=said, gate=title)
+        said = (
+            f"{sentence}; {100 * factor:.3g} % of that count, because {title} earns less than {100 * GATE:g} % there."
+        )
+        return replace(score, score=points, band=Band.PARTIAL, sentence=said, gate=title)
 
     @property
     def meaning(self) -> str:
@@ -97,6 +110,7 @@ class Criterion:
             Band.FULL: f"which {earns} full points",
             Band.PARTIAL: f"which {earns} {100 * share:.3g} % of the points",
             Band.NONE: f"which {earns} no points",
+            Band.REVIEW: "",
         }[band]
         # some meanings end with a comma, as they explain themselves
         return f"{self.meaning} is {_number(value, self.unit)}, {said} ({self.bounds})."
@@ -171,7 +185,7 @@ def _check_cases(words: TomlTable, module: ModuleType, cases: Sequence[Case]) ->
             if not getattr(case, part, None):
                 raise words.fault("kind", f"needs a case with {part}; case {case.name!r} has none")
         if LINEAR in getattr(module, "NEEDS", ()) and not case.can_be_linearized:
-            said = "needs cases of one axis with a reference and a library model that can be linearized"
+            said = "needs cases whose axes have a controller each, and a library model that can be linearized"
             raise words.fault("kind", f"{said}; case {case.name!r} is not one")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.grading.cases.case import LINEAR, CaseRun
-from rds.grading.criteria.measuring import Options, linear_of
+from rds.grading.criteria.measuring import Options, over_loops
 
 MEANING = "the least damping ratio of the closed loop's poles"
 UNIT = "1"
@@ -14,4 +14,4 @@ NEEDS = (LINEAR,)
 
 def measure(run: CaseRun, options: Options) -> float:
     """Without a unit: 1 where nothing oscillates."""
-    return float(linear_of(run).least_damping)
+    return over_loops(run, lambda loop: float(loop.least_damping), min)

@@ -19,4 +19,4 @@ def measure(run: CaseRun, options: Options) -> float:
     speed = float(np.linalg.norm(velocities(run), axis=1).max())
     if speed == 0.0:
         raise NotMeasured("nothing moves")
-    return max(0.0, 100.0 * (speed / run.fact("segment").feed_rate - 1.0))
+    return max(0.0, 100.0 * (speed / float(run.fact("segment").feed_rate) - 1.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.grading.cases.case import LINEAR, CaseRun
-from rds.grading.criteria.measuring import Options, linear_of
+from rds.grading.criteria.measuring import Options, over_loops
 
 MEANING = "the gain margin"
 UNIT = "dB"
@@ -14,4 +14,4 @@ NEEDS = (LINEAR,)
 
 def measure(run: CaseRun, options: Options) -> float:
     """In dB: the least change of the gain, up or down, that makes the loop unstable; 1000 where none does."""
-    return min(float(linear_of(run).margins[0]), 1000.0)
+    return min(over_loops(run, lambda loop: float(loop.margins[0]), min), 1000.0)

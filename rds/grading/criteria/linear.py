@@ -1,29 +1,41 @@
 """A submission's closed loop, linearized about its motion, from outside.
 
-The controller is a black box, so its loop is measured. The same motion is run again with a short pulse of voltage at
-the plant's input, and the first run is taken away: what is left is how the loop answers the pulse. With the pulse D,
-the controller's answer Uc and the plant a linear one,
+The controller is a black box. The linear law that answers as it did in its own run is found there (`law_fit`); with it
+and the axis's linear part G the loop is closed here, and answers a pulse D at the plant's input with the voltage Uc:
 
     L(z) = - Uc(z) / (Uc(z) + D(z)),    1 + L = 0 at the closed loop's poles.
 
-The test is the case's own motion with a deviation of micrometres in it, so that a controller is about where it always
-is. A pulse of another size must change the answer in proportion; where it does not there are no margins. A controller
-can notice that the positions are not rounded: see `same_loop` for what is done about it.
+What the law is depends on nothing but the run that is graded: no other plant is shown to it, so that none can be
+noticed, and deviations are as large as a force on the axis makes them, many counts of the encoder.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
+from rds.core.types import Model
+from rds.grading.criteria.law_fit import LawFit, departure, law_fits
 from rds.identification.robustness.margins import margins_of
+from rds.modes.parts import start
 
 PULSE = 1.0  # V, for one sample
-IN_PROPORTION = 0.02  # of the largest answer: by how much the second may differ
-_GONE = 1e-3  # of the largest deviation: what may be left of it at the end
+MOST = 0.25  # of the answer: by how much the linear law may depart in the whole stretch
+MOST_IN_A_PART = 0.45  # and in each of `_PARTS`: who is another law for a while is found, too
+_PARTS = 8
+_QUARTERS = 4  # of the stretch, in which a law that is not one is fitted by itself
+_SHORTEST = 40  # samples: a part that is halved again
+_VALUES = 6  # different ones, at least, in such a part
+_SIMPLER = 1.1  # a law of higher order must depart less than by this factor
+_CHATTERS = 0.25  # of the limit: RMS change of a voltage from sample to sample that switches rather than controls
+_GONE, _LEFT = 1e-6, 1e-3  # of the largest deviation: enough, and most, that may be left of it at the end
+_SHORT, _LONG = 1 << 10, 1 << 14  # samples of an answer
+_GROWS = "the loop is not stable: a deviation grows"
+_FAR = 1e9  # mm: an axis that has gone as far does not come back
 _GRID = 1 << 16
 _HANKEL = 300  # rows
 _RANK = 1e-7  # of the largest singular value: what counts as a mode
@@ -71,22 +83,124 @@ class LinearLoop:
         return float(np.where(swings, ratios, 1.0).min(initial=1.0))
 
 
+@dataclass(frozen=True)
+class NoLoop:
+    """Why there is no linearized loop. `is_known`: it was seen that there is none; else it could not be measured."""
+
+    why: str
+    is_known: bool
+
+
 @np.errstate(over="ignore", invalid="ignore")  # of voltages that no converter has
-def linear_loop(runs: Sequence[tuple[np.ndarray, np.ndarray]], T: float) -> LinearLoop | str:
-    """From (command, position) of the run without a pulse, with `PULSE`, and with -2 `PULSE`; or why there is none."""
-    (u0, y0), (u1, y1), (u2, _) = runs
-    voltage, position = u1 - u0, y1 - y0
-    size = np.abs(position).max(initial=0.0)
-    if not np.isfinite(size) or size == 0.0:
-        return "its answer to a pulse is no number"
-    tail = max(len(position) // 20, 1)
-    if np.abs(position[-tail:]).max() > _GONE * size:
-        return (
-            f"{len(position) * T:.3g} s after a pulse the loop has not come to rest: it is not stable, or only slowly"
-        )
-    largest = np.abs(voltage).max(initial=0.0)
-    if largest == 0.0:
-        return "its voltage does not depend on the measured position: there is no loop"
-    if np.abs(voltage + 0.5 * (u2 - u0)).max() > IN_PROPORTION * largest:
-        return "it does not answer in proportion about this motion: it has no linear loop"
-    return LinearLoop(voltage, position, T)
+def linear_loop(
+    voltage: np.ndarray, position: np.ndarray, command: np.ndarray, limit: float, model: Model, T: float
+) -> LinearLoop | NoLoop:
+    """The loop about the linear axis `model`, of the law that answers deviations `position` (mm) with `voltage` (V).
+
+    Both are of a stretch that begins with the force; `command` (V) is that of the same stretch without it, `limit` (V)
+    the converter's. Of a law that is several, one after the other, the least stable.
+    """
+    if not np.any(position):
+        return NoLoop("a force on the axis moves nothing: how its voltage answers cannot be seen", False)
+    if not np.any(voltage):
+        return NoLoop("its voltage does not depend on the measured position: there is no loop", True)
+    if np.isfinite(voltage).all():
+        whole = _best(voltage, position, slice(None), model, T, _PARTS)
+        if whole is not None:
+            return whole
+        edges = np.linspace(0, len(voltage), _QUARTERS + 1).astype(int)
+        loops = [
+            loop for a, b in pairwise(edges) for loop in _of_part(voltage, position, slice(int(a), int(b)), model, T)
+        ]
+        if unstable := next((loop for loop in loops if isinstance(loop, NoLoop)), None):
+            return unstable
+        if loops:
+            return min((loop for loop in loops if isinstance(loop, LinearLoop)), key=lambda loop: loop.margins[2])
+    changes = np.diff(command)
+    if not np.isfinite(changes).all() or np.sqrt(np.mean(changes**2)) >= _CHATTERS * limit:
+        return NoLoop("its voltage switches from sample to sample by a good part of the converter's range", True)
+    return NoLoop("no linear law answers a force as it does, not even nearly", False)
+
+
+def _of_part(
+    voltage: np.ndarray, position: np.ndarray, part: slice, model: Model, T: float
+) -> Iterator[LinearLoop | NoLoop]:
+    """The loop of the law in this part; where it has none, those of what is exactly a linear law in parts of it."""
+    loop = _best(voltage, position, part, model, T, 1)
+    if loop is not None:
+        yield loop
+        return
+    todo = [part]
+    while todo:
+        part = todo.pop()
+        if min(len(np.unique(each[part])) for each in (voltage, position)) < _VALUES:  # held, as it is rounded: no law
+            continue
+        for fit in law_fits(voltage, position, part, exactly=True):
+            if fit.is_exact:
+                loop = closed(fit, model, T)
+                if isinstance(loop, LinearLoop) or loop.why == _GROWS:  # else nothing was measured during this part
+                    yield loop
+                break
+        else:
+            if (length := part.stop - part.start) >= _SHORTEST:
+                middle = part.start + length // 2
+                todo += [slice(part.start, middle), slice(middle, part.stop)]
+
+
+def _best(
+    voltage: np.ndarray, position: np.ndarray, part: slice, model: Model, T: float, parts: int
+) -> LinearLoop | NoLoop | None:
+    """The loop of the law that fits this part; NoLoop where all that fit are unstable; None where none fits."""
+    found: list[tuple[float, LinearLoop | NoLoop]] = []
+    for fit in law_fits(voltage, position, part):
+        if fit.departure > MOST or departure(fit, voltage, position, part, parts) > MOST_IN_A_PART:
+            continue
+        loop = closed(fit, model, T)
+        if fit.is_exact:
+            return loop
+        found.append((fit.departure, loop))
+    stable = [each for each in found if isinstance(each[1], LinearLoop)]
+    if not stable:
+        return found[0][1] if found else None
+    least = min(share for share, _ in stable)
+    return next(loop for share, loop in stable if share <= _SIMPLER * least)
+
+
+def closed(fit: LawFit, model: Model, T: float) -> LinearLoop | NoLoop:
+    """The answer of a linear law on a linear axis to a pulse, until it has died down."""
+    samples = _SHORT
+    while True:
+        loop = LinearLoop(*_answers(fit, model, T, samples), T)
+        size = np.abs(loop.position).max()
+        ends = [np.abs(part).max() for part in np.array_split(loop.position, 20)]
+        if len(loop.position) < samples or not np.isfinite(size):
+            return NoLoop(_GROWS, True)
+        if ends[-1] <= _GONE * size or (samples == _LONG and ends[-1] <= _LEFT * size):
+            return loop
+        if samples == _LONG:
+            if ends[-1] >= ends[-2]:
+                return NoLoop("the loop is not stable: a deviation does not die down", True)
+            return NoLoop(f"a deviation takes longer than {_LONG * T:.3g} s to die down", False)
+        samples *= 4
+
+
+def _answers(fit: LawFit, model: Model, T: float, samples: int) -> tuple[np.ndarray, np.ndarray]:
+    motion = start(model, T)
+    a, b = fit.a[1:].tolist(), fit.b.tolist()
+    last_u, last_y = [0.0] * len(a), [0.0] * len(b)
+    voltages, positions = [], []
+    for k in range(samples):
+        y = motion.read()
+        last_y = [y, *last_y[:-1]]
+        u = _dot(b, last_y) - _dot(a, last_u)
+        last_u = [u, *last_u[:-1]]
+        if not abs(y) < _FAR:
+            break
+        voltages.append(u)
+        positions.append(y)
+        motion.write(u + PULSE if k == 0 else u)
+    return np.array(voltages), np.array(positions)
+
+
+def _dot(factors: Iterable[float], values: Iterable[float]) -> float:
+    return sum(factor * value for factor, value in zip(factors, values, strict=True))

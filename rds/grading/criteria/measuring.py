@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,10 @@ class NotMeasured(RdsError):
     """There is no value, for the reason in the message: no points."""
 
 
+class NotKnown(NotMeasured):
+    """There may be a value, but it could not be measured: for a review, and no zero."""
+
+
 def over_axes(run: CaseRun, of: Callable[[str], float], worst: Callable[..., float] = max) -> float:
     """The worst of the axes."""
     return float(worst(of(axis) for axis in run.result.axes))
@@ -36,7 +40,7 @@ def used(run: CaseRun, axis: str, options: Options) -> slice | np.ndarray:
     if "from" not in options and "until" not in options:
         return settled(run.result, axis)
     time, half = run.result["time"], run.result.sample_period / 2
-    chosen = (time >= options.get("from", 0.0) - half) & (time < options.get("until", np.inf) - half)
+    chosen: np.ndarray = (time >= options.get("from", 0.0) - half) & (time < options.get("until", np.inf) - half)
     if not chosen.any():
         raise NotMeasured("no sample of the run lies between `from` and `until`")
     return chosen
@@ -119,8 +123,14 @@ def crossing(step: Step, level: float) -> float:
     return float(step.time[k - 1] + (level - a) / (b - a) * (step.time[k] - step.time[k - 1]))
 
 
-def linear_of(run: CaseRun) -> Any:
-    """The linearized loop; NotMeasured with the reason why there is none."""
-    if run.linear is None or isinstance(run.linear, str):
-        raise NotMeasured(run.linear or "the loop was not linearized")
-    return run.linear
+def over_loops(run: CaseRun, of: Callable[[Any], float], worst: Callable[[Iterable[float]], float]) -> float:
+    """The worst of the linearized loops of all axes; NotMeasured or NotKnown with the reason where one has none."""
+    from rds.grading.criteria.linear import NoLoop
+
+    loops = run.linear or (NoLoop("the loop was not linearized", True),)
+    missing = [loop for loop in loops if isinstance(loop, NoLoop)]
+    if known := next((loop for loop in missing if loop.is_known), None):
+        raise NotMeasured(known.why)
+    if missing:
+        raise NotKnown(missing[0].why)
+    return float(worst(of(loop) for loop in loops))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.grading.cases.case import LINEAR, CaseRun
-from rds.grading.criteria.measuring import Options, linear_of
+from rds.grading.criteria.measuring import Options, over_loops
 
 MEANING = "the least distance of the loop from -1"
 UNIT = "1"
@@ -14,4 +14,4 @@ NEEDS = (LINEAR,)
 
 def measure(run: CaseRun, options: Options) -> float:
     """Without a unit: 1/modulus is the largest gain of the sensitivity."""
-    return float(linear_of(run).margins[2])
+    return over_loops(run, lambda loop: float(loop.margins[2]), min)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.grading.cases.case import LINEAR, CaseRun
-from rds.grading.criteria.measuring import Options, linear_of
+from rds.grading.criteria.measuring import Options, over_loops
 
 MEANING = "the phase margin"
 UNIT = "°"
@@ -14,4 +14,4 @@ NEEDS = (LINEAR,)
 
 def measure(run: CaseRun, options: Options) -> float:
     """In degrees; a loop whose gain is never 1 has 180."""
-    return min(float(linear_of(run).margins[1]), 180.0)
+    return min(over_loops(run, lambda loop: float(loop.margins[1]), min), 180.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.grading.cases.case import LINEAR, CaseRun
-from rds.grading.criteria.measuring import Options, linear_of
+from rds.grading.criteria.measuring import Options, over_loops
 
 MEANING = "the largest pole |z| of the closed loop"
 UNIT = "1"
@@ -14,4 +14,4 @@ NEEDS = (LINEAR,)
 
 def measure(run: CaseRun, options: Options) -> float:
     """Without a unit: a mode falls to |z| of itself in each sample."""
-    return float(abs(linear_of(run).poles[0]))
+    return over_loops(run, lambda loop: float(abs(loop.poles[0])), max)

@@ -47,12 +47,12 @@ def results(grade: Grade, pictures: Sequence[Picture], factor: float = 1.0) -> d
 
 
 def _test(score: CriterionScore, number: int, factor: float) -> dict[str, Any]:
-    return {
+    status = {} if score.band is Band.REVIEW else {"status": "passed" if score.band is Band.FULL else "failed"}
+    return status | {
         "name": score.title,
         "number": str(number),
         "score": float(scaled(score.score, factor)),
         "max_score": float(scaled(score.max_score, factor)),
-        "status": "passed" if score.band is Band.FULL else "failed",
         "output": of_criterion(score),
         "output_format": "text",
         "visibility": "visible" if score.visible else "after_published",

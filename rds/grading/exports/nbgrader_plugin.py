@@ -15,7 +15,7 @@ from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.nbgrader_gradebook import NOTEBOOK
 
 
-class CriteriaExportPlugin(ExportPlugin):
+class CriteriaExportPlugin(ExportPlugin):  # type: ignore[misc]
     """A line for each student and assignment that rds has graded: the points of every criterion, penalty, score."""
 
     def export(self, gradebook: Any) -> None:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 from rds.grading.batch.grades_table import criteria_of
 from rds.grading.feedback import histogram
 from rds.grading.feedback.plain_text import isolated, one_line
-from rds.grading.grade import Band, Grade, Status
+from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.results import html
 from rds.results.report import page
 
@@ -20,6 +20,7 @@ _STYLE = f"""<style>
 .cards {{ display: flex; flex-wrap: wrap; gap: 1rem 2.5rem; }} .cards figure {{ margin: 0; max-width: 412px; }}
 figcaption {{ font-weight: 600; }} td, p {{ overflow-wrap: anywhere; }} td {{ max-width: 28rem; }}
 td.number, td.status {{ white-space: nowrap; }} td.reason {{ min-width: 22rem; }}
+td.gate {{ color: var(--missed); font-weight: 700; }} td.review {{ color: var(--void); font-weight: 700; }}
 {histogram.STYLE}</style>"""
 
 
@@ -62,6 +63,17 @@ def _first(grades: Sequence[Grade], links: Mapping[str, str], missing: Sequence[
         parts.append(
             f'<p class="verdict missed"><strong>{len(again)} not graded</strong> by no fault of theirs; run the same '
             f"command again with --resume: {names}</p>"
+        )
+    review = [grade for grade in grades if grade.status is not Status.GRADER_ERROR and grade.for_review]
+    if review:
+        lines = "".join(
+            f"<li>{_name(grade.student, links)}: {escape(one_line(score.sentence, 400))}</li>"
+            for grade in review
+            for score in grade.for_review
+        )
+        parts.append(
+            f'<div class="verdict void"><strong>{len(review)} for a review</strong>: these could not be measured, and '
+            f"count in proportion to the rest of the submission until you have looked.<ul>{lines}</ul></div>"
         )
     counts = Counter(grade.status for grade in grades)
     rows = "".join(
@@ -146,13 +158,25 @@ def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) ->
     cells = [
         _points(grade.score) if is_graded else "–",
         f"{grade.late_days:.2g}" if grade.late_days else "",
-        *(_points(scores[name].score) if name in scores else "–" for name in criteria),
     ]
     numbers = "".join(f'<td class="number">{each}</td>' for each in cells)
+    numbers += "".join(_cell(scores.get(name)) for name in criteria)
     return (
         f'<tr><td>{_name(grade.student, links)}</td><td class="status">{escape(str(grade.status))}</td>{numbers}'
         f'<td class="reason">{escape(one_line(grade.reason, 300))}</td></tr>'
     )
+
+
+def _cell(score: CriterionScore | None) -> str:
+    """A criterion's points; what a gate took of them, or nobody could measure, stands out."""
+    if score is None:
+        return '<td class="number">–</td>'
+    if score.gate:
+        title = f"required: {escape(one_line(score.gate))}"
+        return f'<td class="number gate" title="{title}">{_points(score.score)} (gate)</td>'
+    if score.band is Band.REVIEW:
+        return f'<td class="number review">{_points(score.score)} (review)</td>'
+    return f'<td class="number">{_points(score.score)}</td>'
 
 
 def _points(value: float) -> str:

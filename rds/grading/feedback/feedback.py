@@ -18,7 +18,12 @@ from rds.grading.feedback.plain_text import isolated, one_line, plain
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.results.report import page
 
-_BANDS = {Band.FULL: "full points", Band.PARTIAL: "part of the points", Band.NONE: "no points"}
+_BANDS = {
+    Band.FULL: "full points",
+    Band.PARTIAL: "part of the points",
+    Band.NONE: "no points",
+    Band.REVIEW: "not measured: for a review",
+}
 _WHAT_IT_MEANS = {
     Status.OK: "",
     Status.MISSING: "Nothing was handed in.",

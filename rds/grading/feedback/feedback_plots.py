@@ -137,7 +137,8 @@ def _rows_panels(result: Result, beside: Result | None, axes: Sequence[str]) -> 
 
 def _magnitude(result: Result, axes: Sequence[str], word: str) -> np.ndarray:
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.sqrt(sum(np.square(result[f"{axis}_reference_{word}"]) for axis in axes))
+        size: np.ndarray = np.sqrt(sum(np.square(result[f"{axis}_reference_{word}"]) for axis in axes))
+    return size
 
 
 def _path(result: Result, beside: Result | None, axes: Sequence[str], word: str, reference: str) -> Panel:

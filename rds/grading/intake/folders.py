@@ -47,8 +47,11 @@ def read_regular(path: Path, most: int) -> bytes:
         said = error.strerror if isinstance(error, OSError) else str(error)
         raise Refusal(f"it cannot be opened: {said}") from None
     with os.fdopen(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        about = os.fstat(file.fileno())
+        if not stat.S_ISREG(about.st_mode):
             raise Refusal("it is not a regular file; hand in one Python file or notebook")
+        if about.st_nlink > 1:  # whose it is, and what it will hold tomorrow, another name decides
+            raise Refusal("it is a hard link to another file; copy the files without links (cp --no-preserve=links)")
         try:
             data = file.read(most + 1)
         except OSError as error:

@@ -9,16 +9,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rds.grading.sandbox.counts import Counts
     from rds.grading.sandbox.errors import SandboxError, SubmissionError
     from rds.grading.sandbox.limits import Limits
     from rds.grading.sandbox.pool import Pool
     from rds.grading.sandbox.requirements import available
-    from rds.grading.sandbox.subject import Counts, Loaded, Subject
+    from rds.grading.sandbox.subject import Loaded, Subject
 
 __all__ = ["Counts", "Limits", "Loaded", "Pool", "SandboxError", "Subject", "SubmissionError", "available"]
 
 _MODULES = {
-    "Counts": "subject",
+    "Counts": "counts",
     "Limits": "limits",
     "Loaded": "subject",
     "Pool": "pool",

@@ -14,6 +14,7 @@ SITE, SOURCES = "/opt/packages", "/opt/rds"
 
 ROOMS = (
     *("__init__.py", "core", "checks", "models", "modes", "machines"),
+    *(f"network/{name}.py" for name in ("__init__", "delays", "distributions", "links")),  # which a plan may have
     *("grading/__init__.py", "grading/grade.py", "grading/sandbox"),
 )
 """What of this package is visible inside: the fixed interfaces. The laws and methods of the library are not: to write

@@ -106,7 +106,8 @@ class Subject:
         if t != run.k * run.T:
             raise ValueError(f"t = {t!r} s is not sample {run.k} of {run.T} s; the samples of a run come in order")
         if run.is_single:
-            return run.ask(t, r[0], r[1], r[2], y)[2]  # type: ignore[arg-type]
+            voltage: float = run.ask(t, r[0], r[1], r[2], y)[2]  # type: ignore[arg-type]
+            return voltage
         return run.ask(t, *r[0], *r[1], *r[2], *y)[2:]  # type: ignore[misc]
 
     def begin_model(self, params: Mapping[str, Any] | None = None, T: float = 1e-3) -> float:
@@ -119,7 +120,7 @@ class Subject:
 
     def advance(self, u: float) -> float:
         """One sample of the constant voltage `u`, V; the output after it."""
-        return self._running("model").ask(u)[2]
+        return float(self._running("model").ask(u)[2])
 
     def rows(
         self, segment: Segment, T: float, params: Mapping[str, Any] | None = None, most: int = 1_000_000
@@ -164,6 +165,11 @@ class Subject:
         if not isinstance(answer, dict) or "value" not in answer:
             self._give_up(cell, Status.BROKE_CONTRACT, "it wrote into the grader's pipe")
         return answer["value"]
+
+    @property
+    def defines(self) -> tuple[str, ...]:
+        """The names of what it says can be called in it."""
+        return self.loaded.defines
 
     @property
     def counts(self) -> Counts:

@@ -42,9 +42,11 @@ def read_submission(path: Path) -> Submission:
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else str(error)
         raise SubmissionError(Status.REFUSED, f"it cannot be opened, or is a link: {said}") from None
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+    about = os.fstat(descriptor)
+    if not stat.S_ISREG(about.st_mode) or about.st_nlink > 1:
         os.close(descriptor)
-        raise SubmissionError(Status.REFUSED, "it is not a regular file; hand in one Python file")
+        kind = "not a regular file" if not stat.S_ISREG(about.st_mode) else "a hard link to another file"
+        raise SubmissionError(Status.REFUSED, f"it is {kind}; hand in one Python file")
     with os.fdopen(descriptor, "rb") as file:
         data = file.read(LARGEST + 1)
     if len(data) > LARGEST:

@@ -30,6 +30,11 @@ class Parameter:
         """Whether the data tell it; if not, its value is a guess."""
         return not isinf(self.std_error)
 
+    @property
+    def wide(self) -> bool:
+        """Whether the interval is wider than the value: the data hardly tell it."""
+        return self.std_error > 0.0 and self.high - self.low > abs(self.value)
+
 
 def guesses(parameters: Mapping[str, Parameter]) -> list[str]:
     """The names of those that the data do not tell."""

@@ -55,16 +55,21 @@ def finite(value: Any) -> Any:
 
 def parameter_rows(estimate: Estimate) -> tuple[list[str], Rows]:
     """Columns and rows of the parameters with their intervals."""
-    rows: Rows = [[name, *_shown(p), p.unit] for name, p in estimate.parameters.items()]
+    at_bound = estimate.details.get("at_bound", ())
+    rows: Rows = [[name, *_shown(p, name in at_bound), p.unit] for name, p in estimate.parameters.items()]
     return ["parameter", "value", "std error", "95 % interval", "unit"], rows
 
 
-def _shown(p: Parameter) -> tuple[str, str, str]:
-    """Value, standard error and interval; of a guess few digits and no number for how good it is."""
+def _shown(p: Parameter, at_bound: bool = False) -> tuple[str, str, str]:
+    """Value, standard error and interval; of what the data do not tell few digits, and that it is no estimate."""
     if not p.told:
         return f"({p.value:.2g}, a guess)", "–", "not told by these data"
     if p.std_error == 0.0:
         return f"{p.value:.6g}", "–", "held"
+    if at_bound:
+        return f"({p.value:.2g}, at its bound)", "–", "not told by these data"
+    if p.wide:
+        return f"({p.value:.2g}, hardly told)", f"{p.std_error:.2g}", f"{p.low:.2g} to {p.high:.2g}"
     return f"{p.value:.6g}", f"{p.std_error:.2g}", f"{p.low:.6g} to {p.high:.6g}"
 
 

@@ -18,6 +18,7 @@ from rds.identification.fit.initial_state import estimate_start
 from rds.identification.fit.kstep import ahead, errors_of
 from rds.identification.logs.fingerprint import fingerprint
 from rds.identification.logs.log import Gravity, Log
+from rds.identification.logs.trace import trace
 from rds.identification.structures.structure import Structure
 
 _START = 1000  # samples from which a log's initial state is estimated
@@ -73,6 +74,11 @@ def made_estimate(
         f"{log.name}: {finding.what}" for log in logs for finding in log.findings if finding.gravity is Gravity.WARNING
     ]
     said += [*said_of_guesses(parameters), *warnings]
+    if _none_told(parameters) and not any(UNUSABLE in sentence for sentence in said):
+        said.append(
+            f"{UNUSABLE}: not one of them is told by these data (every interval is wider than its value, or has no "
+            "end); record more motion, at other commands (`rds excite`)"
+        )
     for number, log in enumerate(logs):
         state = None if states is None else states[number]
         begun[log.name], modelled = _run(structure, log, values, state)
@@ -100,6 +106,12 @@ def made_estimate(
         warnings=tuple(dict.fromkeys(said)),
         details=dict(details or {}),
     )
+
+
+def _none_told(parameters: Mapping[str, Parameter]) -> bool:
+    """Whether something was estimated, and nothing of it is worth a number."""
+    estimated = [p for p in parameters.values() if p.std_error > 0.0]
+    return bool(estimated) and all(not p.told or p.wide for p in estimated)
 
 
 def t_quantile(freedom: float, share: float = 0.95) -> float:
@@ -146,7 +158,7 @@ def fitted_stretch(log: Log) -> dict[str, Any]:
     """What an estimate, and the model file made of it, say of a log that was fitted: `Estimate.logs` holds these.
 
     Beside file and rows, the lowest and highest command (V) and velocity (mm/s), beyond which the model is a guess,
-    and the fingerprint by which the data are known again under another name.
+    and the fingerprint and the trace by which the data are known again under another name, or with noise.
     """
     step = max(round(_SMOOTH / log.sample_period), 1)
     rate = log.position if log.units.get("position") == "rev/min" else _slopes(log, min(step, len(log) - 1))
@@ -159,7 +171,8 @@ def fitted_stretch(log: Log) -> dict[str, Any]:
         "command": (float(log.command.min()), float(log.command.max())),
         "velocity": (float(rate.min()), float(rate.max())),
     }
-    return found | ({"fingerprint": hashes} if (hashes := fingerprint(log)) else {})
+    found |= {"fingerprint": hashes} if (hashes := fingerprint(log)) else {}
+    return found | ({"trace": places} if (places := trace(log)) else {})
 
 
 def _slopes(log: Log, step: int) -> np.ndarray:

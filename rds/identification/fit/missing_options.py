@@ -32,7 +32,10 @@ _UNTELLABLE = ("viscous",)  # no data tell it beside the others
 
 def with_hint(estimate: Estimate, logs: Sequence[Log]) -> Estimate:
     """The estimate with the hint among its warnings, where there is one; `logs` are those that were fitted."""
-    hint = missing_option(estimate, logs)
+    try:
+        hint = missing_option(estimate, logs)
+    except InputError:  # the part that is tried holds too little: a hint ends no fit
+        return estimate
     return estimate if hint is None else replace(estimate, warnings=(*estimate.warnings, hint))
 
 

@@ -32,7 +32,7 @@ from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Paramete
 FORMAT = 1
 _SPREAD = ("std_error", "low", "high")
 _ERRORS = ("fit_percent", "rmse", "maximum")
-_LOG_TEXTS = ("name", "source", "sha256", "fingerprint")
+_LOG_TEXTS = ("name", "source", "sha256", "fingerprint", "trace")
 _LOG_RANGES = ("command", "velocity")  # lowest and highest that occurred
 _HEADER = (
     "A model of an axis and how far to trust it, estimated from logged data.\n"

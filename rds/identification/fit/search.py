@@ -13,6 +13,7 @@ from itertools import chain, islice, tee
 
 import numpy as np
 
+from rds.core.errors import InputError
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.residuals import effective_samples
 from rds.identification.fit.smoothing import motion_of
@@ -26,6 +27,7 @@ _EXACT = 1e-6  # of the motion: residuals of data without noise
 _AGAIN = 1e-3  # of the sum of squares: two searches that end nearer than this end at the same place
 _LITTLE = 0.02  # of what an option begins with: hardly any effect, but a derivative
 _GLIMPSE = 30  # free runs of a search from another start
+_TOUCHES = 1e-9  # of the units used: what is nearer to a bound has run into it
 _SAME = 0.01  # of the noise: runs that differ by less are the same
 
 
@@ -116,7 +118,9 @@ def _search(problem: Problem, starts: Iterable[Start]) -> Found:
     """
     best: Solution | None = None
     tried = 0
+    begun: dict[str, float] = {}
     for values, states in starts if problem.names else islice(starts, 1):
+        begun = begun or dict(values)
         solution = least_squares(problem, problem.point(values, states), _GLIMPSE if tried else None)
         tried += 1
         again = best is not None and abs(solution.squares - best.squares) <= _AGAIN * best.squares
@@ -130,7 +134,33 @@ def _search(problem: Problem, starts: Iterable[Start]) -> Found:
     if not best.converged and tried > 1:
         end = least_squares(problem, best.point)
         best = end if end.squares <= best.squares else best
+    for number, name in enumerate(problem.names):
+        if not stands_at_bound(problem, best, number) or _explains(problem, best):
+            continue
+        best = _leave_bound(problem, best, number, begun[name])
+        tried += 1
     return Found(problem, best, tried)
+
+
+def stands_at_bound(problem: Problem, solution: Solution, number: int) -> bool:
+    """Whether the parameter with this number is at a bound, or so near that it may as well be."""
+    low, high = problem.structure.bounds(problem.names[number])
+    value = float(solution.point[number])
+    return any(np.isfinite(bound) and abs(value - bound) <= _TOUCHES for bound in (low, high))
+
+
+def _leave_bound(problem: Problem, best: Solution, number: int, begun: float) -> Solution:
+    """The better of the end of a search and of one that begins there, but with this parameter where all began.
+
+    A search that ran into a bound may stand still there for no reason but the way by which it came.
+    """
+    point = best.point.copy()
+    point[number] = begun
+    try:
+        again = least_squares(problem, point)
+    except InputError:  # the free run from there is not finite
+        return best
+    return again if again.squares < (1.0 - _AGAIN) * best.squares else best
 
 
 def _explains(problem: Problem, solution: Solution) -> bool:

@@ -23,7 +23,7 @@ from rds.identification.fit.free_run_doubts import is_little
 from rds.identification.fit.made_estimate import made_estimate, t_quantile
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.profile import widening
-from rds.identification.fit.search import Found, find, from_plain
+from rds.identification.fit.search import Found, find, from_plain, stands_at_bound
 from rds.identification.fit.smoothing import encoder_step
 from rds.identification.fit.solve import EVALUATIONS, first_state
 from rds.identification.fit.suspicions import suspicions
@@ -99,6 +99,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
             "fixed": dict(fixed),
             "evaluations": solution.evaluations,
             "starts": found.tried,
+            "at_bound": [name for i, name in enumerate(problem.names) if stands_at_bound(problem, solution, i)],
             "noise_rms": uncertainty.noise,
             "correlated_over_samples": uncertainty.block,
             "effective_samples": uncertainty.effective,

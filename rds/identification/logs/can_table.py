@@ -164,9 +164,10 @@ def _signals(message: can.Message, databases: Sequence[Any], cyclic: bool) -> It
 
 def _cyclic(identifier: int, data: bytes) -> list[Signal] | None:
     try:
-        if identifier == frames.COMMAND:
+        if identifier in (frames.COMMAND, frames.MORE_VOLTAGES):
+            first = frames.SLOTS * (identifier == frames.MORE_VOLTAGES)
             volts = frames.decode_voltages(identifier, data)
-            return [(f"command.slot_{i}", "V", value) for i, value in enumerate(volts)]
+            return [(f"command.slot_{i}", "V", value) for i, value in enumerate(volts, first)]
         if identifier - frames.ANSWER in frames.NODES:
             answer = frames.decode_answer(identifier, data)
             if answer.kind == frames.Kind.ANSWER:

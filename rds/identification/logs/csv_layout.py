@@ -118,7 +118,9 @@ def _head(path: Path) -> tuple[list[str], str]:
         raise InputError("it is empty; record it again or take another copy", str(path))
     for mark, name in ((codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
         if data.startswith(mark):
-            raise InputError(f"it is text in {name}; save it as CSV (UTF-8)", str(path))
+            raise InputError(
+                f"it is text in {name}; save it as CSV (UTF-8)", str(path)
+            )  # read_csv turned it into UTF-8
     if b"\0" in data:
         raise InputError("it is not text (it has null bytes); is its ending right?", str(path))
     encoding = "utf-8"

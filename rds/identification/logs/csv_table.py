@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import codecs
 import re
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -33,6 +35,35 @@ def read_csv(
 
     A last line without its end is left out where it is shorter than the lines before it: the file was cut there.
     """
+    with open(path, "rb") as stream:
+        wide = stream.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    return _of_utf_16(path, delimiter, decimal, progress) if wide else _table(path, delimiter, decimal, progress)
+
+
+def _of_utf_16(path: Path, delimiter: str | None, decimal: str | None, progress: Progress | None) -> Table:
+    """The table in a text of two bytes a character, as spreadsheets save "Unicode text": by a copy in UTF-8."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        try:
+            with (
+                open(path, encoding="utf-16", newline="") as text,
+                open(copy, "w", encoding="utf-8", newline="") as out,
+            ):
+                while part := text.read(_BLOCK):
+                    out.write(part)
+        except UnicodeError as error:
+            raise InputError(
+                f"it begins as text in UTF-16 and is none: {error}; take another copy", str(path)
+            ) from error
+        try:
+            table = _table(copy, delimiter, decimal, progress)
+        except InputError as error:
+            raise InputError(str(error).replace(str(copy), str(path))) from error
+    said = Finding("encoding", "it is not UTF-8; it was read as utf-16")
+    return replace(table, path=path, findings=(said, *table.findings))
+
+
+def _table(path: Path, delimiter: str | None, decimal: str | None, progress: Progress | None) -> Table:
     layout = sniff(path, delimiter, decimal)
     findings: list[Finding] = []
     if layout.encoding != "utf-8":
@@ -40,7 +71,7 @@ def read_csv(
     end, cut = _end(path, layout)
     if cut is not None:
         findings.append(cut)
-    names = _unique(layout.names, path)
+    names = _unique(layout.names, findings)
     words = set(layout.words)
     while True:  # a column that turns out to hold words is read again as such, once
         try:
@@ -269,8 +300,15 @@ def _end(path: Path, layout: Layout) -> tuple[int, Finding | None]:
     return size, Finding("cut", "its last line has no end: if the file was cut there, its last number may be wrong")
 
 
-def _unique(names: Sequence[str], path: Path) -> list[str]:
-    doubled = next((name for name in names if names.count(name) > 1), None)
-    if doubled is not None:
-        raise InputError(f"two columns are headed {doubled!r}; rename one", str(path))
-    return list(names)
+def _unique(names: Sequence[str], findings: list[Finding]) -> list[str]:
+    """The headings; from its second time on, one that repeats has a number: `position`, `position (2)`."""
+    found: list[str] = []
+    for at, name in enumerate(names):
+        number = 1 + names[:at].count(name)
+        while (own := name if number == 1 else f"{name} ({number})") in found:
+            number += 1
+        found.append(own)
+    if renamed := [own for own, name in zip(found, names, strict=True) if own != name]:
+        what = f"columns have the same heading; the later ones are called {', '.join(map(repr, renamed[:8]))}"
+        findings.append(Finding("headings", what, Gravity.WARNING))
+    return found

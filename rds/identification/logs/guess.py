@@ -13,7 +13,6 @@ from rds.core.toml_text import toml_text
 from rds.identification.logs.map import DIMENSIONS, SUFFIX, UNKNOWN, AxisMap, ColumnMap, LogMap, TimeMap
 from rds.identification.logs.table import Column, Table, remedy
 from rds.identification.logs.units import dimension, known_units
-from rds.results.units import default_unit
 
 # words of names, lower case, that tell a quantity; the first that fits
 _WORDS: Mapping[str, frozenset[str]] = {
@@ -31,7 +30,6 @@ _WORDS: Mapping[str, frozenset[str]] = {
     ).union(("istposition", "lageistwert", "lage")),
 }
 _OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration"))  # never what was measured
-_LIKELY = {"time": "s", "command": "V", "position": "mm", "velocity": "mm/s", "current": "A", "reference": "mm"}
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
 _TOLD = 5  # columns that a sentence names
@@ -91,8 +89,10 @@ def draft(table: Table) -> str:
         if time is not None:
             content["time"] = {"column": time, "unit": _unit(table, time, "time")}
         else:
-            content["time"] = {"rate": 1000.0}
-            notes.append("No column tells the time: give the rate in Hz if the samples are equally spaced.")
+            content["time"] = {"rate": UNKNOWN}
+            notes.append(
+                f"No column tells the time: if the samples are equally spaced, give their rate in Hz for {UNKNOWN!r}."
+            )
     axes: dict[str, object] = {}
     for name, columns in _groups(table, time).items():
         parts = {q: _likely(columns, q) for q in ("command", "position", "velocity", "current", "reference")}
@@ -101,17 +101,20 @@ def draft(table: Table) -> str:
         }
         for needed in ("command", "position"):
             if needed not in chosen:
-                chosen[needed] = {"column": UNKNOWN, "unit": _LIKELY[needed]}
+                chosen[needed] = {"column": UNKNOWN, "unit": UNKNOWN}
         if any(c is not None and dimension(c.unit or "") == "counts" for c in parts.values()):
-            chosen["resolution"] = 0.001
-            notes.append("resolution: mm (or degrees) per encoder count, or name a machine.")
+            chosen["resolution"] = UNKNOWN
+            notes.append(f"resolution: give mm (or degrees) per encoder count for {UNKNOWN!r}, or name a machine.")
         if {"command", "position"} & {q for q, c in parts.items() if c is not None}:
             axes[name] = chosen
     if not axes:
-        axes["X"] = {q: {"column": UNKNOWN, "unit": _LIKELY[q]} for q in ("command", "position")}
+        axes["X"] = {q: {"column": UNKNOWN, "unit": UNKNOWN} for q in ("command", "position")}
     missing = [c.name for c in table.columns.values() if c.unit is None and c.text is None]
     if missing:
         notes.append(f"The file gives no unit for {', '.join(missing[:8])}{' ...' if len(missing) > 8 else ''}.")
+        notes.append(
+            f"Where {UNKNOWN!r} stands, give the unit: a metre taken for a millimetre is a gain 1000 times wrong."
+        )
     strange = [f"{c.unit!r} of {c.name!r}" for c in table.columns.values() if _is_strange(c)]
     if strange:
         notes.append(f"Unknown units, for which {UNKNOWN!r} stands here: {', '.join(strange[:8])}.")
@@ -126,11 +129,7 @@ def map_path(data: Path) -> Path:
 
 def _unit(table: Table, name: str | None, quantity: str) -> str:
     unit = table.columns[name].unit if name is not None and name in table.columns else None
-    if unit is not None and dimension(unit) in DIMENSIONS[quantity]:
-        return unit
-    if name is not None and name in table.columns and _is_strange(table.columns[name]):
-        return UNKNOWN
-    return (name and default_unit(name)) or _LIKELY[quantity]
+    return unit if unit is not None and dimension(unit) in DIMENSIONS[quantity] else UNKNOWN
 
 
 def _time(table: Table) -> tuple[str | None, str]:

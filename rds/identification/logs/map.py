@@ -182,6 +182,10 @@ def _files(words: TomlTable, key: str, folder: Path) -> tuple[Path, ...]:
 
 def _unit(words: TomlTable, quantity: str) -> str | None:
     unit: str | None = words.read("unit")
+    if unit == UNKNOWN:
+        raise words.fault(
+            "unit", f"is the draft's mark for what the file does not tell: give the unit of the {quantity}"
+        )
     if unit is not None:
         try:
             check_unit(unit, DIMENSIONS[quantity], quantity)

@@ -5,6 +5,7 @@ Each unit belongs to a dimension and is some factor of that dimension's base uni
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
@@ -66,10 +67,14 @@ _BY_UNIT = MappingProxyType(
 _ALIKE = 0.75  # of the letters: what is less alike is another unit, not a slip
 # endings of names that say a unit, as in `pos_mm`; not those that are as likely something else (x_in, a_1, p_m)
 _ENDINGS = ("s", "ms", "us", "ns", "mm", "um", "deg", "rad", "counts", "V", "mV", "A", "mA", "N", "Nm", "rpm")
+_RATES = re.compile(r"(?P<stem>.+?)_(?P<unit>mm|um|m|cm|in|deg|rad|rev|counts|inc)_(?:p|per)?_?(?P<time>s|sec|min)")
 
 
 def unit_of_name(name: str) -> str | None:
-    """The unit that a name ends with, as `pos_mm` does; None where it ends with none."""
+    """The unit that a name ends with, as `pos_mm` and `velocity_mm_s` do; None where it ends with none."""
+    if rate := _RATES.fullmatch(name):
+        unit = f"{rate['unit']}/{'s' if rate['time'] == 'sec' else rate['time']}"
+        return unit if dimension(unit) else None
     stem, _, ending = name.rpartition("_")
     return ending if stem and ending in _ENDINGS else None
 

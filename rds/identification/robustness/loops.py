@@ -14,7 +14,7 @@ from rds.core.errors import ContractError, RdsError
 from rds.core.types import Ending, Model
 from rds.identification.robustness.draws import draws
 from rds.identification.robustness.figures import FIGURES, TRACKING, first_counted, tracking_row, voltage_limits
-from rds.identification.robustness.margins import linear_law, loop_margins
+from rds.identification.robustness.margins import law_about_rest, loop_margins
 from rds.identification.robustness.uncertain import Uncertain
 from rds.models import linear_axis, machine_model
 from rds.modes.experiment.compiled import obstacle, pure_law
@@ -58,7 +58,7 @@ class Task:
                 else:
                     rows[k, :, : len(TRACKING)] = found
         for number, column in enumerate(models):
-            law = linear_law(self.plan.axes[number].controller)
+            law = law_about_rest(self.plan.axes[number].controller)
             if law is not None:
                 rows[:, number, len(TRACKING) :] = loop_margins(law, column, self.plan.T)
         return rows, reasons

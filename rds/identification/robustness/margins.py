@@ -11,80 +11,31 @@ rest. A law that does not answer in proportion has no linear loop, and gets no m
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.types import Controller, Model, Reference
+from rds.core.linear_law import Law, linear_law
+from rds.core.types import Controller, Model
 from rds.models.machine_model import MachineAxisMotion, linear_part, split_delay
 
 GRID = 800  # frequencies, logarithmic up to Nyquist's
 _DECADES = 5.0
-_STEP = 1e-4  # of position (mm) and state, for the law's matrices: far inside any limit
 _LARGEST_DELAY = 200  # samples: beyond, no poles are computed
 
 
-@dataclass(frozen=True)
-class LinearLaw:
-    """u = C s + D y, s⁺ = A s + B y: a law about rest, without the states that never reach the voltage."""
-
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    D: float
-
-
-def linear_law(controller: Controller | None) -> LinearLaw | None:
-    """The law about rest (reference, position and velocity zero); None if it is not linear there."""
-    if controller is None or controller.coupled:
+def law_about_rest(controller: Controller | None) -> Law | None:
+    """`linear_law` of a controller; None if it is not linear about rest, and has no margins."""
+    if controller is None:
         return None
     try:
-        rest = _flat(controller.initial_state)
-        for _ in range(2):  # until it has begun: the first sample of some laws is special
-            _, rest = _answer(controller, 0.0, rest)
-        base_u, base_s = _answer(controller, 0.0, rest)
-        columns = [_slope(controller, rest, base_u, base_s, j) for j in range(-1, len(rest))]
-    except Exception:  # a student's law on a state that it never meets: then there are no margins
+        return linear_law(controller)
+    except Exception:  # a student's law on a state that it never meets
         return None
-    if any(column is None for column in columns):
-        return None
-    both = np.array(columns).T  # rows: u, then the states; columns: y, then the states
-    A, B, C, D = both[1:, 1:], both[1:, 0], both[0, 1:], float(both[0, 0])
-    seen = C != 0.0
-    for _ in range(len(seen)):
-        seen = seen | (A[seen] != 0.0).any(axis=0)
-    return LinearLaw(A[np.ix_(seen, seen)], B[seen], C[seen], D)
 
 
-def _flat(state: Any) -> np.ndarray:
-    values = np.asarray(state, dtype=float)
-    if values.ndim != 1:
-        raise ValueError("not a list of numbers")
-    return values
-
-
-def _answer(controller: Controller, y: float, state: np.ndarray) -> tuple[float, np.ndarray]:
-    rest = Reference(0.0, 0.0, 0.0)
-    u, following, *_ = controller.control(0.0, rest, y, tuple(state.tolist()), dict(controller.params))
-    return float(u), _flat(following)
-
-
-def _slope(controller: Controller, rest: np.ndarray, u: float, s: np.ndarray, j: int) -> np.ndarray | None:
-    """The change of voltage and states for a unit of y (j = -1) or of state j; None if it is not in proportion."""
-    found = []
-    for step in (_STEP, -2.0 * _STEP):
-        moved = rest.copy()
-        if j >= 0:
-            moved[j] += step
-        new_u, new_s = _answer(controller, step if j < 0 else 0.0, moved)
-        found.append(np.concatenate([[new_u - u], new_s - s]) / step)
-    first, second = found
-    return first if np.allclose(first, second, rtol=1e-4, atol=1e-6 * max(1.0, np.abs(first).max())) else None
-
-
-def loop_margins(law: LinearLaw, models: Sequence[Model], T: float) -> np.ndarray:
+def loop_margins(law: Law, models: Sequence[Model], T: float) -> np.ndarray:
     """`figures.MARGINS` of each loop: (models, 4). Margins of an unstable loop, or of no linear axis, are NaN."""
     rows = np.full((len(models), 4), np.nan)
     parts = [_axis(model, T) for model in models]
@@ -102,7 +53,7 @@ def loop_margins(law: LinearLaw, models: Sequence[Model], T: float) -> np.ndarra
     return rows
 
 
-def open_loop(law: LinearLaw, model: Model, T: float, w: np.ndarray) -> np.ndarray:
+def open_loop(law: Law, model: Model, T: float, w: np.ndarray) -> np.ndarray:
     """-C(z) P(z) of one loop at the frequencies `w` (rad/s), complex: what Bode and Nyquist draw.
 
     Raises InputError for a model that has no linear axis in it.
@@ -110,7 +61,7 @@ def open_loop(law: LinearLaw, model: Model, T: float, w: np.ndarray) -> np.ndarr
     return _loop(law, np.array([_known(model, T)]), w, T)[0]
 
 
-def closed_poles(law: LinearLaw, models: Sequence[Model], T: float) -> np.ndarray:
+def closed_poles(law: Law, models: Sequence[Model], T: float) -> np.ndarray:
     """The poles z of each sampled loop: (models, poles), as many as the loop with the longest delay has, else NaN.
 
     Raises InputError for a model that has no linear axis in it, or a delay of more than `_LARGEST_DELAY` samples.
@@ -118,7 +69,7 @@ def closed_poles(law: LinearLaw, models: Sequence[Model], T: float) -> np.ndarra
     axes = np.array([_known(model, T) for model in models])
     if axes[:, 2].max() > _LARGEST_DELAY:
         raise InputError(f"a delay of more than {_LARGEST_DELAY} samples of {T:g} s is too long for its poles")
-    found = np.full((len(axes), 3 + int(axes[:, 2].max()) + len(law.B)), np.nan, dtype=complex)
+    found = np.full((len(axes), 3 + int(axes[:, 2].max()) + len(law.G)), np.nan, dtype=complex)
     for whole in np.unique(axes[:, 2]):
         chosen = axes[:, 2] == whole
         poles = np.linalg.eigvals(_closed(law, axes[chosen], int(whole), T))
@@ -154,16 +105,16 @@ def _held(axes: np.ndarray, T: float) -> tuple[np.ndarray, ...]:
     return tau * gone, 1.0 - gone, now, before
 
 
-def _loop(law: LinearLaw, axes: np.ndarray, w: np.ndarray, T: float) -> np.ndarray:
+def _loop(law: Law, axes: np.ndarray, w: np.ndarray, T: float) -> np.ndarray:
     """-C(z) P(z) on the unit circle: (axes, frequencies)."""
     z = np.exp(1j * w * T)
     a12, a22, now, before = (part[..., None] for part in _held(axes, T))
     inputs = now + before / z  # (2, axes, frequencies)
     speed = inputs[1] / (z - a22)
     plant = (inputs[0] + a12 * speed) / (z - 1.0) * z ** -axes[:, 2:3]
-    n = len(law.B)
-    solved = np.linalg.solve(z[:, None, None] * np.eye(n) - law.A, np.tile(law.B[:, None], (len(z), 1, 1)))[..., 0]
-    return -(solved @ law.C + law.D) * plant
+    n = len(law.G)
+    solved = np.linalg.solve(z[:, None, None] * np.eye(n) - law.F, np.tile(law.G, (len(z), 1, 1)))[..., 0]
+    return -(solved @ law.H[0] + law.D) * plant
 
 
 def margins_of(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
@@ -202,7 +153,7 @@ def _nearest(curves: np.ndarray) -> np.ndarray:
     return nearest
 
 
-def _pole_radius(law: LinearLaw, axes: np.ndarray, T: float) -> np.ndarray:
+def _pole_radius(law: Law, axes: np.ndarray, T: float) -> np.ndarray:
     """The largest |pole| of each closed loop, NaN beyond a delay of `_LARGEST_DELAY` samples."""
     radius = np.full(len(axes), np.nan)
     for whole in np.unique(axes[:, 2]):
@@ -212,14 +163,14 @@ def _pole_radius(law: LinearLaw, axes: np.ndarray, T: float) -> np.ndarray:
     return radius
 
 
-def _closed(law: LinearLaw, axes: np.ndarray, whole: int, T: float) -> np.ndarray:
+def _closed(law: Law, axes: np.ndarray, whole: int, T: float) -> np.ndarray:
     """The closed loops' matrices; states x, v, the voltages that wait (latest first), the law's."""
     a12, a22, now, before = _held(axes, T)
-    n, wait = len(law.B), whole + 1
+    n, wait = len(law.G), whole + 1
     M = np.zeros((len(axes), 2 + wait + n, 2 + wait + n))
     M[:, 0, 0], M[:, 0, 1], M[:, 1, 1] = 1.0, a12, a22
     u = np.zeros(2 + wait + n)  # the new voltage as a row
-    u[0], u[2 + wait :] = law.D, law.C
+    u[0], u[2 + wait :] = law.D, law.H[0]
     for row in (0, 1):
         M[:, row, 1 + wait] += before[row]
         if whole:
@@ -229,6 +180,6 @@ def _closed(law: LinearLaw, axes: np.ndarray, whole: int, T: float) -> np.ndarra
     M[:, 2] = u
     for j in range(1, wait):
         M[:, 2 + j, 1 + j] = 1.0
-    M[:, 2 + wait :, 0] = law.B
-    M[:, 2 + wait :, 2 + wait :] = law.A
+    M[:, 2 + wait :, 0] = law.G[:, 0]
+    M[:, 2 + wait :, 2 + wait :] = law.F
     return M

@@ -16,11 +16,12 @@ import numpy as np
 
 from rds.controllers import tracking
 from rds.core.errors import InputError
+from rds.core.linear_law import Law
 from rds.core.types import Controller, Model, Reference
 from rds.identification.fit.design import Linear, design_tracking
 from rds.identification.robustness.draws import Spread, draws
 from rds.identification.robustness.figures import MARGINS
-from rds.identification.robustness.margins import LinearLaw, closed_poles, linear_law, loop_margins, open_loop
+from rds.identification.robustness.margins import closed_poles, law_about_rest, loop_margins, open_loop
 from rds.models import library_model
 
 LONGEST = 10.0  # s of a step response
@@ -107,9 +108,9 @@ class TrackingDesign:
         return float(np.sqrt(abs(self.poles[0] * self.poles[1])))
 
     @cached_property
-    def law(self) -> LinearLaw:
+    def law(self) -> Law:
         """The controller about rest."""
-        found = linear_law(self.controller)
+        found = law_about_rest(self.controller)
         assert found is not None  # the tracking law is linear
         return found
 

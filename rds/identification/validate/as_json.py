@@ -95,6 +95,8 @@ def _log(a: Assessment) -> dict[str, Any]:
         },
         "noise": {"value": a.noise, "unit": a.unit},
         "attainable": None if a.attainable is None else asdict(a.attainable) | {"ratio": a.attainable.ratio},
+        "as_axis": None if a.as_axis is None else asdict(a.as_axis),
+        "as_motion": None if a.as_motion is None else asdict(a.as_motion),
         "ranges": {name: asdict(found) for name, found in a.ranges.items()},
     }
 

@@ -19,6 +19,7 @@ from rds.identification.logs.log import Log
 from rds.identification.logs.motion import noise
 from rds.identification.validate.attainable import Attainable, attainable
 from rds.identification.validate.candidate import Candidate, check_units
+from rds.identification.validate.discrepancy import Discrepancy, as_axis, as_motion
 from rds.identification.validate.same_data import Overlap, overlap
 
 INITIAL_SAMPLES = 50  # from which the initial state is estimated, and which no error counts
@@ -69,6 +70,9 @@ class Assessment:
     tests: ResidualTest | None
     voltage: NeededVoltage | None
     attainable: Attainable | None  # None where no fit to this log is a measure of the model
+    as_axis: Discrepancy | None  # None for a model that is no linear axis
+    as_motion: Discrepancy | None  # None where the model hardly moves
+    frequency: float  # Hz: 99 % of the power of the motion's velocity lies below
     noise: float  # of the measurement, rounding included, in the unit of the position
     overlap: Overlap
     ranges: Mapping[str, Range]
@@ -108,11 +112,12 @@ class Assessment:
         return float(np.ptp(self.measured))
 
 
-def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -> Assessment:
+def assess(candidate: Candidate, log: Log, initial_samples: int | None = None, bandwidth: float = 0.0) -> Assessment:
     """Measure the model against the log.
 
     The initial state is estimated from the first `initial_samples` (default 50, of short logs a tenth), and errors
-    count from there on. InputError for a log too short for that, or in another unit than the model.
+    count from there on. `bandwidth` is the intended one of a loop, Hz (0: see `discrepancy`). InputError for a log too
+    short for that, or in another unit than the model.
     """
     check_units(candidate, log)
     first = _first(log, initial_samples)
@@ -126,7 +131,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
     modelled = response[first:]
     wrong = np.flatnonzero(~np.isfinite(response))
     unstable_at = float(t[wrong[0]]) if len(wrong) else None
-    frequency = _bandwidth(log, response, candidate.is_rate)
+    frequency = _tried(log, response, candidate.is_rate)
     block = block_length(frequency, log.sample_period, len(modelled))
     rates = [_rates(t[first:], values, block, candidate.is_rate) for values in (y[first:], modelled)]
     common: dict[str, Any] = {
@@ -136,6 +141,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
         "modelled": modelled,
         "unstable_at": unstable_at,
         "block": block,
+        "frequency": frequency,
         "block_time": block_means(t[first:], block),
         "block_velocity": rates[0],
         "block_modelled": rates[1],
@@ -155,6 +161,8 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
             tests=None,
             voltage=None,
             attainable=None,
+            as_axis=None,
+            as_motion=None,
             **common,
         )
     measured = y[first:]
@@ -168,6 +176,8 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None) -
         tests=_tests(candidate, log, first, start, modelled, frequency),
         voltage=_voltage(candidate, log, block),
         attainable=attainable(candidate, log, start, common["noise"]),
+        as_axis=as_axis(candidate, log, common["noise"], bandwidth),
+        as_motion=as_motion(log, first, modelled, candidate.is_rate, rates, bandwidth, values.get("tau", 0.0)),
         **common,
     )
 
@@ -185,7 +195,7 @@ def _first(log: Log, initial_samples: int | None) -> int:
     return initial_samples
 
 
-def _bandwidth(log: Log, response: np.ndarray, is_rate: bool) -> float:
+def _tried(log: Log, response: np.ndarray, is_rate: bool) -> float:
     """Of the model's motion, which no rounding disturbs; of the command, where the model hardly moves."""
     if np.isfinite(response).all() and float(np.ptp(response)) > _MOVES * float(np.ptp(log.position)):
         rate = response if is_rate else np.diff(response) / np.diff(log.time)

@@ -8,8 +8,9 @@ from rds.identification.fit.estimate import guesses
 from rds.identification.validate.assessment import Assessment, Range, largest
 from rds.identification.validate.candidate import Candidate
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
-from rds.identification.validate.within import foreseen_at, passes
+from rds.identification.validate.within import foreseen_at, frequency_told, passes
 
+WRONG = frozenset({"gain", "phase", "delay", "friction"})  # what a loop would feel
 DATA = "data-"  # how the kind of a reason begins that is a finding about the log
 
 
@@ -26,7 +27,7 @@ def conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, 
 def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
     against = {reason.kind for reason in reasons if reason.side is Side.AGAINST}
     position, velocity = passes(a, bands)
-    if {"unstable", "sign", "unit"} & against:
+    if ({"unstable", "sign", "unit"} | WRONG) & against:
         return Word.NOT, ""
     if not position and not velocity:
         if a.log.closed_loop and "voltage" not in against and a.voltage and a.voltage.relative_percent is not None:
@@ -63,6 +64,8 @@ def _limits(a: Assessment, bands: Bands) -> Iterator[str]:
         for found in a.ranges.values()
     ):
         yield f"up to the {largest(speed.here):.3g} {speed.unit} tried here"
+    if (frequency := frequency_told(a, bands)) is not None:
+        yield f"up to {frequency:.2g} Hz"
     if a.log.closed_loop:
         yield "in a closed loop such as this"
 
@@ -73,7 +76,8 @@ def sentence_of(candidate: Candidate, a: Assessment, word: Word, purpose: str, r
     if word is Word.UNTOLD:
         return f"Cannot tell whether {name} is valid, from {log}."
     if word is Word.NOT:
-        return f"{name} is not valid for {log}."
+        wrong = [r.what.split(":")[0] for r in reasons if r.side is Side.AGAINST and r.kind in WRONG]
+        return f"{name} is not valid for {log}{': ' if wrong else ''}{'; '.join(wrong)}."
     if word is Word.VALID:
         return f"{name} is valid for {log}."
     sentence = f"{name} is valid for {purpose} only, by {log}."
@@ -92,7 +96,8 @@ def sentence_of(candidate: Candidate, a: Assessment, word: Word, purpose: str, r
 def _tried(a: Assessment) -> str:
     """How fast and at which voltages the log went: what a verdict by it speaks of."""
     speed, command = a.ranges["velocity"], a.ranges["command"]
-    return f"up to {largest(speed.here):.3g} {speed.unit} and {largest(command.here):.3g} {command.unit}"
+    fastest, most = f"{largest(speed.here):.3g} {speed.unit}", f"{largest(command.here):.3g} {command.unit}"
+    return f"up to {fastest}, {most} and {a.frequency:.2g} Hz" if a.frequency > 0.0 else f"up to {fastest} and {most}"
 
 
 def _and(words: list[str]) -> str:

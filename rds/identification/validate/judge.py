@@ -12,7 +12,16 @@ from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.candidate import Candidate
 from rds.identification.validate.conclusion import DATA, conclude, sentence_of
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
-from rds.identification.validate.within import passes, skilled_at
+from rds.identification.validate.within import (
+    Measure,
+    as_good,
+    judged_by,
+    measures,
+    of_noise,
+    passes,
+    skilled_at,
+    slight,
+)
 
 _FACTORS = {  # of measured over modelled, and what makes it
     -1.0: "the sign of the position or of the command is reversed",
@@ -27,6 +36,7 @@ _MISLEADING = ("sign", "units", "columns", "wrap")  # findings of a log after wh
 _BLOCKS = 50  # with fewer, the residual tests find nothing
 _NEAR = 0.15  # how near to such a factor is suspicious
 _FEW = 0.1  # share of lags beyond the plain band that is still called white
+_NEGLIGIBLE = 99.8  # %: of a free run's fit, for what a structure lacks
 _IDENTICAL = 1e-9  # RMSE over the motion: only the model's own output comes so near
 
 
@@ -35,6 +45,7 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
     reasons = [
         *_data(a, bands),
         *_unstable(candidate, a),
+        *_discrepancy(a, bands),
         *_free_run(a, bands),
         *_scale(a, bands),
         *_ahead(a, bands),
@@ -149,6 +160,13 @@ def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
     e = a.free_run
     position, velocity = passes(a, bands)
     what = "speed" if a.velocity is None else "position"
+    if as_good(a) and e.fit_percent < bands.fit_percent:
+        yield Reason(
+            Side.NOTE,
+            "as-good",
+            f"the free run's error is the measurement's noise ({a.noise:.2g} {a.unit}): the model is as good as this "
+            "log can tell",
+        )
     yield Reason(
         Side.FOR if position else Side.AGAINST,
         "free-run",
@@ -168,6 +186,42 @@ def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
             "drift",
             f"the position drifts from the model's by {a.drift:.3g} {a.unit}/s: the error of the velocity adds up",
         )
+
+
+def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
+    found = judged_by(a, bands)
+    if found is None or a.free_run is None or a.motion <= bands.least_steps * (a.log.resolution or 0.0):
+        return
+    for measure in measures(a, bands):
+        off, limit = measure.off, f"band {_shown(measure.band, measure.off.unit)}"
+        if measure.borderline and measure.told:
+            limit += ", borderline"
+        what = f"{_said_of(measure, found.frequency)}: ± {_shown(off.error, off.unit)} standard error; {limit}"
+        if measure.wrong:
+            yield Reason(Side.AGAINST, measure.kind, what)
+        elif measure.told:
+            yield Reason(Side.FOR, measure.kind, what)
+        elif measure.kind == "gain":
+            yield Reason(Side.UNTOLD, "gain-untold", f"this log does not tell the gain: {what}")
+        else:
+            yield Reason(Side.NOTE, f"{measure.kind}-untold", f"this log does not tell the {measure.kind}: {what}")
+
+
+def _said_of(measure: Measure, frequency: float) -> str:
+    """A clause: what the model is off by."""
+    value = measure.off.value
+    size, more = _shown(abs(value), measure.off.unit), value > 0.0
+    if measure.kind == "gain":
+        return f"its gain is {size} too {'high' if more else 'low'}"
+    if measure.kind == "phase":
+        return f"at {frequency:.2g} Hz its phase {'leads' if more else 'lags'} that of the axis by {size}"
+    if measure.kind == "delay":
+        return f"its delay is {size} too {'long' if more else 'short'}"
+    return f"its friction is too {'high' if more else 'low'} by {size} of the largest command"
+
+
+def _shown(value: float, unit: str) -> str:
+    return f"{1e3 * value:.3g} ms" if unit == "s" else f"{value:.3g}{'' if unit == '°' else ' '}{unit}"
 
 
 def _scale(a: Assessment, bands: Bands) -> Iterator[Reason]:
@@ -194,7 +248,8 @@ def _ahead(a: Assessment, bands: Bands) -> Iterator[Reason]:
     text = f"RMSE of predictions so many samples ahead, {a.unit}: {said}"
     if unskilled:
         text += f"; {', '.join(unskilled)} ahead, the model is worth little more than none, whatever its fit"
-    yield Reason(Side.NOTE if skilled else Side.AGAINST, "ahead", text)
+    noisy = all(of_noise(a, e) for e in a.ahead.values())
+    yield Reason(Side.NOTE if skilled or noisy else Side.AGAINST, "ahead", text)
 
 
 def _voltage(a: Assessment, bands: Bands) -> Iterator[Reason]:
@@ -210,8 +265,9 @@ def _voltage(a: Assessment, bands: Bands) -> Iterator[Reason]:
         )
         return
     unit = a.ranges["command"].unit
+    beyond = Side.NOTE if slight(a, bands) else Side.AGAINST  # of a slow or noisy motion, blocks tell little
     yield Reason(
-        Side.FOR if percent <= bands.voltage_percent else Side.AGAINST,
+        Side.FOR if percent <= bands.voltage_percent else beyond,
         "voltage",
         f"the voltage that the model needs for the measured motion differs by {percent:.2f} % "
         f"(RMS {a.voltage.rmse:.3g} {unit}) from the one given",
@@ -227,8 +283,9 @@ def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
         f"p = {tests.p_white:.3f}, {tests.blocks} means over {tests.block * a.log.sample_period * 1e3:.3g} ms; largest "
         f"autocorrelation {r:.2f} after {lag:.3g} s"
     )
+    against = Side.NOTE if slight(a, bands) else Side.AGAINST
     if tests.p_white <= bands.significance:
-        yield Reason(Side.AGAINST, "whiteness", f"the residual is not white ({numbers})")
+        yield Reason(against, "whiteness", f"the residual is not white ({numbers})")
     elif tests.auto.outside > _FEW:
         yield Reason(
             Side.FOR,
@@ -249,7 +306,7 @@ def _residuals(a: Assessment, bands: Bands) -> Iterator[Reason]:
     free = tests.p_command > bands.significance
     c, lag = tests.cross.largest
     yield Reason(
-        Side.FOR if free else Side.AGAINST,
+        Side.FOR if free else against,
         "command",
         f"the residual is {'independent of' if free else 'correlated with'} the command "
         f"(p = {tests.p_command:.3f}; largest correlation {c:.2f} at {lag:.3g} s)",
@@ -270,7 +327,7 @@ def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
             f"the free run is {found.ratio:.3g} times as far off as that of the same structure fitted to this log "
             f"({numbers}): noise and structure do not explain that, the parameters are off"
         )
-        yield Reason(Side.AGAINST, "attainable", text)
+        yield Reason(Side.NOTE if slight(a, bands) else Side.AGAINST, "attainable", text)
     elif all(passes(a, bands)):
         text = f"no other parameters of this structure would come much nearer ({numbers})"
         yield Reason(Side.FOR, "attainable", text)
@@ -280,7 +337,7 @@ def _attainable(a: Assessment, bands: Bands) -> Iterator[Reason]:
             + f" where this log says {p.here:.4g} ({p.apart:.1f} standard errors)"
             for p in off
         )
-        yield Reason(Side.AGAINST, "parameters", f"beyond their intervals: {said}")
+        yield Reason(Side.NOTE if slight(a, bands) else Side.AGAINST, "parameters", f"beyond their intervals: {said}")
 
 
 def _guesses(candidate: Candidate) -> Iterator[Reason]:
@@ -300,7 +357,7 @@ def _structure(a: Assessment, bands: Bands) -> Iterator[Reason]:
         found = over_noise(a.ahead, a.noise)
         if found is not None and found[1] > bands.unexplained:
             yield Reason(
-                Side.AGAINST,
+                Side.NOTE if _negligible(a, bands) else Side.AGAINST,
                 "structure-held",
                 f"{found[0]} samples ahead, where the missing controller hardly shows, the model is {found[1]:.3g} "
                 f"times as far off as noise makes it ({a.ahead[found[0]].rmse:.3g} {a.unit} RMSE): the axis does "
@@ -313,12 +370,17 @@ def _structure(a: Assessment, bands: Bands) -> Iterator[Reason]:
         left, what = a.free_run.rmse, "the free run leaves"
     if left > bands.unexplained * a.noise:
         yield Reason(
-            Side.AGAINST,
+            Side.NOTE if _negligible(a, bands) else Side.AGAINST,
             "structure",
             f"{what} {left:.3g} {a.unit} (RMS), {left / a.noise:.3g} times the measurement's noise "
             f"({a.noise:.2g} {a.unit}, if it is white): the axis does something that the model lacks, and its "
             "parameters may make up for that",
         )
+
+
+def _negligible(a: Assessment, bands: Bands) -> bool:
+    """Whether what the structure lacks is so small a part of the motion that nobody will feel it."""
+    return slight(a, bands) and a.free_run is not None and a.free_run.fit_percent >= _NEGLIGIBLE
 
 
 def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reason]:

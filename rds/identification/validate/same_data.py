@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rds.identification.logs.fingerprint import shared
 from rds.identification.logs.log import Log
+from rds.identification.logs.trace import retraced
 
 if TYPE_CHECKING:
     from rds.identification.validate.candidate import Candidate
@@ -40,6 +41,11 @@ def overlap(candidate: Candidate, log: Log) -> Overlap:
         else:
             how = "the file is another, but holds the same numbers as the fit's data"
         return Overlap(alike, how, known=True)
+    traces = [str(fitted["trace"]) for fitted in candidate.fitted_on if fitted.get("trace")]
+    again = max((retraced(log, trace) for trace in traces), default=0.0)
+    if again > 0.0 and not (log.sha256 and log.sha256 in hashes):
+        how = "other numbers, but the same motion as the fit's data, at the same times and within the noise"
+        return Overlap(again, how, known=True)
     known = bool(prints or (hashes and log.sha256))
     if known:
         return Overlap(0.0, "other data than the fit's", known=True)

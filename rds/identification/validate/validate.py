@@ -92,7 +92,9 @@ def validate(
     bands = bands or Bands()
     names = _names([log.name for log in logs])
     others = _others(candidate, against)
-    assessments = {name: assess(candidate, log, initial_samples) for name, log in zip(names, logs, strict=True)}
+    assessments = {
+        name: assess(candidate, log, initial_samples, bands.bandwidth) for name, log in zip(names, logs, strict=True)
+    }
     verdicts = {name: judge(candidate, a, bands) for name, a in assessments.items()}
     rankings = {name: _ranking(candidate, a, others, bands, initial_samples) for name, a in assessments.items()}
     return Validation(candidate, assessments, verdicts, bands, others, rankings if others else {})

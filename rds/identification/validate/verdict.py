@@ -98,6 +98,11 @@ class Bands:
     apart: float = 3.5  # standard errors by which a parameter may differ from what this log says of it
     beyond: float = 1.1  # speeds and voltages here over the fit's, beyond which the model extrapolates
     covered: float = 0.5  # share of the fit's speeds that a log must cover to speak for all of them
+    bandwidth: float = 0.0  # Hz, that a loop on this axis is to have; 0: half of 1/τ
+    gain_percent: float = 3.0  # %: of the gain at the bandwidth or at rest, whichever the log tells better
+    phase_degrees: float = 4.0  # at the bandwidth
+    delay: float = 1.5e-3  # s, and one and a half samples: of the delay alone
+    friction_percent: float = 3.0  # %: of the largest command
     floor: float = 0.8  # RMSE over the encoder's own rounding (step / √12), below which no measurement comes
 
     def __post_init__(self) -> None:

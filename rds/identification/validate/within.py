@@ -1,18 +1,48 @@
-"""Which of a model's errors are within the bands, on one log."""
+"""Which of a model's errors are within the bands on one log: those of the free run, those that a loop would feel."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import isfinite, sqrt
+
 import numpy as np
 
+from rds.identification.fit.estimate import Errors
 from rds.identification.validate.assessment import Assessment
+from rds.identification.validate.discrepancy import Discrepancy, Off
 from rds.identification.validate.verdict import Bands
+
+_AS_NOISE = 1.2  # times what noise makes of an error: no model could be better
+_SURE = 2.6  # standard errors: 99 %
+_SURE_OF_DELAY = 5.0  # a delay and a time constant make up for each other, by more than derivatives say
+_LIKELY = 2.0  # 95 %
+_UNTOLD = {"gain": 2.0, "phase": 1.4}  # times the band: what the log leaves open is that wide
+_SLIGHT = 0.25  # of the bands
+_SLIGHT_FIT = (99.5, 98.0)  # %, of position and velocity
 
 
 def passes(a: Assessment, bands: Bands) -> tuple[bool, bool]:
-    """Whether the free run's position and velocity are within the band."""
-    position = a.free_run is not None and a.free_run.fit_percent >= bands.fit_percent
-    velocity = a.velocity is not None and a.velocity.fit_percent >= bands.fit_percent
-    return position, velocity if a.velocity is not None else position
+    """Whether the free run's position and velocity are within the band, or as near as noise lets any model come."""
+    position = a.free_run is not None and (a.free_run.fit_percent >= bands.fit_percent or as_good(a))
+    if a.velocity is None:
+        return position, position
+    return position, a.velocity.fit_percent >= bands.fit_percent or as_good_velocity(a)
+
+
+def as_good(a: Assessment) -> bool:
+    """Whether the free run's error is the measurement's noise alone, so that no model could do better."""
+    return a.free_run is not None and a.as_motion is not None and a.free_run.rmse <= _AS_NOISE * a.noise
+
+
+def as_good_velocity(a: Assessment) -> bool:
+    """The same of the velocity: what noise of the position makes of a difference over a block."""
+    made = sqrt(2.0) * a.noise / (a.block * a.log.sample_period)
+    return a.velocity is not None and a.as_motion is not None and a.velocity.rmse <= _AS_NOISE * made
+
+
+def of_noise(a: Assessment, errors: Errors) -> bool:
+    """Whether a prediction from one measured position to another is as good as noise lets it be."""
+    return errors.rmse <= _AS_NOISE * sqrt(2.0) * a.noise
 
 
 def skilled_at(a: Assessment, bands: Bands) -> list[int]:
@@ -25,3 +55,83 @@ def foreseen_at(a: Assessment, bands: Bands) -> list[int]:
     share = 1.0 - bands.fit_percent / 100.0
     way = {k: float(np.sqrt(np.mean((a.measured[k:] - a.measured[:-k]) ** 2))) for k in skilled_at(a, bands)}
     return [k for k in way if a.ahead[k].rmse <= share * way[k]]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What the model is off by in one thing, beside its band."""
+
+    kind: str  # gain, phase, delay, friction
+    off: Off
+    band: float
+
+    @property
+    def wrong(self) -> bool:
+        """Clearly beyond the band."""
+        sure = _SURE_OF_DELAY if self.kind == "delay" else _SURE
+        return abs(self.off.value) > max(self.band, sure * self.off.error)
+
+    @property
+    def reach(self) -> float:
+        """How far off it may be, 95 %."""
+        return abs(self.off.value) + _LIKELY * self.off.error if isfinite(self.off.error) else float("inf")
+
+    @property
+    def told(self) -> bool:
+        """Whether the log says that it is not far beyond the band, or that it is."""
+        return self.wrong or self.reach <= _UNTOLD.get(self.kind, 1.0) * self.band
+
+    @property
+    def borderline(self) -> bool:
+        """Whether a slightly other band would say otherwise."""
+        return 0.75 <= abs(self.off.value) / self.band <= 1.33
+
+
+def judged_by(a: Assessment, bands: Bands) -> Discrepancy | None:
+    """The measure of what a loop would feel: as the axis where that explains the log, else as motion."""
+    axis = a.as_axis
+    if axis is not None and (
+        axis.reached <= bands.unexplained * a.noise or axis.rmse > bands.attainable * axis.reached
+    ):
+        return axis
+    return a.as_motion
+
+
+def measures(a: Assessment, bands: Bands) -> list[Measure]:
+    """Gain and phase, and delay and friction where they are known; empty where nothing is."""
+    found = judged_by(a, bands)
+    if found is None:
+        return []
+    listed = [Measure("gain", found.gain, bands.gain_percent), Measure("phase", found.phase, bands.phase_degrees)]
+    if found.delay is not None:
+        listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period)))
+    if found.friction is not None:
+        listed.append(Measure("friction", found.friction, bands.friction_percent))
+    return listed
+
+
+def frequency_told(a: Assessment, bands: Bands) -> float | None:
+    """The frequency in Hz up to which the phase is within its band for sure; None where that is the intended one."""
+    found = judged_by(a, bands)
+    if found is None:
+        return None
+    phase = Measure("phase", found.phase, bands.phase_degrees)
+    if phase.told:
+        return None
+    lag = abs(found.lag.value) + _LIKELY * found.lag.error
+    return bands.phase_degrees / 360.0 / lag if isfinite(lag) and lag > 0.0 else 0.0
+
+
+def slight(a: Assessment, bands: Bands) -> bool:
+    """Whether all that the model is off by is known, and far within the bands, or noise is all that is left of the log.
+
+    No test of the residual, and no error that noise makes, matters then.
+    """
+    found = [m for m in measures(a, bands) if m.kind in ("gain", "phase")]
+    if found and as_good(a) and all(m.told and not m.wrong for m in measures(a, bands) if m.kind != "friction"):
+        return True
+    if a.free_run is None or not found or any(m.reach > _SLIGHT * m.band for m in found):
+        return False
+    position, velocity = _SLIGHT_FIT
+    near = a.free_run.fit_percent >= position or as_good(a)
+    return near and (a.velocity is None or a.velocity.fit_percent >= velocity or as_good_velocity(a))

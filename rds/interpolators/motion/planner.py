@@ -18,6 +18,7 @@ TOLERANCE = 0.05  # mm (degrees), of G64 without P; chosen
 LONGEST_RAMP = 1000.0  # s, acceleration over jerk of an axis, over which the motion is averaged
 MARGIN = 1e-3  # relative, kept off the limits for rounding
 PASSING = ("coolant",)  # kinds of events for which the motion does not come to rest
+NOT_BUILT = ("line", "rapid", "tip", "tool_length")  # columns of the segments that the pieces do not need
 ENOUGH = 2048  # segments, or samples, that are gathered before they are handed on
 
 
@@ -145,7 +146,7 @@ class _Planner:
         for after, event in self.events:
             if event.kind not in PASSING and first <= after < first + n:
                 rest[after - first] = True
-        path = {name: np.ascontiguousarray(new[name]) for name in SEGMENT.fields or () if name not in ("line", "rapid")}
+        path = {name: np.ascontiguousarray(new[name]) for name in SEGMENT.fields or () if name not in NOT_BUILT}
         path["rate"] = np.where(new["rapid"], inf, new["rate"])
         path["tolerance"] = np.where(np.isfinite(new["tolerance"]), new["tolerance"], self.tolerance)
         f, u, done = build(

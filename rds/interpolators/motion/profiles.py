@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.interpolators.motion.certificate import Certificate, certified
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.samples import SampleBlock
+from rds.interpolators.motion.segments import JOINTS
 
 
 class Profile(NamedTuple):
@@ -20,12 +21,13 @@ class Profile(NamedTuple):
     about: str
 
 
+BLENDED = "blended"
 PROFILES = {
     "planned": Profile(
         ("velocity", "acceleration", "jerk", "deviation"), "look-ahead and blending within G64's tolerance"
     ),
     "trapezoid": Profile(("velocity", "acceleration", "deviation"), "constant accelerations, at rest after each move"),
-    "blended": Profile(("velocity",), "velocities held through corners, all axes in the same stage (three-axis-mill)"),
+    BLENDED: Profile(("velocity",), "velocities held through corners, all axes in the same stage (three-axis-mill)"),
     "point-to-point": Profile(
         ("velocity", "acceleration", "jerk", "deviation"),
         "least time within the jerk, at rest after each move",
@@ -56,7 +58,8 @@ def _samples(
         from rds.interpolators.motion.planner import plan
 
         return plan(blocks, limits, T, start=start)
-    if profile == "blended":
+    blocks = _of_joints(blocks, profile)
+    if profile == BLENDED:
         from rds.interpolators.motion.blended_path import blended_path
 
         return blended_path(blocks, limits, T, start=start)
@@ -65,3 +68,16 @@ def _samples(
     if profile == "trapezoid":
         return each_move(blocks, limits, T, trapezoid_law(T), jerk_limited=False, start=start)
     return each_move(blocks, limits, T, point_to_point_law(T), jerk_limited=True, start=start)
+
+
+def _of_joints(blocks: Iterable[Any], profile: str) -> Iterator[Any]:
+    """The same blocks. InputError for chords of moves of the tool's tip, at each of which these profiles would rest."""
+    for block in blocks:
+        for_tip = getattr(block, "segments", block)["tip"] != JOINTS
+        if for_tip.any():
+            line = getattr(block, "segments", block)["line"][for_tip.argmax()]
+            raise InputError(
+                f"profile {profile!r} does not move the tool's tip (G43.4) smoothly; leave --profile away",
+                f"line {line}",
+            )
+        yield block

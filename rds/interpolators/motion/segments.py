@@ -16,6 +16,7 @@ from rds.core.errors import InputError
 AXES = ("X", "Y", "Z", "A", "B", "C")
 LINE, XY, ZX, YZ = -1, 0, 1, 2  # planes
 EXACT_PATH, EXACT_STOP, BLEND = 0, 1, 2  # modes: G61, G61.1, G64
+JOINTS, MOVED, TILTED = 0, 1, 2  # of `tip`
 FULL_CIRCLE = 1e-6  # rad; an arc shorter than this is a whole turn (LinuxCNC's CIRCLE_FUZZ)
 
 SEGMENT = np.dtype(
@@ -24,6 +25,7 @@ SEGMENT = np.dtype(
         ("rapid", "?"),
         ("plane", "i1"),
         ("mode", "i1"),
+        ("tip", "i1"),  # JOINTS, or for the tool's tip: MOVED (length and rate in mm), TILTED (in degrees, tip at rest)
         ("start", "f8", (6,)),  # X Y Z A B C
         ("end", "f8", (6,)),
         ("centre", "f8", (3,)),  # of an arc, X Y Z; its component along the normal is not used
@@ -32,6 +34,7 @@ SEGMENT = np.dtype(
         ("rate", "f8"),  # mm/s along the path, degrees/s where only rotary axes move; not used by rapids
         ("tolerance", "f8"),  # mm, G64 P; inf where no P was given
         ("collinear", "f8"),  # mm, G64 Q: lines nearer than this to being one are taken as one; 0 where none was given
+        ("tool_length", "f8"),  # mm, of a move for the tip: how much longer the tool is than the machine's own
     ],
     align=True,
 )

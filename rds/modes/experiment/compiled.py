@@ -18,6 +18,7 @@ from rds.machines import converter
 from rds.machines.converter import limits
 from rds.models.linear_axis import LinearAxisMotion, coefficients, respond
 from rds.modes import load_mode
+from rds.modes.loop.commands import Command
 from rds.modes.loop.plan import AxisPlan, Plan
 from rds.modes.process.host import Rows
 
@@ -30,12 +31,16 @@ def obstacle(plan: Plan) -> str | None:
         return f"numba is not installed; install it with: {remedy('fast')}"
     if plan.program is not None:
         return "a path or a part program drives the axes"
+    if plan.network is not None:
+        return "a network is between the axes and their controllers"
     if plan.changes:
         return "live values change while it runs"
     if load_mode(plan.mode).real_time:
         return f"{plan.mode} runs in real time; only simulations can be compiled"
     for axis in plan.axes:
         name = axis.axis.name
+        if axis.command is not Command.VOLTAGE:
+            return f"axis {name}: its drive closes a loop of its own"
         if axis.model.motion is not LinearAxisMotion:
             return f"axis {name}: only the library's linear-axis model can be compiled"
         if axis.controller is not None and pure_law(axis) is None:
@@ -97,7 +102,7 @@ def controlled(law: Callable[..., Any], known: Callable[..., Any] | None) -> Cal
     counted, converted = converter.compiled()
 
     @njit
-    def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage, velocity):
+    def simulate(p, v, a, coefficients, state, constants, start, interface, table, voltage, velocity):  # type: ignore[no-untyped-def]
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
         low, high, step, resolution = interface
@@ -127,19 +132,21 @@ def _telling(known: Callable[..., Any] | None) -> Callable[..., None]:
     if known is None:
 
         @njit
-        def nothing(table, k, y, state, following, coefficients):
+        def nothing(table, k, y, state, following, coefficients):  # type: ignore[no-untyped-def]
             return None
 
-        return nothing
+        compiled: Callable[..., None] = nothing
+        return compiled
     known = njit(known)
 
     @njit
-    def tell(table, k, y, state, following, coefficients):
+    def tell(table, k, y, state, following, coefficients):  # type: ignore[no-untyped-def]
         values = known(y, state, following, coefficients)
         for i in range(len(values)):
             table[k, 5 + i] = values[i]
 
-    return tell
+    compiled = tell
+    return compiled
 
 
 @lru_cache
@@ -151,7 +158,7 @@ def playing() -> Callable[..., None]:
     counted, converted = converter.compiled()
 
     @njit
-    def simulate(command, constants, start, interface, table, voltage):
+    def simulate(command, constants, start, interface, table, voltage):  # type: ignore[no-untyped-def]
         x, w = start
         T, decay, reach, tau, K, plus, minus = constants
         low, high, step, resolution = interface

@@ -12,6 +12,7 @@ from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.folder_kept import folder_kept
 from rds.core.toml_table import TomlTable
 from rds.core.types import Ending
+from rds.machines import Machine, load_machine
 from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.experiment_file import EXPERIMENT, PATHS, is_path
 from rds.modes.experiment.folder import new_folder, require_writable
@@ -22,11 +23,18 @@ from rds.modes.experiment.validation import validated
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import as_text
 from rds.modes.loop.plan import Plan
-from rds.modes.loop.program import InterpolatedProgram
-from rds.modes.process.host import Progress, Rows, run_plan
+from rds.modes.process.host import FailedSimulation, Progress, Rows, run_plan
 from rds.modes.process.live import Live
 from rds.modes.process.record import write_whole
 from rds.results import Result
+
+
+class FailedRun(ContractError):
+    """A student's code has failed in a simulation that is kept: `result` has the samples up to then, saved."""
+
+    def __init__(self, reason: str, result: Result):
+        super().__init__(reason)
+        self.result = result
 
 
 class Experiment:
@@ -59,9 +67,11 @@ class Experiment:
         signal: Any = None,
         model: Any = None,
         overrides: Mapping[str, Mapping[str, Any]] | None = None,
+        error_compensation: Mapping[str, float] | None = None,
         interface: Mapping[str, bool] | None = None,
         timing: Mapping[str, Any] | None = None,
         bus: Mapping[str, Any] | None = None,
+        network: Mapping[str, Any] | None = None,
         compiled: bool = False,
         title: str | None = None,
     ):
@@ -77,9 +87,11 @@ class Experiment:
             "controller": controller,
             "signal": signal,
             "model": model,
+            "error_compensation": error_compensation,
             "interface": interface,
             "timing": timing,
             "bus": bus,
+            "network": network,
             "compiled": compiled,
         }
         table = {key: value for key, value in given.items() if value is not None}
@@ -135,6 +147,20 @@ class Experiment:
         changed.plan()
         return changed
 
+    def with_machine(self, machine: str | Path, channel: str | None = None) -> Experiment:
+        """The same experiment on another machine: a name, or a machine's file as seen from here.
+
+        `channel` is where its modules are, if not where the experiment says. InputError for a machine on which the
+        experiment cannot be run, as one without its axes.
+        """
+        changed = copy.copy(self)
+        changed._put_on(load_machine(str(machine)), channel)
+        changed.plan()
+        return changed
+
+    def _put_on(self, machine: Machine, channel: str | None) -> None:
+        self._words = self._words.over_written(on_machine(self._words.table, machine, channel))
+
     @property
     def periods(self) -> dict[str, float | None]:
         """The period of each axis's reference, s; None where it does not repeat. Metrics leave the first one out."""
@@ -189,8 +215,15 @@ class Experiment:
             folder = new_folder(plan.names, plan.mode) if load_mode(plan.mode).real_time else None
 
         def work(live: Live | None, progress: Progress | None) -> Result:
-            with folder_kept():
-                rows = self._rows(plan, folder, progress, live)
+            try:
+                with folder_kept():
+                    rows = self._rows(plan, folder, progress, live)
+            except FailedSimulation as error:
+                if out is None or not len(error.rows.values):
+                    raise
+                kept = self._saved(plan, known, error.rows, out)
+                said = f"{error} (the samples up to then are in {out})"
+                raise FailedRun(said, kept) from error.__cause__
             return self._finished(plan, known, rows, folder, out)
 
         return self._handle(plan, folder, work)
@@ -206,6 +239,10 @@ class Experiment:
             raise ContractError(f"{rows.reason}{kept}")
         if not len(rows.values):
             raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
+        return self._saved(plan, known, rows, out)
+
+    def _saved(self, plan: Plan, known: dict[str, Any], rows: Rows, out: str | Path | None) -> Result:
+        """The result of these rows, saved where somebody wants it."""
         result = self._complete(outcome(plan, rows, known), plan)
         if load_mode(plan.mode).validates:
             result = validated(plan, result)
@@ -222,7 +259,7 @@ class Experiment:
 
     def _complete(self, result: Result, plan: Plan) -> Result:
         """What else is to be said of a result; a run of another kind adds to it."""
-        if isinstance(plan.program, InterpolatedProgram):
+        if plan.program is not None:
             judged: Result = PATHS.module("path").judged_path(result, plan.program, plan.T)
             return judged
         return result
@@ -238,3 +275,9 @@ class Experiment:
             note = f"not compiled: {note}"
         rows = run_plan(plan, folder, progress, live)
         return replace(rows, notes=(note,)) if note else rows
+
+
+def on_machine(table: Mapping[str, Any], machine: Machine, channel: str | None) -> dict[str, Any]:
+    """The words of an experiment, with another machine and channel."""
+    bus = {} if channel is None else {"bus": {**table.get("bus", {}), "channel": channel}}
+    return {**table, "machine": str(Path(machine.path).resolve()), **bus}

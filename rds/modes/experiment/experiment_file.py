@@ -14,9 +14,11 @@ from rds.core.registry import Registry
 from rds.core.shared_quantities import DURATION, SAMPLE_PERIOD
 from rds.models import model_module, model_names
 from rds.modes import mode_names
+from rds.modes.experiment.compensation import COMPENSATION
+from rds.network.network_file import NETWORK
 from rds.references import signal_kinds, signal_options
 
-AXIS_KEYS = ("reference", "signal", "controller", "model")
+AXIS_KEYS = ("reference", "signal", "controller", "model", "error_compensation")
 PATHS = Registry("reference", {"path": "rds.nc.run.path"})
 """Kinds of references that drive all axes of a run together. Each module gives `WORDS` (the table's keys),
 `program(words, folder, machine, axes, T)`, `judged_path(result, program, T)`, and
@@ -83,6 +85,7 @@ _OF_AN_AXIS: Mapping[str, Declaration] = {
     "reference": Anything("what the axis is to follow, in its unit", (REFERENCE,)),
     "signal": Anything("voltage that drives the axis without a controller, V", (SIGNAL,)),
     "controller": Anything("the law that answers with a voltage", (_CONTROLLER, _NAME_OR_FILE)),
+    "error_compensation": COMPENSATION,
     "model": Anything("what stands for the axis in simulation; by default the machine's own", (_MODEL, _NAME_OR_FILE)),
 }
 INTERFACE = Table(
@@ -135,5 +138,6 @@ EXPERIMENT = Table(
         "interface": INTERFACE,
         "timing": TIMING,
         "bus": BUS,
+        "network": NETWORK,
     },
 )

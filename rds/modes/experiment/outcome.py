@@ -39,7 +39,7 @@ def outcome(plan: Plan, rows: Rows, known: dict[str, Any]) -> Result:
         for told in (columns, units):
             told.pop("interpolate", None)  # nothing was interpolated
     sample = rows.values[:, 0].astype(np.int64)
-    if mode.followed and plan.controlled:
+    if mode.followed and plan.controlled and plan.repeatable:
         columns |= _simulated(plan, rows, sample)
     meta = _description(plan, rows) | known
     if mode.real_time:
@@ -105,7 +105,7 @@ def _description(plan: Plan, rows: Rows) -> dict[str, Any]:
         "ending": str(rows.ending),
         "ending_reason": rows.reason,
         "changes": [list(change) for change in rows.changes],
-        "notes": list(rows.notes),
+        "notes": [*plan.notes, *rows.notes],
         "started": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
         "versions": _versions(),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from rds.models import library_model, model_names
 from rds.models.machine_model import MachineAxisMotion, linear_part
 from rds.models.student import student_model
 from rds.modes.experiment.experiment_file import PATHS
+from rds.modes.loop.commands import Command
 from rds.references import Signal, make_signal, user
 
 _FUNCTIONS = ("control", "derivatives", "advance", "output")
@@ -26,12 +28,17 @@ _FUNCTIONS = ("control", "derivatives", "advance", "output")
 
 @dataclass(frozen=True)
 class Setting:
-    """What parts are made for: the axis, its sample period in s, its converter's limit in V, the user's folder."""
+    """What parts are made for: the axis, its sample period in s, the user's folder, and what the axis is commanded by.
+
+    `limit` is the largest command: the converter's range in V, or `top_speed` (unit/s) for a drive's velocity loop.
+    """
 
     axis: Axis
     T: float
     limit: float
     folder: Path
+    command: Command = Command.VOLTAGE
+    top_speed: float = inf
 
     def path(self, name: str) -> Path:
         """A file that the user named, from the folder of the experiment."""
@@ -53,12 +60,12 @@ def make_model(words: TomlTable, setting: Setting) -> Model:
         substeps = table.read("substeps")
         params = _params(table)
         table.done()
-        with _named(table):
+        with named(table):
             return student_model(student, params, substeps)
     if "file" in table:
         return _fitted_model(table, setting)
     name, options = _name_and_options(table, "model", model_names())
-    with _named(table):
+    with named(table):
         return library_model(name, **((default if name == default.pop("name", None) else {}) | options))
 
 
@@ -91,14 +98,14 @@ def make_controller(words: TomlTable, setting: Setting, model: Model) -> Control
     if student is not None:
         is_coupled, params = table.read("coupled"), _params(table)
         table.done()
-        with _named(table):
+        with named(table):
             return student.controller(coupled=is_coupled, params=params)
     name, options = _name_and_options(table, "controller", controller_names())
     if model.motion is MachineAxisMotion:
         design: Mapping[str, Any] = linear_part(model.params)
     else:
         design = model.params if {"tau", "K"} <= set(model.params) else setting.axis.model
-    with _named(table):
+    with named(table):
         return library_controller(name, design, setting.T, setting.limit, unit=setting.axis.unit, **options)
 
 
@@ -106,7 +113,7 @@ def make_drive(words: TomlTable, key: str, setting: Setting, unit: str) -> Signa
     """The reference or the voltage signal of an axis, in `unit`. InputError if sampling is too slow for it."""
     given = words.any(key)
     table = words.inner(key) if not isinstance(given, Signal) and not callable(given) else None
-    with _named(table or words.table_of(key, {})):
+    with named(table or words.table_of(key, {})):
         signal = _signal(given, table, setting, unit)
         signal.check_sampling(setting.T)
     return signal
@@ -138,10 +145,10 @@ def _table_or_student(words: TomlTable, key: str, setting: Setting) -> tuple[Tom
     if isinstance(given, str):
         given = {"file" if given.endswith((".py", ".toml")) else "name": given}
     elif isinstance(given, dict) and any(callable(given.get(name)) for name in _FUNCTIONS):
-        with _named(nameless):
+        with named(nameless):
             return _functions(words, key, given), from_namespace(given)
     elif callable(given):
-        with _named(nameless):
+        with named(nameless):
             return nameless, from_function(given)
     elif not isinstance(given, dict):
         raise words.fault(key, f"must be a name, the path of a .py file, a function, or a table, as in `[{key}]`")
@@ -187,7 +194,7 @@ def _params(table: TomlTable) -> dict[str, Any] | None:
     return dict(inner.table) if inner else None
 
 
-class _named:
+class named:
     """Errors inside tell the place of the table that asked for it, unless they know a better one."""
 
     def __init__(self, table: TomlTable):

@@ -11,7 +11,7 @@ from rds.core.types import Ending, Verdict
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.experiment.experiment_file import PATHS
 from rds.modes.experiment.folder import new_folder
-from rds.modes.loop.program import InterpolatedProgram
+from rds.modes.loop.program import InterpolatedProgram, Program
 from rds.modes.process.host import Progress
 from rds.results import Result
 from rds.results.files import saved_files
@@ -26,16 +26,23 @@ def run_and_save(
 ) -> tuple[Result, dict[str, Path]]:
     """Run the experiment in the file `path`, and save tables, plots and a report in `out` (default: under runs/)."""
     experiment = Experiment.from_toml(path)
-    folder = out if out is not None else _new_folder(experiment, mode)
+    folder = out if out is not None else folder_of(experiment, mode)
     result = experiment.run(mode, out=folder, progress=progress)
-    program, title = experiment.plan(mode).program, experiment.title or path.stem
-    if isinstance(program, InterpolatedProgram):
-        files: dict[str, Path] = PATHS.module("path").save_path_run(result, program, folder, title)
-        return result, files
-    return result, save_with_report(result, folder, title)
+    return result, save_run(result, experiment.plan(mode).program, folder, experiment.title or path.stem)
 
 
-def _new_folder(experiment: Experiment, mode: str | None) -> Path:
+def save_run(
+    result: Result, program: Program | InterpolatedProgram | None, folder: Path, title: str
+) -> dict[str, Path]:
+    """Plots and reports beside the tables in `folder`, with those of a path (`program`); each path by its kind."""
+    if program is None:
+        return save_with_report(result, folder, title)
+    files: dict[str, Path] = PATHS.module("path").save_path_run(result, program, folder, title)
+    return files
+
+
+def folder_of(experiment: Experiment, mode: str | None) -> Path:
+    """Where its results go when nobody says."""
     plan = experiment.plan(mode)
     return new_folder(plan.names, plan.mode)
 
@@ -90,6 +97,7 @@ def run_json(result: Result, files: dict[str, Path]) -> dict[str, Any]:
             for axis, values in result.metrics.items()
         },
         "timing": {**stages, **counts} if counts else None,
+        **({"program": result.meta["program"]} if "program" in result.meta else {}),
         "validation": result.meta.get("validation"),
         "environment": result.meta.get("environment"),
         "notes": [*result.meta.get("notes", []), *result.notes],

@@ -3,29 +3,41 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
 from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rds.bus.hub.bus_settings import bus_fault
+from rds.bus.hub.bus_settings import SERIAL, bus_fault, serial_fault
 from rds.bus.medium.fault_file import read_faults
+from rds.bus.modules.dialects import SERIAL_DIALECTS
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
 from rds.core.folder_kept import folder_kept
 from rds.core.quantities import Choice
 from rds.core.toml_table import TomlTable
+from rds.core.types import Controller
 from rds.machines import Axis, Machine, load_machine
 from rds.modes import load_mode
+from rds.modes.experiment.compensation import compensated
+from rds.modes.experiment.drives import (
+    check_reference,
+    commands_of,
+    drive_model,
+    gives_way,
+    giving_way,
+    top_speed,
+)
 from rds.modes.experiment.experiment_file import AXIS_KEYS, PATHS, is_path
-from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model
+from rds.modes.experiment.parts import Setting, make_controller, make_drive, make_model, named
+from rds.modes.loop.commands import Command
 from rds.modes.loop.laws import ReferenceSamples
 from rds.modes.loop.mode import Mode
 from rds.modes.loop.plan import AxisPlan, Plan
 from rds.modes.loop.program import InterpolatedProgram, Program
 from rds.modes.process.machine import BUILTIN
+from rds.network.network_file import read_network
 
 MOST_SAMPLES = 20_000_000
 
@@ -57,13 +69,21 @@ def resolve(
     driven = _drive(words, mode) if program is None else _program(words, mode)
     if drawn is not None:
         driven = "program"
-    axes, periods = [], {}
-    for axis, own in _axes(words, machine) if program is None else _program_axes(words, machine, program):
+    bus = bus_table(words, folder)
+    axes, periods, notes = [], {}, []
+    every = _axes(words, machine) if program is None else _program_axes(words, machine, program)
+    commands = _commands(words, bus, machine, [axis.name for axis, _ in every], driven)
+    for axis, own in every:
         if drawn is not None and own is not words and "reference" in own.table:
             raise InputError("the path drives all axes of the run: remove this reference", own.place("reference"))
-        made, periods[axis.name] = _axis_plan(own, Setting(axis, T, limit, folder), driven, samples)
+        command = commands[axis.name]
+        speed = top_speed(axis, machine)
+        most = limit if command is Command.VOLTAGE else speed if saturation else inf
+        setting = Setting(axis, T, most, folder, command, speed)
+        made, periods[axis.name], note = _axis_plan(own, setting, driven, samples)
         axes.append(made)
-    bus = bus_table(words, folder)
+        notes += [note] if note else []
+    network = read_network(words, folder)
     words.done()
     _check_coupling(axes, words)
     plan = Plan(
@@ -75,14 +95,18 @@ def resolve(
         saturation=saturation,
         quantization=quantization,
         bus=bus,
+        network=network,
         import_path=_import_path(axes, own_file),
         program=leads,
+        notes=tuple(notes),
         **timing,
     )
     return plan, {"period": periods}
 
 
-def _path(words: TomlTable, folder: Path, machine: Machine, T: float) -> tuple[InterpolatedProgram | None, str | None]:
+def _path(
+    words: TomlTable, folder: Path, machine: Machine, T: float
+) -> tuple[InterpolatedProgram | Program | None, str | None]:
     """The path that all axes of the run follow, and the file of its interpolator, if the user wrote one."""
     given = words.any("reference")
     if not is_path(given):
@@ -99,7 +123,8 @@ def _path(words: TomlTable, folder: Path, machine: Machine, T: float) -> tuple[I
     table.declared = PATHS.module(kind).WORDS
     names = [axis.name for axis, _ in _axes(words, machine)]
     try:
-        made: tuple[InterpolatedProgram, str | None] = PATHS.module(kind).program(table, folder, machine, names, T)
+        made: tuple[InterpolatedProgram | Program, str | None]
+        made = PATHS.module(kind).program(table, folder, machine, names, T)
     except InputError as error:
         raise error if error.where else InputError(str(error), table.place()) from error
     return made
@@ -109,7 +134,7 @@ def _samples(words: TomlTable, T: float) -> int:
     if "duration" not in words:
         raise words.missing("duration")
     duration = words.read("duration")
-    samples = round(duration / T)
+    samples: int = round(duration / T)
     if duration < T * (1.0 - 1e-9):
         raise words.fault("duration", f"s must be at least one sample period, {T:g} s")
     if samples > MOST_SAMPLES:
@@ -201,13 +226,50 @@ def _drive(words: TomlTable, mode: Mode) -> str:
     return "signal" if has["signal"] else "controller"
 
 
-def _axis_plan(words: TomlTable, setting: Setting, driven: str, samples: int) -> tuple[AxisPlan, float | None]:
-    axis = setting.axis
+def _commands(
+    words: TomlTable, bus: dict[str, Any], machine: Machine, names: list[str], driven: str
+) -> dict[str, Command]:
+    """How each axis is commanded over this bus; a drive's own loops take references, and no voltage signals."""
+    table = words.inner("bus")
+    with named(words if table is None else table):
+        commands = commands_of(bus, machine, names)
+    others = [name for name, command in commands.items() if command is not Command.VOLTAGE]
+    if not others:
+        return commands
+    assert table is not None
+    if driven == "signal":
+        raise InputError(
+            f"a signal is a voltage, and the drive of axis {others[0]} takes a {commands[others[0]].quantity}: use "
+            'mode = "cst" in [bus.cia402], or a [reference]',
+            table.place("cia402"),
+        )
+    if driven == "program" and (slow := [name for name, command in commands.items() if command is Command.PROFILE]):
+        raise InputError(
+            f'mode = "pp" moves axis {slow[0]} by a profile of its own, so that it leaves a path that axes follow '
+            'together: use mode = "csp"',
+            table.place("cia402"),
+        )
+    return commands
+
+
+def _axis_plan(
+    words: TomlTable, setting: Setting, driven: str, samples: int
+) -> tuple[AxisPlan, float | None, str | None]:
+    """One axis's plan, its reference's period, and a note for the result."""
+    axis, command = setting.axis, setting.command
     times = np.arange(samples) * setting.T
-    model = make_model(words, setting)
-    period: float | None
+    own = command is Command.VOLTAGE or words.any("model") is not None
+    model = make_model(words, setting) if own else drive_model(axis, command)
+    controller = period = note = None
+    if driven != "signal" and (words.any("controller") is not None or not gives_way(axis, command)):
+        controller = make_controller(words, setting, model)
+    if gives_way(axis, command):
+        controller, note = giving_way(axis, command, controller)
+    if (table := words.inner("error_compensation")) is not None:
+        controller = _compensated(table, setting, controller)
+    most = setting.limit if command is Command.VELOCITY else inf
     if driven == "program":
-        plan, period = AxisPlan(axis, model, make_controller(words, setting, model)), None
+        plan = AxisPlan(axis, model, controller, command=command, most_target=most)
     elif driven == "signal":
         if "signal" not in words:
             raise InputError(f"axis {axis.name} has no [signal]", words.place())
@@ -219,11 +281,30 @@ def _axis_plan(words: TomlTable, setting: Setting, driven: str, samples: int) ->
         reference = make_drive(words, "reference", setting, axis.unit)
         samples_of = ReferenceSamples(*(np.asarray(part, dtype=float) for part in reference.reference(times)))
         _check_travel(samples_of, axis, words)
-        plan = AxisPlan(axis, model, make_controller(words, setting, model), samples_of)
+        with named(words.table_of("reference", {})):
+            check_reference(samples_of, axis, command, setting.top_speed, setting.T)
+        plan = AxisPlan(axis, model, controller, samples_of, command=command, most_target=most)
         period = reference.period
     if words.name:
         words.done()
-    return plan, period
+    return plan, period, note
+
+
+def _compensated(table: TomlTable, setting: Setting, controller: Controller | None) -> Controller | None:
+    """The controller with error compensation; that of a spindle as it is, unless it is meant itself."""
+    axis = setting.axis
+    time, most = table.read("time"), table.read("most")
+    table.done()
+    if controller is None:
+        raise InputError("[signal] drives the axis without a controller, and nothing is compensated", table.place())
+    if controller.coupled:
+        raise InputError(
+            "[error_compensation] is for axes with controllers of their own; a coupled one does it itself",
+            table.place(),
+        )
+    if setting.command is Command.PROFILE or axis.is_spindle:
+        return controller
+    return compensated(controller, setting.T, time, most, axis.unit)
 
 
 def _program(words: TomlTable, mode: Mode) -> str:
@@ -292,17 +373,14 @@ def bus_table(words: TomlTable, folder: Path) -> dict[str, Any]:
     channel = table.any("channel")
     if channel is not None and (isinstance(channel, bool) or not isinstance(channel, str | int)):
         raise table.fault("channel", "must be the name or the number of a channel")
-    table.read("dialect")
+    dialect = table.read("dialect")
+    if dialect in SERIAL_DIALECTS or (interface == SERIAL and "dialect" not in table):
+        if (wrong := serial_fault(table.table)) is not None:
+            raise table.fault(*wrong)
+        return {**table.table, "interface": SERIAL, "dialect": SERIAL_DIALECTS[0]}
     if (wrong := bus_fault(table.table)) is not None and (wrong[0] == "cia402" or interface != BUILTIN):
         raise table.fault(*wrong)
-    drives = table.any("cia402")
-    for name, mode in _drive_modes(drives):
-        if mode in ("csp", "csv"):
-            raise InputError(
-                f'{name} = "{mode}" takes positions or velocities, and every mode of an experiment hands out voltages: '
-                'use "cst"; rds.bus.modules.cia402.follow sends references to drives in csp and csv',
-                table.place("cia402"),
-            )
+    table.any("cia402")
     if interface == BUILTIN:
         table.read("bitrate")
         table.read("data_bitrate")
@@ -319,17 +397,6 @@ def bus_table(words: TomlTable, folder: Path) -> dict[str, Any]:
     if (fault := Choice("interface", sorted(VALID_INTERFACES)).fault(interface)) is not None:
         raise table.fault("interface", fault)
     return dict(table.table)
-
-
-def _drive_modes(drives: Any) -> Iterator[tuple[str, Any]]:
-    """The modes that a [bus.cia402] table gives, by their keys; what is no such table is refused where it is read."""
-    if not isinstance(drives, Mapping):
-        return
-    yield "bus.cia402.mode", drives.get("mode")
-    axes = drives.get("axis")
-    for name, axis in axes.items() if isinstance(axes, Mapping) else ():
-        if isinstance(axis, Mapping):
-            yield f"bus.cia402.axis.{name}.mode", axis.get("mode")
 
 
 def _timing(words: TomlTable, mode: Mode) -> dict[str, Any]:
@@ -350,16 +417,20 @@ def _timing(words: TomlTable, mode: Mode) -> dict[str, Any]:
 
 
 def _check_coupling(axes: list[AxisPlan], words: TomlTable) -> None:
-    controllers = [plan.controller for plan in axes if plan.controller is not None]
-    if not any(controller.coupled for controller in controllers):
+    """A coupled controller drives all position axes; a spindle may have one of its own, as the first or last axis."""
+    together = [plan.controller for plan in axes if plan.controller is not None and plan.controller.coupled]
+    if not together:
         return
-    first = controllers[0]
-    same = all(c.coupled and c.source == first.source and c.params == first.params for c in controllers)
-    if not same:
+    same = all(c.source == together[0].source and c.params == together[0].params for c in together)
+    apart = [plan for plan in axes if plan.controller is None or not plan.controller.coupled]
+    if not same or not all(plan.axis.is_spindle for plan in apart):
         raise InputError(
-            "a coupled controller drives all axes of the run; give it in the general [controller] table only",
+            "a coupled controller drives all axes of the run, but a spindle; give it in the general [controller] table "
+            "only",
             words.place("controller"),
         )
+    if any(plan in apart for plan in axes[1:-1]):
+        raise InputError("name the spindle last: the axes of a coupled controller stand together", words.place("axes"))
 
 
 def _import_path(axes: list[AxisPlan], interpolator: str | None) -> tuple[str, ...]:

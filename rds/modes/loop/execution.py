@@ -12,6 +12,7 @@ from typing import Protocol
 
 from rds.core.types import Ending
 from rds.modes.loop.changes import STOP
+from rds.modes.loop.force_guard import MOST
 from rds.modes.loop.homing import Homing
 from rds.modes.loop.laws import LiveReference
 from rds.modes.loop.program import (
@@ -91,6 +92,7 @@ class Execution:
         self._program, self._T, self._follower = program, T, follower
         self._references, self._spindle_axis, self._resolution = references, spindle_axis, resolution
         self._expects = expects
+        self._is_made = isinstance(program, InterpolatedProgram)
         self._values = {OVERRIDE: 1.0, HOLD: 0.0, RESUME: 0.0, HOME: 0.0, OPTIONAL_STOP: 1.0, STOP: 0.0}
         self.state = self._shown = State.RUNS
         self.ending: tuple[Ending, str] | None = None
@@ -105,6 +107,9 @@ class Execution:
         self._changes_tool = False  # as soon as the spindle stands
         self._position = list(program.start)
         self._way: Homing | None = None  # home
+        guard = program.guard if isinstance(program, Program) else None
+        self._guard = None if guard is None else guard.start(T)
+        self._allowed = MOST  # rate, by the guard
         for reference, value in zip(references, self._position, strict=False):
             reference.position.value = value
 
@@ -119,7 +124,8 @@ class Execution:
     def law(self, k: int, positions: Sequence[float], row: list[float], voltages: list[float]) -> None:
         """Comes before the laws of the axes: sets their references, and records where in the program this is.
 
-        Samples that were discarded count: the axes moved on in them.
+        Samples that were discarded count: the axes moved on in them. But a path whose rows are made on the way waits in
+        them, so that an interpolator that is too slow makes the axes slower, and never sends them ahead in a jump.
         """
         if self._last < 0:
             self._last = 0  # and it does so with its first row
@@ -129,6 +135,8 @@ class Execution:
             self._shown_line = self._line
         for _ in range(k - self._last):
             self._step(positions)
+            if self._is_made and self.state is State.RUNS:
+                break
         self._last = k
         shown = self._shown
         rate = self._follower.rate if shown is State.RUNS else 0.0
@@ -136,6 +144,8 @@ class Execution:
             rate = self._way.rate
         row += (self._shown_line, self._follower.place, rate, shown)
         row += self._follower.columns()
+        if self._guard is not None:
+            row.append(self._guard.measured if shown is State.RUNS else 0.0)
 
     def over(self) -> tuple[Ending, str] | None:
         """How the run ends before its next sample, and why, if it does."""
@@ -162,11 +172,13 @@ class Execution:
 
     def _wanted(self) -> float:
         values = self._values
-        return 0.0 if values[HOLD] or values[STOP] or values[HOME] else values[OVERRIDE]
+        return 0.0 if values[HOLD] or values[STOP] or values[HOME] else min(values[OVERRIDE], self._allowed)
 
     def _along_the_path(self, positions: Sequence[float]) -> None:
         follower, until, wanted = self._follower, self._until(), self._wanted()
         follower.advance(wanted, until)
+        if self._guard is not None:
+            self._allowed = self._guard.allowed(follower.place, follower.rate)
         self._put(follower.position, follower.velocity, follower.acceleration)
         self._line = self._shown_line = follower.line(-int(-follower.place // 1))
         is_there = follower.place >= until

@@ -1,4 +1,8 @@
-"""What turns a measured position into a voltage at each sample: a controller, or a voltage signal played back."""
+"""What turns a measured position into a command at each sample: a controller, or a voltage signal played back.
+
+The command is a voltage, unless a drive closes a loop of its own: `VOLTAGE`, and what the others are called and
+measured in, is for the sentences that refuse an answer.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,8 @@ from rds.core.types import Controller, Reference
 from rds.core.values import own_copy, shown
 from rds.machines.converter import as_voltage
 from rds.modes.loop.loop import Law
+
+VOLTAGE = ("voltage", "V")  # a command, and its unit
 
 
 @dataclass(frozen=True)
@@ -68,8 +74,9 @@ def controlled(
     T: float,
     limit: Callable[[Any], float],
     params: dict[str, Any],
+    command: tuple[str, str] = VOLTAGE,
 ) -> Law:
-    """One axis under its own controller; records reference, measured position, command voltage and its signals.
+    """One axis under its own controller; records reference, measured position, command and its signals.
 
     `params` are the controller's, in a table that may be changed while it runs.
     """
@@ -89,11 +96,11 @@ def controlled(
                 u = as_voltage(u)
             voltages.append(limit(u))
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise _broken(answer, k * T, name, controller) from None
+            raise _broken(answer, k * T, name, controller, command) from None
         row += r
         row += (y, u)
 
-    return _telling(axis, name, controller, reference, T, limit, params) if controller.signals else law
+    return _telling(axis, name, controller, reference, T, limit, params, command) if controller.signals else law
 
 
 def _telling(
@@ -104,6 +111,7 @@ def _telling(
     T: float,
     limit: Callable[[Any], float],
     params: dict[str, Any],
+    command: tuple[str, str],
 ) -> Law:
     """`controlled` for a controller with signals: apart, so that one without pays nothing for them."""
     control, observe = controller.control, controller.observe
@@ -126,7 +134,7 @@ def _telling(
                 u = as_voltage(u)
             voltages.append(limit(u))
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise _broken(answer, k * T, name, controller) from None
+            raise _broken(answer, k * T, name, controller, command) from None
         if observe is None:
             values: Sequence[float] = _told(told, names, k * T, name, controller)
         else:
@@ -149,6 +157,7 @@ def coupled(
     T: float,
     limits: Sequence[Callable[[Any], float]],
     params: dict[str, Any],
+    command: tuple[str, str] = VOLTAGE,
 ) -> Law:
     """Several axes under one controller that gets and gives arrays in axis order; `params` as of `controlled`."""
     control, signals = controller.control, tuple(controller.signals)
@@ -170,7 +179,7 @@ def coupled(
             commands = _commands(u, n)
             voltages += [limit(value) for limit, value in zip(limits, commands, strict=True)]
         except (TypeError, ValueError, OverflowError, ContractError):
-            raise _broken(answer, k * T, owners, controller, n) from None
+            raise _broken(answer, k * T, owners, controller, command, n) from None
         told = _told(rest[0], signals, k * T, owners, controller, n) if signals else ()
         for i in range(n):
             row += (*(of_axes[i] for of_axes in values), float(y[i]), commands[i], *(value[i] for value in told))
@@ -219,18 +228,20 @@ def _told(told: Any, names: Sequence[str], t: float, axis: str, controller: Cont
         raise BrokenContract(f"{said}; {signals_wanted(names, n)}", _line(controller)) from None
 
 
-def _broken(answer: Any, t: float, axis: str, controller: Controller, n: int = 1) -> BrokenContract:
-    """The error of a voltage that is none, or of an answer that has too few or too many parts."""
+def _broken(
+    answer: Any, t: float, axis: str, controller: Controller, command: tuple[str, str], n: int = 1
+) -> BrokenContract:
+    """The error of a command that is none, or of an answer that has too few or too many parts."""
     names, is_several = tuple(controller.signals), isinstance(answer, tuple | list)
     said = f"control() returned {shown(answer, 200)} at t = {t:.3f} s (axis {axis})"
     if names and controller.observe is None and not (is_several and len(answer) == 3):
-        wanted = signals_wanted(names, n if controller.coupled else 0)
+        wanted = signals_wanted(names, n if controller.coupled else 0, command[0])
         return BrokenContract(f"{said}; as signals declares {', '.join(names)}, {wanted}", _line(controller))
     if not names and is_several and len(answer) == 3 and isinstance(answer[2], Mapping):
-        wanted = "it must return (voltage, next_state), unless the file declares the third part beside params"
+        wanted = f"it must return ({command[0]}, next_state), unless the file declares the third part beside params"
         return BrokenContract(f"{said}; {wanted}, as in {EXAMPLE}", _line(controller))
     parts = 3 if names and controller.observe is None else 2
-    return BrokenContract(_fault(answer, t, axis, parts, n), controller.source.path)
+    return BrokenContract(_fault(answer, t, axis, parts, command, n), controller.source.path)
 
 
 def _line(controller: Controller) -> str | None:
@@ -240,12 +251,13 @@ def _line(controller: Controller) -> str | None:
     return path if line is None else f"{path}:{line}"
 
 
-def _fault(answer: Any, t: float, axis: str, parts: int, n: int) -> str:
-    wanted = "one finite number in V" if n == 1 else f"{n} finite numbers in V, one for each axis"
+def _fault(answer: Any, t: float, axis: str, parts: int, command: tuple[str, str], n: int) -> str:
+    what, unit = command
+    wanted = f"one finite number in {unit}" if n == 1 else f"{n} finite numbers in {unit}, one for each axis"
     if not isinstance(answer, tuple | list) or len(answer) != parts:
         said = f"control() returned {shown(answer, 200)} at t = {t:.3f} s (axis {axis})"
-        return f"{said}; it must return (voltage, next_state) with a finite voltage in V"
+        return f"{said}; it must return ({what}, next_state) with a finite {what} in {unit}"
     return (
-        f"control() returned the voltage {shown(answer[0], 200)} at t = {t:.3f} s (axis {axis}); "
-        f"it must return (voltage, next_state) with the voltage {wanted}"
+        f"control() returned the {what} {shown(answer[0], 200)} at t = {t:.3f} s (axis {axis}); "
+        f"it must return ({what}, next_state) with the {what} {wanted}"
     )

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -16,27 +17,39 @@ from rds.core.types import Controller, Model
 from rds.machines import Axis, Machine
 from rds.machines.converter import converter
 from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
+from rds.modes.loop.commands import Command, limiter
 from rds.modes.loop.execution import Execution, Follower
 from rds.modes.loop.interpolated import Interpolated
 from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
 from rds.modes.loop.live_values import Channel
 from rds.modes.loop.loop import Law
-from rds.modes.loop.program import COLUMNS, INTERPOLATED_COLUMNS, InterpolatedProgram, Program, program_channels
+from rds.modes.loop.program import InterpolatedProgram, Program, program_channels, program_columns
 from rds.modes.loop.retimed import Retimed
 from rds.modes.loop.tuning import Tuning
+from rds.network.delays import Network
 
 _UNBOUNDED = 1 << 50  # samples
 
 
 @dataclass(frozen=True)
 class AxisPlan:
-    """One axis of a run: its model, and a controller with a reference (unless a program gives it) or a signal."""
+    """One axis of a run: its model, and a controller with a reference (unless a program gives it) or a signal.
+
+    `command` is what the controller hands out; targets of a drive's own loop are kept within ±`most_target`.
+    """
 
     axis: Axis
     model: Model
     controller: Controller | None = None
     reference: ReferenceSamples | None = None
     signal: Sequence[float] | None = None  # V at every sample
+    command: Command = Command.VOLTAGE
+    most_target: float = inf  # in the command's unit
+
+    @property
+    def acting(self) -> str:
+        """The column of what acted on the axis."""
+        return f"{self.axis.name}_{self.command.acting}"
 
     @property
     def signals(self) -> dict[str, str]:
@@ -63,7 +76,9 @@ class Plan:
     rehearsal: float = 0.25  # s of clock and I/O without the student's code, before a real-time run
     import_path: tuple[str, ...] = ()  # folders of the students' files, for what they import from there
     changes: tuple[tuple[int, str, float], ...] = ()  # of live values: (sample, channel, value), in order
+    network: Network | None = None  # between the axes and their controllers
     program: Program | InterpolatedProgram | None = None  # instead of references; `samples` is what it takes unhindered
+    notes: tuple[str, ...] = ()  # for the result, from before the run
 
     @property
     def names(self) -> list[str]:
@@ -80,10 +95,16 @@ class Plan:
         """After so many samples the run ends in any case; a program waits for as long as somebody lets it."""
         return self.samples if self.program is None else _UNBOUNDED
 
-    def limit(self) -> Callable[[Any], float]:
-        """The converter of this run."""
+    def limits(self) -> list[Callable[[Any], float]]:
+        """What each axis's commands go through: the converter of this run, or the limits of a drive's target."""
         board = self.machine.converter
-        return converter(board.range, board.bits, saturation=self.saturation, quantization=self.quantization)
+        volts = converter(board.range, board.bits, saturation=self.saturation, quantization=self.quantization)
+        return [
+            volts
+            if axis.command is Command.VOLTAGE
+            else limiter(axis.command, axis.most_target, axis.command.unit(axis.axis.unit))
+            for axis in self.axes
+        ]
 
     def channels(self) -> list[Channel]:
         """What may be changed while it runs: the parameters of controllers, the override of a program, the stop."""
@@ -127,38 +148,60 @@ class Plan:
         )
         return Drive([execution.law, *self._laws(params, list(live.values()))], changes, sets_references=True)
 
+    def _groups(self) -> list[list[int]]:
+        """The axes under one law, in axis order: those of a coupled controller together, every other one alone."""
+        controllers = [plan.controller for plan in self.axes]
+        together = [i for i, each in enumerate(controllers) if each is not None and each.coupled]
+        alone = [[i] for i in range(len(self.axes)) if i not in together]
+        return sorted([together, *alone]) if together else alone
+
     def _tunings(self) -> list[Tuning]:
-        """The live parameters of each controller; of one controller, if it drives all axes."""
-        first = self.axes[0].controller
-        if first is not None and first.coupled:
-            return [Tuning("controller", first)]
-        return [
-            Tuning(plan.axis.name, plan.controller, plan.axis.unit) for plan in self.axes if plan.controller is not None
-        ]
+        """The live parameters of each controller; a coupled one has them once."""
+        found = []
+        for first, *_ in self._groups():
+            axis, controller = self.axes[first].axis, self.axes[first].controller
+            if controller is not None:
+                name = "controller" if controller.coupled else axis.name
+                found.append(Tuning(name, controller) if controller.coupled else Tuning(name, controller, axis.unit))
+        return found
 
     @property
-    def plant_velocities(self) -> list[int]:
-        """The axes whose model's velocity is recorded where the model is the plant: where a law tells signals.
+    def repeatable(self) -> bool:
+        """Whether the laws answer the same when the run is gone through again."""
+        return all(plan.controller is None or plan.controller.repeatable for plan in self.axes)
 
-        An estimate is then held against it; without signals a result has the columns that it always had.
+    @property
+    def plant_columns(self) -> list[tuple[int, str, str]]:
+        """What is recorded of the models where they are the plant: axis, attribute of its motion, unit.
+
+        The velocity where a law tells signals, as an estimate is then held against it; and what a model tells itself.
+        Without either a result has the columns that it always had.
         """
-        if not any(plan.controller is not None and plan.controller.signals for plan in self.axes):
-            return []
-        return [i for i, plan in enumerate(self.axes) if plan.model.has_velocity and not plan.axis.is_spindle]
+        signals = any(plan.controller is not None and plan.controller.signals for plan in self.axes)
+        found = []
+        for i, plan in enumerate(self.axes):
+            if signals and plan.model.has_velocity and not plan.axis.is_spindle:
+                found.append((i, "velocity", f"{plan.axis.unit}/s"))
+            found += [(i, name, unit) for name, unit in plan.model.told.items()]
+        return found
 
     def _laws(self, params: list[dict[str, Any]], references: Sequence[ReferenceSamples | LiveReference]) -> list[Law]:
-        limit, plans = self.limit(), self.axes
-        first = plans[0].controller
-        if first is not None and first.coupled:
-            limits = [limit] * len(plans)
-            return [coupled(range(len(plans)), self.names, first, references, self.T, limits, params[0])]
-        laws = []
-        for i, plan in enumerate(plans):
-            if plan.signal is not None:
-                laws.append(played(i, plan.signal, limit))
+        limits, plans, names = self.limits(), self.axes, self.names
+        laws, own = [], iter(params)
+        for group in self._groups():
+            first = group[0]
+            signal, controller = plans[first].signal, plans[first].controller
+            if signal is not None:
+                laws.append(played(first, signal, limits[first]))
+                continue
+            assert controller is not None
+            command = _command_of([plans[i] for i in group])
+            if controller.coupled:
+                of_group = ([names[i] for i in group], controller, [references[i] for i in group])
+                laws.append(coupled(group, *of_group, self.T, [limits[i] for i in group], next(own), command))
             else:
-                assert plan.controller is not None
-                laws.append(controlled(i, plan.axis.name, plan.controller, references[i], self.T, limit, params[i]))
+                of_axis = (first, names[first], controller, references[first], self.T, limits[first])
+                laws.append(controlled(*of_axis, next(own), command))
         return laws
 
     def columns(self, followed: str | None, simulates_plant: bool = False) -> tuple[list[str], dict[str, str]]:
@@ -170,30 +213,44 @@ class Plan:
         columns = ["sample"]
         units = {"sample": ""}
         if self.program is not None:
-            of_program = COLUMNS | (INTERPOLATED_COLUMNS if isinstance(self.program, InterpolatedProgram) else {})
+            of_program = program_columns(self.program)
             columns += of_program
             units |= of_program
         for plan in self.axes:
             name, unit = plan.axis.name, plan.axis.unit
-            parts = {"measured": unit, "command": "V"}
+            # behind a network the law has what has arrived, which is not where the axis is
+            heard = "measured" if self.network is None else "received"
+            parts = {heard: unit, "command": plan.command.unit(unit)}
             if self.controlled:
                 rates = {"reference_velocity": f"{unit}/s", "reference_acceleration": f"{unit}/s²"}
                 parts = {"reference": unit, **rates, **parts, **plan.signals}
             for part, part_unit in parts.items():
                 columns.append(f"{name}_{part}")
                 units[columns[-1]] = part_unit
-        for part, part_unit in [("voltage", "V"), *([(followed, "")] if followed else [])]:
-            for plan in self.axes:
+        for plan in self.axes:
+            columns.append(plan.acting)
+            units[columns[-1]] = plan.command.unit(plan.axis.unit)
+        for plan in self.axes if followed else ():
+            columns.append(f"{plan.axis.name}_{followed}")
+            units[columns[-1]] = plan.axis.unit
+        for i, part, unit in self.plant_columns if simulates_plant else ():
+            columns.append(f"{self.axes[i].axis.name}_plant_{part}")
+            units[columns[-1]] = unit
+        for plan in self.axes if self.network is not None else ():
+            for part, part_unit in (("measured", plan.axis.unit), *((f"delay_{of}", "s") for of in ("sc", "c", "ca"))):
                 columns.append(f"{plan.axis.name}_{part}")
-                units[columns[-1]] = part_unit or plan.axis.unit
-        for i in self.plant_velocities if simulates_plant else ():
-            axis = self.axes[i].axis
-            columns.append(f"{axis.name}_plant_velocity")
-            units[columns[-1]] = f"{axis.unit}/s"
+                units[columns[-1]] = part_unit
         if len(units) < len(columns):
             twice = next(name for name in columns if columns.count(name) > 1)
             raise InputError(f"two columns of the run are called {twice!r}; give the signal another name")
         return columns, units
+
+
+def _command_of(plans: Sequence[AxisPlan]) -> tuple[str, str]:
+    """What a law of these axes hands out, and its unit, for people: of one kind, or the kinds of the axes in order."""
+    kinds = [(plan.command.quantity, plan.command.unit(plan.axis.unit)) for plan in plans]
+    what, unit = ({kind[i]: None for kind in kinds} for i in (0, 1))
+    return " or ".join(what), " or ".join(unit)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,8 @@ from functools import partial
 from math import ceil
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rds.core.shared_quantities import FEED_SHARE
+from rds.modes.loop.force_guard import COLUMN, ForceGuard
 from rds.modes.loop.live_values import Channel
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ class Program:
     Row 0 is where the motion begins, at rest; dwells have their rows. `position` (m × n, mm or degrees), `velocity` and
     `acceleration` are in the order of `axes`; `line` (m) is the program line of each row. `spindle` is the axis
     that the words S, M3 and M4 drive. `home` (n) is where the axes go home to; `limits` (3 × n) are velocity,
-    acceleration and jerk of the axes.
+    acceleration and jerk of the axes. `guard` lowers the feed where a force would be too large.
     """
 
     axes: tuple[str, ...]
@@ -51,6 +53,8 @@ class Program:
     home: tuple[float, ...]
     limits: np.ndarray
     name: str = ""
+    guard: ForceGuard | None = None
+    origin: Any = None  # what an experiment's path was planned from (`rds.nc.run.prepare.Prepared`), for the result
 
     @property
     def samples(self) -> int:
@@ -61,6 +65,13 @@ class Program:
     def start(self) -> tuple[float, ...]:
         """Where the motion begins (n)."""
         return tuple(float(value) for value in self.position[0])
+
+
+def program_columns(program: Program | InterpolatedProgram) -> dict[str, str]:
+    """The columns of a record that say where in the program it is, with their units."""
+    if isinstance(program, InterpolatedProgram):
+        return COLUMNS | INTERPOLATED_COLUMNS
+    return COLUMNS | (COLUMN if program.guard is not None else {})
 
 
 Row = tuple[Sequence[float], Sequence[float], Sequence[float], int]
@@ -109,7 +120,7 @@ def dwell_samples(seconds: float, T: float) -> int:
     return ceil(seconds / T - 1e-9)
 
 
-def program_channels(fastest: float = 2.0) -> list[Channel]:
+def program_channels(fastest: float = FEED_SHARE.high) -> list[Channel]:
     """What may be changed while a program runs, besides the parameters of controllers; `fastest` feed override."""
     switch = partial(Channel, low=0.0, high=1.0, whole=True)
     feed = "feed as a multiple of the programmed one; " + ("rapids only get slower" if fastest > 1.0 else "at most 1")

@@ -59,6 +59,14 @@ class Rows:
     changes: tuple[Change, ...] = ()  # of live values
 
 
+class FailedSimulation(ContractError):
+    """A student's code has failed in a simulation: `rows` are the samples up to then."""
+
+    def __init__(self, reason: str, rows: Rows):
+        super().__init__(reason)
+        self.rows = rows
+
+
 def run_plan(plan: Plan, directory: Path | None, progress: Progress | None = None, live: Live | None = None) -> Rows:
     """Run a plan in its mode. A real-time run keeps its raw record in `directory` (made if it doesn't exist).
 
@@ -100,8 +108,13 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
 
     def run() -> Ending:
         ending = None
+        process = os.getpid()
         while ending is None:
-            ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+            try:
+                ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+            finally:
+                if os.getpid() != process:  # the student's code has forked: the copy must not go on as the program
+                    os._exit(0)
             if progress:
                 progress(loop.k, plan.samples)
         return ending
@@ -110,7 +123,11 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
         with attached:
             ending = run() if live is None else interruptible(run, lambda: live.was_stopped, lambda: len(recorded))
     except (*STUDENT_ERRORS, Endless) as error:
-        raise ContractError(fault(plan, error, loop.k)) from error
+        reason = fault(plan, error, loop.k)
+        whole = len(recorded) // len(columns) * len(columns)
+        values = np.frombuffer(recorded[:whole]).reshape(-1, len(columns))
+        taken = tuple(timed(changes.taken, plan.T))
+        raise FailedSimulation(reason, Rows(columns, units, values, Ending.FAULT, reason, {}, changes=taken)) from error
     values = np.frombuffer(recorded).reshape(-1, len(columns))
     return Rows(columns, units, values, ending, changes.reason, {}, changes=tuple(timed(changes.taken, plan.T)))
 

@@ -167,6 +167,34 @@ def read_raw(directory: str | Path) -> tuple[dict[str, Any], Any]:
     return about, rows.reshape(-1, width)
 
 
+class RecordTail:
+    """Reads a record while it grows: `new()` gives the whole rows that have come since, as `read_raw` gives all."""
+
+    def __init__(self, directory: str | Path):
+        """InputError where there is no record yet, or its header cannot be read."""
+        self.about, rows = read_raw(directory)
+        self._path = Path(directory) / NAME
+        self._width = rows.shape[1]
+        self._read = 0  # rows
+        with open(self._path, "rb") as file:
+            file.readline()
+            file.readline()
+            self._first = file.tell()
+
+    def new(self) -> Any:
+        """Rows × columns; none where the record has gone."""
+        import numpy as np
+
+        data = b""
+        with contextlib.suppress(OSError), open(self._path, "rb") as file:
+            file.seek(self._first + 8 * self._width * self._read)
+            data = file.read()
+        rows = np.frombuffer(data, dtype="<f8", count=len(data) // (8 * self._width) * self._width)
+        rows = rows.reshape(-1, self._width)
+        self._read += len(rows)
+        return rows
+
+
 def table(names: Sequence[str], units: Mapping[str, str], rows: Any, T: float) -> tuple[dict[str, Any], dict[str, str]]:
     """Rows as a loop recorded them as columns with their units: time = sample·T in s, stages of a sample in µs."""
     columns, of = {}, {}

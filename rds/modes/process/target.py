@@ -62,7 +62,8 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
         if bus["interface"] == "rds":
             watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
-        loop = Stopwatch(clock, ring.append, ring.stop_asked).time(mode.build(plan, drivers))
+        stopwatch = Stopwatch(clock, ring.append, ring.stop_asked)
+        loop = stopwatch.time(mode.build(plan, drivers))
         assert loop.changes is not None
         loop.changes.desk = desk
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
@@ -73,7 +74,10 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
         ring.beat(READY)
         with quiet_memory():
             clock.start()
-            report["ending"] = loop.run()
+            try:
+                report["ending"] = loop.run()
+            finally:
+                stopwatch.end_copy()
         report["reason"] = loop.changes.reason
         if report["ending"] is Ending.DONE:
             drivers.confirm()

@@ -47,7 +47,8 @@ class Timing:
     @property
     def total(self) -> np.ndarray:
         """From due time to completion, ns."""
-        return self.lateness + self.io + self.interpolate + self.compute + self.model
+        total: np.ndarray = self.lateness + self.io + self.interpolate + self.compute + self.model
+        return total
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,8 @@ def own_wait(timing: Timing, period: int) -> np.ndarray:
     start = timing.sample * period + timing.lateness
     due = np.concatenate(([0], (timing.sample[:-1] + 1) * period))
     complete = np.concatenate(([0], timing.sample[:-1] * period + timing.total[:-1]))
-    return np.maximum(start - np.maximum(due, complete), 0)
+    late: np.ndarray = np.maximum(start - np.maximum(due, complete), 0)
+    return late
 
 
 def _usual_io(io: np.ndarray, silent: int) -> float:

@@ -24,16 +24,35 @@ _FORMATS = {
     "SET_MOTION_CONTROL_MODE": "CANON_%s",  # EXACT_PATH, EXACT_STOP, CONTINUOUS (with its tolerance)
     "USE_TOOL_LENGTH_OFFSET": "%.4f %.4f %.4f, %.4f %.4f %.4f, %.4f %.4f %.4f",
     "SET_SPINDLE_MODE": "%d %.4f",
+    "START_SPEED_FEED_SYNC": "%f,%d",
+    "SET_MOTION_OUTPUT_VALUE": "%d,%f",
+    "SET_AUX_OUTPUT_VALUE": "%d,%f",
+    "SET_TOOL_TABLE_ENTRY": "%d, %d, %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f, %.4f, %.4f, %d",
+    "LOG": '"%s"',
+    "LOGOPEN": '"%s"',
+    "LOGAPPEND": '"%s"',
 }
+# Calls of which only the first arguments are written, and what stands behind them.
+_SHORTENED = {
+    "NURBS_FEED": (1, ", ..."),
+    "STRAIGHT_PROBE": (6, ""),
+    "RIGID_TAP": (3, ""),
+    "CHANGE_TOOL_NUMBER": (1, ""),
+}
+_UNWRITTEN = frozenset(("WAIT",))  # calls that `rs274 -g` does not print
 
 
 def _call_text(call: Call) -> str:
     if call.name == "SET_MOTION_CONTROL_MODE" and len(call.args) == 2:
         return f"{call.name}(CANON_{call.args[0]}, {call.args[1]:f})"
     pattern = _FORMATS.get(call.name)
+    args, rest = call.args, ""
+    if call.name in _SHORTENED:
+        count, rest = _SHORTENED[call.name]
+        args = args[:count]
     if pattern is None:
-        pattern = ", ".join("%.4f" if isinstance(value, float) else "%s" for value in call.args)
-    return f"{call.name}({pattern % call.args})"
+        pattern = ", ".join("%.4f" if isinstance(value, float) else "%s" for value in args)
+    return f"{call.name}({pattern % args}{rest})"
 
 
 _STRAIGHT = "(%.4f, %.4f, %.4f, %.4f, %.4f, %.4f)"
@@ -56,7 +75,8 @@ def texts(items: Iterable[MotionBlock | Call]) -> Iterator[tuple[str, str]]:
     """Of each call, the digits of its line's word N ("" without) and its text: `SELECT_PLANE(CANON_PLANE_XY)`."""
     for item in items:
         if isinstance(item, Call):
-            yield item.n, _call_text(item)
+            if item.name not in _UNWRITTEN:
+                yield item.n, _call_text(item)
         else:
             yield from _row_texts(item.rows)
 

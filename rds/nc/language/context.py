@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rds.nc.language.blocks import AXES
@@ -39,6 +40,9 @@ class Context:
         self.out = out
         self.stretches = stretches  # gets what compensation made of what was programmed
         self.leaving: Compensation | None = None  # the compensation that G40 ended, until the move after it
+        self.control_points: list[tuple[float, float, float]] = []  # x, y, weight: of the NURBS since G5.2
+        self.order = 3  # of that NURBS
+        self.saved_modes: Callable[[Context, int], None]  # does M70 to M73, which belong to subroutines
         self.left_turned = 0.0  # degrees, the rotation of the coordinates at that G40
 
     def from_machine(self, length: float) -> float:

@@ -11,14 +11,16 @@ may bear that of a branch or loop in it).
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
-from rds.nc.language.owords import Word, nested, read_gr, read_word, spelled
+from rds.nc.language.owords import FANUC, Word, nested, read_fanuc, read_gr, read_word, spelled
 from rds.nc.language.parameters import Parameters
+from rds.nc.language.saved_modes import SavedModes
 from rds.nc.language.source import Place, Source, open_file
 from rds.nc.language.words import column_of, line_number, recoded, tidy
 
@@ -42,7 +44,9 @@ class Frame:
     name: str
     source: Source
     place: Place
-    kept: list[float]
+    kept: list[float] | None  # None: M98 called it, which has the parameters of its caller
+    saved: SavedModes | None = None  # by M70 or M73
+    more: int = 0  # how often M98 still calls it
     repeats: dict[str, int] = field(default_factory=dict)  # rounds left, by label
 
 
@@ -67,6 +71,8 @@ class Control:
         self._jumps = 0
         self._kept: tuple | None = None  # label, changes and what was visible at an earlier jump
         self._opened: dict[Path, Source] = {}
+        self._saved: SavedModes | None = None  # by M70 in the main program
+        self.restore: Callable[[SavedModes], None] = lambda _: None  # what M73 wants when a subroutine returns
         self.value = 0.0  # what the last subroutine returned
         self.returned = False
 
@@ -87,6 +93,26 @@ class Control:
         scope = self._frames[-1].name if self._frames else self._defining
         return read_word(text, at, self._parameters, scope=scope, defining=self._defining, skipping=self.skipping)
 
+    def fanuc(self, text: str, at: int) -> Word | None:
+        """M98 or M99, when it begins at `at`; M99 of the main program, which ends it, is a word like others."""
+        match = FANUC.match(text, at)
+        if match is None or (match[1] == "9" and not self._frames):
+            return None
+        within = self._frames[-1].name if self._frames else ""
+        return read_fanuc(text, at, self._parameters, within, self.skipping)
+
+    @property
+    def saved(self) -> SavedModes | None:
+        """The modes that M70 or M73 saved in the subroutine being executed, or in the main program."""
+        return self._frames[-1].saved if self._frames else self._saved
+
+    @saved.setter
+    def saved(self, modes: SavedModes | None) -> None:
+        if self._frames:
+            self._frames[-1].saved = modes
+        else:
+            self._saved = modes
+
     def read_gr(self, text: str, at: int) -> Word:
         """The subroutine call GR. Raises Fault."""
         return Word() if self.skipping else read_gr(text, at, self._parameters)
@@ -97,7 +123,7 @@ class Control:
         """Do what an O word says. Raises Fault."""
         if not word.kind or (self.skipping and self.skipping != word.name):
             return
-        if self._seeking and word.kind != "sub":
+        if self._seeking and word.kind not in ("sub", "program"):
             return
         _ACTIONS[word.kind](self, word)
 
@@ -106,12 +132,16 @@ class Control:
         if self._seeking:
             name = self._seeking
             label = Label("call", self._frames[-1].source, self._since_place)
-            word = f"{self._since.spelled} CALL"
+            by_number = self._since.kind == "m98"
+            word = self._since.spelled if by_number else f"{self._since.spelled} CALL"
+            begins = (
+                f"by O{name} on a line of its own, ended by M99" if by_number else f"between O<{name}> SUB and ENDSUB"
+            )
             raise self._fault_at(
                 label,
                 word,
-                f"the subroutine is not defined in {self.source.name or 'the program'} after the call; define it"
-                f" between O<{name}> SUB and ENDSUB, or in a file {name}.ngc beside the program",
+                f"the subroutine {name} is not defined in {self.source.name or 'the program'} after the call; define it"
+                f" {begins}, or in a file {name}.ngc beside the program",
             )
         if self.skipping:
             label = self._labels.get(self.skipping, Label("", self.source, self._since_place))
@@ -126,7 +156,7 @@ class Control:
         source.go_to(place)
         raw = source.read()
         text = tidy(raw)
-        column = column_of(raw, max(text.find("o", line_number(text)[2]), 0)) + place.column
+        column = column_of(raw, max(line_number(text)[2], 0)) + place.column
         return ProgramError(recoded(message), file=source.name, line=place.line, column=column, word=recoded(word))
 
     def _skip_to(self, name: str) -> None:
@@ -209,6 +239,12 @@ class Control:
     # -- subroutines --------------------------------------------------------------------------------------------------
 
     def _sub(self, word: Word) -> None:
+        if self._frames and self._frames[-1].kept is None and word.name == self._frames[-1].name:
+            raise Fault(
+                f"{word.spelled} SUB is called by M98, which calls programs that begin with {word.spelled} alone and"
+                f" end with M99; write {word.spelled} CALL",
+                at=word.at,
+            )
         if self.skipping:  # its definition was looked for, and is found
             self._seeking = self.skipping = ""
             self._define(word)
@@ -229,11 +265,15 @@ class Control:
             raise Fault(
                 f"more than {self._dialect.max_depth} subroutine calls inside one another; call fewer", at=word.at
             )
-        frame = Frame(word.name, self.source, self.source.following(), self._parameters.enter(word.arguments))
+        by_number = word.kind == "m98"
+        if by_number and not word.times:
+            return
+        kept = self._parameters.enter(None if by_number else word.arguments)
+        frame = Frame(word.name, self.source, self.source.following(), kept, more=word.times - 1)
         place = self.source.place
         self._frames.append(frame)
         label = self._labels.get(word.name)
-        if label is not None and label.kind == "sub":
+        if label is not None and label.kind in ("sub", "program"):
             self._jump(label)
             return
         self._jumps += 1
@@ -256,9 +296,23 @@ class Control:
         self._opened[path] = found
         return found
 
+    def _program(self, word: Word) -> None:
+        """A program number alone: where M98 goes to, and nothing else."""
+        if self._frames and self._frames[-1].name == word.name and self._frames[-1].kept is not None:
+            raise Fault(
+                f"the program {word.spelled} is called by {word.spelled} CALL; write M98 P{word.name}, or SUB after it",
+                at=word.at,
+            )
+        if self.skipping:  # it was looked for, and is found
+            self._seeking = self.skipping = ""
+            self._define(word)
+
     def _return(self, word: Word) -> None:
         if self._frames:
             frame = self._frames[-1]
+            if (frame.kept is None) != (word.kind == "m99"):
+                ends = "M99" if frame.kept is None else f"{spelled(frame.name)} ENDSUB"
+                raise Fault(f"{word.spelled} {word.kind.upper()} does not end this; write {ends}", at=word.at)
             # RETURN may bear the label of the branch or loop that it stands in: LinuxCNC's own examples are written so
             within = word.kind == "return" and f"{frame.name}#{word.name}" in self._labels
             if word.name != frame.name and not within:
@@ -270,12 +324,23 @@ class Control:
             self.value, self.returned = word.value or 0.0, word.value is not None
             self._frames.pop()
             self._parameters.leave(frame.kept)
-            self.source = frame.source
-            self.source.go_to(frame.place)
+            if frame.more:
+                self._again(frame, word)
+            else:
+                self.source = frame.source
+                self.source.go_to(frame.place)
+            if frame.saved is not None and frame.saved.again:
+                self.restore(frame.saved)
         elif not self._defining:
             raise Fault(f"{word.spelled} {word.kind.upper()} outside of a subroutine; remove it", at=word.at)
         elif word.kind == "endsub":
             self.skipping = self._defining = ""
+
+    def _again(self, frame: Frame, word: Word) -> None:
+        """M98 with L: the program once more."""
+        self._frames.append(Frame(frame.name, frame.source, frame.place, self._parameters.enter(None)))
+        self._frames[-1].more = frame.more - 1
+        self._jump(self._labels[word.name])
 
     # -- branches -----------------------------------------------------------------------------------------------------
 
@@ -378,6 +443,9 @@ _ACTIONS = {
     "endsub": Control._return,
     "return": Control._return,
     "call": Control._call,
+    "program": Control._program,
+    "m98": Control._call,
+    "m99": Control._return,
     "if": Control._if,
     "elseif": Control._elseif,
     "else": Control._else,

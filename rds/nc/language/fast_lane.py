@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rds.nc.language.canon import MOTION
-from rds.nc.language.state import PER_MINUTE
+from rds.nc.language.state import NO_MOTION, PER_MINUTE
 
 if TYPE_CHECKING:
     from rds.nc.language.context import Context
@@ -28,6 +28,7 @@ ROWS = 16384  # at once
 FEW_LINES = 4  # less in one go are not worth the way
 LONGEST_PAUSE = 63  # lines until the next attempt
 NEVER = 1 << 62
+_PLAIN = frozenset((0, 10, 20, 30, NO_MOTION))  # motions that a line without a G word may go on with
 
 
 @cache
@@ -80,6 +81,9 @@ class FastLane:
             and not state.comp_side
             and state.feed_mode == PER_MINUTE
             and state.arc_allowed == 1
+            and not state.unplaced
+            and not state.diameter
+            and state.motion in _PLAIN
         )
 
     def _read(self, read: Callable[..., Any], source: Source) -> int:

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, NON_MODAL, STOP, Block, check, settle_motion
+from rds.core.errors import InputError
+from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, STOP, Block, check, settle_motion
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.context import Context
 from rds.nc.language.control import Control
@@ -21,16 +22,22 @@ from rds.nc.language.moves import move
 from rds.nc.language.names import known_names
 from rds.nc.language.offsets import start
 from rds.nc.language.parameters import Parameters, read_parameters
+from rds.nc.language.saved_modes import SavedModes, lines_to_restore, modes_now
 from rds.nc.language.source import LONGEST, open_source
-from rds.nc.language.state import NO_MOTION, State
+from rds.nc.language.state import State
 from rds.nc.language.stream import Stream
 from rds.nc.language.tools import Tool, ToolTable, read_tools
 from rds.nc.language.words import column_of, fill, line_number, place_of, read_plain, read_words, recoded, tidy, word_at
 
 if TYPE_CHECKING:
+    from rds.machines.ncc import Script
     from rds.nc.compensation.moves import Stretch
 
+_USUAL = frozenset((0, 10, 20, 30))  # motions that no line goes on with wrongly but by words that are checked
 _PROGRAM_NUMBER = re.compile(r"[po][0-9]+")
+_SCRIPT = re.compile(r"(?:n[0-9]+)?(rf[0-9]|build)")
+_NO_SCRIPT = "a configuration script stands at the program's head, before its first block; move this line there"
+_SCRIPT_IS_OFF = "this is a line of a configuration script; read the program with the option ncc (--with ncc)"
 _MOTION_WORD = re.compile(r"(?:n[0-9]+)?(?!o).*?(g40(?![0-9])|[xyz]|m[0-9])")  # of a block that compensation refuses
 
 
@@ -84,12 +91,15 @@ class Interpreter:
         self.context = Context(options, table, Parameters(state, kept), state, self.out, stretches)
         self.control = Control(self.source, self.context.parameters, options)
         self.context.parameters.known = known_names(self.context, self.control, lambda: self.control.source.line)
+        self.context.saved_modes = self._saved_modes
+        self.control.restore = self._restore
         self.lane = FastLane(self.context, self.source)
         self._remark = remark
         self._percent = False
         self._first = True  # no block has been executed
         self._text = ""
         self._places: dict[str, int] = {}
+        self.configuration: Script | None = None  # what the program's head says of the machine (option ncc)
         self._left_over: LeftOver | None = None  # what stands behind M2 or M30, once it has been met
 
     def close(self) -> None:
@@ -147,6 +157,32 @@ class Interpreter:
             raise ProgramError("the program is empty; write blocks and end with M2", file=self.source.name, line=1)
         if not self._percent:
             self.source.go_to(first)
+        if self.options.ncc:
+            self._read_configuration()
+
+    def _read_configuration(self) -> None:
+        """Read the configuration script at the program's head, if there is one. Raises ProgramError."""
+        from rds.machines.ncc import Script
+
+        script, source = Script(), self.source
+        behind = source.following()
+        try:
+            while (raw := source.read()) and script.take(raw.decode("latin-1"), source.line):
+                if script.line == source.line:
+                    behind = source.following()
+            if script.line:
+                script.check_built(source.line, f"{raw.decode('latin-1').strip():.30}" if raw else "the program's end")
+                self.configuration = script
+                if self._remark is not None:
+                    said = (
+                        f"the configuration of {len(script.links)} links, built in line {script.built}, has no fault; "
+                        "a machine that runs the program must have this chain (`rds machine new` makes one of a script)"
+                    )
+                    self._remark(ProgramError(said, file=source.name, line=script.built))
+        except InputError as error:
+            said = str(error).removeprefix(f"{error.where}: ")
+            raise ProgramError(said, file=source.name, line=script.line) from None
+        source.go_to(behind)
 
     def _file_ended(self) -> None:
         """Raises ProgramError, but where the last line of the program may be its end."""
@@ -184,7 +220,8 @@ class Interpreter:
                 return False
             return self._block(text)
         except Fault as fault:
-            raise self._error(fault, raw) from None
+            scripts = Fault(_NO_SCRIPT if self.options.ncc else _SCRIPT_IS_OFF, at=0)
+            raise self._error(scripts if _SCRIPT.match(self._text) else fault, raw) from None
         except ProgramError as error:
             if error.line:
                 raise
@@ -198,6 +235,8 @@ class Interpreter:
         if plain is None:
             return self._other(text)
         digits, words = plain
+        if words and words[0][0] == "m" and words[0][1].lstrip("0") in ("98", "99"):
+            return self._other(text)
         out = self.out
         out.digits, out.n = len(digits), 0
         if digits:
@@ -215,6 +254,10 @@ class Interpreter:
             return self._percent_sign()
         out.digits, out.n, at = line_number(text)
         first = text[at : at + 1]
+        if first == "m" and (fanuc := self.control.fanuc(text, at)) is not None:
+            self._first = False
+            self.control.execute(fanuc)
+            return False
         if first == "o" or (self.options.gr and text.startswith("gr", at)):
             self._first = False
             word = control.read(text, at) if first == "o" else control.read_gr(text, at)
@@ -230,7 +273,9 @@ class Interpreter:
         context, words = self.context, block.words
         self._first = False
         state = context.state
-        if not block.g and not block.m and not block.comment and state.motion != NO_MOTION:
+        if state.diameter and "x" in words:
+            words["x"] /= 2.0
+        if not block.g and not block.m and not block.comment and state.motion in _USUAL:
             if AXIS_SET.isdisjoint(words):
                 settle_motion(block, state)
             else:
@@ -245,13 +290,43 @@ class Interpreter:
                 return False
         else:
             settle_motion(block, state)
-        if block.g.get(NON_MODAL) is not None or not CHECKED.isdisjoint(words):
+        if block.g or block.motion not in _USUAL or not CHECKED.isdisjoint(words):
             check(block, state)
         context.parameters.settle()
         ended = execute(context, block)
         if ended:
             self._after_end(f"M{block.m[STOP]}")
         return ended
+
+    def _saved_modes(self, m: Context, code: int) -> None:
+        """M70, M73 (save the modes), M71 (forget them), M72 (restore them). Raises Fault."""
+        if code == 72:
+            if self.control.saved is None:
+                raise Fault("no modes are saved here; write M70, or M73 in a subroutine, before", "m72")
+            self._restore(self.control.saved)
+        else:
+            again = code == 73 and self.control.depth > 0
+            self.control.saved = None if code == 71 else modes_now(m.state, m.parameters, again)
+
+    def _restore(self, saved: SavedModes) -> None:
+        """Bring saved modes back, by the words that differ. Raises Fault."""
+        state, parameters = self.context.state, self.context.parameters
+        try:
+            if saved.units != ("G20" if state.inches else "G21"):
+                self._obey(saved.units.lower())
+            for line in lines_to_restore(saved, modes_now(state, parameters), bool(state.inches)):
+                self._obey(line)
+        except Fault as fault:
+            raise Fault(f"the saved modes cannot be restored ({fault.message})") from None
+
+    def _obey(self, text: str) -> None:
+        """Execute a block of plain words that no line of the program holds. Raises Fault."""
+        block = Block()
+        plain = read_plain(text)
+        assert plain is not None  # words that the interpreter has written itself
+        fill(block, plain[1], text)
+        settle_motion(block, self.context.state)
+        execute(self.context, block)
 
     def _program_number(self, text: str) -> bool:
         """The option's program number, P001 or O001, on the first block."""

@@ -12,12 +12,17 @@ from rds.nc.language.blocks import (
     CONTROL,
     COOLANT,
     COORDINATES,
+    DIAMETER,
     DISTANCE,
     FEED_MODE,
     G92_SERIES,
     NON_MODAL,
+    OVERRIDES,
     PLANE,
+    RETRACT,
+    SIGNALS,
     SPINDLE,
+    SPINDLE_MODE,
     STOP,
     TOOL_CHANGE,
     TOOL_OFFSET,
@@ -25,9 +30,9 @@ from rds.nc.language.blocks import (
     Block,
 )
 from rds.nc.language.comment_values import expanded
-from rds.nc.language.context import Context, rotate
+from rds.nc.language.context import INCH, Context, rotate
 from rds.nc.language.expressions import Fault, whole
-from rds.nc.language.moves import home, move
+from rds.nc.language.moves import draw_points, home, move
 from rds.nc.language.offsets import (
     call_origin,
     g92_mode,
@@ -37,15 +42,18 @@ from rds.nc.language.offsets import (
     select_system,
     set_g92,
     set_system,
+    set_tool,
     set_tool_offset,
     set_units,
+    tell_tool,
 )
 from rds.nc.language.outside import active_comment
-from rds.nc.language.parameters import DEBUG_SHOWN, SYSTEM, SYSTEMS, TOOL
+from rds.nc.language.parameters import DEBUG_SHOWN, INPUT, SYSTEM, SYSTEMS
 from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES, XY, YZ
+from rds.nc.language.tool_centre import check_words
 
-_ACTIVE_COMMENTS = ("logopen,", "logappend,", "log,", "pyrun,", "py,", "abort,", "probeopen", "probeclose")
-_ACTIVE_ALONE = ("logclose", "pyreload")
+_ACTIVE_COMMENTS = ("pyrun,", "py,", "abort,")
+_ACTIVE_ALONE = ("pyreload",)
 
 
 def execute(m: Context, block: Block) -> bool:
@@ -53,6 +61,9 @@ def execute(m: Context, block: Block) -> bool:
     words, g = block.words, block.g
     if block.comment:
         comment(m, block.comment)
+    if SPINDLE_MODE in g:
+        m.state.surface_speed = int(g[SPINDLE_MODE] == 960)
+        m.out.call("SET_SPINDLE_MODE", 0, abs(words.get("d", 1e30)) if m.state.surface_speed else 0.0)
     if FEED_MODE in g:
         set_feed_mode(m, g[FEED_MODE])
     if "f" in words and m.state.feed_mode != INVERSE_TIME:
@@ -64,7 +75,7 @@ def execute(m: Context, block: Block) -> bool:
     if "t" in words:
         select_tool(m, int(words["t"]))
     if block.m:
-        _m_words(m, block.m)
+        _m_words(m, block)
     if g:
         _g_words(m, block)
     if block.motion != -1:
@@ -76,15 +87,26 @@ def execute(m: Context, block: Block) -> bool:
     return False
 
 
-def _m_words(m: Context, groups: dict[int, int]) -> None:
+def _m_words(m: Context, block: Block) -> None:
+    groups, words = block.m, block.words
+    if SIGNALS in groups:
+        signal(m, groups[SIGNALS], words)
     if TOOL_CHANGE in groups:
-        change_tool(m)
-    if SPINDLE in groups:
+        if groups[TOOL_CHANGE] == 61:
+            name_tool(m, words)
+        else:
+            change_tool(m)
+    spindle = groups.get(SPINDLE, -1)
+    if spindle == 19:
+        orient(m, words)
+    elif spindle >= 70:
+        m.saved_modes(m, spindle)
+    elif spindle >= 0:
         name, turning = {
             3: ("START_SPINDLE_CLOCKWISE", 1),
             4: ("START_SPINDLE_COUNTERCLOCKWISE", -1),
             5: ("STOP_SPINDLE_TURNING", 0),
-        }[groups[SPINDLE]]
+        }[spindle]
         m.out.call(name, 0)
         m.state.spindle = turning
     coolant = groups.get(COOLANT)
@@ -98,18 +120,24 @@ def _m_words(m: Context, groups: dict[int, int]) -> None:
         m.out.call("MIST_OFF")
         m.out.call("FLOOD_OFF")
         m.state.mist = m.state.flood = 0
+    if OVERRIDES in groups:
+        override(m, groups[OVERRIDES], words)
 
 
 def _g_words(m: Context, block: Block) -> None:
     """All G words but those of motion."""
     g, words = block.g, block.words
     non_modal = g.get(NON_MODAL)
+    if m.state.tcp:
+        check_words(g)
     if non_modal == 40:
         m.out.call("DWELL", words["p"])
     if PLANE in g:
         select_plane(m, g[PLANE])
     if UNITS in g:
         set_units(m, g[UNITS])
+    if DIAMETER in g:
+        set_diameter(m, g[DIAMETER] == 70, block)
     if COMPENSATION in g:
         compensate(m, g[COMPENSATION], words)
     if TOOL_OFFSET in g:
@@ -122,14 +150,21 @@ def _g_words(m: Context, block: Block) -> None:
         _distance(m, g[DISTANCE] == 900)
     if ARC_DISTANCE in g:
         _arc_distance(m, g[ARC_DISTANCE] == 901)
+    if RETRACT in g:
+        set_retract(m, g[RETRACT])
     if non_modal == 100:
-        set_system(m, block)
+        if words["l"] in (2, 20):
+            set_system(m, block)
+        else:
+            set_tool(m, block)
     elif non_modal in (280, 300):
         home(m, block, non_modal)
     elif non_modal in (281, 301):
         keep_home(m, non_modal)
-    elif non_modal == 920:
-        set_g92(m, block)
+    elif non_modal in (520, 920):
+        set_g92(m, block, non_modal)
+    elif non_modal == 53:
+        draw_points(m, block)
     if G92_SERIES in g:
         g92_mode(m, g[G92_SERIES])
 
@@ -153,6 +188,16 @@ def comment(m: Context, text: str) -> None:
         return
     if lower.startswith("print,"):
         m.out.call("PRINT", expanded(text[6:], m.parameters))
+        return
+    for name in ("logopen,", "logappend,"):
+        if lower.startswith(name):
+            m.out.call(name[:-1].upper(), text[len(name) :])
+            return
+    if lower.startswith("log,"):
+        m.out.call("LOG", expanded(text[4:], m.parameters))
+        return
+    if lower == "logclose":
+        m.out.call("LOGCLOSE")
         return
     for name in (*_ACTIVE_COMMENTS, *_ACTIVE_ALONE):
         if lower == name if name in _ACTIVE_ALONE else lower.startswith(name):
@@ -191,12 +236,118 @@ def change_tool(m: Context) -> None:
         raise Fault("no tool is selected; write T and its number on the line or before", "m6")
     if m.state.comp_side:
         raise Fault("the tool cannot change while the cutter is compensated; write it after G40", "m6")
+    if m.state.tcp:
+        raise Fault("the tool cannot change while G43.4 is in force; write G49 before", "m6")
     m.out.call("START_CHANGE")
     m.out.call("STOP_SPINDLE_TURNING", 0)
     m.state.spindle = 0
     m.out.call("CHANGE_TOOL", m.tools.selected)
     m.tools.change()
     tell_tool(m)
+
+
+def name_tool(m: Context, words: dict[str, float]) -> None:
+    """M61 Q: this tool is in the spindle; nothing is changed."""
+    try:
+        number = whole(words.get("q", -1.0))
+        if number < 0:
+            raise Fault("M61 needs the tool that is in the spindle; write Q and its number (Q0: none)")
+        slot = m.tools.find(number)
+    except Fault as fault:
+        fault.key = "q" if "q" in words else "m61"
+        raise
+    m.tools.put(slot)
+    m.out.call("CHANGE_TOOL_NUMBER", slot, number)
+    tell_tool(m)
+
+
+def orient(m: Context, words: dict[str, float]) -> None:
+    """M19 R (degrees) P (0 the shorter way, 1 clockwise, 2 counter-clockwise) Q (s to wait for it)."""
+    m.state.spindle = 0
+    angle, way = words.get("r", 0.0), words.get("p", 0.0)
+    if not 0.0 <= angle <= 360.0:
+        raise Fault(f"R{angle:g} is no angle of the spindle; write 0 to 360 degrees", "r")
+    if way not in (0.0, 1.0, 2.0):
+        raise Fault("P says which way the spindle turns; write 0 (the shorter), 1 or 2", "p")
+    if "q" in words and words["q"] <= 0.0:
+        raise Fault("Q says how many seconds the spindle may take; write more than 0", "q")
+    if "r" in words or "p" in words:
+        m.out.call("ORIENT_SPINDLE", 0, angle, int(way))
+
+
+def signal(m: Context, code: int, words: dict[str, float]) -> None:
+    """M62 to M65 P (digital outputs on and off, with motion or at once), M66 P or E (an input), M67 and M68 E Q (analog
+    outputs).
+    """
+    key = f"m{code}"
+    if m.state.comp_side:
+        raise Fault("inputs and outputs do not go with cutter compensation; write it after G40", key)
+    letter = "p" if code <= 65 else "e"
+    if code == 66:
+        _read_input(m, words)
+        return
+    if letter not in words:
+        raise Fault(f"M{code} needs {letter.upper()}, the number of the output; add it", key)
+    index = round(words[letter])
+    if index < 0:
+        raise Fault(f"{letter.upper()}{words[letter]:g} is no output; they count from 0", letter)
+    where = "AUX" if code in (64, 65, 68) else "MOTION"
+    if code <= 65:
+        m.out.call(f"{'SET' if code in (62, 64) else 'CLEAR'}_{where}_OUTPUT_BIT", index)
+    else:
+        m.out.call(f"SET_{where}_OUTPUT_VALUE", index, words.get("q", -1.0))
+
+
+def _read_input(m: Context, words: dict[str, float]) -> None:
+    """M66: nothing answers here, so #5399 keeps its value, as for `rs274`."""
+    if ("p" in words) == ("e" in words):
+        raise Fault("M66 reads one input; write P (digital) or E (analog) with its number", "m66")
+    letter = "p" if "p" in words else "e"
+    if words[letter] < 0.0:
+        raise Fault(f"{letter.upper()}{words[letter]:g} is no input; they count from 0", letter)
+    if words.get("l", 0.0) and (letter == "e" or words.get("q", 0.0) <= 0.0):
+        raise Fault("M66 waits (L1 to L4) only for a digital input P, with Q above 0, the seconds at most", "l")
+    m.out.call("WAIT", letter.upper(), round(words[letter]), int(words.get("l", 0.0)), words.get("q", 0.0))
+    if letter == "p":
+        m.parameters.numbers[INPUT] = float(m.parameters.numbers[INPUT] != 0.0)
+
+
+def override(m: Context, code: int, words: dict[str, float]) -> None:
+    """M48 to M53: whether the operator's override, adaptive feed and feed hold work."""
+    state, out = m.state, m.out
+    if state.comp_side:
+        raise Fault("overrides do not change while the cutter is compensated; write it after G40", f"m{code}")
+    on = code == 48 or (code != 49 and words.get("p", 1.0) != 0.0)
+    does = "ENABLE" if on else "DISABLE"
+    if code in (48, 49, 50):
+        state.feed_override = int(on)
+        out.call(f"{does}_FEED_OVERRIDE")
+    if code in (48, 49, 51):
+        state.speed_override = int(on)
+        out.call(f"{does}_SPEED_OVERRIDE", 0)
+    if code == 52:
+        out.call(f"{does}_ADAPTIVE_FEED")
+    elif code == 53:
+        out.call(f"{does}_FEED_HOLD")
+
+
+def set_diameter(m: Context, diameter: bool, block: Block) -> None:
+    """G7 (X words are diameters), G8 (radii): from the words of this block on."""
+    if m.state.diameter != diameter:
+        m.state.diameter = int(diameter)
+        m.out.comment(f"interpreter: Lathe diameter mode changed to {'diameter' if diameter else 'radius'}")
+        scale = 0.5 if diameter else 2.0
+        for letter in ("x", "i", "j", "k") if block.motion == 760 else ("x",):
+            if letter in block.words:
+                block.words[letter] *= scale
+
+
+def set_retract(m: Context, code: int) -> None:
+    """G98, G99: where canned cycles go out to."""
+    if m.state.comp_side:
+        raise Fault("where cycles retract to cannot change while the cutter is compensated", f"g{code}")
+    m.out.comment(f"interpreter: retract mode set to {'old_z' if code == 980 else 'r_plane'}")
+    m.state.retract_high = int(code == 980)
 
 
 def stand_by_the_contour(m: Context, compensation: Compensation) -> None:
@@ -209,14 +360,6 @@ def stand_by_the_contour(m: Context, compensation: Compensation) -> None:
     rotate(beside, m.left_turned - m.state.rotation)
     m.state.x, m.state.y, m.state.z = plus([m.state.x, m.state.y, m.state.z], beside)
     m.leaving = None
-
-
-def tell_tool(m: Context) -> None:
-    """Parameters 5400 to 5413: the tool in the spindle."""
-    tool = m.tools.spindle
-    numbers = [float(tool.number), *tool.offset, 0.0, 0.0, 0.0]
-    numbers += [tool.diameter, tool.front, tool.back, float(tool.orientation)]
-    m.parameters.numbers[TOOL : TOOL + 14] = numbers
 
 
 def select_plane(m: Context, code: int) -> None:
@@ -289,14 +432,16 @@ def control_path(m: Context, code: int, words: dict[str, float]) -> None:
     """G61 (exact path), G61.1 (exact stop), G64 (blending: within P of the path; Q: joins nearly straight lines)."""
     if m.state.comp_side:
         raise Fault("path control cannot change while the cutter is compensated; write it after G40", f"g{code}")
-    if code == 610:
-        m.out.call("SET_MOTION_CONTROL_MODE", "EXACT_PATH")
-    elif code == 611:
-        m.out.call("SET_MOTION_CONTROL_MODE", "EXACT_STOP")
+    state, unit = m.state, INCH if m.state.inches else 1.0
+    state.path_mode = {610: "EXACT_PATH", 611: "EXACT_STOP", 640: "CONTINUOUS"}[code]
+    if code != 640:
+        m.out.call("SET_MOTION_CONTROL_MODE", state.path_mode)
     else:
         tolerance = words.get("p", 0.0)
+        collinear = words.get("q", tolerance)
+        state.path_tolerance, state.path_collinear = tolerance * unit, collinear * unit
         m.out.call("SET_MOTION_CONTROL_MODE", "CONTINUOUS", tolerance)
-        m.out.call("SET_NAIVECAM_TOLERANCE", words.get("q", tolerance))
+        m.out.call("SET_NAIVECAM_TOLERANCE", collinear)
 
 
 def _distance(m: Context, absolute: bool) -> None:
@@ -351,6 +496,9 @@ def _end(m: Context, code: int) -> None:
     state.feed_mode, state.feed_rate = PER_MINUTE, 0.0
     out.call("SET_FEED_MODE", 0, 0)
     out.rate(0.0)
+    if not state.feed_override:
+        out.call("ENABLE_FEED_OVERRIDE")
+    state.feed_override = state.speed_override = 1
     state.comp_side, state.arc_allowed = 0, 1
     out.call("STOP_SPINDLE_TURNING", 0)
     out.call("SET_SPINDLE_MODE", 0, 0.0)

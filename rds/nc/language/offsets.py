@@ -5,11 +5,14 @@ A position in program coordinates p, with rotation R about Z, lies in the machin
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rds.nc.language.blocks import Block
 from rds.nc.language.context import INCH, Context, given, rotate
 from rds.nc.language.expressions import Fault
-from rds.nc.language.parameters import G28_HOME, G30_HOME, G92, G92_APPLIED, SYSTEM, SYSTEMS
+from rds.nc.language.parameters import G28_HOME, G30_HOME, G92, G92_APPLIED, SYSTEM, SYSTEMS, TOOL
 from rds.nc.language.state import State
+from rds.nc.language.tool_centre import check_switch, switch
 
 NOTHING = [0.0] * 6
 
@@ -133,15 +136,19 @@ def set_system(m: Context, block: Block) -> None:
     m.out.call("SET_XY_ROTATION", rotation)
 
 
-def set_g92(m: Context, block: Block) -> None:
-    """G92: the position gets the values given."""
+def set_g92(m: Context, block: Block, code: int) -> None:
+    """G92: the position gets the values given. G52: the origin is shifted by them, whatever it was shifted before."""
     state = m.state
-    _not_compensated(state, "g920")
+    _not_compensated(state, f"g{code}")
     m.parameters.numbers[G92_APPLIED] = 1.0
     position = state.position()
     for index, value in given(block.words):
-        state.axis_offset[index] = position[index] + state.axis_offset[index] - value
-        position[index] = value
+        if code == 520:
+            position[index] += state.axis_offset[index] - value
+            state.axis_offset[index] = value
+        else:
+            state.axis_offset[index] = position[index] + state.axis_offset[index] - value
+            position[index] = value
     state.move_to(position)
     call_g92(m)
     m.vector_to_machine(G92, state.axis_offset)
@@ -171,19 +178,26 @@ def _not_compensated(state: State, key: str) -> None:
 
 
 def set_tool_offset(m: Context, code: int, block: Block) -> None:
-    """G43 (of a tool in the table), G43.1 (given by axis words), G49 (none)."""
+    """G43 (of a tool in the table), G43.1 (given by axis words), G43.4 (for the tool's tip), G49 (none)."""
     state, words = m.state, block.words
+    check_switch(m, code)
     if state.comp_side:
         raise Fault("the tool offset cannot change while the cutter is compensated; write it after G40", f"g{code}")
-    if code == 490:
-        offset = list(NOTHING)
-    elif code == 431:
-        offset = list(state.tool_offset)
+    offset = list(state.tool_offset if code in (431, 432) else NOTHING)
+    if code == 431:
         for index, value in given(words):
             offset[index] = value
-    else:
+    elif code == 432 and "h" not in words:
+        if not given(words):
+            raise Fault("G43.2 adds an offset; write H (of a tool) or axis words", "g432")
+        for index, value in given(words):
+            offset[index] += value
+    elif code != 490:
+        if code == 432 and given(words):
+            raise Fault("G43.2 has either H or axis words; leave one away", "h")
         tool = m.tools.slots[_slot(m, words)]
-        offset = [m.from_machine(length) for length in tool.offset[:3]] + list(tool.offset[3:])
+        offset = plus(offset, [m.from_machine(length) for length in tool.offset[:3]] + list(tool.offset[3:]))
+    switch(m, code, offset)
     m.out.call("USE_TOOL_LENGTH_OFFSET", *offset, 0.0, 0.0, 0.0)
     shift = minus(state.tool_offset, offset)
     rotate(shift, -state.rotation)
@@ -199,6 +213,84 @@ def _slot(m: Context, words: dict[str, float]) -> int:
     except Fault as fault:
         fault.key = "h"
         raise
+
+
+def set_tool(m: Context, block: Block) -> None:
+    """G10 L1 (the tool's offset is what is given), L10 and L11 (it is such that the position becomes what is given, in
+    the active coordinate system or in G59.3), L0 (the table is read anew): for this run, the file stays as it is.
+    """
+    words, tools = block.words, m.tools
+    kind = int(words["l"])
+    if kind == 0:
+        if tools.spindle.number:
+            raise Fault("G10 L0 does not go with a tool in the spindle; write T0 M6 before", "g100")
+        m.out.call("RELOAD_TOOLDATA")
+        return
+    if kind != 1:
+        _not_compensated(m.state, "g100")
+    try:
+        slot = tools.find(int(words["p"] + 0.5))
+    except Fault as fault:
+        fault.key = "p"
+        raise
+    tool = tools.slots[slot]
+    offset = [m.from_machine(length) for length in tool.offset[:3]] + list(tool.offset[3:])
+    axes = dict(given(words))
+    if kind == 1:
+        for index, value in axes.items():
+            offset[index] = value
+    else:
+        _offset_by_position(m, axes, 9 if kind == 11 else m.state.origin_index, offset)
+    orientation = tool.orientation
+    if "q" in words:
+        orientation = int(words["q"])
+        if orientation != words["q"] or not 0 <= orientation <= 9:
+            raise Fault(f"Q{words['q']:g} is no orientation of a lathe tool; write 0 to 9", "q")
+    changed = replace(
+        tool,
+        offset=tuple([m.to_machine(length) for length in offset[:3]] + offset[3:]),
+        diameter=m.to_machine(words["r"]) * 2.0 if "r" in words else tool.diameter,
+        front=words.get("i", tool.front),
+        back=words.get("j", tool.back),
+        orientation=orientation,
+    )
+    tools.slots[slot] = changed
+    entry = (changed.number, *changed.offset, 0.0, 0.0, 0.0, changed.front, changed.back, changed.orientation)
+    m.out.call("SET_TOOL_TABLE_ENTRY", slot, *entry)
+    if slot == tools.loaded:
+        tools.put(slot)
+        m.out.call("SET_TOOL_TABLE_ENTRY", 0, *entry)
+    tell_tool(m)
+
+
+def _offset_by_position(m: Context, axes: dict[int, float], system: int, offset: list[float]) -> None:
+    """The offset with which the position in a system gets the values given; the part along an axis of the (perhaps
+    turned) system that is not given stays.
+    """
+    state, rotation = m.state, m.parameters.numbers[SYSTEMS + 20 * system + 10]
+    here = plus(state.position(), state.axis_offset)
+    rotate(here, state.rotation)
+    here = minus(plus(plus(here, state.origin), state.tool_offset), m.vector_from_machine(SYSTEMS + 20 * system + 1))
+    rotate(here, -rotation)
+    if system != 9 and m.parameters.numbers[G92_APPLIED]:
+        here = minus(here, m.vector_from_machine(G92))
+    for index, value in axes.items():
+        if index > 1:
+            offset[index] = here[index] - value
+    if 0 in axes or 1 in axes:
+        kept = offset[:2]
+        rotate(kept, -rotation)
+        wanted = [here[index] - axes[index] if index in axes else kept[index] for index in (0, 1)]
+        rotate(wanted, rotation)
+        offset[:2] = wanted
+
+
+def tell_tool(m: Context) -> None:
+    """Parameters 5400 to 5413: the tool in the spindle."""
+    tool = m.tools.spindle
+    numbers = [float(tool.number), *tool.offset, 0.0, 0.0, 0.0]
+    numbers += [tool.diameter, tool.front, tool.back, float(tool.orientation)]
+    m.parameters.numbers[TOOL : TOOL + 14] = numbers
 
 
 def in_machine(m: Context, position: list[float]) -> list[float]:

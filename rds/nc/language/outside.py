@@ -2,43 +2,49 @@
 
 from __future__ import annotations
 
-_CYCLES = "canned cycles are outside this dialect; write their moves as G0 and G1"
-_LATHE = "lathe cycles and threading are outside this dialect; write their moves as G0 and G1"
-_PROBE = "probing is outside this dialect; leave it away"
-_SPLINE = "splines are outside this dialect; write lines (G1) or arcs (G2, G3), for example from `rds nc make points`"
+_ROUGHING = "{} a lathe from a contour's subroutine; write its cuts as G0 and G1, or let the CAM program write them"
 _G = {
-    **dict.fromkeys((50, 51, 52, 53, 61, 62, 63), _SPLINE),
-    70: "diameter mode is outside this dialect; program radii and leave G7 away",
-    80: "radius mode is how X is read here always; leave G8 away",
-    110: "G11 is outside this dialect; leave it away",
+    110: "G11 ends programmable data input of other controls; leave it away, G10 needs no end here",
+    120: "G12 mills a circular pocket clockwise on other controls; write the circle as G2 with I and J",
+    121: "G12.1 begins polar interpolation of other controls; write X and Y",
+    130: "G13 mills a circular pocket on other controls; write the circle as G3 with I and J",
+    150: "G15 ends polar coordinates of other controls; @ and ^ give radius and angle here, leave G15 away",
+    160: "G16 begins polar coordinates of other controls; write radius and angle as @ and ^, or X and Y",
     **dict.fromkeys((171, 181, 191), "there are no axes U, V, W; use G17, G18 or G19"),
-    **dict.fromkeys((330, 331), _LATHE),
-    **dict.fromkeys((382, 383, 384, 385), _PROBE),
-    432: "adding up tool offsets is outside this dialect; give the sum with G43.1 and axis words",
-    520: "G52 is outside this dialect; shift the origin with G92 or G10 L2",
-    **dict.fromkeys((700, 710, 711, 712, 720, 721, 722, 760), _LATHE),
-    **dict.fromkeys((730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890), _CYCLES),
-    **dict.fromkeys((980, 990), "it sets where canned cycles retract to, and there are none here; leave it away"),
-    960: "constant surface speed is outside this dialect; program revolutions per minute with S",
-    970: "S is in revolutions per minute here always; leave G97 away",
+    270: "G27 checks the reference point of other controls; leave it away",
+    290: "G29 goes back from the reference point on other controls; write the position with G0",
+    310: "G31 is the skip (probing) of other controls; write G38.2",
+    320: "G32 cuts a thread on other controls; write G33 with K, the way for each turn",
+    500: "G50 ends scaling, or limits the spindle on lathes of other controls; leave it away (D of G96 limits it)",
+    510: "G51 scales the coordinates on other controls; let the CAM program scale them, or use parameters",
+    600: "G60 goes to a place from one side on other controls; write G61.1 and the moves",
+    650: "G65 calls a macro of other controls; write O<name> CALL [...]",
+    660: "G66 calls a macro after each move on other controls; write O<name> CALL after them",
+    670: "G67 ends G66 of other controls; leave it away",
+    680: "G68 turns the coordinates on other controls; write G10 L2 P0 R and the angle",
+    690: "G69 ends G68 of other controls; write G10 L2 P0 R0",
+    700: _ROUGHING.format("G70 finishes"),
+    **dict.fromkeys((710, 711, 712), _ROUGHING.format("G71 turns")),
+    **dict.fromkeys((720, 721, 722), _ROUGHING.format("G72 faces")),
+    750: "G75 cuts grooves on other controls; write its cuts as G0 and G1",
+    770: "G77 is a turning cycle of other controls; write its cuts as G0 and G1",
+    780: "G78 is a threading cycle of other controls; write G76 or G33",
 }
 _M = {
-    19: "spindle orientation is outside this dialect; leave it away",
-    **dict.fromkeys((48, 49, 50, 51, 52, 53), "overrides are the operator's here; leave it away"),
-    61: "the number of the tool in the spindle is not set by hand here; write T and M6",
-    **dict.fromkeys((62, 63, 64, 65, 66, 67, 68), "inputs and outputs are outside this dialect; leave it away"),
-    **dict.fromkeys(
-        (70, 71, 72, 73), "saving modal state is outside this dialect; write the modes again where they are needed"
-    ),
-    98: "subroutines are called by O words here; write O<name> CALL",
-    99: "subroutines end with O<name> ENDSUB; programs end with M2 or M30",
+    10: "M10 clamps an axis on other controls; leave it away",
+    11: "M11 releases an axis on other controls; leave it away",
+    97: "M97 calls part of a program on other controls; write O<name> CALL",
+    98: "M98 stands first on its line; write M98 P and the program's number on a line of its own",
 }
 _LETTERS = {
     **dict.fromkeys("uvw", "there are no axes U, V, W; the axes are X Y Z A B C"),
-    "e": "E is outside this dialect; numbers have no exponent, write 0.001 for 1E-3",
-    "@": "polar coordinates are outside this dialect; write X and Y, for example X[10*COS[30]]",
-    "^": "polar coordinates are outside this dialect; write X and Y, for example X[10*COS[30]]",
-    "$": "there is one spindle; leave $ away",
+    "$": (
+        "words that begin with $ are settings and commands of a sender or of Grbl ($H homes, $X unlocks, $J= jogs), not"
+        " of a part program; home the machine before the program, and remove the line"
+    ),
+    "?": "? asks a Grbl board for its status; it is no part of a program, remove it",
+    "!": "! is the feed hold of a Grbl board; it is no part of a program, remove it",
+    "~": "~ is the cycle start of a Grbl board; it is no part of a program, remove it",
     "n": "a line number stands first on its line; move it there",
     "o": "an O word stands first on its line, after N; write a line of its own, or the digit 0 if that is meant",
     ",": "no word begins with ','; write a decimal point, 10.5, and blanks between words",

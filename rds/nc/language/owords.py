@@ -13,7 +13,8 @@ _KINDS = (
     *("break", "continue", "endwhile", "endrepeat", "return"),
 )
 _KIND = re.compile("|".join(sorted(_KINDS, key=len, reverse=True)))
-_GLOBAL = frozenset(("sub", "endsub", "call", "return"))
+_GLOBAL = frozenset(("sub", "endsub", "call", "return", "program"))
+FANUC = re.compile(r"m0*9([89])(?![0-9.\[#])")  # M98 calls a program by its number, M99 ends it
 _TESTS = frozenset(("while", "repeat", "if", "elseif"))
 
 
@@ -30,6 +31,7 @@ class Word:
     test: float = 0.0
     arguments: list[float] = field(default_factory=list)
     value: float | None = None  # that RETURN or ENDSUB gives back
+    times: int = 1  # that M98 calls
 
 
 def read_word(text: str, at: int, parameters: Parameters, *, scope: str, defining: str, skipping: str) -> Word:
@@ -47,17 +49,15 @@ def read_word(text: str, at: int, parameters: Parameters, *, scope: str, definin
         raise
     match = _KIND.match(text, reader.at)
     word = Word(match[0] if match else "", at=at)
+    if not match and reader.peek() in ("", "(", ";") and not defining:
+        word.kind = "program"  # O1000 alone, as Fanuc's programs begin
     word.spelled = spelled(label)
     word.name = label if word.kind in _GLOBAL else f"{scope}#{label}"
     if match:
         reader.at = match.end()
-    elif not defining:
-        alone = (
-            " stands alone; as a program number it is an option of the dialect, of the first block (`--with"
-            " program-numbers`): switch it on, leave it away, or"
-        )
-        said = " is followed by no control word;" if reader.peek() else alone
-        raise Fault(f"{word.spelled}{said} write one of {', '.join(_KINDS).upper()} after it", at=at)
+    elif not defining and not word.kind:
+        said = f"{word.spelled} is followed by no control word; write one of {', '.join(_KINDS).upper()} after it"
+        raise Fault(said if skipping else f"{said}, or nothing where a program of that number begins", at=at)
     _read_values(word, reader, defining, skipping)
     if not skipping:
         while reader.peek() == "(":
@@ -102,6 +102,45 @@ def _read_arguments(word: Word, reader: Reader) -> None:
         if len(word.arguments) >= ARGUMENTS:
             raise reader.fault(f"more than {ARGUMENTS} arguments; hand the rest over in parameters from #31 on")
         word.arguments.append(reader.expression())
+
+
+def read_fanuc(text: str, at: int, parameters: Parameters, within: str, skipping: str) -> Word:
+    """M98 P (program number) L (how often), or M99: the first word of a block. Raises Fault.
+
+    `within` is the program that M99 ends.
+    """
+    match = FANUC.match(text, at)
+    assert match is not None  # as the caller has seen
+    word = Word(f"m9{match[1]}", at=at, spelled=f"M9{match[1]}")
+    if skipping and match[1] == "8":
+        return Word(at=at)
+    reader = Reader(text, parameters, match.end())
+    if match[1] == "9":
+        word.name = within
+        if not skipping:
+            _check_comment(reader, "M99")
+        return word
+    found: dict[str, float] = {}
+    while (letter := reader.peek()) in ("p", "l"):
+        reader.at += 1
+        if letter in found:
+            raise Fault(f"two {letter.upper()} words on one line; leave one", at=reader.at - 1)
+        found[letter] = reader.integer()
+        if found[letter] < 0:
+            raise Fault(f"{letter.upper()}{found[letter]} is negative; write a number from 0", at=reader.at - 1)
+    _check_comment(reader, "M98")
+    if "p" not in found:
+        raise Fault("M98 without P; write the number of the program to call, M98 P1000", at=at)
+    word.name, word.times = str(int(found["p"])), int(found.get("l", 1))
+    return word
+
+
+def _check_comment(reader: Reader, said: str) -> None:
+    while reader.peek() == "(":
+        reader.at = reader.text.index(")", reader.at) + 1
+    if reader.peek() not in ("", ";"):
+        more = " P, L and" if said == "M98" else ""
+        raise reader.fault(f"only{more} a comment can follow {said}; move the rest to a line of its own")
 
 
 def read_gr(text: str, at: int, parameters: Parameters) -> Word:

@@ -20,6 +20,8 @@ DEBUG_SHOWN = 5599  # (DEBUG, ...) is a message while this is above 0
 READ_ONLY = frozenset([*range(5400, 5414), *range(5420, 5429)])
 TOOL = 5400  # number; 5401 to 5409 offsets X Y Z A B C U V W; 5410 diameter
 POSITION = 5420  # X Y Z A B C
+PROBED = 5061  # X Y Z A B C of the last probing; 5070: whether it touched
+INPUT = 5399  # what M66 read
 G28_HOME, G30_HOME = 5161, 5181
 G92_APPLIED, G92 = 5210, 5211
 SYSTEM = 5220  # which coordinate system is selected
@@ -109,15 +111,22 @@ class Parameters:
 
     # -- subroutines ---------------------------------------------------------------------------------------------------
 
-    def enter(self, arguments: list[float]) -> list[float]:
-        """A subroutine begins with its arguments in #1 to #30. Returns what they were, for leave()."""
+    def enter(self, arguments: list[float] | None) -> list[float] | None:
+        """A subroutine begins with its arguments in #1 to #30. Returns what they were, for leave().
+
+        None: it has those of its caller, and what it makes of them stays (M98).
+        """
+        if arguments is None:
+            self.locals.append({})
+            return None
         kept = self.numbers[1 : ARGUMENTS + 1]
         self.numbers[1 : ARGUMENTS + 1] = arguments + [0.0] * (ARGUMENTS - len(arguments))
         self.locals.append({})
         return kept
 
-    def leave(self, kept: list[float]) -> None:
-        self.numbers[1 : ARGUMENTS + 1] = kept
+    def leave(self, kept: list[float] | None) -> None:
+        if kept is not None:
+            self.numbers[1 : ARGUMENTS + 1] = kept
         self.locals.pop()
 
 

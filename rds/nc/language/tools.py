@@ -66,8 +66,12 @@ class ToolTable:
 
     def change(self) -> None:
         """The selected tool goes into the spindle."""
-        self.loaded = self.selected
-        self.slots[0] = self.slots[self.selected] if self.selected else NO_TOOL
+        self.put(self.selected)
+
+    def put(self, slot: int) -> None:
+        """The tool of a slot is in the spindle; none is for 0."""
+        self.loaded = slot
+        self.slots[0] = self.slots[slot] if slot else NO_TOOL
 
 
 def read_tools(path: Path) -> list[Tool]:

@@ -14,13 +14,13 @@ _LOWER = bytes.maketrans(b"ABCDEFGHIJKLMNOPQRSTUVWXYZ", b"abcdefghijklmnopqrstuv
 _COMMENT = re.compile(rb"(\([^()]*\)|;.*)", re.DOTALL)
 # Digits in one way only: if the point were optional by itself, a line of many words that is not plain would take hours.
 _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
-_PLAIN = re.compile(rf"/?(?:n([0-9]+)(?:\.[0-9]+)?)?((?:[a-mp-z]{_NUMBER})*)")
-_WORD = re.compile(rf"([a-z])({_NUMBER})")
+_PLAIN = re.compile(rf"/?(?:n([0-9]+)(?:\.[0-9]+)?)?((?:[a-mp-z@^]{_NUMBER})*)")
+_WORD = re.compile(rf"([a-z@^])({_NUMBER})")
 _LINE_NUMBER = re.compile(r"/?(?:n([0-9]*)(\.?)([0-9]*))?")
-_OTHERS = frozenset("abcdfhijklpqrstxyz")
+_OTHERS = frozenset("abcdefhijklpqrstxyz@^")
 _DIGITS_MOST = 9
 _ANYTHING = re.compile(
-    rf"gr[0-9]*|(?:{FUNCTION.pattern})(?=\[)|[a-z]?{_NUMBER}|#(?:<[^>]*>|[0-9]+)|[\x80-\xff]+|.",
+    rf"gr[0-9]*|(?:{FUNCTION.pattern})(?=\[)|[a-z@^]?{_NUMBER}|#(?:<[^>]*>|[0-9]+)|[\x80-\xff]+|.",
     re.DOTALL,
 )
 

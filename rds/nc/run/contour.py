@@ -1,7 +1,7 @@
 """The contour error: how far a measured position is from the programmed path, exactly, near where the motion is.
 
 Only X, Y and Z count, in mm: a rotary axis that lags moves the point that it carries by an amount which depends on how
-far out that is, and this is not known here.
+far out that is. Of moves programmed for the tool's tip, points and path are the tip's (judge.py), and it counts.
 """
 
 from __future__ import annotations

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rds.interpolators.motion.planner import TOLERANCE
-from rds.interpolators.motion.segments import AXES, BLEND
+from rds.interpolators.motion.segments import AXES, BLEND, JOINTS
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import InterpolatedProgram
 from rds.nc.run.contour import contour_error
@@ -30,14 +30,13 @@ _LINEAR = AXES[:3]
 def judged(result: Result, prepared: Prepared) -> Result:
     """The result with the column `contour_error` (mm; 0 on the way home) and with `meta["program"]`."""
     state = result["program_state"].astype(int)
-    made = prepared.program if isinstance(prepared.program, InterpolatedProgram) else None
-    if made is not None:
-        prepared = replace(prepared, segment=_segments(result))
+    is_reference = bool(prepared.about)  # then the commanded path is a subject of its own
+    prepared = located(result, prepared)
     error, line = contour(result, prepared, state)
     columns = dict(result.columns)
     units = dict(result.units)
     columns["contour_error"], units["contour_error"] = error, "mm"
-    if made is not None:
+    if is_reference:
         columns["path_error"], units["path_error"] = contour(result, prepared, state, "reference")[0], "mm"
     moves = moving(result)
     on_path = moves & (state != State.HOME)
@@ -53,7 +52,9 @@ def judged(result: Result, prepared: Prepared) -> Result:
         "waiting_samples": len(result) - int(moves.sum()),
         "limit_shares": _limit_shares(result, prepared),
         "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) and linear else None,
-        **({"path_error": worst(columns["path_error"], line, on_path, "mm")} | made.about if made is not None else {}),
+        **({"path_error": worst(columns["path_error"], line, on_path, "mm")} if is_reference else {}),
+        **prepared.about,
+        **_force(result, worst, moves),
         "following_error": {
             name: found
             for name in prepared.program.axes
@@ -71,6 +72,13 @@ def judged(result: Result, prepared: Prepared) -> Result:
     return Result(columns, units, meta)
 
 
+def _force(result: Result, worst: Callable[..., Any], where: np.ndarray) -> dict[str, Any]:
+    """The largest cutting force that the load cell measured, of a run that has one."""
+    if "cutting_force" not in result:
+        return {}
+    return {"cutting_force": worst(result["cutting_force"], result["program_line"].astype(int), where, "N")}
+
+
 def worst_lines(result: Result, column: np.ndarray, count: int = 5) -> list[tuple[int, float, float]]:
     """The program lines with the largest values of a column: line, value and when it was, s."""
     line, moves = result["program_line"].astype(int), moving(result)
@@ -82,12 +90,14 @@ def worst_lines(result: Result, column: np.ndarray, count: int = 5) -> list[tupl
     return sorted(found, key=lambda entry: -entry[1])[:count]
 
 
-def _segments(result: Result) -> np.ndarray:
-    """Which segment each sample of an interpolator belongs to, as the run recorded it."""
+def located(result: Result | Mapping[str, np.ndarray], prepared: Prepared) -> Prepared:
+    """`prepared` with the segment of each sample, which of an interpolator's only the run's own rows tell."""
+    if not isinstance(prepared.program, InterpolatedProgram):
+        return prepared
     sample = np.ceil(result["program_sample"]).astype(int)
     segment = np.zeros(int(sample.max(initial=0)) + 1, dtype=int)
     segment[sample] = result["program_segment"].astype(int) - 1
-    return np.maximum.accumulate(segment)  # samples that were passed over
+    return replace(prepared, segment=np.maximum.accumulate(segment))  # samples that were passed over
 
 
 def contour(
@@ -102,8 +112,8 @@ def contour(
     line = result["program_line"].astype(int)
     if not len(path):
         return np.zeros(len(line)), line
-    points, wanted = np.zeros((len(line), 3)), np.zeros((len(line), 3))
-    for i, name in enumerate(_LINEAR):
+    points, wanted = np.zeros((len(line), 6)), np.zeros((len(line), 6))
+    for i, name in enumerate(AXES):
         if name in axes:
             points[:, i], wanted[:, i] = result[f"{name}_{of}"], result[f"{name}_reference"]
         else:
@@ -112,12 +122,23 @@ def contour(
     blended = path["mode"] == BLEND
     given = path["tolerance"][blended]
     corner = float(np.where(np.isfinite(given), given, TOLERANCE).max(initial=0.0))
-    reach = np.linalg.norm(points - wanted, axis=1) + corner + 1e-3
-    on_path = state != State.HOME
-    error = np.zeros(len(line))
-    error[on_path], nearest = contour_error(points[on_path], path, prepared.segment[row][on_path], reach[on_path])
-    line = line.copy()
-    line[on_path] = path["line"][nearest]
+    segment = prepared.segment[row]
+    for_tip = path["tip"][segment] != JOINTS
+    error, line = np.zeros(len(line)), line.copy()
+
+    def measure(some: np.ndarray, here: np.ndarray, there: np.ndarray, along: np.ndarray) -> None:
+        reach = np.linalg.norm(here - there, axis=1) + corner + 1e-3
+        error[some], nearest = contour_error(here, along, segment[some], reach)
+        line[some] = path["line"][nearest]
+
+    some = (state != State.HOME) & ~for_tip
+    measure(some, points[some, :3], wanted[some, :3], path)
+    some = (state != State.HOME) & for_tip
+    if prepared.tip is not None and some.any():
+        corner += TOLERANCE
+        length = path["tool_length"][segment[some]]
+        here, there = (prepared.tip.tip.places(each[some], length)[0] for each in (points, wanted))
+        measure(some, here, there, prepared.tip.path)
     return error, line
 
 

@@ -1,4 +1,4 @@
-"""A path as the reference of a run: an interpolator makes its samples inside the loop, while the axes move.
+"""A path as the reference of a run: an interpolator makes its samples inside the loop, or a profile before it.
 
 `[reference] kind = "path"` of an experiment names this module (`rds.modes.experiment.resolve`); `rds nc run
 --interpolator` gets a part program's moves through here.
@@ -24,17 +24,19 @@ from rds.interpolators.acceleration import LIBRARY as FILTERS
 from rds.interpolators.acceleration import Acceleration, make_acceleration, smooth_one_by_one
 from rds.interpolators.interpolator import Interpolator, find_interpolator, from_student
 from rds.interpolators.motion.limits import Limits
-from rds.interpolators.motion.segments import AXES, arc, line
+from rds.interpolators.motion.profiles import BLENDED, PROFILES
+from rds.interpolators.motion.segments import AXES, BLEND, EXACT_STOP, arc, line
 from rds.interpolators.path import check_chain
 from rds.interpolators.segment import Arc
 from rds.interpolators.segment_rows import SEGMENTS, read_segments, segments_of
 from rds.machines import Machine
 from rds.modes.loop.interpolated import LEAST_AHEAD
-from rds.modes.loop.program import Happening, InterpolatedProgram, Row, Stretch, dwell_samples
+from rds.modes.loop.program import Happening, InterpolatedProgram, Program, Row, Stretch, dwell_samples
 from rds.nc.check import Setup, motion
 from rds.nc.interpolator_segments import program as moves_of
+from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import judged
-from rds.nc.run.prepare import Prepared
+from rds.nc.run.prepare import Prepared, planned, prepare
 from rds.results import Result
 
 SUFFIX = ".toml"  # of a path file; any other is a part program
@@ -42,9 +44,10 @@ MOST_SAMPLES = 20_000_000
 _MOST_AHEAD = 100_000
 _ARC_POINTS = 65  # of an arc, looked at for the travel of the axes
 _LINEAR = AXES[:3]
+_OF_AN_INTERPOLATOR = ("interpolator", "params", "acceleration", "exact_stop", "look_ahead")
 
 WORDS = Table(
-    "a path of lines and arcs that all axes of the run follow together, through an interpolator",
+    "a path of lines and arcs that all axes of the run follow together, by an interpolator or a planned profile",
     {
         "file": Text(f"a path file ({SUFFIX}), or a part program"),
         "start": SEGMENTS.keys["start"],
@@ -71,6 +74,7 @@ WORDS = Table(
                 ),
             ),
         ),
+        "profile": Choice("in place of an interpolator: how the motion is planned before the run", tuple(PROFILES)),
         "exact_stop": Flag("with acceleration: the axes come to rest at the end of each segment", False),
         "look_ahead": Quantity(
             "rows that are made before they are needed",
@@ -94,12 +98,20 @@ class Method:
 
 def program(
     words: TomlTable, folder: Path, machine: Machine, axes: Sequence[str], T: float
-) -> tuple[InterpolatedProgram, str | None]:
+) -> tuple[InterpolatedProgram | Program, str | None]:
     """The program of a `[reference]` table for the axes of a run, and the path of the user's interpolator.
 
     InputError with the place of the words that won't do.
     """
-    method = method_of(words, folder)
+    profile = words.read("profile")
+    if profile is not None and (given := [key for key in _OF_AN_INTERPOLATOR if key in words]):
+        raise InputError(
+            f"profile = {profile!r} plans the motion, and {given[0]} goes with an interpolator, which makes it: "
+            "give one of them",
+            words.place(given[0]),
+        )
+    method = method_of(words, folder) if profile is None else None
+    own_file = None if method is None else method.interpolator.source.path
     file = words.read("file")
     inline = [key for key in ("start", "feed", "segment") if key in words]
     if (file is None) != bool(inline):
@@ -107,9 +119,13 @@ def program(
             "a path needs either file (a path file or a part program), or start, feed and [[reference.segment]]",
             words.place("file" if file is not None else None),
         )
+    made: InterpolatedProgram | Program
     if file is not None and not str(file).endswith(SUFFIX):
         words.done()
-        made = of_part_program(folder / file, machine, None, T, method)
+        if method is not None:
+            made = of_part_program(folder / file, machine, None, T, method)
+        else:
+            made = _with_origin(prepare(folder / file, machine, None, T, None, profile), profile)
         if set(axes) - {made.spindle} != set(made.axes):
             raise InputError(
                 f"a part program moves {', '.join(made.axes)}, and the run has {', '.join(axes)}; "
@@ -117,9 +133,8 @@ def program(
                 words.place("file"),
             )
         if made.spindle is not None and made.spindle not in axes:
-            note = f"the spindle stands: {made.spindle} is none of the axes of this run"
-            made = replace(made, spindle=None, notes=(*made.notes, note))
-        return made, method.interpolator.source.path
+            made = _noted(replace(made, spindle=None), f"the spindle stands: {made.spindle} is none of the run's axes")
+        return made, own_file
     if file is not None:
         segments, name = read_segments(folder / file), str(file)
     else:
@@ -134,13 +149,55 @@ def program(
     first: Segment = LineSegment((0.0,) * len(axes), segments[0].start, max(each.feed_rate for each in segments))
     lines: list[int] = list(range(1, len(segments) + 1))
     rests: dict[int, tuple[Happening, ...]] = {}
-    notes: tuple[str, ...] = ()
-    if any(segments[0].start):
+    if is_led := any(segments[0].start):
         segments, lines, rests = [first, *segments], [0, *lines], {0: ()}
-        notes = (f"the axes begin at 0: a straight line leads to the start of the path, {segments[1].start}",)
-    made = program_of(name, segments, lines, rests, (), method, machine, axes, T)
-    made = replace(made, notes=notes, about={**made.about, "counted_in": "segment"})
-    return made, method.interpolator.source.path
+    if method is not None:
+        made = program_of(name, segments, lines, rests, (), method, machine, axes, T)
+        made = replace(made, about={**made.about, "counted_in": "segment"})
+    else:
+        made = _planned(name, segments, lines, rests, profile, machine, axes, T)
+    if is_led:
+        made = _noted(made, f"the axes begin at 0: a straight line leads to the start of the path, {first.end}")
+    return made, own_file
+
+
+def _planned(
+    name: str,
+    segments: Sequence[Segment],
+    lines: Sequence[int],
+    rests: Iterable[int],
+    profile: str,
+    machine: Machine,
+    axes: Sequence[str],
+    T: float,
+) -> Program:
+    """The motion of these segments, planned by `profile`: on the path, but where `blended` rounds its corners.
+
+    At rest at the end of the segments in `rests`.
+    """
+    check_chain(segments, T)
+    _check_room(segments, lines, machine, axes)
+    path = _path(segments, lines, [AXES.index(each) for each in axes])
+    if profile == BLENDED:
+        path["mode"] = BLEND
+    path["mode"][list(rests)] = EXACT_STOP
+    prepared = planned([PathBlock(path)], machine, T, Path(name), profile, axes)
+    assert isinstance(prepared.program, Program)
+    return _with_origin(replace(prepared, program=replace(prepared.program, spindle=None)), profile, "segment")
+
+
+def _with_origin(prepared: Prepared, profile: str, counted_in: str = "line") -> Program:
+    """The planned samples, which know what they were planned from."""
+    program = prepared.program
+    assert isinstance(program, Program)
+    return replace(program, origin=replace(prepared, about={"profile": profile, "counted_in": counted_in}))
+
+
+def _noted(made: InterpolatedProgram | Program, note: str) -> InterpolatedProgram | Program:
+    """The same with one more note for the result."""
+    if isinstance(made, InterpolatedProgram):
+        return replace(made, notes=(*made.notes, note))
+    return replace(made, origin=replace(made.origin, notes=(*made.origin.notes, note)))
 
 
 def of_part_program(
@@ -157,16 +214,17 @@ def of_part_program(
     """
     if not file.is_file():
         raise InputError("there is no such part program; check the name and the folder", str(file))
-    if any(name not in machine.axes for name in _LINEAR):
-        raise InputError(f"{machine.name} lacks one of X, Y and Z, all of which an interpolator moves", str(file))
+    axes = [name for name in _LINEAR if name in machine.axes]
+    if not axes:
+        raise InputError(f"{machine.name} has none of X, Y and Z, which an interpolator moves", str(file))
     notes: list[str] = []
-    programmed = moves_of(motion(file, machine, setup or Setup(), progress, notes), machine, T, MOST_SAMPLES)
+    programmed = moves_of(motion(file, machine, setup or Setup(), progress, notes), machine, T, MOST_SAMPLES, axes)
     due: dict[int, tuple[Happening, ...]] = {}
     for after, event in programmed.events:
         due[after] = (*due.get(after, ()), Happening(0, event.kind, float(event.value), event.line))
     first = due.pop(-1, ())
     made = program_of(
-        file.name, programmed.segments, programmed.lines, due, first, method, machine, _LINEAR, T, spindle=True
+        file.name, programmed.segments, programmed.lines, due, first, method, machine, axes, T, spindle=True
     )
     return replace(made, notes=(*notes, *made.notes))
 
@@ -349,18 +407,24 @@ def _in_space(point: Sequence[float], order: Sequence[int]) -> list[float]:
     return whole
 
 
-def judged_path(result: Result, made: InterpolatedProgram, T: float) -> Result:
+def judged_path(result: Result, made: InterpolatedProgram | Program, T: float) -> Result:
     """The result of a run along a path, with its contour error; see `judge.judged`."""
     return judged(result, as_prepared(made, Path(made.name), T))
 
 
-def save_path_run(result: Result, made: InterpolatedProgram, folder: Path, title: str) -> dict[str, Path]:
+def save_path_run(result: Result, made: InterpolatedProgram | Program, folder: Path, title: str) -> dict[str, Path]:
     """Save pictures and reports beside the tables in `folder`, with the path; each file's path by its kind."""
     from rds.nc.run.report import save_run
 
     return save_run(result, as_prepared(made, Path(made.name), result.meta["sample_period"]), folder, title)
 
 
-def as_prepared(made: InterpolatedProgram, file: Path, T: float) -> Prepared:
-    """The program as what is prepared and judged; which segment a sample belongs to is known when it has run."""
-    return Prepared(file, made, made.path, np.zeros(0, int), T, made.notes)
+def as_prepared(made: InterpolatedProgram | Program, file: Path, T: float) -> Prepared:
+    """The program as what is prepared and judged.
+
+    Which segment a sample of an interpolator belongs to is known when it has run.
+    """
+    if isinstance(made, Program):
+        prepared: Prepared = made.origin
+        return replace(prepared, program=made)
+    return Prepared(file, made, made.path, np.zeros(0, int), T, made.notes, about=made.about)

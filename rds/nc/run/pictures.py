@@ -46,6 +46,14 @@ def path(result: Result, prepared: Prepared) -> Picture:
     contour = any(name in LINEAR for name in axes)
     error = result["contour_error"] * 1e3
     planned, rapid, row = _planned(result, prepared)
+    measured_at = {name: result[f"{name}_measured"] for name in axes}
+    if prepared.tip is not None and not isinstance(prepared.program, InterpolatedProgram):
+        length = prepared.path["tool_length"][prepared.segment]
+        planned = planned.copy()
+        for i, values in prepared.tip.of_axes(axes, [planned[:, k] for k in range(len(axes))], length).items():
+            planned[:, i] = values
+        found = prepared.tip.of_axes(axes, list(measured_at.values()), length[row])
+        measured_at |= {axes[i]: values for i, values in found.items()}
     at = _thinned(error, np.flatnonzero(~rapid[row] & (result["program_state"] != State.HOME)))
     count = len(views) + len(alone)
     across = 2 if len(views) > 1 else 1
@@ -76,11 +84,11 @@ def path(result: Result, prepared: Prepared) -> Picture:
     for place, (title, across_name, up) in zip(places, views, strict=False):
         names = (across_name, up)
         u, v = (planned[edges, axes.index(name)] for name in names)
-        x, y = (result[f"{name}_measured"] for name in names)
+        x, y = (measured_at[name] for name in names)
         drawn = draw(place, (u, v), (x, y))
         dress(place, f"{up} [mm]", f"{across_name} [mm]")
         place.set_aspect("equal", adjustable="datalim")
-        place.set_title(title, loc="left", fontsize="medium")
+        place.set_title(title + ", tool's tip on the work" * (prepared.tip is not None), loc="left", fontsize="medium")
     sent = _sent_at(result, row, edges)
     for place, name in zip(places[len(views) :], alone, strict=False):
         u, v = sent, planned[edges, axes.index(name)]

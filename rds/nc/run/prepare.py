@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -11,21 +11,40 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.interpolators.motion.certificate import Certificate, certified
+from rds.interpolators.motion.certificate import Certificate
 from rds.interpolators.motion.limits import Limits
-from rds.interpolators.motion.planner import PASSING, plan
+from rds.interpolators.motion.planner import PASSING
+from rds.interpolators.motion.profiles import motion_of
 from rds.interpolators.motion.samples import SampleBlock
-from rds.interpolators.motion.segments import AXES, SEGMENT
+from rds.interpolators.motion.segments import AXES, JOINTS, SEGMENT
 from rds.machines import Machine
+from rds.machines.kinematics.tip import Tip
 from rds.modes.loop.program import Happening, InterpolatedProgram, Program
 from rds.nc.check import Setup, check_program, compiled_if_current
 from rds.nc.compiled_file import open_compiled
-from rds.nc.toolpath import PathBlock
+from rds.nc.path_block import PathBlock
+from rds.nc.tool_centre import ToolCentre, path_of_tip
 
 SPINDLE_UNIT = "rev/min"
 MOST_SAMPLES = 20_000_000  # whose references fit into memory: five and a half hours at 1 kHz
 
 Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class TipPath:
+    """The path of a program in work coordinates, segment for segment, and the machine as it is, with its errors."""
+
+    path: np.ndarray  # of SEGMENT, as programmed for the tip where `tip` says so
+    tip: Tip
+
+    def of_axes(self, axes: Sequence[str], columns: Sequence[np.ndarray], length: np.ndarray) -> dict[int, np.ndarray]:
+        """X, Y, Z of the tip (n,) by the number of the axis, of a column of positions for each of `axes`."""
+        positions = np.zeros((len(length), len(AXES)))
+        for name, column in zip(axes, columns, strict=True):
+            positions[:, AXES.index(name)] = column
+        places, _ = self.tip.places(positions, length)
+        return {axes.index(name): places[:, i] for i, name in enumerate(AXES[:3]) if name in axes}
 
 
 @dataclass(frozen=True)
@@ -42,6 +61,8 @@ class Prepared:
     T: float
     notes: tuple[str, ...] = ()
     certificate: Certificate | None = None  # of the planned samples
+    tip: TipPath | None = None  # of a program with moves for the tool's tip
+    about: dict[str, Any] = field(default_factory=dict)  # of a path as reference: what made its samples, for the result
 
     @property
     def seconds(self) -> float:
@@ -50,9 +71,16 @@ class Prepared:
 
 
 def prepare(
-    file: Path, machine: Machine, setup: Setup | None = None, T: float | None = None, progress: Progress | None = None
+    file: Path,
+    machine: Machine,
+    setup: Setup | None = None,
+    T: float | None = None,
+    progress: Progress | None = None,
+    profile: str = "planned",
 ) -> Prepared:
     """Check the program in `file` for `machine`, and plan its motion with samples of `T` s (default: the machine's).
+
+    `profile` is one of `rds.interpolators.motion.profiles`.
 
     A current compiled form beside the file is used, and made if there is none. Raises InputError with all faults if the
     machine cannot run it, and ProgramError or InputError for what cannot be read.
@@ -66,17 +94,29 @@ def prepare(
             raise InputError(str(validation))
         compiled = open_compiled(place)
     require_room(least_seconds(compiled.blocks()), machine, T, file)
-    found = planned(compiled.blocks(), machine, T, file)
+    found = planned(compiled.blocks(), machine, T, file, profile)
+    if (found.path["tip"] != JOINTS).any():
+        found = replace(found, tip=tip_path(found.path, machine, setup.correct))
     return replace(found, notes=(*compiled.trailer.get("notes", ()), *found.notes))
 
 
-def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path) -> Prepared:
-    """The motion of blocks that the machine can run; see `prepare`. RdsError if a sample breaks a limit."""
+def planned(
+    blocks: Iterable[PathBlock],
+    machine: Machine,
+    T: float,
+    file: Path,
+    profile: str = "planned",
+    axes: Sequence[str] | None = None,
+) -> Prepared:
+    """The motion of blocks that the machine can run; see `prepare`. RdsError if a sample breaks a promise of it.
+
+    `axes` are those of the run, where these are not all of the machine's; the blocks move no others.
+    """
     limits = Limits.of(machine)
     path: list[np.ndarray] = []
-    rows = _Rows([AXES.index(name) for name in machine.axes if name in AXES])
-    certificate = Certificate(limits)
-    for block in certified(plan(_kept(blocks, path), limits, T), certificate):
+    rows = _Rows([AXES.index(name) for name in (machine.axes if axes is None else axes) if name in AXES])
+    samples, certificate = motion_of(profile, _kept(blocks, path), limits, T, start=np.zeros(len(AXES)))
+    for block in samples:
         rows.add(block)
         if rows.count > MOST_SAMPLES:
             require_room(rows.count * T, machine, T, file)
@@ -84,11 +124,11 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
         raise InputError("nothing in it moves or waits: there is nothing to run", str(file))
     certificate.require(str(file))
     position, velocity, acceleration, line, segment = rows.columns()
-    axes = tuple(AXES[i] for i in rows.axes)
+    moved = tuple(AXES[i] for i in rows.axes)
     spindle = next((axis.name for axis in machine.axes.values() if axis.unit == SPINDLE_UNIT), None)
     table = np.array([limits.velocity, limits.acceleration, limits.jerk])[:, rows.axes]
     program = Program(
-        axes=axes,
+        axes=moved,
         spindle=spindle,
         position=position,
         velocity=velocity,
@@ -99,7 +139,7 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
             for sample, event in rows.events
             if event.kind not in PASSING
         ),
-        home=(0.0,) * len(axes),
+        home=(0.0,) * len(moved),
         limits=table,
         name=file.name,
     )
@@ -109,6 +149,12 @@ def planned(blocks: Iterable[PathBlock], machine: Machine, T: float, file: Path)
     )
     whole = np.concatenate(path) if path else np.zeros(0, SEGMENT)
     return Prepared(file, program, whole, segment, T, tuple(notes), certificate)
+
+
+def tip_path(path: np.ndarray, machine: Machine, correct: bool) -> TipPath:
+    """Where a program's moves for the tip take it on the work, for measuring."""
+    made = path_of_tip(ToolCentre(machine, correct).real, path)
+    return TipPath(made, Tip(machine.kinematics))
 
 
 def least_seconds(blocks: Iterable[PathBlock]) -> float:

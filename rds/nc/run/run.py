@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from math import hypot
+from dataclasses import dataclass, field, replace
+from math import ceil, hypot
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
+from rds.interpolators.motion.segments import AXES, JOINTS
 from rds.machines import Machine, load_machine
+from rds.machines.forces.cut_file import CutFile, read_cut
 from rds.modes.experiment import Experiment
+from rds.modes.experiment.experiment import on_machine
 from rds.modes.experiment.experiment_file import EXPERIMENT
 from rds.modes.experiment.resolve import resolve
 from rds.modes.experiment.run import Run
 from rds.modes.loop.execution import State
 from rds.modes.loop.plan import Plan
-from rds.modes.loop.program import HOLD, HOME, OVERRIDE, RESUME
+from rds.modes.loop.program import HOLD, HOME, OVERRIDE, RESUME, Program
 from rds.modes.process.host import Progress
 from rds.modes.process.live import Live
 from rds.nc.check import Setup
+from rds.nc.run.forces import program_forces
 from rds.nc.run.judge import judged
 from rds.nc.run.path import WORDS, as_prepared, method_of, of_part_program
-from rds.nc.run.prepare import SPINDLE_UNIT, prepare
+from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, prepare
 from rds.results import Result
 
 AXES_CONTROLLER = {"name": "tracking"}
 SPINDLE_CONTROLLER = {"name": "pid"}
+_AHEAD = 1e-3  # s, over which the rate of the tip is taken
 
 
 @dataclass(frozen=True)
@@ -38,14 +45,17 @@ class Status:
     line: int
     state: State
     rate: float
-    feed: float  # mm/min along the path, as wanted
+    feed: float  # mm/min along the path, as wanted; of the tip, while G43.4 is on
     share: float  # of the planned samples that are done
     measured: dict[str, float]
     reference: dict[str, float]
+    tip: dict[str, float] = field(default_factory=dict)  # X, Y, Z of the tool's tip on the work, while G43.4 is on
 
 
 class ProgramRun(Run):
     """A part program that runs. `desk` has all its live values; the verbs here are those of an operator."""
+
+    prepared: Prepared | None = None
 
     def hold(self) -> None:
         """Come to rest on the path."""
@@ -74,16 +84,41 @@ class ProgramRun(Run):
         of = dict(zip(columns, rows[-1].tolist(), strict=True))
         program = self.plan.program
         assert program is not None
+        tip, feed = self._tip(of)
+        if feed is None:
+            feed = 60.0 * hypot(*(of[f"{name}_reference_velocity"] for name in program.axes if name in "XYZ"))
         return Status(
             time=of["sample"] * self.plan.T,
             line=int(of["program_line"]),
             state=State(int(of["program_state"])),
             rate=of["program_override"],
-            feed=60.0 * hypot(*(of[f"{name}_reference_velocity"] for name in program.axes if name in "XYZ")),
+            feed=feed,
             share=min((of["program_sample"] + 1.0) / program.samples, 1.0),
             measured={name: of[f"{name}_measured"] for name in self.plan.names},
             reference={name: of[f"{name}_reference"] for name in self.plan.names},
+            tip=tip,
         )
+
+    def _tip(self, of: dict[str, float]) -> tuple[dict[str, float], float | None]:
+        """Where the tip is on the work (mm), and its feed (mm/min) as wanted; nothing where joints are programmed."""
+        prepared = self.prepared
+        if prepared is None or prepared.tip is None or int(of["program_state"]) == State.HOME:
+            return {}, None
+        row = min(max(ceil(of["program_sample"]), 0), len(prepared.segment) - 1)
+        segment = prepared.path[prepared.segment[row]]
+        if segment["tip"] == JOINTS:
+            return {}, None
+
+        def place(kind: str, ahead: float = 0.0) -> Any:
+            rates = [ahead * of[f"{name}_reference_velocity"] if ahead else 0.0 for name in prepared.program.axes]
+            joints = np.zeros((1, len(AXES)))
+            for name, rate in zip(prepared.program.axes, rates, strict=True):
+                joints[0, AXES.index(name)] = of[f"{name}_{kind}"] + rate
+            assert prepared.tip is not None
+            return prepared.tip.tip.places(joints, float(segment["tool_length"]))[0][0]
+
+        feed = 60.0 / _AHEAD * float(np.linalg.norm(place("reference", _AHEAD) - place("reference")))
+        return dict(zip("XYZ", map(float, place("measured")), strict=True)), feed
 
 
 class PartProgram(Experiment):
@@ -96,7 +131,11 @@ class PartProgram(Experiment):
     With `interpolator` (a name of the library, the path of a student's .py file, a function, or a table with
     `interpolator`, `params` and `look_ahead`) its moves are not planned: the interpolator makes the samples inside the
     loop, with `acceleration` (a filter's name, or a table with `name` and `time`) on top, and at rest at the end of
-    each segment if `exact_stop`.
+    each segment if `exact_stop`. Else `profile` says how the motion is planned: "planned" (within the jerk, blending),
+    "trapezoid", "blended" or "point-to-point".
+
+    With `cut` (a file, or a `CutFile`) the feed is lowered where the cutting force or a joint's load would exceed the
+    limits of the cut, by the plan and by the load cell.
 
         part = PartProgram("part.ngc")
         result = part.run()
@@ -115,6 +154,8 @@ class PartProgram(Experiment):
         interpolator: Any = None,
         acceleration: Any = None,
         exact_stop: bool = False,
+        profile: str = "planned",
+        cut: str | Path | CutFile | None = None,
         experiment: str | Path | None = None,
         mode: str | None = None,
         sample_period: float | None = None,
@@ -129,20 +170,29 @@ class PartProgram(Experiment):
         self._folder = Path.cwd() if experiment is None else Path(experiment).resolve().parent
         self._machine = _load(str(table.get("machine", "mini-cnc")), self._folder)
         table.setdefault("controller", AXES_CONTROLLER)
+        self._table = table
         self._words = words.over_written(_with_spindle(table, self._machine))
         T = self._words.read("sample_period", self._machine.sample_period)
         if interpolator is None:
             for key, value in (("acceleration", acceleration), ("exact_stop", exact_stop)):
                 if value:
                     raise InputError(f"{key} goes with interpolator, which is not given: planned motion needs neither")
-            self.prepared = prepare(Path(file), self._machine, setup, T, progress)
-        else:
-            how = {"interpolator": interpolator} if not isinstance(interpolator, dict) else dict(interpolator)
-            how |= {} if acceleration is None else {"acceleration": acceleration}
-            how |= {"exact_stop": True} if exact_stop else {}
-            method = method_of(TomlTable(how, WORDS), Path.cwd())
-            made = of_part_program(Path(file), self._machine, setup, T, method, progress)
-            self.prepared = as_prepared(made, Path(file), T)
+        elif profile != "planned":
+            raise InputError(f"profile = {profile!r} plans the motion, and an interpolator makes it: give one of them")
+
+        def prepared(machine: Machine) -> Prepared:
+            if interpolator is None:
+                made = prepare(Path(file), machine, setup, T, progress, profile)
+            else:
+                how = {"interpolator": interpolator} if not isinstance(interpolator, dict) else dict(interpolator)
+                how |= {} if acceleration is None else {"acceleration": acceleration}
+                how |= {"exact_stop": True} if exact_stop else {}
+                method = method_of(TomlTable(how, WORDS), Path.cwd())
+                made = as_prepared(of_part_program(Path(file), machine, setup, T, method, progress), Path(file), T)
+            return made if cut is None else _guarded(made, machine, cut)
+
+        self._prepare = prepared
+        self.prepared = prepared(self._machine)
         self.plan()
 
     @classmethod
@@ -158,16 +208,36 @@ class PartProgram(Experiment):
         assert isinstance(run, ProgramRun)
         return run
 
+    def _put_on(self, machine: Machine, channel: str | None) -> None:
+        self._table = on_machine(self._table, machine, channel)
+        self._words = self._words.over_written(_with_spindle(self._table, machine))
+        self._machine, self.prepared = machine, self._prepare(machine)
+
     def _handle(
         self, plan: Plan, folder: Path | None, work: Callable[[Live | None, Progress | None], Result]
     ) -> ProgramRun:
-        return ProgramRun(plan, folder, work)
+        run = ProgramRun(plan, folder, work)
+        run.prepared = self.prepared
+        return run
 
     def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
         return resolve(self._words, self._folder, mode, self.prepared.program)
 
     def _complete(self, result: Result, plan: Plan) -> Result:
         return judged(result, self.prepared)
+
+
+def _guarded(prepared: Prepared, machine: Machine, cut: str | Path | CutFile) -> Prepared:
+    """The program with a guard that keeps the limits of the cut."""
+    found = program_forces(prepared, machine, cut if isinstance(cut, CutFile) else read_cut(cut))
+    if not found.cut.limits:
+        raise InputError(
+            "the cut has no [limits], and there is nothing to keep; give one, as in force = 40.0", str(cut)
+        )
+    assert isinstance(prepared.program, Program)
+    notes = tuple(f"{warning}; the feed is lowered there" for warning in found.warnings())
+    program = replace(prepared.program, guard=found.guard())
+    return replace(prepared, program=program, notes=(*prepared.notes, *notes))
 
 
 def _load(name: str, folder: Path) -> Machine:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from rds.bus.hub.address import runtime_directory
+from rds.bus.hub.runtime_folder import runtime_directory
 from rds.core.errors import InputError
 from rds.core.extras import missing
 from rds.machines import load_machine

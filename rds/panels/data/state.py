@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
+from rds.identification.fit.fit import METHODS
 from rds.identification.logs.tables import TEXTS
 from rds.identification.structures import SIMULATION_ERROR
 from rds.panels.session.choices import Choices
-from rds.panels.session.fields import Choice, Field, Several, Text
+from rds.panels.session.fields import Choice, Field, Several, Text, labels
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
 
@@ -27,13 +28,7 @@ STRUCTURES = {
     "spindle": "Spindle (first order)",
     "user": "Own file",
 }
-METHODS = {
-    "": "The structure's own",
-    SIMULATION_ERROR: "Simulation error",
-    "inverse-dynamics": "Inverse dynamics",
-    "step": "Step response",
-    "frequency": "Frequency response",
-}
+_METHODS = {"step": "Step response", "frequency": "Frequency response"}
 OPTIONS = {
     "viscous": "viscous friction",
     "stribeck": "Stribeck friction",
@@ -195,7 +190,9 @@ def _fields() -> Iterable[Field]:
     yield Choice("structure", "Structure", "which model is fitted", "axis", STRUCTURES)
     yield Text("structure_file", "Own file", "a Python file with derivatives() and params", "", "e.g. my_model.py")
     yield Several("options", "With", "what else the structure has (axis only)", [], OPTIONS, least=0)
-    yield Choice("method", "Method", "how it is fitted", "", METHODS)
+    yield Choice(
+        "method", "Method", "how it is fitted", "", {"": "The structure's own"} | labels(METHODS.names(), _METHODS)
+    )
     yield Text(
         "model", "Model file", "the fitted model is written here; every mode takes it", "fitted.toml", "fitted.toml"
     )

@@ -27,7 +27,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Checked:
-    """One file: what it stands for ("controller", "model", "signal"), its text, and what was found in it."""
+    """One file: its role ("controller", "model", "interpolator", "signal"), its text, and what was found in it."""
 
     role: str
     path: Path
@@ -53,23 +53,26 @@ class Checked:
 class Builds:
     """Files that were checked. One that has not changed since is not checked again."""
 
-    _kept: dict[tuple[str, Path, float], tuple[str, Checked]] = field(default_factory=dict)
+    _kept: dict[tuple[str, Path, float, int], tuple[str, Checked]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
 
-    def check(self, role: str, path: Path, T: float, pulse: Callable[[], None] = lambda: None) -> Checked:
+    def check(
+        self, role: str, path: Path, T: float, pulse: Callable[[], None] = lambda: None, axes: int = 0
+    ) -> Checked:
         """Check the file at `path`, which stands for `role`, for a loop of `T` s. Takes seconds the first time.
 
+        `axes` is how many a coupled controller drives together; 0 where each axis has its own.
         `pulse()` is called ten times a second meanwhile: what it raises ends the check.
         """
         data = _read(path)
         if isinstance(data, str):
             return Checked(role, path, "", (Mark(None, data),))
-        digest, key = hashlib.sha256(data).hexdigest(), (role, path, T)
+        digest, key = hashlib.sha256(data).hexdigest(), (role, path, T, axes)
         with self._lock:
             before = self._kept.get(key)
         if before is not None and before[0] == digest:
             return before[1]
-        checked = _checked(role, path, data.decode("utf-8", "replace"), T, pulse)
+        checked = _checked(role, path, data.decode("utf-8", "replace"), T, pulse, axes)
         with self._lock:
             self._kept[key] = digest, checked
         return checked
@@ -79,15 +82,21 @@ class Builds:
         with self._lock:
             return [checked for _, checked in self._kept.values()]
 
-    def require(self, files: Iterable[tuple[str, Path]], T: float, pulse: Callable[[], None] = lambda: None) -> None:
-        """InputError naming the first file that will not do; `pulse` as in `check`."""
+    def require(
+        self,
+        files: Iterable[tuple[str, Path]],
+        T: float,
+        pulse: Callable[[], None] = lambda: None,
+        axes: int = 0,
+    ) -> None:
+        """InputError naming the first file that will not do; `pulse` and `axes` as in `check`."""
         for role, path in files:
-            checked = self.check(role, path, T, pulse)
+            checked = self.check(role, path, T, pulse, axes)
             if not checked.ok:
                 raise InputError(checked.sentence)
 
 
-def _checked(role: str, path: Path, text: str, T: float, pulse: Callable[[], None]) -> Checked:
+def _checked(role: str, path: Path, text: str, T: float, pulse: Callable[[], None], axes: int) -> Checked:
     try:
         if role == "signal":
             from rds.references.rows import read_rows
@@ -99,17 +108,17 @@ def _checked(role: str, path: Path, text: str, T: float, pulse: Callable[[], Non
 
             read_model(path)
             return Checked(role, path, text)
-        return _python(role, path, text, T, pulse)
+        return _python(role, path, text, T, pulse, axes if role == "controller" else 0)
     except InputError as error:
         # the message without its place, which the mark is
         said = str(error).removeprefix(f"{error.where}: ").removeprefix(f"{path}:").strip()
         return Checked(role, path, text, (_mark(said, path, text, error.where),))
 
 
-def _python(role: str, path: Path, text: str, T: float, pulse: Callable[[], None]) -> Checked:
+def _python(role: str, path: Path, text: str, T: float, pulse: Callable[[], None], axes: int) -> Checked:
     from rds.checks import check_file
 
-    report = check_file(path, T, pulse=pulse)
+    report = check_file(path, T, coupled=bool(axes), axes=axes or 2, pulse=pulse)
     marks, notes = [], []
     for each in report.reports:
         if each.interface in (role, "file"):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any
 
 from rds.machines import Axis, Machine
 from rds.modes import load_mode
+from rds.panels.equipment.fields import SIZES
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,9 @@ class Diagram:
 
 def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]) -> Diagram:
     """The diagram of an experiment's `table`; `words` names what was chosen ("controller", "model") for people."""
-    axis, mode = machine.axes[table["axis"]], load_mode(str(table["mode"]))
+    axes = [machine.axes[name] for name in table.get("axes") or [table["axis"]]]
+    axis, mode = axes[0], load_mode(str(table["mode"]))
+    names = ", ".join(each.name for each in axes)
     controlled = "reference" in table
     blocks = [_source(table, axis, controlled)]
     links = []
@@ -55,13 +59,14 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
     column = len(blocks)
     board = machine.converter
     converter = (f"± {board.range:g} V", f"{board.bits} bit")
-    model = Block("model", f"Model of {axis.name}", _model(table, axis, words), column + 1)
-    encoder = Block("encoder", "Encoder", (f"{axis.resolution:g} {axis.unit} per count",), column + 2)
+    model = Block("model", f"Model of {names}", _of_each(axes, lambda each: _model(table, each, words)), column + 1)
+    resolution = _of_each(axes, lambda each: (f"{each.resolution:g} {each.unit} per count",))
+    encoder = Block("encoder", "Encoder", resolution, column + 2)
     measured = f"y [{axis.unit}]"
     if mode.moves_machine:
         blocks += [
-            Block("converter", "CAN command", (f"node {axis.node}", *converter), column),
-            Block("machine", f"Machine, {_name(axis)}", _travel(axis), column + 1),
+            Block("converter", "CAN command", (_nodes(axes), *converter), column),
+            Block("machine", f"Machine, {_name(axes)}", _of_each(axes, _travel), column + 1),
             encoder,
         ]
         links += [Link(acting, "converter", "u [V]"), Link("converter", "machine", "V"), Link("machine", "encoder", "")]
@@ -89,12 +94,39 @@ def diagram(table: Mapping[str, Any], machine: Machine, words: Mapping[str, str]
 def _source(table: Mapping[str, Any], axis: Axis, controlled: bool) -> Block:
     shape = table["reference" if controlled else "signal"]
     unit = axis.unit if controlled else "V"
-    if shape["kind"] == "user":
-        lines: tuple[str, ...] = (str(shape["file"]).rpartition("/")[2],)
+    if shape["kind"] == "path":
+        lines: tuple[str, ...] = _path_lines(shape)
+    elif shape["kind"] == "user":
+        lines = (str(shape["file"]).rpartition("/")[2],)
     else:
         offset = f"about {shape['offset']:g} {unit}" if shape.get("offset") else ""
-        lines = (shape["kind"], f"{shape['amplitude']:g} {unit}, {shape['frequency']:g} Hz", offset)
+        sizes = [f"{shape['amplitude']:g} {unit}"] if "amplitude" in shape else []
+        sizes += [f"{shape['frequency']:g} Hz"] if "frequency" in shape else []
+        others = [f"{name} {value}" for name, value in shape.items() if name not in ("kind", *SIZES)]
+        lines = (shape["kind"], ", ".join(sizes), offset, *others)
     return Block("source", "Reference" if controlled else "Voltage signal", tuple(filter(None, lines)), 0)
+
+
+def _path_lines(shape: Mapping[str, Any]) -> tuple[str, ...]:
+    """The path, and who makes its samples."""
+    if "file" in shape:
+        path = str(shape["file"]).rpartition("/")[2]
+    else:
+        path = f"circle of {2.0 * shape['segment'][0]['centre'][0]:g} mm"
+    feed = (f"{shape['feed']:g} mm/min",) if "feed" in shape else ()
+    if "profile" in shape:
+        return path, *feed, str(shape["profile"])
+    name = str(shape["interpolator"]).rpartition("/")[2]
+    return (path, *feed, name, *([f"{shape['acceleration']['name']} filter"] if "acceleration" in shape else []))
+
+
+def _of_each(axes: Sequence[Axis], lines: Callable[[Axis], tuple[str, ...]]) -> tuple[str, ...]:
+    """Each line once where it is the same for all axes, else with the names of the axes."""
+    told: list[str] = []
+    for of_axes in zip_longest(*map(lines, axes), fillvalue=""):
+        same = all(each == of_axes[0] for each in of_axes)
+        told += [of_axes[0]] if same else [f"{axis.name}: {each}" for axis, each in zip(axes, of_axes, strict=True)]
+    return tuple(told)
 
 
 def _model(table: Mapping[str, Any], axis: Axis, words: Mapping[str, str]) -> tuple[str, ...]:
@@ -112,11 +144,15 @@ def _controller(table: Mapping[str, Any], words: Mapping[str, str]) -> tuple[str
     given = {name: value for name, value in table["controller"].items() if name not in ("name", "file")}
     poles = given.pop("poles", None)
     given |= given.pop("params", {})  # of a student's file
-    lines = [words.get("controller", "")]
+    lines = [words.get("controller", ""), *(["all axes together"] if given.pop("coupled", False) else [])]
     if poles:
         lines.append(f"poles {poles[0][0]:g} ± {abs(poles[0][1]):g}i 1/s")
-    lines += [f"{name.replace('_', ' ')} {value:g}" for name, value in given.items()]
+    lines += [f"{name.replace('_', ' ')} {_shown(value)}" for name, value in given.items()]
     return tuple(lines[:4])
+
+
+def _shown(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def _travel(axis: Axis) -> tuple[str, ...]:
@@ -124,8 +160,14 @@ def _travel(axis: Axis) -> tuple[str, ...]:
     return (f"{low:g} to {high:g} {axis.unit}",)
 
 
-def _name(axis: Axis) -> str:
-    return axis.name if axis.unit == "rev/min" else f"{axis.name} axis"
+def _name(axes: Sequence[Axis]) -> str:
+    if len(axes) > 1:
+        return f"axes {', '.join(axis.name for axis in axes)}"
+    return axes[0].name if axes[0].is_spindle else f"{axes[0].name} axis"
+
+
+def _nodes(axes: Sequence[Axis]) -> str:
+    return f"node{'s' * (len(axes) > 1)} {', '.join(str(axis.node) for axis in axes)}"
 
 
 def _sentence(blocks: Iterable[Block], mode: str, T: float) -> str:

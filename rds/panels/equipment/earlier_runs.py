@@ -2,67 +2,120 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.kit.button import button, follow
+from rds.panels.code.versions import changes
+from rds.panels.code.view import changes_html
+from rds.panels.equipment.runs_widget import RunsWidget
+from rds.panels.kit.button import attempt, button, follow
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.session.kept_runs import KeptRun, State
+from rds.panels.session.run_table import RunRow, RunTable, code_of, differences
+from rds.panels.session.session import RUNS
 from rds.panels.session.task import Task
-from rds.results import Result
+from rds.results import Result, html
 
 MOST = 6  # that one picture can show
 _SHOWN = 200
-_STATES = {
-    State.WHOLE: "",
-    State.GOES_ON: ", goes on",
-    State.SAVED_NOW: ", is being saved",
-    State.CUT_SHORT: ", cut short: its record can be opened",
-}
 
 
 class EarlierRuns:
-    """The list. `opened(results, folders, short names)` is called with what was chosen."""
+    """The table. `opened(results, folders, short names)` is called with what was chosen, `ghost(result, name)` with a
+    run that is to stand behind the live strip; none for no run.
+    """
 
-    def __init__(self, shell: Any, opened: Callable[[list[Result], list[str], list[str]], None]):
-        self._session, self._opened = shell.session, opened
-        self._runs: list[KeptRun] = []
-        self.list = widgets.SelectMultiple(
-            options=[], rows=12, tooltip="Hold Ctrl or Shift to choose several", layout={"width": "auto"}
-        )
+    def __init__(
+        self,
+        shell: Any,
+        opened: Callable[[list[Result], list[str], list[str]], None],
+        ghost: Callable[[Result | None, str], None],
+    ):
+        self._session, self._opened, self._ghost = shell.session, opened, ghost
+        self._runs: dict[str, KeptRun] = {}
+        self._rows: dict[str, RunRow] = {}
+        self._kept = RunTable(self._session.folder / RUNS)
         self.bar, self.notice = WorkBar(shell.ticker), Notice()
-        tip = "Open the run that is chosen; several are laid over"
+        self.table = RunsWidget(self._open_one, self._star, self._note)
+        tip = "Open the run that is ticked; several are laid over"
         self.open_button = button("Open", tip, self.open, self.notice, primary=True)
+        tip = "What was chosen differently in the two runs that are ticked, and what came of it"
+        differ = button("What differs", tip, self.differ, self.notice)
+        tip = "Let the run that is ticked stand behind the strip, to compare the next one with; none ticked: no ghost"
+        behind = button("As ghost", tip, self.show_ghost, self.notice)
         again = button("Look again", "Look for runs that other pages have made meanwhile", self.refresh, self.notice)
-        hint = widgets.HTML(
-            "<p>Choose a run to reopen it, or several (Ctrl or Shift) to lay them over each other. "
-            f"The latest {_SHOWN} are listed; <code>rds compare</code> takes any.</p>"
+        self.difference = widgets.HTML()
+        self.widget = widgets.VBox(
+            [row(self.open_button, differ, behind, again, self.bar), self.notice, self.difference, self.table]
         )
-        self.widget = widgets.VBox([hint, self.list, row(self.open_button, again, self.bar), self.notice])
 
     def refresh(self) -> None:
         """As they lie in the folder now."""
-        chosen = {self._runs[i].name for i in self.list.value}
-        self._runs = self._session.runs(_SHOWN)
-        self.list.options = [(_label(run), i) for i, run in enumerate(self._runs)]
-        self.list.value = tuple(i for i, run in enumerate(self._runs) if run.name in chosen)
+        runs = self._session.runs(_SHOWN)
+        self._runs = {run.name: run for run in runs}
+        rows = self._kept.rows(runs)
+        self._rows = {row.name: row for row in rows}
+        self.table.show(rows)
+
+    def differ(self) -> None:
+        """What the button that compares does."""
+        chosen = sorted(self._ticked(), key=lambda run: run.when)
+        if len(chosen) != 2:
+            raise InputError(f"tick two runs to compare; {len(chosen)} {'is' if len(chosen) == 1 else 'are'} ticked")
+        a, b = (self._rows[run.name] for run in chosen)
+        self.notice.clear()
+        self.difference.value = difference_html(a, b, _short(chosen))
+
+    def show_ghost(self) -> None:
+        """What the ghost button does."""
+        chosen = self._ticked()
+        if len(chosen) > 1:
+            raise InputError(f"one run can be the ghost; {len(chosen)} are ticked")
+        if not chosen:
+            self._ghost(None, "")
+            self.notice.say("no run stands behind the strip any more")
+            return
+        name = _short(chosen)[0]
+
+        def show(results: list[Result]) -> None:
+            self._ghost(results[0], name)
+            self.notice.say(f"{name} stands behind the live strip, dotted", "good")
+
+        self._load(chosen, show)
+
+    def _ticked(self) -> list[KeptRun]:
+        return [run for name, run in self._runs.items() if name in self.table.ticked]
+
+    def _open_one(self, name: str) -> None:
+        self.table.ticked = [name]
+        attempt("open", self.open, self.notice)
+
+    def _star(self, name: str, on: bool) -> None:
+        attempt("star", lambda: self._kept.set_star(name, on), self.notice)
+        self.refresh()
+
+    def _note(self, name: str, text: str) -> None:
+        attempt("note", lambda: self._kept.set_note(name, text), self.notice)
+        self.refresh()
 
     def open(self) -> None:
         """What the open button does."""
-        chosen = [self._runs[i] for i in self.list.value]
+        chosen = self._ticked()
         if not chosen:
-            raise InputError("choose a run in the list first")
+            raise InputError("tick a run in the table first")
         if len(chosen) > MOST:
-            raise InputError(f"{len(chosen)} runs are too many for one picture; choose at most {MOST}")
+            raise InputError(f"{len(chosen)} runs are too many for one picture; tick at most {MOST}")
+        names, short = [run.name for run in chosen], _short(chosen)
+        self._load(chosen, lambda results: self._opened(results, names, short))
+
+    def _load(self, chosen: list[KeptRun], show: Callable[[list[Result]], None]) -> None:
         if early := [run for run in chosen if run.state in (State.GOES_ON, State.SAVED_NOW)]:
             raise InputError(f"{early[0].name} {early[0].state}; open it when that is over (Look again)")
-        names, short = [run.name for run in chosen], _short(chosen)
 
         def work(task: Task[list[Result]]) -> list[Result]:
             results = []
@@ -70,9 +123,6 @@ class EarlierRuns:
                 task.advance(number, len(chosen), f"opening {run.name}")
                 results.append(run.open())
             return results
-
-        def show(results: list[Result]) -> None:
-            self._opened(results, names, short)
 
         follow(self.bar, self.notice, lambda: self._session.work("opening", work), show)
 
@@ -87,6 +137,14 @@ def _short(runs: list[KeptRun]) -> list[str]:
     return names if len(set(names)) == len(names) else [run.name for run in runs]
 
 
-def _label(run: KeptRun) -> str:
-    when = time.strftime("%d %b %H:%M:%S", time.localtime(run.when))
-    return f"{when}  {run.name.partition('-')[2].partition('-')[2]}{_STATES[run.state]}"
+def difference_html(a: RunRow, b: RunRow, names: Sequence[str]) -> str:
+    """What was chosen differently in two runs, what came of it, and the lines of code that are new and gone."""
+    rows = [["RMS error", a.rms, b.rms], ["fit", a.fit, b.fit], ["timing", a.verdict, b.verdict]]
+    rows = [each for each in rows if each[1] or each[2]]
+    rows += [list(each) for each in differences(a.facts, b.facts)]
+    shown = html.table(["", *names], rows, "What differs")
+    before, after = code_of(a), code_of(b)
+    for key in before.keys() & after.keys():
+        if before[key] != after[key]:
+            shown += f"<h3>{key.capitalize()}</h3>{changes_html(changes(before[key], after[key]))}"
+    return shown

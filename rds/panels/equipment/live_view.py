@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import ipywidgets as widgets
+import numpy as np
 
 from rds.machines import Machine
 from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.strip import StripChart
+from rds.panels.equipment.taken_up import TakenUpRun
 from rds.panels.kit.field import FieldView
 from rds.panels.session.live_values import LiveValues
-from rds.results import html
+from rds.results import Result, html
 
-_HINT = "<p>Choose on the left what to try, then Run: the motion shows here, as it happens.</p>"
+_HINT = (
+    "<p>Choose on the left what to try, then Run. Here will be, as it happens, in lanes that share their time: the "
+    "reference and the measured position; the error between them; the voltage. Drag in a lane to zoom, place two "
+    "cursors to measure, and let an earlier run stand behind.</p>"
+)
 
 
 class LiveView:
@@ -21,10 +28,11 @@ class LiveView:
 
     def __init__(self, shell: Any, machine: Machine):
         self._shell, self._machine = shell, machine
-        self._run: EquipmentRun | None = None
+        self._run: EquipmentRun | TakenUpRun | None = None
         self._traces: list[tuple[str, str]] = []
         self._values: list[FieldView] = []
         self._said = 0
+        self._ghost: tuple[Result | None, str] = (None, "")
         self.strip = StripChart()
         self.strip.layout.display = "none"
         self.hint = widgets.HTML(_HINT)
@@ -40,7 +48,7 @@ class LiveView:
         self._changes = widgets.HTML()
         self.widget = widgets.VBox([self.hint, self.strip, self._live, self._changes, self.show_machine, self.picture])
 
-    def follow(self, run: EquipmentRun) -> None:
+    def follow(self, run: EquipmentRun | TakenUpRun) -> None:
         """Show this run from its beginning."""
         self._run, self._traces, self._said = run, [], 0
         self.hint.value = "<p>The loop is being started; the first samples come in a moment.</p>"
@@ -58,6 +66,7 @@ class LiveView:
             self.hint.value = ""
             self.strip.layout.display = ""
             self.strip.begin(traces)
+            self._stand_behind()
             if self._view is not None:
                 self._view.begin(traces)
         if self._traces and len(rows := run.new_rows()):
@@ -68,6 +77,16 @@ class LiveView:
         if self._view is not None and self.show_machine.value:
             self._view.show(self.strip.at(self.strip.shown))
 
+    def show_ghost(self, result: Result | None, name: str) -> None:
+        """Let an earlier run stand behind the strip, until another one does, or None."""
+        self._ghost = result, name
+        self._stand_behind()
+
+    def _stand_behind(self) -> None:
+        result, name = self._ghost
+        rows = ghost_rows(result, self._traces) if result is not None and self._traces else np.empty((0, 1))
+        self.strip.stand_behind(rows, name)
+
     def ended(self) -> None:
         """The run is over; its strip stays, to be scrubbed through."""
         run, self._run = self._run, None
@@ -77,7 +96,7 @@ class LiveView:
             if not self._traces:
                 self.hint.value = _HINT
 
-    def _offer_values(self, run: EquipmentRun) -> None:
+    def _offer_values(self, run: EquipmentRun | TakenUpRun) -> None:
         choices = LiveValues(run)
         self._values = [FieldView(choices, name) for name in choices.fields]
         box = widgets.Box(self._values)
@@ -91,21 +110,37 @@ class LiveView:
         self._values = []
         self._live.children = []
 
-    def _list_changes(self, run: EquipmentRun) -> None:
+    def _list_changes(self, run: EquipmentRun | TakenUpRun) -> None:
         changes = run.changes
         if len(changes) != self._said:
             self._said = len(changes)
+            self.strip.events = [{"time": time, "text": f"{name} {new:g}"} for time, name, _, new in changes]
             self._changes.value = changes_table(changes)
 
     def _toggle(self, on: bool) -> None:
         self.strip.tells = on
         if on and self._view is None:
-            from rds.panels.equipment.machine_view import MachineView
+            from rds.panels.equipment.machine_view import view_of
 
-            self._view = MachineView(self._machine)
+            self._view = view_of(self._machine)
             self._view.begin(self._traces)
             self.strip.observe(lambda _: self._view.show(self.strip.at(self.strip.shown)), "shown")
         self.picture.children = [self._view.widget] if on else []
+
+
+def ghost_rows(result: Result, traces: Sequence[tuple[str, str]]) -> np.ndarray:
+    """What a result has of these traces: rows of time and one value each, nan for what it does not have."""
+    columns = [result["time"]]
+    for name, unit in traces:
+        axis = name.removesuffix("_error")
+        reference, measured = f"{axis}_reference", f"{axis}_measured"
+        if name in result and result.units.get(name, "") == unit:
+            columns.append(result[name])
+        elif name != axis and reference in result and measured in result and result.units[measured] == unit:
+            columns.append(result[reference] - result[measured])
+        else:
+            columns.append(np.full(len(result), np.nan))
+    return np.column_stack(columns)
 
 
 def changes_table(changes: Any) -> str:

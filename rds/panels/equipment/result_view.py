@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import ipywidgets as widgets
 
@@ -14,32 +14,48 @@ from rds.panels.equipment.result_actions import ResultActions
 from rds.panels.kit.figure import FigureView
 from rds.results import Result, html
 
-_EMPTY = "<p>No result yet: run something, or open one of the earlier runs.</p>"
+if TYPE_CHECKING:
+    from rds.nc.run.prepare import Prepared
+
+_EMPTY = (
+    "<p>No result yet. After a run, or when one of the earlier runs is opened, here are the errors in numbers, the "
+    "response, the error and the voltage over time, and the files to save or send.</p>"
+)
+_NO_TIMING = (
+    "<p>No result yet. After a run against the clock here is the verdict, met, missed or void, with its reason: how "
+    "long each part of a sample took, and the samples that were late.</p>"
+)
 _STAGES = ("p50", "p99", "p999", "max")
 
 
 class ResultView:
-    """`show(result)` when a run is over, `saved(folder)` when its files are there."""
+    """`show(result, prepared)` when a run is over, `saved(folder)` when its files are there."""
 
     def __init__(self, shell: Any):
         self._shell, self._session = shell, shell.session
         self.result: Result | None = None
         self._timing_of: Result | None = None
         self.numbers = widgets.HTML(_EMPTY)
-        self.figure = FigureView()
+        self.path, self.figure = FigureView(), FigureView()
         self.validation = widgets.HTML()
         self.timing_figure = FigureView()
-        self.timing_numbers = widgets.HTML(_EMPTY)
+        self.timing_numbers = widgets.HTML(_NO_TIMING)
         self.timing = widgets.VBox([self.timing_numbers, self.timing_figure])
         self.actions = ResultActions(shell)
-        self.widget = widgets.VBox([self.numbers, self.figure, self.validation, self.actions.widget])
+        self.widget = widgets.VBox([self.numbers, self.path, self.figure, self.validation, self.actions.widget])
 
-    def show(self, result: Result) -> None:
-        """Show it."""
+    def show(self, result: Result, prepared: Prepared | None = None) -> None:
+        """Show it; `prepared` is the path that its axes followed together."""
         self.clear()
         self.result = result
         notes = html.notes_list(html.all_notes(result))
-        self.numbers.value = _metrics({"": result}) + notes + changes_table(result.meta.get("changes") or [])
+        if prepared is not None:
+            from rds.nc.run.pictures import path
+
+            self.path.draw(self._session, self._shell.ticker, lambda: path(result, prepared))
+        self.numbers.value = (
+            _contour(result) + _metrics({"": result}) + notes + changes_table(result.meta.get("changes") or [])
+        )
         self.figure.draw(self._session, self._shell.ticker, result.plot)
         self.actions.writing()
         self._validate(result)
@@ -60,8 +76,9 @@ class ResultView:
     def clear(self) -> None:
         """Nothing to show."""
         self.result = self._timing_of = None
-        self.numbers.value = self.timing_numbers.value = _EMPTY
+        self.numbers.value, self.timing_numbers.value = _EMPTY, _NO_TIMING
         self.validation.value = ""
+        self.path.clear()
         self.figure.clear()
         self.timing_figure.clear()
         self.actions.clear()
@@ -106,6 +123,16 @@ _STAGE_NAMES = {
     "compute": "compute (the controller)",
     "model": "model",
 }
+
+
+def _contour(result: Result) -> str:
+    """How well the axes followed their path together, in sentences; nothing where there was none."""
+    about = result.meta.get("program")
+    if not about:
+        return ""
+    from rds.nc.run.report import findings
+
+    return "".join(f"<p>{escape(sentence)}</p>" for sentence in findings(about))
 
 
 def _metrics(results: Mapping[str, Result]) -> str:

@@ -7,22 +7,29 @@ import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.modes import DEFAULT, load_mode
-from rds.modes.experiment.experiment import Experiment
-from rds.modes.experiment.report import save_with_report
+from rds.modes.experiment.experiment import Experiment, FailedRun
+from rds.modes.experiment.experiment_file import PATHS
+from rds.modes.experiment.report import save_run
 from rds.modes.experiment.run import Run
 from rds.modes.loop.plan import Plan
+from rds.modes.loop.program import HOLD, OVERRIDE
+from rds.panels.session.run_table import keep_choices
 from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session
 from rds.panels.session.task import Stopped, Task
 from rds.results import Result
 
-_KINDS = ("reference", "measured", "modelled", "voltage")
+if TYPE_CHECKING:
+    from rds.nc.run.prepare import Prepared
+
+STRIP_RATE = 100.0  # rows a second of a path whose contour error is worked out for the strip
+_KINDS = ("reference", "measured", "modelled", "voltage", "target")
 
 
 class EquipmentRun:
@@ -48,6 +55,7 @@ class EquipmentRun:
         self.title = title or f"{', '.join(names)}, {mode}"
         self.files: dict[str, Path] = {}
         self.plan: Plan | None = None
+        self.prepared: Prepared | None = None  # the path, where the axes follow one together
         self.result: Result | None = None  # as soon as the loop is over; its files come later
         self._prepare = prepare
         self._run: Run | None = None
@@ -70,6 +78,8 @@ class EquipmentRun:
                 self._tell(task, "loading")
                 experiment = Experiment.from_table(self.table, self.session.folder)
                 self.plan = experiment.plan()
+                if (program := self.plan.program) is not None:
+                    self.prepared = PATHS.module("path").as_prepared(program, Path(program.name), self.plan.T)
                 self._tell(task, "starting the loop" if self.real_time else "simulating")
                 held.enter_context(saving(self.folder))
                 run = experiment.start(out=self.folder)
@@ -78,13 +88,18 @@ class EquipmentRun:
                     run.stop()
                 running = "running" if self.real_time else "simulating"
                 # before the first sample the loop is still being started, and its note stays; so does that of a stop
-                self.result = run.wait(
-                    lambda taken, of: task.advance(taken, of, running if taken and not task.stopping else "")
-                )
+                try:
+                    self.result = run.wait(
+                        lambda taken, of: task.advance(taken, of, running if taken and not task.stopping else "")
+                    )
+                except FailedRun as error:  # what there is up to the fault is a result
+                    self.result = error.result
+                    raise
             finally:
                 self.session.give_machine_back(self)
+            keep_choices(self.folder, self.table)
             task.note = "saving tables, pictures and the report"
-            self.files = save_with_report(self.result, self.folder, self.title)
+            self.files = save_run(self.result, self.plan.program, self.folder, self.title)
             return self.result
 
     def _tell(self, task: Task[Result], note: str) -> None:
@@ -147,8 +162,9 @@ class EquipmentRun:
     def traces(self) -> list[tuple[str, str]]:
         """The names and units of what `new_rows` gives beside the time; none before the loop has begun."""
         columns, units = self._columns()
-        found = [(name, units.get(name, "")) for name in _shown(columns)]
-        return found + [(f"{axis}_error", units.get(f"{axis}_measured", "")) for axis in _followed(columns)]
+        found = [(name, units.get(name, "")) for name in shown(columns)]
+        found += [(f"{axis}_error", units.get(f"{axis}_measured", "")) for axis in followed(columns)]
+        return [*found, ("contour_error", "mm")] if columns and self.prepared is not None else found
 
     def new_rows(self) -> np.ndarray:
         """Rows recorded since it was last asked: time in s, then one column per trace."""
@@ -156,9 +172,13 @@ class EquipmentRun:
         rows = self._new(columns)
         if not len(rows):
             return np.empty((0, 1 + len(self.traces())))
+        if self.prepared is not None:
+            rows = rows[:: max(round(1.0 / (STRIP_RATE * self.prepared.T)), 1)]
         of = dict(zip(columns, rows.T, strict=True))
-        errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in _followed(columns)]
-        return np.column_stack([of["time"], *(of[name] for name in _shown(columns)), *errors])
+        errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in followed(columns)]
+        if self.prepared is not None:
+            errors.append(contour_errors(of, self.prepared))
+        return np.column_stack([of["time"], *(of[name] for name in shown(columns)), *errors])
 
     def _columns(self) -> tuple[list[str], Mapping[str, str]]:
         if self.result is not None:
@@ -181,10 +201,14 @@ class EquipmentRun:
 
     @property
     def live_values(self) -> dict[str, Any]:
-        """The controller's channels, whose values can be changed now, by name; none before and after the loop."""
+        """What can be changed now, by name: the controllers' parameters, and hold and override of a path.
+
+        None before and after the loop.
+        """
         if self._run is None or self._run.done or not self._run.columns:
             return {}
-        return {name: channel for name, channel in self._run.desk.channels.items() if "." in name}
+        channels = self._run.desk.channels
+        return {name: channel for name, channel in channels.items() if "." in name or name in (HOLD, OVERRIDE)}
 
     def change(self, name: str, value: float) -> None:
         """Change a live value from the next sample on; InputError where that will not do, or when it is over."""
@@ -198,12 +222,19 @@ class EquipmentRun:
         return list(self._run.changes) if self._run is not None else []
 
 
-def _shown(columns: Sequence[str]) -> list[str]:
+def contour_errors(of: Mapping[str, np.ndarray], prepared: Prepared) -> np.ndarray:
+    """How far each measured position is from the path, mm; `of` are some rows of a run, as columns."""
+    from rds.nc.run.judge import contour, located
+
+    return contour(of, located(of, prepared), of["program_state"].astype(int))[0]
+
+
+def shown(columns: Sequence[str]) -> list[str]:
     """The columns that a strip shows: of each axis its motion, and its voltage."""
     return [name for kind in _KINDS for name in columns if name.endswith(f"_{kind}")]
 
 
-def _followed(columns: Sequence[str]) -> list[str]:
+def followed(columns: Sequence[str]) -> list[str]:
     """The axes that follow a reference."""
     return [
         name.removesuffix("_reference")

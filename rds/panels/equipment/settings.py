@@ -6,13 +6,16 @@ from collections.abc import Iterable, Sequence
 
 import ipywidgets as widgets
 
+from rds.panels.equipment.fields import SIZES
 from rds.panels.equipment.state import Equipment
+from rds.panels.interpolator.motion import MADE
 from rds.panels.kit.field import FieldView
 
 _GROUPS = (
     ("system", "mode"),
-    ("shape", "shape_file", "amplitude", "frequency", "offset"),
-    ("controller", "controller_file"),
+    ("shape", "shape_file", "path_file", *SIZES, "radius", "feed", "laps"),
+    ("interpolator", "interpolator_file", *MADE),
+    ("controller", "controller_file", "coupled"),
     ("model", "model_file"),
     ("duration", "sample_period"),
 )
@@ -55,7 +58,8 @@ class EquipmentSettings:
         shown = self._equipment.shown
         # the parts stay in their places, so that nothing that is being typed elsewhere is drawn anew
         for box, names in zip(self._groups, _GROUPS, strict=True):
-            _fill(box, [self._view(name) for name in names if name in shown])
+            more = self._equipment.of_signal if "shape" in names else []
+            _fill(box, [self._view(name) for name in (*names, *more) if name in shown])
         choices = self._equipment.choices
         groups: tuple[tuple[_Folded, list[str]], ...] = (
             (self._controllers, self._equipment.parameters),

@@ -1,4 +1,4 @@
-"""Equipment model and equipment control: choices of one system, and the experiment that they say.
+"""Equipment model and equipment control: choices of one system (an axis, or some together), and their experiment.
 
 The experiment is the same table that a TOML file would hold: what a panel runs, the command line repeats.
 """
@@ -16,22 +16,32 @@ from rds.modes import SIMULATION, load_mode
 from rds.modes.experiment.experiment import Experiment
 from rds.modes.loop.plan import Plan
 from rds.modes.process.machine import BUILTIN
+from rds.panels.code.versions import keep_file
 from rds.panels.equipment.build import Builds, Checked
 from rds.panels.equipment.fields import (
+    CIRCLE,
     OF_MODEL,
+    OF_SIGNAL,
+    PATH,
     POLE,
     PREFIX,
+    SIZES,
     USER,
+    axes_of,
     controllers,
     first_fields,
     own_fields,
     parameter_fields,
+    shapes,
+    signal_fields,
     sizes,
+    sizes_of,
     tracking_options,
 )
 from rds.panels.equipment.run import EquipmentRun
+from rds.panels.interpolator.motion import MADE, PLANNED, filter_of, idle_motion
 from rds.panels.session.choices import Choices
-from rds.panels.session.fields import Choice, Field
+from rds.panels.session.fields import Choice, Field, value_of
 from rds.panels.session.formula import formula_file
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
@@ -41,7 +51,10 @@ FIRST_SINE = {"system": "X", "mode": SIMULATION, "shape": "sinusoid", "model": "
 
 @dataclass
 class Equipment:
-    """One system under test: `kind` is "model" (a voltage signal drives it) or "control" (a controller does)."""
+    """One system under test: `kind` is "model" (a voltage signal drives it) or "control" (a controller does).
+
+    A system is one axis, or with controllers several, which may follow a path together.
+    """
 
     session: Session
     kind: str
@@ -58,14 +71,34 @@ class Equipment:
         self.choices.watch(self._chosen)
 
     @property
+    def axes(self) -> list[str]:
+        """The axes of the system that is chosen."""
+        return axes_of(self.choices["system"])
+
+    @property
     def axis(self) -> Axis:
-        """The axis that is chosen."""
-        return self.machine.axes[self.choices["system"]]
+        """The axis that is chosen; the first of several, whose unit and travel the fields have."""
+        return self.machine.axes[self.axes[0]]
+
+    @property
+    def on_path(self) -> bool:
+        """Whether the axes follow a path together, which says how long the run lasts."""
+        return self.choices["shape"] in (CIRCLE, PATH)
+
+    @property
+    def coupled(self) -> bool:
+        """Whether one controller of the student's drives all axes."""
+        return "coupled" in self.shown and bool(self.choices["coupled"])
 
     @property
     def parameters(self) -> list[str]:
         """The names of the controller's parameters among the choices: in the library's order, or in the file's."""
         return [name for name in self._order if name.startswith(PREFIX) and name in self.choices]
+
+    @property
+    def of_signal(self) -> list[str]:
+        """The names of what the chosen kind of signal needs besides its size, among the choices."""
+        return [name for name in self.choices.fields if name.startswith(OF_SIGNAL)]
 
     @property
     def model_parameters(self) -> list[str]:
@@ -77,8 +110,14 @@ class Equipment:
         """The names of the choices that matter for what is chosen, in order."""
         chosen = self.choices
         idle = {name for name, owner in _FILES.items() if owner in chosen and chosen[owner] != USER}
-        if chosen["shape"] == USER:
-            idle |= {"amplitude", "frequency", "offset"}
+        idle |= {*SIZES} - {*sizes_of(str(chosen["shape"]))}
+        if self.on_path:
+            idle |= {"duration", *idle_motion(chosen.values())}
+        else:
+            idle |= _OF_PATH
+        idle |= {"radius", "feed", "laps"} if chosen["shape"] != CIRCLE else {"path_file"}
+        if len(self.axes) == 1 or chosen["controller"] != USER:
+            idle.add("coupled")
         if not load_mode(str(chosen["mode"])).modelled:  # the machine alone
             idle |= {"model", "model_file"}
         return [name for name in chosen.fields if name not in idle]
@@ -88,7 +127,7 @@ class Equipment:
         for name, value in FIRST_SINE.items():
             if name in self.choices and _option(self.choices.fields[name], value):
                 self.choices.set(name, value)
-        for name in ("amplitude", "frequency", "offset", "duration", "sample_period", *self.parameters):
+        for name in (*SIZES, "duration", "sample_period", *self.parameters):
             self.choices.set(name, self.choices.fields[name].default)
 
     def table(self) -> dict[str, Any]:
@@ -96,9 +135,9 @@ class Equipment:
         chosen = self.choices
         table: dict[str, Any] = {
             "machine": self.session.machine,
-            "axis": chosen["system"],
+            **({"axis": self.axes[0]} if len(self.axes) == 1 else {"axes": self.axes}),
             "mode": chosen["mode"],
-            "duration": chosen["duration"],
+            **({} if self.on_path else {"duration": chosen["duration"]}),
             "sample_period": chosen["sample_period"],
             "signal" if self.kind == "model" else "reference": self._shape(),
         }
@@ -127,16 +166,21 @@ class Equipment:
                 found.append((role, self.session.folder / self._file(name, role)))
         return found
 
+    @property
+    def checked_axes(self) -> int:
+        """How many axes a coupled controller is checked with; 0 for one of a single axis."""
+        return len(self.axes) if self.coupled else 0
+
     def build(self) -> Task[list[Checked]]:
         """Begin to check the student's files; InputError where one is not named."""
         self.fit_parameters()
-        files, T = self.files(), self.choices["sample_period"]
+        files, T, axes = self.files(), self.choices["sample_period"], self.checked_axes
 
         def work(task: Task[list[Checked]]) -> list[Checked]:
             checked = []
             for number, (role, path) in enumerate(files):
                 task.advance(number, len(files), f"checking {path.name}")
-                checked.append(self.builds.check(role, path, T, task.pulse))
+                checked.append(self.builds.check(role, path, T, task.pulse, axes))
             return checked
 
         return self.session.work("build", work)
@@ -144,11 +188,11 @@ class Equipment:
     def load(self) -> Task[str]:
         """Begin to make everything ready for a run, without running: a sentence about the samples and the machine."""
         self.fit_parameters()
-        files, T, table = self.files(), self.choices["sample_period"], self.table()
+        files, T, table, axes = self.files(), self.choices["sample_period"], self.table(), self.checked_axes
 
         def work(task: Task[str]) -> str:
             task.note = "checking your files"
-            self.builds.require(files, T, task.pulse)
+            self.builds.require(files, T, task.pulse, axes)
             task.note = "loading"
             plan = Experiment.from_table(table, self.session.folder).plan()
             return f"loaded: {plan.samples} samples, {plan.T * 1e3:g} ms each; {machine_sentence(plan)}"
@@ -158,18 +202,45 @@ class Equipment:
     def run(self) -> EquipmentRun:
         """The run of what is chosen, to be started. Its files are checked first, where that was not done yet."""
         self.fit_parameters()
-        files, T, table = self.files(), self.choices["sample_period"], self.table()
-        return EquipmentRun(self.session, table, prepare=lambda pulse: self.builds.require(files, T, pulse))
+        files, T, table, axes = self.files(), self.choices["sample_period"], self.table(), self.checked_axes
+        made = EquipmentRun(self.session, table, prepare=lambda pulse: self.builds.require(files, T, pulse, axes))
+        for _, path in files:
+            keep_file(path, made.folder.name)
+        return made
 
     def _shape(self) -> dict[str, Any]:
         chosen = self.choices
+        if self.on_path:
+            return self._path() | self._motion()
         if chosen["shape"] == USER:
             given = self._file("shape_file", "signal, or a formula of t")
             if not self._is_file():
                 given = formula_file(self.session.folder, given, chosen["duration"], chosen["sample_period"])
             return {"kind": "user", "file": given}
-        shape = {"kind": chosen["shape"], "amplitude": chosen["amplitude"], "frequency": chosen["frequency"]}
-        return shape | ({"offset": chosen["offset"]} if chosen["offset"] else {})
+        shape: dict[str, Any] = {"kind": chosen["shape"]}
+        for name in (*sizes_of(str(chosen["shape"])), *self.of_signal):
+            value = value_of(chosen.fields[name], chosen[name])
+            if value is not None and (name != "offset" or value):
+                shape[name.removeprefix(OF_SIGNAL)] = value
+        return shape
+
+    def _path(self) -> dict[str, Any]:
+        """What the axes follow together: a path file, a part program, or a circle that begins at 0."""
+        chosen = self.choices
+        if chosen["shape"] == PATH:
+            return {"kind": "path", "file": self._file("path_file", "path, or of your part program")}
+        nowhere, centre = [0.0] * len(self.axes), [chosen["radius"], *[0.0] * (len(self.axes) - 1)]
+        lap = {"kind": "arc", "end": nowhere, "centre": centre}
+        return {"kind": "path", "start": nowhere, "feed": chosen["feed"], "segment": [lap] * int(chosen["laps"])}
+
+    def _motion(self) -> dict[str, Any]:
+        chosen = self.choices
+        if chosen["interpolator"] == PLANNED:
+            return {"profile": PLANNED}
+        own = chosen["interpolator"] == USER
+        name = self._file("interpolator_file", "interpolator") if own else chosen["interpolator"]
+        told = {key: value for key, value in filter_of(chosen.values()).items() if value}
+        return {"interpolator": name, **told}
 
     def _is_file(self) -> bool:
         return str(self.choices["shape_file"]).strip().lower().endswith(".csv")
@@ -177,10 +248,11 @@ class Equipment:
     def _controller(self) -> dict[str, Any]:
         chosen = self.choices
         if chosen["controller"] == USER:
-            return self._own("controller_file", "controller", self.parameters)
+            own = self._own("controller_file", "controller", self.parameters)
+            return own | ({"coupled": True} if self.coupled else {})
         if POLE in chosen:
             return {"name": chosen["controller"]} | tracking_options(chosen.values())
-        given = {name.removeprefix(PREFIX): chosen[name] for name in self.parameters}
+        given = {name.removeprefix(PREFIX): value_of(chosen.fields[name], chosen[name]) for name in self.parameters}
         return {"name": chosen["controller"]} | {name: value for name, value in given.items() if value is not None}
 
     def _own(self, name: str, what: str, parameters: list[str]) -> dict[str, Any]:
@@ -198,6 +270,8 @@ class Equipment:
     def _chosen(self, name: str) -> None:
         if name in ("system", "controller"):
             self._fit_system()
+        elif name == "shape":
+            self._fit_signal()
         elif name in ("controller_file", "model", "model_file", "mode"):
             self.fit_parameters()
 
@@ -205,10 +279,19 @@ class Equipment:
         """What the chosen system and controller allow."""
         fields = self.choices.fields
         fitting = sizes(self.kind, self.machine, self.axis)
-        self.choices.replace(each for each in fitting if each != fields[each.name])
+        self.choices.replace(each for each in [*fitting, shapes(self.kind, self.axes)] if each != fields[each.name])
         if self.kind == "control" and (fitting_laws := controllers(self.axis)) != fields["controller"]:
             self.choices.replace([fitting_laws])
+        self._fit_signal()
         self.fit_parameters()
+
+    def _fit_signal(self) -> None:
+        """What the chosen kind of signal needs."""
+        unit = "V" if self.kind == "model" else self.axis.unit
+        wanted = {each.name: each for each in signal_fields(str(self.choices["shape"]), unit)}
+        fields = self.choices.fields
+        self.choices.remove([name for name in self.of_signal if name not in wanted])
+        self.choices.replace(each for name, each in wanted.items() if fields.get(name) != each)
 
     def fit_parameters(self) -> None:
         """The parameters of what is chosen, as a student's file has them now.
@@ -244,7 +327,13 @@ class Equipment:
 
 
 _FILES = {"shape_file": "shape", "model_file": "model", "controller_file": "controller"}  # shown for what is the user's
-_ROLES = {"shape_file": "signal", "model_file": "model", "controller_file": "controller"}
+_ROLES = {
+    "shape_file": "signal",
+    "interpolator_file": "interpolator",
+    "model_file": "model",
+    "controller_file": "controller",
+}
+_OF_PATH = {"path_file", "radius", "feed", "laps", "interpolator", "interpolator_file", *MADE}
 
 
 def _plain(number: float | None) -> float | int | None:

@@ -1,4 +1,4 @@
-"""A live strip chart: some traces over the last seconds, ten times a second, which can be paused and scrubbed back.
+"""A live strip chart: lanes linked in time, ten times a second, paused, scrubbed, zoomed, measured by two cursors.
 
 The chart is uPlot (MIT licence, in `static/`), in an anywidget. Rows are thinned to what a screen can show before
 they leave the kernel, and sent as bytes; all that was recorded stays in the run's own files.
@@ -15,10 +15,15 @@ import anywidget
 import numpy as np
 import traitlets
 
+from rds.core.colours import BLUE, QUANTITIES
+
 _STATIC = Path(__file__).parent / "static"
-# Okabe and Ito's colours, which the colour-blind can tell apart, without the yellow that a projector swallows
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DASHES: tuple[list[int], ...] = ([], [9, 4], [3, 3], [9, 3, 3, 3])  # by axis, of several
+_LANES = {"error": "error", "voltage": "voltage", "target": "target", "contour error": "contour error"}
+_WEIGHTS = {"position": 1.8, "voltage": 0.9, "target": 0.9}  # how high a lane is, beside 1
+_ORDER = ("position", "error", "contour error", "voltage", "target")  # of the lanes, from the top
 RATE = 100.0  # rows a second that are sent
+MOST_GHOST = 5_000  # rows of an earlier run that are sent, at most twice as many
 KEPT = 200_000  # rows kept for a page that is shown again
 
 
@@ -35,7 +40,9 @@ class StripChart(anywidget.AnyWidget):
     _style = traitlets.Unicode().tag(sync=True)
     traces: Any = traitlets.List([]).tag(sync=True)
     window = traitlets.Float(5.0).tag(sync=True)  # s that are shown
-    height = traitlets.Int(260).tag(sync=True)  # px
+    height = traitlets.Int(430).tag(sync=True)  # px of all lanes together
+    events: Any = traitlets.List([]).tag(sync=True)  # marks: {"time": s, "text": what happened}
+    ghost = traitlets.Unicode("").tag(sync=True)  # the name of an earlier run that stands behind; none: ""
     tells = traitlets.Bool(False).tag(sync=True)  # whether the page says in `shown` which time it shows
     shown = traitlets.Float(0.0).tag(sync=True)  # s, the right edge
 
@@ -43,20 +50,13 @@ class StripChart(anywidget.AnyWidget):
         super().__init__(_esm=_module(), _style=(_STATIC / "uPlot.min.css").read_text(encoding="utf-8"), **options)
         self._rows = np.empty((0, 1))
         self._next = -np.inf
+        self._ghost = np.empty((0, 1))
         self.on_msg(self._asked)
 
     def begin(self, traces: Sequence[tuple[str, str]]) -> None:
-        """Empty, with these traces: (name, unit) each. Traces of a unit share an axis, but errors have their own."""
-        self.traces = [
-            {
-                "name": name.replace("_", " "),
-                "unit": unit,
-                "scale": f"{unit} of error" if name.endswith("_error") else unit,
-                "color": COLORS[i % len(COLORS)],
-                "dash": [6, 4] if i == 0 else [],
-            }
-            for i, (name, unit) in enumerate(traces)
-        ]
+        """Empty, with these traces: (name, unit) each, in lanes by quantity and unit."""
+        self.events = []
+        self.traces = dressed(traces)
         self._rows = np.empty((0, len(traces) + 1))
         self._next = -np.inf
         self.send({"kind": "clear"})
@@ -67,6 +67,12 @@ class StripChart(anywidget.AnyWidget):
         if len(chosen):
             self._rows = np.concatenate((self._rows, chosen))[-KEPT:]
             self._deliver(chosen)
+
+    def stand_behind(self, rows: np.ndarray, name: str) -> None:
+        """Draw an earlier run `name` behind: rows as of `add`, with nan for what it does not have. No rows: none."""
+        self._ghost = rows[:: max(1, len(rows) // MOST_GHOST)]
+        self.ghost = name if len(rows) else ""
+        self._deliver_ghost()
 
     def at(self, time: float) -> np.ndarray:
         """The row that was sent last before `time` (s); empty where there is none."""
@@ -84,9 +90,47 @@ class StripChart(anywidget.AnyWidget):
     def _deliver(self, rows: np.ndarray) -> None:
         self.send({"kind": "rows", "width": rows.shape[1]}, [np.ascontiguousarray(rows, dtype="<f8").tobytes()])
 
+    def _deliver_ghost(self) -> None:
+        rows = np.ascontiguousarray(self._ghost, dtype="<f8")
+        self.send({"kind": "ghost", "width": rows.shape[1]}, [rows.tobytes()])
+
     def _asked(self, _: Any, content: Any, __: Any) -> None:
         """A page that has just been shown asks for everything so far."""
         if content == {"kind": "all"}:
             self.send({"kind": "clear"})
             if len(self._rows):
                 self._deliver(self._rows)
+            if len(self._ghost):
+                self._deliver_ghost()
+
+
+def dressed(traces: Sequence[tuple[str, str]]) -> list[dict[str, Any]]:
+    """The traces as the page draws them: each quantity has its colour, each axis its dashes, each lane its height."""
+    parts = [_parts(name) for name, _ in traces]
+    axes = list(dict.fromkeys(axis for axis, _ in parts if axis))
+    found = []
+    for (name, unit), (axis, quantity) in zip(traces, parts, strict=True):
+        lane = _LANES.get(quantity, "position" if quantity in QUANTITIES else quantity)
+        dash = DASHES[axes.index(axis) % len(DASHES)] if len(axes) > 1 and axis else []
+        found.append(
+            {
+                "name": name.replace("_", " "),
+                "unit": unit,
+                "lane": lane,
+                "scale": f"{lane} [{unit}]",
+                "rank": _ORDER.index(lane) if lane in _ORDER else len(_ORDER),
+                "weight": _WEIGHTS.get(lane, 1.0),
+                "color": QUANTITIES.get(quantity, BLUE),
+                "width": 3.0 if quantity == "reference" else 1.6,
+                "dash": [6, 4] if quantity == "modelled" and not dash else dash,
+            }
+        )
+    return found
+
+
+def _parts(name: str) -> tuple[str, str]:
+    """The axis and the quantity of a column."""
+    if name == "contour_error":
+        return "", "contour error"
+    axis, _, quantity = name.rpartition("_")
+    return axis, quantity

@@ -8,13 +8,17 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.panels.code.state import Code
+from rds.panels.code.view import CodeView
 from rds.panels.equipment.build import Checked
 from rds.panels.equipment.earlier_runs import EarlierRuns
+from rds.panels.equipment.fields import USER
 from rds.panels.equipment.live_view import LiveView
 from rds.panels.equipment.result_view import ResultView
 from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.settings import EquipmentSettings
 from rds.panels.equipment.state import Equipment
+from rds.panels.equipment.taken_up import TakenUpRun, is_driven_by
 from rds.panels.equipment.what_runs import WhatRuns
 from rds.panels.kit.button import attempt, button, follow, run_order, say_error
 from rds.panels.kit.layout import row
@@ -22,9 +26,9 @@ from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.results import Result, html
 
-TABS = ("Live", "Results", "Timing", "What runs", "Earlier runs")
+TABS = ("Live", "Code", "Results", "Timing", "What runs", "Earlier runs")
 _STOPPED = "stopped; nothing was checked or loaded"
-LIVE, RESULTS, TIMING, WHAT, EARLIER = range(len(TABS))
+LIVE, CODE, RESULTS, TIMING, WHAT, EARLIER = range(len(TABS))
 
 
 class EquipmentView:
@@ -32,14 +36,14 @@ class EquipmentView:
 
     def __init__(self, shell: Any, equipment: Equipment):
         self.shell, self.equipment = shell, equipment
-        self.run: EquipmentRun | None = None
+        self.run: EquipmentRun | TakenUpRun | None = None
         self.settings = EquipmentSettings(equipment)
         self.bar = WorkBar(shell.ticker)
         self.notice = Notice()
         self.live = LiveView(shell, equipment.machine)
         self.results = ResultView(shell)
-        self.what = WhatRuns(equipment)
-        self.earlier = EarlierRuns(shell, self._reopened)
+        self.what = WhatRuns(equipment, shell.ticker)
+        self.earlier = EarlierRuns(shell, self._reopened, self.live.show_ghost)
         say = self.notice
         built = "Check your files in a process of their own; faults show at their lines"
         viewed = "What will run, as a block diagram; your files; the experiment's file"
@@ -52,8 +56,17 @@ class EquipmentView:
             button("View model", viewed, self.view, say),
             button("Load", loaded, self.load, say),
         ]
+        self.code: CodeView | None = None  # once somebody looks at it
+        self._code_place = widgets.VBox([])
         self.tabs = widgets.Tab(
-            [self.live.widget, self.results.widget, self.results.timing, self.what.widget, self.earlier.widget],
+            [
+                self.live.widget,
+                self._code_place,
+                self.results.widget,
+                self.results.timing,
+                self.what.widget,
+                self.earlier.widget,
+            ],
             titles=TABS,
         )
         self.tabs.add_class("rds-tabs")
@@ -64,9 +77,12 @@ class EquipmentView:
         self.widget.add_class("rds-columns")
         equipment.choices.watch(self._chosen)
         self._stale = False  # whether something was chosen since what runs was shown
+        if equipment.kind == "control":
+            shell.on_code = self.edit
         shell.ticker.add(self._tick)
         self._shown: Result | None = None
         self._end_look: Callable[[], None] = lambda: None
+        self.take_up()
 
     def start(self) -> None:
         """What the run button does."""
@@ -74,13 +90,76 @@ class EquipmentView:
             return
         self._refuse()
         self.notice.clear()
-        self.run = self.equipment.run().start()
-        self._shown = None
+        run = self.equipment.run()
+        try:
+            run.start()
+        except InputError:
+            if not self.take_up():  # the machine is in use by a run that can be followed
+                raise
+            return
+        self._follow(run)
+
+    def take_up(self) -> bool:
+        """Follow the run that was begun elsewhere and goes on; false where there is none for this panel."""
+        session = self.equipment.session
+        if self.bar.busy or session.machine_user is not None:
+            return False
+        for kept in session.runs_that_go_on():
+            if is_driven_by(kept) == self.equipment.kind:
+                self._follow(TakenUpRun(kept))
+                self.notice.say(f"{kept.name} goes on, which was begun elsewhere: Stop ends it safely")
+                return True
+        return False
+
+    def _follow(self, run: EquipmentRun | TakenUpRun) -> None:
+        self.run, self._shown = run, None
         self.tabs.selected_index = LIVE
         self.results.clear()
-        self.live.follow(self.run)
+        self.live.follow(run)
         self._end_look = self.shell.ticker.add(self._look)
-        self.bar.follow(self.run, lambda: attempt("showing the run", self._ended, self.notice))
+        self.bar.follow(run, lambda: attempt("showing the run", self._ended, self.notice))
+
+    def edit(self) -> CodeView:
+        """Show the code, of the file that is chosen."""
+        if self.code is None:
+            equipment, choices = self.equipment, self.equipment.choices
+            roles = ("controller", "model") if equipment.kind == "control" else ("model",)
+            codes = {
+                role: Code(
+                    equipment.session,
+                    role,
+                    equipment.builds,
+                    lambda: float(choices["sample_period"]),
+                    lambda: equipment.checked_axes,
+                )
+                for role in roles
+            }
+            tip = "Run with this file, and the settings on the left (Ctrl+Enter in the editor)"
+            press = run_order(self.shell, tip, lambda: self.edit().press(), self.notice, choices, "Run this file")
+            self.bar.locks = [*self.bar.locks, press]
+            press.disabled = self.bar.busy
+            self.code = CodeView(self.shell, codes, self._run_file, press)
+            self._code_place.children = [self.code.widget]
+        self._show_chosen_file()
+        self.code.refresh()
+        if self.tabs.selected_index != CODE:
+            self.tabs.selected_index = CODE
+        return self.code
+
+    def _run_file(self, role: str, name: str) -> None:
+        """Choose a file, and run."""
+        if self.bar.busy:
+            raise InputError("wait until the run is over, or stop it first")
+        self.equipment.choices.set(role, USER)
+        self.equipment.choices.set(f"{role}_file", name)
+        self.start()
+
+    def _show_chosen_file(self) -> None:
+        """The code is that of the file that is chosen on the left."""
+        choices = self.equipment.choices
+        for role in ("model", "controller"):
+            if self.code is not None and role in choices and choices[role] == USER:
+                self.code.open(role, str(choices[f"{role}_file"]).strip())
 
     def build(self) -> None:
         """What the build button does."""
@@ -132,8 +211,14 @@ class EquipmentView:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif run.error is not None:
             say_error("the run", run.error, self.notice)
+            if run.result is not None:
+                self.results.saved(run.folder)
             if run.result is None:  # its file may be at fault
-                self.what.show_checked(self.equipment.builds.latest())
+                checked = self.equipment.builds.latest()
+                self.what.show_checked(checked)
+                if self.code is not None and self.code.shows(checked):
+                    self.tabs.selected_index = CODE
+                    self.code.show_checked(checked)
         else:
             self.results.saved(run.folder)
         self.earlier.refresh()
@@ -141,7 +226,7 @@ class EquipmentView:
     def _show(self, result: Result) -> None:
         """The loop is over; its files are still being written."""
         self._shown = result
-        self.results.show(result)
+        self.results.show(result, self.run.prepared if self.run is not None else None)
         self.notice.say(*_verdict(result))
         if self.tabs.selected_index == LIVE:  # whoever looks at something else is left there
             self.tabs.selected_index = RESULTS
@@ -158,6 +243,9 @@ class EquipmentView:
 
     def _chosen(self, name: str) -> None:
         self._stale = True
+        choices = self.equipment.choices
+        if name in ("controller", "model") and choices[name] == USER and not str(choices[f"{name}_file"]).strip():
+            self.edit().turn(name)  # nobody need know how such a file is written
 
     def _tick(self) -> None:
         """What runs is shown as it is chosen now, while one looks at it."""
@@ -169,6 +257,8 @@ class EquipmentView:
         """Tabs that cost something are filled when they are looked at."""
         if change["new"] == TIMING:
             self.results.draw_timing()
+        elif change["new"] == CODE:
+            self.edit()
         elif change["new"] == WHAT:
             self.what.refresh()
         elif change["new"] == EARLIER:

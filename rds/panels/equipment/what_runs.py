@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from typing import Any
 
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.modes.experiment.experiment import Experiment
 from rds.panels.equipment.build import Checked, Mark
 from rds.panels.equipment.diagram import diagram
+from rds.panels.equipment.equations import equations, equations_html
 from rds.panels.equipment.state import Equipment
 from rds.panels.kit.button import button
 from rds.panels.kit.diagram import diagram_svg
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
+from rds.panels.kit.ticker import Ticker
 from rds.panels.session.as_file import as_python, as_toml, write_toml
+from rds.panels.session.task import Task
 
 _LONGEST = 400  # lines of a source that are shown
 
@@ -23,10 +28,12 @@ _LONGEST = 400  # lines of a source that are shown
 class WhatRuns:
     """`refresh()` when it is looked at; `show_checked(files)` after a build."""
 
-    def __init__(self, equipment: Equipment):
-        self._equipment = equipment
+    def __init__(self, equipment: Equipment, ticker: Ticker):
+        self._equipment, self._ticker = equipment, ticker
+        self._planning: Task[str] | None = None
         self._checked: dict[str, Checked] = {}
         self.drawing = widgets.HTML()
+        self.equations = widgets.HTML()
         self.sources = widgets.HTML()
         self.toml, self.python = widgets.HTML(), widgets.HTML()
         self.notice = Notice()
@@ -40,7 +47,7 @@ class WhatRuns:
             selected_index=None,
         )
         text.add_class("rds-folded")
-        self.widget = widgets.VBox([self.drawing, self.sources, text])
+        self.widget = widgets.VBox([self.drawing, self.equations, self.sources, text])
 
     def refresh(self) -> None:
         """As it is chosen now."""
@@ -51,9 +58,31 @@ class WhatRuns:
             self.toml.value = self.python.value = ""
         else:
             self.drawing.value = diagram_svg(diagram(table, self._equipment.machine, self._equipment.words()))
+            self._work_out(table)
             self.toml.value = f"<pre>{escape(as_toml(table))}</pre>"
             self.python.value = f"<pre>{escape(as_python(table))}</pre>"
         self._show_sources()
+
+    def _work_out(self, table: dict[str, Any]) -> None:
+        """The equations, beside the page: their numbers may have to be tuned first. What is only looked at runs no
+        code of the user's, who has it in sight below.
+        """
+        if self._equipment.files():
+            self._planning, self.equations.value = None, ""
+            return
+
+        def work(task: Task[str]) -> str:
+            return equations_html(equations(Experiment.from_table(table, self._equipment.session.folder).plan()))
+
+        task = self._planning = self._equipment.session.work("equations", work)
+
+        def look() -> None:
+            if task.done:
+                end()
+                if self._planning is task:  # what cannot be loaded has none: a build says why
+                    self.equations.value = task.result or ""
+
+        end = self._ticker.add(look)
 
     def show_checked(self, files: Sequence[Checked]) -> None:
         """What a build found."""

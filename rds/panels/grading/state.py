@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
 from rds.core.private_files import open_descriptor, open_private
+from rds.grading.exports import GRADEBOOKS
 from rds.panels.session.choices import Choices
-from rds.panels.session.fields import Choice, Field, Number, Text
+from rds.panels.session.fields import Choice, Field, Number, Text, labels
 from rds.panels.session.session import Session
 from rds.panels.session.task import Task
 
@@ -31,13 +32,6 @@ if TYPE_CHECKING:
     from rds.grading.batch.finished import Finished
     from rds.grading.exports.export import Written
 
-GRADEBOOKS = {
-    "nbgrader": "nbgrader",
-    "moodle": "Moodle",
-    "canvas": "Canvas",
-    "gradescope": "Gradescope",
-    "prairielearn": "PrairieLearn",
-}
 LOCK = ".grading.lock"  # in the session's folder: locked while a batch goes on, with its process and folder in it
 LOG = ".grading.log"  # what that batch says on stderr
 _LOOKS = 0.2  # s between looks at the journal
@@ -242,6 +236,10 @@ def _said(words: list[str], pulse: Callable[[], None]) -> str:
     return said + refused
 
 
+def _gradebooks() -> dict[str, str]:
+    return labels(GRADEBOOKS.names(), {"nbgrader": "nbgrader", "prairielearn": "PrairieLearn"})
+
+
 def _fields() -> Iterable[Field]:
     yield Text("assignment", "Assignment", "its folder, with assignment.toml", "", "e.g. assignments/tracking")
     yield Text(
@@ -252,7 +250,7 @@ def _fields() -> Iterable[Field]:
     )
     yield Number("jobs", "Jobs", "processes side by side", None, low=1, high=256, whole=True, optional=True)
     yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tls://host:8786")
-    yield Choice("to", "Gradebook", "what grades are exported to", "nbgrader", GRADEBOOKS)
+    yield Choice("to", "Gradebook", "what grades are exported to", "nbgrader", _gradebooks())
     yield Text("gradebook", "Your gradebook", "as downloaded from Canvas or Moodle; nbgrader's gradebook.db", "", "")
 
 

@@ -21,27 +21,25 @@ from rds.core.private_files import make_folder, umask, write_private
 _HERE = Path(__file__).parent
 FIRST = "index"
 _PULSE = 0.1  # s
-# the order in which a reader needs them; documents that are not named here come last
-ORDER = (
-    *("readme", "panels", "equipment", "design", "program-panel", "machine-panel", "experiments", "paper", "data"),
-    *("identification", "identification-methods", "validation", "robustness", "part-programs", "part-program-language"),
-    *("cutter-compensation", "motion", "interpolation", "paths", "assignments", "submissions", "grading"),
-    *("grading-setup", "sandbox", "shared-computers", "safety", "bus", "bus-timing", "oacs", "cia402"),
-    *("thesis-reports", "architecture", "changelog"),
-)
 
 
 def sources() -> dict[str, Path]:
     """The documents by name; InputError where the package was installed without them."""
     for folder in (_HERE / "docs", _HERE.parents[2] / "docs"):  # installed, or a checkout
         if (folder / "experiments.md").is_file():
-            found = {path.stem.lower(): path for path in sorted(folder.glob("*.md"))}
+            found = {path.stem.lower(): path for path in sorted(folder.glob("*.md"))}  # FIRST has their order
             for name in ("README", "CHANGELOG"):
                 beside = (folder if folder.parent == _HERE else folder.parent) / f"{name}.md"
                 if beside.is_file():
                     found[name.lower()] = beside
             return found
     raise InputError("the documents are not installed; install rds from a wheel or a checkout that has docs/")
+
+
+def pictures(documents: dict[str, Path]) -> dict[str, Path]:
+    """The pictures of the documents, by the names that they have beside the pages."""
+    folder = documents[FIRST].parent / "pictures"
+    return {path.name: path for path in sorted(folder.glob("*.png"))}
 
 
 def help_pages(out: Path | None = None, pulse: Callable[[], None] = lambda: None) -> Path:
@@ -83,8 +81,13 @@ def _built(documents: dict[str, Path], work: Path, pulse: Callable[[], None]) ->
     make_folder(source)
     make_folder(target)
     for name, path in documents.items():
+        if name == FIRST:
+            continue
         write_private(source / f"{name}.md", _local(path.read_text(encoding="utf-8"), set(documents)).encode())
-    write_private(source / f"{FIRST}.md", _contents(documents).encode())
+    index = _local(documents[FIRST].read_text(encoding="utf-8"), set(documents))
+    write_private(source / f"{FIRST}.md", (index + _contents(index)).encode())
+    for name, path in pictures(documents).items():
+        write_private(source / name, path.read_bytes())
     # in a process of its own: sphinx changes docutils for the whole process
     command = [sys.executable, "-m", "sphinx", "-q", "-b", "html", "-c", str(_HERE), "-d", str(work / "doctrees")]
     code, said = _run([*command, str(source), str(target)], pulse)
@@ -122,14 +125,25 @@ def _run(command: list[str], pulse: Callable[[], None]) -> tuple[int, str]:
         end()
 
 
-def _contents(documents: dict[str, Path]) -> str:
-    order = [name for name in ORDER if name in documents]
-    order += sorted(set(documents) - set(order))
-    return "# RDS\n\n```{toctree}\n:maxdepth: 1\n\n" + "\n".join(order) + "\n```\n"
+def contents(index: str) -> dict[str, list[str]]:
+    """The names of the documents by the headings of the first page, in its order."""
+    found = {}
+    for part in re.split(r"^## ", index, flags=re.M)[1:]:
+        names = [Path(target).stem.lower() for target in re.findall(r"\]\(([^)\s#]+\.md)", part)]
+        found[part.partition("\n")[0]] = names
+    return found
+
+
+def _contents(index: str) -> str:
+    """The first page's order, for the navigation beside all pages."""
+    return "".join(
+        f"\n```{{toctree}}\n:hidden:\n:maxdepth: 1\n:caption: {heading}\n\n" + "\n".join(names) + "\n```\n"
+        for heading, names in contents(index).items()
+    )
 
 
 def _local(text: str, known: set[str]) -> str:
-    """Links between the documents as they lie side by side here; links to other files of the checkout become text."""
+    """Links between documents and pictures side by side, as they lie here; links to other files become text."""
 
     def link(match: re.Match[str]) -> str:
         words, target = match.group(1), match.group(2)
@@ -141,6 +155,7 @@ def _local(text: str, known: set[str]) -> str:
             return f"[{words}]({name}.md{'#' + place if place else ''})"
         return words
 
+    text = re.sub(r"(?<=\]\()[\w./-]*pictures/(?=[\w-]+\.png\))", "", text)
     return "".join(
         part if part.startswith("```") else re.sub(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)", link, part)
         for part in _parts(text)
@@ -154,6 +169,7 @@ def _parts(text: str) -> Iterator[str]:
 
 def _fingerprint(documents: dict[str, Path]) -> str:
     ours = [_HERE / "conf.py", Path(__file__), *sorted((_HERE / "static").iterdir())]
+    ours += pictures(documents).values()
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in ours))
     for name, path in sorted(documents.items()):
         digest.update(name.encode() + b"\0" + path.read_bytes())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -11,9 +11,10 @@ from rds.core.errors import InputError
 from rds.core.geometry import PLANES
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.interpolators import DEFAULT, interpolator_module, interpolator_names
+from rds.interpolators.acceleration import LIBRARY as FILTERS
 from rds.interpolators.segment_rows import FEED_UNITS, segments_of
 from rds.nc.bundled import bundled
-from rds.panels.session.fields import Choice, Field, Flag, Number, Text
+from rds.panels.session.fields import Choice, Field, Flag, Number, Text, labels
 
 USER = "user"
 LINE, ARC = "line", "arc"
@@ -69,11 +70,25 @@ def fields() -> Iterable[Field]:
     yield Text("line_file", "File for lines", "a Python file with interpolate()", "", "e.g. my_interpolator.py")
     yield _method(ARC)
     yield Text("arc_file", "File for arcs", "a Python file with interpolate()", "", "e.g. my_interpolator.py")
-    filters = {NONE: "None", "linear": "Linear", "exponential": "Exponential", "s-shape": "S-shape"}
-    yield Choice("acceleration", "Acceleration", "a filter on top of the motion", NONE, filters)
-    yield Number("acceleration_time", "Time of it", "how long the velocity rises", 0.02, unit="s", above=0.0, high=10.0)
-    yield Flag("exact_stop", "Exact stop", "come to rest at the end of each segment", False)
+    yield from filter_fields(NONE, 0.02)
     yield Text("file", "Save as", "a name that ends with .csv, .mat or .parquet", "interpolation.csv")
+
+
+def filter_fields(name: str, seconds: float) -> Iterable[Field]:
+    """The acceleration filter on top of an interpolator, by default `name` with `seconds`."""
+    filters = {NONE: "None"} | labels(FILTERS.names(), {"s-shape": "S-shape"})
+    tip = "how long the velocity rises"
+    yield Choice("acceleration", "Acceleration", "a filter on top of the motion", name, filters)
+    yield Number("acceleration_time", "Time of it", tip, seconds, unit="s", above=0.0, high=10.0)
+    yield Flag("exact_stop", "Exact stop", "come to rest at the end of each segment", False)
+
+
+def filter_words(chosen: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The name and time of the filter that is chosen, as a table of words; None for none."""
+    name = chosen["acceleration"]
+    if name == NONE:
+        return None
+    return {"name": name, "time_constant" if name == "exponential" else "time": chosen["acceleration_time"]}
 
 
 def feed(unit: str, value: float) -> Number:

@@ -9,8 +9,11 @@ import ipywidgets as widgets
 
 from rds.core.errors import InputError
 from rds.interpolators.result import Interpolation
+from rds.panels.code.state import Code
+from rds.panels.code.view import CodeView
 from rds.panels.equipment.build import Checked
 from rds.panels.equipment.what_runs import source_html
+from rds.panels.interpolator.fields import USER
 from rds.panels.interpolator.segment_table import SegmentTable
 from rds.panels.interpolator.state import Interpolating
 from rds.panels.kit.button import button, follow
@@ -65,7 +68,15 @@ class InterpolatorView:
         self.run_button = button("Interpolate", "Work out the motion along the path", self.start, say, primary=True)
         tip = "In a process of its own; faults show at their lines"
         self.check_button = button("Check my file", tip, self.check, say)
-        self.bar.locks = [self.run_button, self.check_button]
+        tip = "Interpolate with this file (Ctrl+Enter in the editor)"
+        self.file_button = button("Run this file", tip, lambda: self._code().press(), say, primary=True)
+        self.bar.locks = [self.run_button, self.check_button, self.file_button]
+        tip = "Write an interpolator of your own: an editor with a file that works to begin with"
+        self.code_button = widgets.ToggleButton(description="Code", tooltip=tip)
+        self.code_button.layout.width = "auto"
+        self.code_button.observe(lambda change: self._show_code(change["new"]), "value")
+        self._code_place = widgets.VBox([])
+        self._code_view: CodeView | None = None
         self.picture = widgets.ToggleButtons(options=[("Motion", "motion")], tooltips=["which picture is shown"])
         self.picture.observe(lambda change: self._draw(), "value")
         self._save_row = self._saving()
@@ -73,9 +84,10 @@ class InterpolatorView:
         self.results.layout.display = "none"
         main = widgets.VBox(
             [
-                row(self.run_button, self.check_button),
+                row(self.run_button, self.check_button, self.code_button),
                 self.bar,
                 self.notice,
+                self._code_place,
                 self.segments,
                 self.source,
                 self.numbers,
@@ -111,6 +123,28 @@ class InterpolatorView:
         self._side.children = groups
         self.segments.layout.display = "" if "rows" in shown else "none"
         self.check_button.layout.display = "" if {"line_file", "arc_file"} & set(shown) else "none"
+
+    def _code(self) -> CodeView:
+        if self._code_view is None:
+            work = self.work
+            code = Code(work.session, "interpolator", work.builds, lambda: float(work.choices["period"]))
+            self._code_view = CodeView(self.shell, {"interpolator": code}, self._run_file, self.file_button)
+        return self._code_view
+
+    def _show_code(self, on: bool) -> None:
+        self._code_place.children = [self._code().widget] if on else []
+        if on:
+            for role in self.work.roles:
+                if self.work.choices[f"{role}_method"] == USER:
+                    self._code().open("interpolator", str(self.work.choices[f"{role}_file"]).strip())
+            self._code().refresh()
+
+    def _run_file(self, _: str, name: str) -> None:
+        for role in self.work.roles:
+            self.work.choices.set(f"{role}_method", USER)
+            self.work.choices.set(f"{role}_file", name)
+        self.start()
+        self._code().refresh()
 
     def _view(self, name: str) -> FieldView:
         if name not in self._views:

@@ -15,6 +15,7 @@ from rds.core.types import ArcSegment, Segment
 from rds.interpolators.segment_rows import FEED_UNITS, segments_of
 from rds.machines import load_machine
 from rds.nc.bundled import find_bundled
+from rds.panels.code.versions import keep_file
 from rds.panels.equipment.build import Builds, Checked
 from rds.panels.interpolator.fields import (
     ARC,
@@ -28,6 +29,7 @@ from rds.panels.interpolator.fields import (
     USER,
     feed,
     fields,
+    filter_words,
     option_fields,
     read_point,
 )
@@ -120,6 +122,8 @@ class Interpolating:
         program = self._program_path() if self.choices["given"] in (BUNDLED, PROGRAM) else None
         segments = [] if program is not None else self.segments()
         acceleration, chosen = self._acceleration(), self.choices.values()
+        for file in files:
+            keep_file(file, f"interpolated with a feed of {chosen['feed']:g} {chosen['feed_unit']}")
 
         def work(task: Task[Interpolation]) -> Interpolation:
             from rds.interpolators.path import interpolate
@@ -182,10 +186,8 @@ class Interpolating:
     def _acceleration(self) -> Acceleration | None:
         from rds.interpolators.acceleration import make_acceleration
 
-        name, time = self.choices["acceleration"], self.choices["acceleration_time"]
-        if name == NONE:
-            return None
-        return make_acceleration(name, **{"time_constant" if name == "exponential" else "time": time})
+        words = filter_words(self.choices.values())
+        return None if words is None else make_acceleration(**words)
 
     def _program_path(self) -> Path:
         if self.choices["given"] == BUNDLED:

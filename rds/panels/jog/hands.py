@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from rds.bus.modules.calling import find_machine
-from rds.bus.modules.dialects import open_drivers
-from rds.bus.modules.rds import frames
+from rds.bus.modules.dialects import SERIAL_DIALECTS, open_drivers
 from rds.bus.tools.link import default_channel
 from rds.controllers import library_controller
 from rds.controllers.axis_data import SPINDLE_UNIT
@@ -92,24 +91,25 @@ class SpindleLaw:
 
 
 class VoltageHand:
-    """Modules that take voltages (rds, oacs): a loop for each axis and spindle whose model has tau and K."""
+    """Modules that take voltages (rds, oacs, dcs): a loop for each axis and spindle whose model has tau and K."""
 
-    period = 0.002  # s
+    period = 0.002  # s; on a serial line, which carries no more, the machine's sample period
 
     def __init__(self, machine: Machine, dialect: str, bus: Mapping[str, Any]):
         self.left_out: dict[str, str] = {}
-        for place, axis in enumerate(machine.axes.values()):
-            if place >= frames.SLOTS:
-                self.left_out[axis.name] = f"a command carries the voltages of the machine's first {frames.SLOTS} only"
-            elif not (axis.model.get("tau") and axis.model.get("K")):
+        serial = dialect in SERIAL_DIALECTS
+        if serial:
+            self.period = machine.sample_period
+        for axis in machine.axes.values():
+            if not (axis.model.get("tau") and axis.model.get("K")):
                 self.left_out[axis.name] = "its modules take voltages, and it has no model with tau and K"
         self.axes = {name: axis for name, axis in jog_axes(machine).items() if name not in self.left_out}
         options = {key: value for key, value in bus.items() if key not in ("dialect", "cia402", "faults")}
         self.spindles = {name: each for name, each in jog_spindles(machine).items() if name not in self.left_out}
         if self.spindles:
-            _leave_out(self, set(find_machine(machine, timeout=_ANSWERS_IN, **options)))
+            _leave_out(self, set(_on_line(machine, options) if serial else _on_bus(machine, options)))
         volts = machine.converter.range
-        self._laws = {name: _axis_law(machine.axis(name), volts) for name in self.axes}
+        self._laws = {name: _axis_law(machine.axis(name), volts, self.period) for name in self.axes}
         self._turners = {name: SpindleLaw(machine.axis(name), self.period, volts) for name in self.spindles}
         self._names = [*self.axes, *self.spindles]
         self._drivers = open_drivers(dialect, machine, self._names, self.period, False, options)
@@ -150,9 +150,21 @@ def _leave_out(hand: Hand, answering: set[str]) -> None:
         hand.left_out[name] = "no module answers for it; switch it on, and take the machine again"
 
 
-def _axis_law(axis: Axis, voltage: float) -> AxisLaw:
+def _on_bus(machine: Machine, options: Mapping[str, Any]) -> list[str]:
+    return find_machine(machine, timeout=_ANSWERS_IN, **options)
+
+
+def _on_line(machine: Machine, options: Mapping[str, Any]) -> list[str]:
+    from rds.bus.modules.dcs.calling import find_units
+
+    return find_units(machine, options.get("channel"), options.get("baud"))
+
+
+def _axis_law(axis: Axis, voltage: float, period: float) -> AxisLaw:
+    """A loop that is slow enough for its sample period: the module's own time constant may be much shorter."""
     friction = float(axis.model.get("friction_plus", 0.0)), float(axis.model.get("friction_minus", 0.0))
-    return AxisLaw(axis.model["tau"], axis.model["K"], friction, voltage, axis.resolution)
+    tau = max(float(axis.model["tau"]), 2.0 * period)
+    return AxisLaw(tau, axis.model["K"], friction, voltage, axis.resolution)
 
 
 class DriveHand:

@@ -12,7 +12,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from rds.bus.hub.bus_settings import bus_fault
+from rds.bus.hub.bus_settings import SERIAL, bus_fault
+from rds.bus.modules.dialects import SERIAL_DIALECTS, bus_interface
 from rds.bus.tools.link import BUILTIN, bus_name
 from rds.core.errors import InputError, MachineError
 from rds.core.toml_table import TomlTable
@@ -124,8 +125,8 @@ class Jog:
                 from rds.bus.modules.cia402.settings import read_settings
 
                 read_settings(bus.get("cia402", {}), self.machine)  # refused here, before anything is started
-            interface = bus["interface"] = str(bus.get("interface", BUILTIN))
-            if interface == BUILTIN:
+            interface = bus["interface"] = bus_interface(self.machine, bus)
+            if interface in (BUILTIN, SERIAL):
                 bus["channel"] = bus.get("channel") or self.machine.name
             task.note = "looking for the machine"
             self.dialect = self._dialect(bus)
@@ -162,6 +163,8 @@ class Jog:
         name = bus_name(interface, channel)
         if wanted is not None:
             check_dialect(wanted)
+        if interface == SERIAL and wanted in (None, *SERIAL_DIALECTS):
+            return self._serial_line(str(channel), bus)
         if interface != BUILTIN or channel in channels():
             options = self.session.bus_options
             found = find_dialect(self.machine, interface, channel, wanted or DEFAULT, **options)
@@ -175,6 +178,25 @@ class Jog:
             self._ends.append(weakref.finalize(self, end_server, self._server))
             return wanted or DEFAULT
         raise MachineError(f"no module of {self.machine.name} answers on {name}; switch it on")
+
+    def _serial_line(self, channel: str, bus: Mapping[str, Any]) -> str:
+        """The units of a serial line; where none answers, simulated ones are started for it."""
+        from rds.bus.hub.bus_settings import OF_OWN_LINE
+        from rds.bus.modules.dcs.calling import find_units
+        from rds.bus.modules.dcs.port import is_device
+        from rds.bus.modules.server_process import end_server, start_server
+
+        (dialect,) = SERIAL_DIALECTS
+        if find_units(self.machine, channel, bus.get("baud")):
+            return dialect
+        if is_device(channel):
+            raise MachineError(
+                f"no unit of {self.machine.name} answers on {channel}; check power, cable and [bus] baud"
+            )
+        words = {key: bus[key] for key in ("baud", *OF_OWN_LINE) if key in bus}
+        self._server = start_server(dialect, self.machine.path, channel, words)
+        self._ends.append(weakref.finalize(self, end_server, self._server))
+        return dialect
 
     def end(self) -> None:
         """Let the machine go: no voltage, drives by a quick stop. Nothing where it is not taken.

@@ -50,14 +50,16 @@ def order(
     return made
 
 
-def run_order(shell: Any, tip: str, act: Callable[[], Any], notice: Notice, choices: Choices) -> widgets.Button:
+def run_order(
+    shell: Any, tip: str, act: Callable[[], Any], notice: Notice, choices: Choices, text: str = "Run"
+) -> widgets.Button:
     """The Run button: an order in those modes in which something moves."""
 
     def follow_mode(name: str) -> None:
         if name == "mode":
             (made.remove_class if not load_mode(str(choices["mode"])).moves_machine else made.add_class)(_ORDER)
 
-    made = order(shell, "Run", tip, act, notice, primary=True)
+    made = order(shell, text, tip, act, notice, primary=True)
     follow_mode("mode")
     choices.watch(follow_mode)
     return made

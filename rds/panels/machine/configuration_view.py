@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
 from html import escape
 from typing import Any
 
 import ipywidgets as widgets
 
+from rds.machines.assembly import assembled, first_order, judged
+from rds.machines.library import library
+from rds.machines.machine import Machine
 from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
-from rds.panels.machine.configuration import directions, faults, first_order, moved, write_machine
+from rds.panels.machine.configuration import directions, moved, write_machine
 from rds.panels.machine.state import MachineDesk
 from rds.panels.session.fields import Text
 from rds.results import html
@@ -24,20 +29,28 @@ class ConfigurationView:
 
     def __init__(self, shell: Any, desk: MachineDesk):
         self.session, self.desk = shell.session, desk
+        self._ticker, self._figure = shell.ticker, FigureView()
         self.notice = Notice()
         self.choices = shell.session.choices("configuration", [_FILE])
-        self.order: list[int] = []
+        self.order: list[int | str] = []
         self._place, self._found = widgets.VBox([]), widgets.HTML()
         self._write = button("Write machine", "Write the machine's file", self.write, self.notice, primary=True)
         side = [group("The machine", FieldView(self.choices, "file"), row(self._write))]
         head = widgets.HTML("<p>Number the modules as they are mounted: 1 holds the tool, the last one the work.</p>")
-        self.widget = columns(side, [self.notice, head, self._place, self._found])
+        self._accessories = row(
+            *(
+                button(f"Add {name}", module.title, partial(self._toggle, name), self.notice)
+                for name, module in library().items()
+                if module.kind == "accessory" and module.source.startswith("OACS")
+            )
+        )
+        self.widget = columns(side, [self.notice, head, self._place, self._accessories, self._found, self._figure])
         self.refresh()
 
     def refresh(self) -> None:
         """Other modules are known."""
-        if set(self.order) != set(self.desk.data):
-            self.order = first_order(self.desk.data)
+        if {each for each in self.order if isinstance(each, int)} != set(self.desk.data):
+            self.order = [*first_order(self.desk.data)]
         self._show()
 
     def write(self) -> None:
@@ -51,34 +64,58 @@ class ConfigurationView:
 
     def _show(self) -> None:
         self._place.children = [self._row(place, number) for place, number in enumerate(self.order, start=1)]
-        wrong = faults(self.order, self.desk.data)
-        self._write.disabled = bool(wrong)
-        if wrong:
+        self._accessories.layout.display = None if self.order else "none"
+        verdict = judged(self.order, self.desk.data)
+        self._write.disabled = not verdict.ok
+        if not verdict.ok:
             kind = "warning" if not self.order else "error"
-            self.notice.say("\n".join(wrong), kind)
+            self.notice.say("\n".join(fault.text for fault in verdict.faults), kind)
             self._found.value = ""
+            self._figure.clear()
             return
         self.notice.say("this order makes a machine that can move as its modules say", "good")
         rows = [
-            [self._name(number), kind, *map(float, direction.round(6) + 0.0)]
-            for number, (kind, direction) in directions(self.order, self.desk.data).items()
+            [name, kind, *map(float, direction.round(6) + 0.0)]
+            for name, (kind, direction) in directions(self.order, self.desk.data).items()
         ]
         note = "Unit vectors, in the tool's directions, with all axes at zero."
         self._found.value = html.table(["module", "does", "x", "y", "z"], rows, "What moves how", note)
+        machine = assembled("machine", self.order, self.desk.data)
+        self._figure.draw(self.session, self._ticker, lambda: _picture(machine), "The links with their frames")
 
-    def _row(self, place: int, number: int) -> widgets.HBox:
+    def _row(self, place: int, number: int | str) -> widgets.HBox:
         up = button("▲", "Nearer to the tool", lambda: self._move(number, -1), self.notice)
         down = button("▼", "Nearer to the work", lambda: self._move(number, 1), self.notice)
         up.disabled, down.disabled = place == 1, place == len(self.order)
         for each in (up, down):
             each.layout.min_width = each.layout.width = "44px"
         text = widgets.HTML(f"<b>{place}</b> &nbsp; {escape(self._name(number))}")
-        return row(up, down, text)
+        if isinstance(number, int):
+            return row(up, down, text)
+        return row(
+            up, down, text, button("Remove", "Take the accessory out", lambda: self._toggle(number), self.notice)
+        )
 
-    def _name(self, number: int) -> str:
+    def _name(self, number: int | str) -> str:
+        if isinstance(number, str):
+            return f"accessory {library()[number].title} ({number})"
         data = self.desk.data[number]
         return f"{data['axis']}: {data['kind']} {data['type_text']} (module {number})"
 
-    def _move(self, number: int, by: int) -> None:
+    def _toggle(self, accessory: str) -> None:
+        """Put an accessory behind the tool, or take it out."""
+        if accessory in self.order:
+            self.order.remove(accessory)
+        else:
+            self.order.insert(1, accessory)
+        self._show()
+
+    def _move(self, number: int | str, by: int) -> None:
         self.order = moved(self.order, number, by)
         self._show()
+
+
+def _picture(machine: Machine) -> Any:
+    from rds.machines.picture import picture
+
+    return picture(machine)

@@ -9,7 +9,7 @@ from rds.bus.modules.oacs.pid import FIELDS, MEANINGS, RANGES, Tuning
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Number
 
-_SPEAK = {"rds": "rds: cyclic", "oacs": "oacs: distributed", "cia402": "cia402: drives"}
+_SPEAK = {"rds": "rds: cyclic", "oacs": "oacs: distributed", "cia402": "cia402: drives", "dcs": "dcs: serial line"}
 CONTROLLERS = {"P": "P", "PI": "PI", "PID": "PID"}
 
 SERVED = Choice(

@@ -9,6 +9,7 @@ import ipywidgets as widgets
 from rds.panels.machine.bus_view import BusView
 from rds.panels.machine.configuration_view import ConfigurationView
 from rds.panels.machine.controllers_view import ControllersView
+from rds.panels.machine.library_view import LibraryView
 from rds.panels.machine.modules_view import ModulesView
 from rds.panels.machine.state import MachineDesk
 
@@ -29,8 +30,16 @@ def build(shell: Any) -> widgets.Widget:
         controllers.refresh()
 
     modules = ModulesView(shell, desk, found)
-    tabs = widgets.Tab([modules.widget, configuration.widget, controllers.widget, BusView(shell, desk).widget])
-    for index, title in enumerate(("1 Modules", "2 Configuration", "3 Controllers", "Bus")):
+    tabs = widgets.Tab(
+        [
+            modules.widget,
+            configuration.widget,
+            controllers.widget,
+            BusView(shell, desk).widget,
+            LibraryView(shell).widget,
+        ]
+    )
+    for index, title in enumerate(("1 Modules", "2 Configuration", "3 Controllers", "Bus", "By hand")):
         tabs.set_title(index, title)
     tabs.add_class("rds-tabs")
     return tabs

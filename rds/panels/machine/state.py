@@ -10,7 +10,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rds.bus.modules.dialects import DEFAULT
+from rds.bus.hub.bus_settings import DEFAULT_BAUD, SERIAL
+from rds.bus.modules.dcs.port import is_device, is_there
+from rds.bus.modules.dialects import DEFAULT, interface_of
 from rds.bus.tools.link import BUILTIN, bus_name, default_channel
 from rds.core.errors import InputError, MachineError, RdsError
 from rds.core.toml_file import read_toml
@@ -22,6 +24,7 @@ from rds.panels.session.task import Stopped, Task
 from rds.results import Result
 
 T = TypeVar("T")
+ON_LINE = "dcs"  # the dialect of units on a serial line
 DESCRIBES_ITSELF = "oacs"  # the dialect whose modules say what they are
 
 
@@ -61,7 +64,12 @@ class MachineDesk:
     def _fitting(machine: str, now: str) -> str:
         """Modules that a machine's file describes are distributed ones: what they say of themselves is the point."""
         with contextlib.suppress(InputError):  # of a file that will not do: said when it is used
-            if all(axis.module for axis in load_machine(machine).axes.values()):
+            axes = load_machine(machine).axes.values()
+            if any(axis.module.get("motor") for axis in axes):
+                return ON_LINE
+            if now == ON_LINE:
+                return DEFAULT
+            if all(axis.module for axis in axes):
                 return DESCRIBES_ITSELF
             return DEFAULT if now == DESCRIBES_ITSELF else now
         return now
@@ -75,8 +83,10 @@ class MachineDesk:
 
     @property
     def bus(self) -> tuple[str, str | None]:
-        """Interface and channel: of the session's bus, else the built-in one with the name of the machine chosen."""
+        """Interface and channel: of the session's bus, else those of simulated modules of the machine chosen."""
         interface = self.session.interface
+        if "interface" not in self.session.bus:
+            interface = interface_of(self.choices["dialect"], interface)
         return interface, default_channel(self.machine, interface, self.session.bus.get("channel"))
 
     @property
@@ -89,13 +99,14 @@ class MachineDesk:
     def start(self) -> Task[None]:
         """Start the simulated modules of the machine chosen. InputError where that cannot be."""
         interface, channel = self.bus
-        if interface != BUILTIN:
+        machine, dialect = self.machine, self.choices["dialect"]
+        on_line = dialect == ON_LINE and interface == SERIAL and not is_device(str(channel))
+        if interface != BUILTIN and not on_line:
             raise InputError(
                 f"the bus is {bus_name(interface, channel)}, whose modules are real: switch them on, and scan"
             )
         if self.serves:
             raise InputError("this page runs the simulated modules already; stop them first")
-        machine, dialect = self.machine, self.choices["dialect"]
         if dialect == DESCRIBES_ITSELF:
             from rds.bus.modules.oacs.module_data import read_modules
 
@@ -107,11 +118,15 @@ class MachineDesk:
             from rds.bus.modules.calling import find_machine
             from rds.bus.modules.server_process import end_server, start_server
 
-            if channel in channels() and find_machine(machine, interface, channel):
+            there = (
+                is_there(channel) if on_line else channel in channels() and find_machine(machine, interface, channel)
+            )
+            if there:
                 raise InputError(f"modules answer on {bus_name(interface, channel)} already: press Scan to see them")
             self._server = start_server(dialect, machine.path, channel)
             self._end = weakref.finalize(self, end_server, self._server)
-            self.session.channels.add(channel)
+            if not on_line:
+                self.session.channels.add(channel)
 
         return self._work("start the simulated modules", begin)
 
@@ -134,11 +149,16 @@ class MachineDesk:
             from rds.bus.tools.scan import scan_all
 
             self.rows, self.data = [], {}
-            rows = scan_all(interface, channel, **self.session.bus_options)
+            on_line = interface == SERIAL and self.choices["dialect"] == ON_LINE
+            own = interface == BUILTIN or (on_line and not is_device(str(channel)))
+            if on_line:
+                rows = _on_line(str(channel), self.session.bus.get("baud", DEFAULT_BAUD), own)
+            else:
+                rows = scan_all(interface, channel, **self.session.bus_options)
             if not rows:
                 raise MachineError(
                     f"no module answers on {bus_name(interface, channel)}; "
-                    + ("start the simulated modules" if interface == BUILTIN else "check their power and the cable")
+                    + ("start the simulated modules" if own else "check their power and the cable")
                 )
             numbers = [row["id"] for row in rows if row["dialect"] == DESCRIBES_ITSELF]
             for done, number in enumerate(numbers):
@@ -277,3 +297,10 @@ class MachineDesk:
 
         with open_bus(*self.bus, node="panel", **self.session.bus_options) as bus:
             yield Module(bus, number)
+
+
+def _on_line(channel: str, baud: int, served: bool) -> list[dict[str, Any]]:
+    """The units on a serial line; none where a machine's line is not served."""
+    from rds.bus.modules.dcs.scan import scan_channel
+
+    return scan_channel(channel, baud) if not served or is_there(channel) else []

@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels.kit.button import button
+from rds.panels.page.alive import Alive
 from rds.panels.registry import PANELS
 
 NAME = "menu"
@@ -25,7 +26,7 @@ def build(shell: Any) -> widgets.Widget:
 
 
 def _first(shell: Any) -> widgets.Widget:
-    """What somebody who knows nothing of it does first."""
+    """What somebody who knows nothing of it sees and does first: an axis that moves, and three steps from there."""
 
     def begin() -> None:
         from rds.panels.equipment.state import Equipment
@@ -33,10 +34,41 @@ def _first(shell: Any) -> widgets.Widget:
         Equipment(shell.session, "control").first_sine()
         shell.open("equipment-control")
 
-    tip = "Choose a first experiment for you; then press Run"
-    press = button("Track a sine", tip, begin, shell, primary=True)
-    text = widgets.HTML("<p>New here? Let the X axis follow a sine: press this, then Run. The result follows.</p>")
-    first = widgets.HBox([press, text])
+    def write() -> None:
+        shell.open("equipment-control")
+        if shell.on_code is not None:
+            shell.on_code()
+
+    def design() -> None:
+        shell.open("design")
+
+    steps = (
+        (
+            "Track a sine",
+            "Choose a first experiment for you; then press Run",
+            begin,
+            "Let the X axis follow it: press Run there.",
+        ),
+        (
+            "Write a controller",
+            "An editor with a file that works to begin with",
+            write,
+            "Yours in its place: change it, and run it.",
+        ),
+        (
+            "Place its poles",
+            "The design panel: drag the poles, see the response",
+            design,
+            "Drag them, and see what a better one does.",
+        ),
+    )
+    rows = []
+    for number, (title, tip, act, text) in enumerate(steps):
+        press = button(title, tip, act, shell, primary=number == 0)
+        line = widgets.HBox([press, widgets.HTML(f"<p>{text}</p>")])
+        line.add_class("rds-first-step")
+        rows.append(line)
+    first = widgets.HBox([Alive(shell.session, shell.ticker), widgets.VBox(rows)])
     first.add_class("rds-first")
     return first
 

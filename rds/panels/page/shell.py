@@ -45,6 +45,7 @@ class Shell:
         self.here = ""
         self.help_page = "readme"
         self.on_help: Callable[[str], None] | None = None  # turns the help to a page, once its panel is there
+        self.on_code: Callable[[], Any] | None = None  # shows the code of a controller, once its panel is there
         self._notice = Notice()
         self._heard: list[Message] = list(session.messages)  # what was said before there was a page
         self._title = widgets.HTML()
@@ -61,7 +62,7 @@ class Shell:
         self.colours = Colours(self._darken)
         self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
         unseen = [self.presence, self.colours, Keys(), widgets.HTML(_style())]
-        self.widget = widgets.VBox([*unseen, self._head(), self._notice, body, self._rescue])
+        self.widget = widgets.VBox([*unseen, self._corner(), self._head(), self._notice, body, self._rescue])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
         self.ticker.add(self._show_messages)
@@ -106,16 +107,22 @@ class Shell:
         module = PANELS.module(name)
         return button(module.TITLE, module.SUMMARY, lambda: self.open(name), self)
 
-    def _head(self) -> widgets.HBox:
+    def _corner(self) -> widgets.Box:
+        """The emergency stop, which stays in its corner above everything else, however narrow the page is."""
         stop = widgets.Button(
             description="EMERGENCY STOP", tooltip="Zero volts on every module of the bus, now, whatever runs"
         )
         stop.add_class("rds-stop")
         stop.on_click(lambda _: self.emergency_stop())
+        corner = widgets.Box([stop])
+        corner.add_class("rds-corner")
+        return corner
+
+    def _head(self) -> widgets.HBox:
         tip = "Let the modules be used again after an emergency stop"
         release = order(self, "Release", tip, self._release, self)
         guide = button("Help", "The page of the documentation on this panel", self._help, self)
-        head = widgets.HBox([self._title, guide, self.colours.button, release, stop])
+        head = widgets.HBox([self._title, guide, self.colours.button, release])
         head.add_class("rds-head")
         return head
 
@@ -150,9 +157,11 @@ class Shell:
 
     def _offer_runs(self) -> None:
         """What was going on when the page was last left."""
+        from rds.panels.equipment.taken_up import is_driven_by
         from rds.panels.session.kept_runs import State
 
-        if self.session.runs_that_go_on():
-            self.say("a run goes on: its results will be among the earlier runs; Emergency stop ends it", "warning")
+        if going := self.session.runs_that_go_on():
+            if self.here == "menu":  # whoever reloads the page is back where the run is
+                self.open(f"equipment-{is_driven_by(going[0])}")
         elif [run.state for run in self.session.runs(1)] == [State.CUT_SHORT]:
             self.say("the last run was cut short; what it recorded can be opened among the earlier runs", "warning")

@@ -10,15 +10,16 @@ from typing import Any
 from rds.core.errors import RdsError
 from rds.machines import Machine
 from rds.nc.active import Follower, Modes
-from rds.nc.check import Setup, watched
+from rds.nc.check import Setup, validator_of, watched
 from rds.nc.cycle_time import CycleTime, cycle_time
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.parameters import read_parameters
 from rds.nc.language.reading_on import Later
+from rds.nc.path_block import PathBlock
 from rds.nc.run.prepare import least_seconds, require_room
-from rds.nc.toolpath import PathBlock
+from rds.nc.tool_centre import shown
 from rds.nc.trace import Trace
-from rds.nc.validate import Validation, Validator
+from rds.nc.validate import Validation
 from rds.panels.session.task import Task
 
 
@@ -87,8 +88,12 @@ def look(
         parameters = read_parameters(setup.parameters) if setup.parameters else None
     except RdsError as error:
         return Look((Mark(0, 0, 0, str(error)),))
+    setup = setup.on(machine)
     label = str(source)
-    validator, trace = Validator(machine, tools, label), Trace()
+    try:
+        validator, trace = validator_of(source, machine, setup), Trace()
+    except ProgramError as error:  # a configuration script of another machine
+        return Look((Mark(error.line, 0, 0, error.reason),))
     try:
         follower = Follower(
             source,
@@ -104,7 +109,7 @@ def look(
     kept: list[PathBlock] = []
     try:
         for block in validator.watch(watched(follower.run(), validator, setup, validator.report)):
-            trace.add(block.segments)
+            trace.add(shown(block.segments, machine))
             kept.append(block)
     finally:
         follower.close()

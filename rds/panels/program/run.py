@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.nc.check import Setup
-from rds.nc.run.judge import contour
-from rds.nc.run.prepare import Prepared
 from rds.nc.run.report import save_run
 from rds.nc.run.run import PartProgram, ProgramRun, Status
-from rds.panels.equipment.run import EquipmentRun
+from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors
 from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session
 from rds.panels.session.task import Task
 from rds.results import Result
-
-STRIP_RATE = 100.0  # rows a second that are looked at for the strip
 
 
 class ProgramWork(EquipmentRun):
@@ -37,24 +34,31 @@ class ProgramWork(EquipmentRun):
         file: Path,
         mode: str,
         setup: Setup,
-        controller: str,
+        controller: Any,
         changes: list[tuple[float, str, float]],
         prepare: Callable[[Callable[[], None]], None] | None = None,
+        motion: Mapping[str, Any] | None = None,
     ):
+        """`motion` is what `PartProgram` is told of an interpolator; nothing for planned motion."""
         super().__init__(session, {"mode": mode}, f"{file.name}, {mode}", prepare)
         self.file, self.mode = file, mode
         self.folder = session.folder / RUNS / f"{time.strftime('%Y%m%d-%H%M%S')}-{file.stem}-{self.folder.name[-4:]}"
-        self.prepared: Prepared | None = None
         self._setup, self._controller, self._changes = setup, controller, changes
+        self._motion = dict(motion or {})
 
     def _work(self, task: Task[Result]) -> Result:
         with contextlib.ExitStack() as held:
             try:
                 if self._prepare is not None:
                     self._prepare(lambda: self._tell(task, "checking the controller's file"))
-                self._tell(task, "planning the program")
+                self._tell(task, "reading the program" if self._motion else "planning the program")
                 part = PartProgram(
-                    self.file, self.session.machine, setup=self._setup, controller=self._controller, mode=self.mode
+                    self.file,
+                    self.session.machine,
+                    setup=self._setup,
+                    controller=self._controller,
+                    mode=self.mode,
+                    **self._motion,
                 )
                 self.plan, self.prepared = part.plan(), part.prepared
                 self._tell(task, "starting the loop" if self.real_time else "simulating")
@@ -154,5 +158,4 @@ class ProgramWork(EquipmentRun):
             return np.empty((0, 1 + len(self.traces())))
         of = dict(zip(columns, rows[:: max(round(1.0 / (STRIP_RATE * prepared.T)), 1)].T, strict=True))
         errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in prepared.program.axes]
-        away, _ = contour(of, prepared, of["program_state"].astype(int))
-        return np.column_stack([of["time"], *errors, away])
+        return np.column_stack([of["time"], *errors, contour_errors(of, prepared)])

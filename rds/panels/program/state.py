@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError, RdsError
+from rds.core.shared_quantities import FEED_OVERRIDE
 from rds.machines import load_machine
 from rds.nc.bundled import bundled
 from rds.panels.equipment.build import Builds
+from rds.panels.interpolator.fields import USER
+from rds.panels.interpolator.motion import PLANNED, filter_of, idle_motion, motion_fields
 from rds.panels.program.text import ProgramText, check_name, programs
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, mode_choice
@@ -46,20 +49,16 @@ def _fields(folder: Path) -> Iterable[Field]:
     yield Text(
         "controller",
         "Controller of the axes",
-        "a name (tracking, feedforward, p, pid, modified-pid), or a Python file of yours; the spindle has PID",
+        "a name (tracking, feedforward, cascade, p, pid, modified-pid), or a Python file of yours; the spindle has PID",
         "tracking",
         "tracking or my_controller.py",
         120,
     )
-    yield Number(
-        "override",
-        "Feed override",
-        "of the programmed feed, for a run's start and while it runs; rapids only get slower",
-        100.0,
-        unit="%",
-        low=0.0,
-        high=200.0,
-    )
+    tip = "the file's control() gets and returns arrays, one value for each axis: contour control"
+    yield Flag("coupled", "One controller for all axes", tip, False)
+    tip = "of the programmed feed, for a run's start and while it runs; rapids only get slower"
+    yield Number.of(FEED_OVERRIDE, "override", "Feed override", tooltip=tip)
+    yield from motion_fields()
     yield Flag("optional_stop", "Stop at M1", "whether M1 waits for Resume", True)
     for name, (label, tip) in OPTIONS.items():
         yield Flag(name, label, tip, False)
@@ -242,6 +241,10 @@ class Program:
         if share == 0.0:
             raise InputError("an override of 0 % never moves; begin with more, and hold while it runs")
         controller, files = self._controller()
+        motion, own = self._motion()
+        if motion and share > 1.0:
+            raise InputError("an override above 100 % goes with planned motion: an interpolator knows no faster rows")
+        files += own
         if self.session.bus:
             raise InputError(
                 "this page has a bus of its own, which programs are not run on here; `rds nc run --controller "
@@ -254,11 +257,32 @@ class Program:
         T = self.machine.sample_period
         prepare = (lambda pulse: self.builds.require(files, T, pulse)) if files else None
         mode = str(self.choices["mode"])
-        return ProgramWork(self.session, self.text.path, mode, self.setup(), controller, changes, prepare)
+        return ProgramWork(self.session, self.text.path, mode, self.setup(), controller, changes, prepare, motion)
 
-    def _controller(self) -> tuple[str, list[tuple[str, Path]]]:
+    def _motion(self) -> tuple[dict[str, Any], list[tuple[str, Path]]]:
+        """What `PartProgram` is told of an interpolator, and the user's file of it; nothing for planned motion."""
+        name, chosen = str(self.choices["interpolator"]), self.choices.values()
+        if name == PLANNED:
+            return {}, []
+        own = []
+        if name == USER:
+            path = (self.session.folder / str(chosen["interpolator_file"]).strip()).resolve()
+            if not path.is_file():
+                raise InputError(
+                    "the interpolator's file is not there; save it in your folder, and name it in Settings"
+                )
+            name, own = str(path), [("interpolator", path)]
+        return {"interpolator": name, **filter_of(chosen)}, own
+
+    def idle(self) -> set[str]:
+        """Choices that say nothing now."""
+        return idle_motion(self.choices.values())
+
+    def _controller(self) -> tuple[Any, list[tuple[str, Path]]]:
         name = str(self.choices["controller"]).strip() or "tracking"
         if not name.endswith(".py"):
+            if self.choices["coupled"]:
+                raise InputError(f"the controller {name} is for single axes; a coupled one is a Python file of yours")
             from rds.controllers import controller_module
 
             try:
@@ -269,4 +293,6 @@ class Program:
         path = (self.session.folder / name).resolve()
         if not path.is_file():
             raise InputError(f"there is no file {name} in your folder; save your controller there, or name another")
+        if self.choices["coupled"]:  # its check needs the axes; the run tells its faults with their lines
+            return {"file": str(path), "coupled": True}, []
         return str(path), [("controller", path)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from html import escape
 
 from rds.machines import Machine
@@ -39,7 +40,11 @@ def _head(status: Status | None, override: float) -> str:
 
 
 def _positions(status: Status | None, modes: Modes | None, machine: Machine) -> str:
-    work = modes.work(status.measured) if status is not None and modes is not None else {}
+    work = {}
+    if status is not None and modes is not None:
+        # the tip on the work, whose place has the tool's length in it already
+        shown = replace(modes, tool_offset=(0.0, 0.0, 0.0)) if status.tip else modes
+        work = shown.work(status.measured | status.tip)
     rows = []
     for name, axis in machine.axes.items():
         at = None if status is None else status.measured.get(name)

@@ -7,8 +7,9 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels.equipment.strip import StripChart
+from rds.panels.interpolator.motion import MADE
 from rds.panels.kit.button import attempt, say_error
-from rds.panels.kit.field import field_group
+from rds.panels.kit.field import FieldView, field_group
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
 from rds.panels.program.editor import Editor
@@ -55,8 +56,12 @@ class ProgramView:
 
     def _arranged(self) -> widgets.Widget:
         choices = self.program.choices
-        settings = field_group(choices, ["controller", "optional_stop", *OPTIONS])
-        more = widgets.VBox([settings, self.tools.widget])
+        self._motion = {name: FieldView(choices, name) for name in ("interpolator", "interpolator_file", *MADE)}
+        motion = widgets.VBox([*self._motion.values()])
+        motion.add_class("rds-group")
+        self._show_motion()
+        settings = field_group(choices, ["controller", "coupled", "optional_stop", *OPTIONS])
+        more = widgets.VBox([motion, settings, self.tools.widget])
         run = widgets.VBox([self.status, self.strip])
         self.tabs = widgets.Tab([self.preview.widget, run, self.result.widget, more], titles=TABS)
         self.tabs.add_class("rds-tabs")
@@ -94,6 +99,14 @@ class ProgramView:
             self.files.refresh()
         elif name == "tools":
             self.tools.chosen()
+        elif name in self._motion:
+            self._show_motion()
+
+    def _show_motion(self) -> None:
+        """Only the fields of the motion that say something now."""
+        idle = self.program.idle()
+        for name, view in self._motion.items():
+            view.layout.display = "none" if name in idle else ""
 
     def _turned(self, change: Any) -> None:
         # pictures are wider than what else stands beside the text

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
+from rds.core import quantities
 from rds.core.errors import InputError
-from rds.core.quantities import Quantity, shortened
+from rds.core.quantities import Declaration, Quantity, shortened
+from rds.core.toml_file import parse_toml
 from rds.modes import DEFAULT, load_mode, mode_names
 from rds.modes.loop.mode import Drive
 
@@ -117,7 +119,7 @@ class Text(Field):
     placeholder: str = ""
     longest: int = 4096
     refuse: Callable[[str], None] | None = None
-    needed: bool = False  # whether no text at all is refused, too
+    needed: bool = False  # empty text is an error as well
 
     def check(self, value: Any) -> str:
         """The text."""
@@ -151,6 +153,48 @@ class Several(Field):
         if len(set(value)) < self.least:
             raise InputError(f"{self.label} needs {self.least} or more of {', '.join(self.options)}")
         return [key for key in self.options if key in value]
+
+
+def labels(names: Sequence[str], told: Mapping[str, str]) -> dict[str, str]:
+    """The parts of a library as the options of a choice: by the words that are `told`, else by their names."""
+    return {name: told.get(name, name.replace("-", " ").capitalize()) for name in names}
+
+
+def field_of(declaration: Declaration, name: str, label: str, unit: str = "") -> Field:
+    """The field of an option that may be left out: a number, or what a file would say (`[[1, 2]]`, `true`).
+
+    `unit` takes the place of the declaration's own.
+    """
+    if isinstance(declaration, Quantity):
+        unit = unit or declaration.unit
+        tip = ", ".join(filter(None, (declaration.meaning, unit)))
+        return Number.of(declaration, name, label, tooltip=tip, unit=unit, optional=True)
+    tip = f"{declaration.meaning}: as in a file"
+    if isinstance(declaration, quantities.Choice):
+        tip = f"{declaration.meaning}: {', '.join(declaration.known)}"
+    return Text(name, label, tip, "", refuse=lambda text: _refuse_value(declaration, label, text))
+
+
+def value_of(field: Field, value: Any) -> Any:
+    """What a field of `field_of` says in a file; None for nothing."""
+    return _value(field.label, value) if isinstance(field, Text) and isinstance(value, str) else value
+
+
+def _value(label: str, text: str) -> Any:
+    if not text.strip():
+        return None
+    try:
+        return parse_toml(f"value = {text}", label)["value"]
+    except InputError:
+        if text.replace("-", "").replace("_", "").isalnum():  # a word without its quotes
+            return text.strip()
+        raise InputError(f"{label} is not a value as in a file, such as 1.5, [1, 2] or a word: {text!r:.60}") from None
+
+
+def _refuse_value(declaration: Declaration, label: str, text: str) -> None:
+    value = _value(label, text)
+    if value is not None:
+        quantities.checked(declaration, value, label)
 
 
 def mode_choice(drives: Drive) -> Choice:

@@ -7,6 +7,7 @@ from typing import Any
 
 from rds.modes.loop.live_values import Channel
 from rds.panels.equipment.run import EquipmentRun
+from rds.panels.equipment.taken_up import TakenUpRun
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Number
 
@@ -14,9 +15,10 @@ from rds.panels.session.fields import Number
 class LiveValues(Choices):
     """The live values of a run. One that the loop will not take stays what it was, with InputError."""
 
-    def __init__(self, run: EquipmentRun):
+    def __init__(self, run: EquipmentRun | TakenUpRun):
         channels: Mapping[str, Channel] = run.live_values
-        super().__init__(_field(channel) for channel in channels.values())
+        several = len({name.partition(".")[0] for name in channels if "." in name}) > 1
+        super().__init__(_field(channel, several) for channel in channels.values())
         self._run = run
 
     def set(self, name: str, value: Any) -> None:
@@ -25,11 +27,12 @@ class LiveValues(Choices):
         super().set(name, value)
 
 
-def _field(channel: Channel) -> Number:
+def _field(channel: Channel, several: bool) -> Number:
+    """Its owner, an axis, is named where there are several."""
     words = channel.meaning.partition(",")[0]
     return Number(
         channel.name,
-        f"{channel.name.partition('.')[2]}, {words}",
+        f"{channel.name if several else channel.name.rpartition('.')[2]}, {words}",
         f"{channel.meaning}; holds from the next sample on, and is recorded with its time",
         channel.value,
         unit=channel.unit,

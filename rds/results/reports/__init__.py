@@ -1,4 +1,5 @@
-"""Reports of what was measured on a machine: accuracy, moves, response times, currents, vibration, reconfiguration.
+"""Reports of what was measured on a machine: accuracy, moves, response times, currents, vibration, reconfiguration,
+speed, flatness; return error, rapids and path error of part programs.
 
 One door: a kind of report, data files and options in; tables, pictures and findings out. Light to import: matplotlib
 and python-can are imported by what needs them.
@@ -24,6 +25,11 @@ KINDS = Registry(
         "current": "rds.results.reports.current",
         "vibration": "rds.results.reports.vibration",
         "reconfiguration": "rds.results.reports.reconfiguration",
+        "speed": "rds.results.reports.speed",
+        "flatness": "rds.results.reports.flatness",
+        "return-error": "rds.results.reports.return_error",
+        "unsynchronized-rapids": "rds.results.reports.unsynchronized_rapids",
+        "path-error": "rds.results.reports.path_error",
     },
     own=False,
 )

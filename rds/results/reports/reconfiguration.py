@@ -87,6 +87,9 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
             tables.append(_list(path, found))
             times.setdefault("first change until ready", []).extend(change.whole for change in found)
             times.setdefault("last change until ready", []).extend(change.after_last for change in found)
+            moving = _until_moving(columns)
+            if moving:
+                times.setdefault("last module plugged in until moving", []).extend(moving)
             if pending:
                 modules = ", ".join(event.module or "?" for event in pending)
                 findings.append(f"{path.name}: not ready again at its end, after changes of {modules}.")
@@ -107,6 +110,19 @@ def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
         {"Reconfiguration times": lambda: picture(times)},
         findings,
     )
+
+
+def _until_moving(columns: Sequence[Column]) -> list[float]:
+    """From the last `added` until the next `moving`, s."""
+    named = {column.name.lower(): column for column in columns}
+    found, plugged = [], None
+    for value, what in zip(named["time"].numbers(), named["event"].cells.values(), strict=True):
+        if what == "added":
+            plugged = _SECONDS[named["time"].unit] * value
+        elif what == "moving" and plugged is not None:
+            found.append(_SECONDS[named["time"].unit] * value - plugged)
+            plugged = None
+    return found
 
 
 def _from_events(

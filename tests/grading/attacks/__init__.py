@@ -5,7 +5,7 @@ Each is put behind `INSIDE`, which ends it at once where it does not run in a sa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rds.grading.grade import Status
 from rds.grading.sandbox import Limits
@@ -39,6 +39,8 @@ SHORT = Limits(
     output_bytes=10_000,
     file_bytes=4 << 20,
 )
+PATIENT = replace(SHORT, wall_seconds=40.0, call_seconds=10.0, load_seconds=10.0)
+"""For honest submissions: a busy computer makes no difference to what they answer."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 from rds.bus.modules.cia402 import codes
 from rds.bus.modules.cia402.codes import Mode, NmtCommand, State, error_text, state_of, status_text
 from rds.bus.modules.cia402.presence import refuse_clashes
-from rds.bus.modules.cia402.settings import DriveSettings, Settings
+from rds.bus.modules.cia402.settings import Command, DriveSettings, Settings
 from rds.bus.tools.listening import pause
 from rds.core.contracts import Limits, Watch, unwatched
 from rds.core.errors import InputError, MachineError
@@ -79,6 +79,8 @@ def prepare(network: canopen.Network, settings: Settings, period: float, watch: 
             _communication(node, drive, settings, period)
             _map(node, drive, settings.transmission)
             _reset_fault(node, drive)
+            if drive.command is Command.PP:
+                _profile(node, drive)
             for index, subindex, value in drive.write:
                 _download(node, index, subindex, value)
             node.nmt.state = "OPERATIONAL"
@@ -267,6 +269,14 @@ def _reset_fault(node: canopen.RemoteNode, drive: DriveSettings) -> None:
         _download(node, 0x6040, 0, codes.FAULT_RESET)
         _download(node, 0x6040, 0, codes.DISABLE_VOLTAGE)
     _wait_for_state(node, drive, State.SWITCH_ON_DISABLED)
+
+
+def _profile(node: canopen.RemoteNode, drive: DriveSettings) -> None:
+    """The profile of mode pp, within the axis's limits; the drive's own where the machine's file has none."""
+    limits = drive.axis.limits
+    if limits is not None:
+        for index, most in ((0x6081, limits.velocity), (0x6083, limits.acceleration), (0x6084, limits.acceleration)):
+            _download(node, index, 0, round(most * drive.velocity_counts))
 
 
 def _choose(node: canopen.RemoteNode, drive: DriveSettings, mode: Mode) -> None:

@@ -13,8 +13,11 @@ from __future__ import annotations
 from math import copysign, floor
 from typing import NamedTuple
 
-from rds.bus.modules.cia402.motions import Demand, towards
+from rds.bus.modules.cia402.motions import Demand
 from rds.bus.modules.cia402.servo import NEGATIVE, POSITIVE, Servo
+from rds.models.profile_drive import towards
+
+_STANDS = 1e-6  # unit/s: a loop that balances the friction exactly comes to rest in the limit only
 
 
 class Method(NamedTuple):
@@ -60,7 +63,7 @@ class Homing:
         """The velocity to go at."""
         wanted = self._step()
         self._velocity = towards(self._velocity, wanted, self._acceleration * T)
-        if self.home is not None and self._velocity == 0.0 and self._servo.axis.velocity == 0.0:
+        if self.home is not None and self._velocity == 0.0 and abs(self._servo.axis.velocity) < _STANDS:
             self.done = True
         return None, self._velocity
 

@@ -55,8 +55,9 @@ class Cia402Drivers(CanDrivers[Remote]):
     the machine's name) and further `options` for it. `cia402` is the `[bus.cia402]` table (settings.py).
 
     What write() takes depends on each drive's mode: "cst" (default) voltages, as the contract says, sent as a target
-    torque of 1000 ‰ per rated voltage; "csp" positions in the axis's unit; "csv" velocities in unit/s. Positions, read
-    and commanded, are relative to where the axis stood at start(), or with `positions = "drive"` the drive's own.
+    torque of 1000 ‰ per rated voltage; "csp" positions in the axis's unit, which the drive follows from SYNC to SYNC;
+    "csv" velocities in unit/s; "pp" positions that the drive goes to by a profile of its own. Positions, read and
+    commanded, are relative to where the axis stood at start(), or with `positions = "drive"` the drive's own.
     Power comes on with the first write() after start(); with `dry_run` never.
     """
 
@@ -189,7 +190,10 @@ class Cia402Drivers(CanDrivers[Remote]):
             self._check(now)
             if not all(drive.enabled for drive in self.drives):
                 acting = tuple(
-                    [value if drive.enabled else 0.0 for value, drive in zip(acting, self.drives, strict=True)]
+                    [
+                        value if drive.enabled else drive.resting
+                        for value, drive in zip(acting, self.drives, strict=True)
+                    ]
                 )
         self._acting = acting
         return measured
@@ -201,9 +205,10 @@ class Cia402Drivers(CanDrivers[Remote]):
         self._bus.send(self._sync, self._send_timeout)
 
     def write(self, targets: Sequence[float]) -> tuple[float, ...]:
-        """Take the targets (V; in the modes csp and csv unit, unit/s) that act from the next SYNC on.
+        """Take the targets (V; in the modes csp and pp unit, in csv unit/s) that act from the next SYNC on.
 
-        Returns those that act since the last SYNC, as the drives' numbers say them; 0 for one whose power isn't on yet.
+        Returns those that act since the last SYNC, as the drives' numbers say them; where the power isn't on yet, the
+        one at which nothing moves.
         InputError for one that is too large.
         """
         if len(targets) != len(self.drives):
@@ -233,11 +238,12 @@ class Cia402Drivers(CanDrivers[Remote]):
         for drive in self.drives:
             drive.was_enabled = False
             drive.emergency = 0
+            drive.forget_set_points()
 
     def _send_targets(self) -> None:
         for drive in self.drives:
             if drive.enabled and self._armed:
-                drive.controlword = codes.ENABLE_OPERATION
+                drive.operate()
             elif self._stopping:
                 drive.quit()
             else:
@@ -285,7 +291,7 @@ class Cia402Drivers(CanDrivers[Remote]):
     # --- the end
 
     def stop(self) -> None:
-        """Power off on all axes, now: voltage disabled in mode cst, a quick stop in csp and csv.
+        """Power off on all axes, now: voltage disabled in mode cst, a quick stop in the others.
 
         If the bus is broken, the drives do it themselves when SYNC and heartbeat are missing; the log says so.
         """

@@ -7,8 +7,9 @@ the step before.
 
 from __future__ import annotations
 
-from math import copysign, sqrt
 from typing import Protocol
+
+from rds.models.profile_drive import profile_step, towards
 
 Demand = tuple[float | None, float]
 
@@ -20,11 +21,6 @@ class Motion(Protocol):
 
     def step(self, now: float, T: float) -> Demand:
         """Position demand (or None) and velocity demand."""
-
-
-def towards(value: float, target: float, most: float) -> float:
-    """`value`, moved towards `target` by `most` at most."""
-    return target if abs(target - value) <= most else value + copysign(most, target - value)
 
 
 class Ramp:
@@ -62,18 +58,17 @@ class Profile:
 
     def step(self, now: float, T: float) -> Demand:
         """One step, never faster than can still be braked before the target."""
-        distance = self.target - self.position
-        half = 0.5 * self.deceleration * T
-        brakeable = sqrt(half * half + 2.0 * self.deceleration * abs(distance)) - half
-        wanted = 0.0 if self.halted else copysign(min(self.speed, brakeable), distance)
-        slowing = abs(wanted) < abs(self.velocity) or wanted * self.velocity < 0.0
-        before = self.velocity
-        self.velocity = towards(before, wanted, (self.deceleration if slowing else self.acceleration) * T)
-        moved = 0.5 * (before + self.velocity) * T
-        if not self.halted and abs(distance) <= abs(moved) + 1e-9 and abs(self.velocity) <= 2.0 * self.deceleration * T:
-            self.position, self.velocity, self.done = self.target, 0.0, True
-        else:
-            self.position += moved
+        self.position, self.velocity, arrived = profile_step(
+            self.position,
+            self.velocity,
+            self.target,
+            self.speed,
+            self.acceleration,
+            self.deceleration,
+            T,
+            self.halted,
+        )
+        self.done = self.done or arrived
         return self.position, self.velocity
 
 

@@ -80,6 +80,7 @@ class Operation:
             (0x2001, 1): partial(self._set_gain, "position_gain"),
             (0x2001, 2): partial(self._set_gain, "velocity_gain"),
             (0x2001, 3): partial(self._set_gain, "integral_time"),
+            (0x2001, 4): partial(self._set_gain, "current_limit"),
         }
         writers |= {(index, 0): partial(self._take_target, index, modes) for index, modes in TARGETS.items()}
 
@@ -168,7 +169,7 @@ class Operation:
         servo, values = self.servo, self.objects.values
         for index, subindex in ((0x6065, 0), (0x6066, 0), (0x6072, 0), (0x607D, 1), (0x607D, 2)):
             self.objects.writers[index, subindex](values[index, subindex])
-        gains = servo.position_gain, servo.velocity_gain, servo.integral_time
+        gains = servo.position_gain, servo.velocity_gain, servo.integral_time, servo.current_limit
         values |= {(0x2001, place): gain for place, gain in enumerate(gains, 1)}
 
     # --- what time brings

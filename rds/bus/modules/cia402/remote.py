@@ -32,7 +32,9 @@ class Remote(Module):
         "_command",
         "_counts_limit",
         "_factor",
+        "_handed",
         "_pack",
+        "_placed",
         "_settings",
         "controlword",
         "emergency",
@@ -58,6 +60,7 @@ class Remote(Module):
             * {
                 Command.CST: 1000.0 / settings.rated_voltage,
                 Command.CSP: settings.counts,
+                Command.PP: settings.counts,
                 Command.CSV: settings.velocity_counts,
             }[settings.command]
         )
@@ -67,6 +70,8 @@ class Remote(Module):
         )
         self.controlword = codes.DISABLE_VOLTAGE
         self.target = 0  # in the drive's units, as the next RPDO carries it
+        self._placed: int | None = None  # mode pp: the target that the RPDO before carried,
+        self._handed: int | None = None  # and the last one that was handed over as a new set-point
         self.status = 0
         self.state: State | None = None
         self.enabled = self.was_enabled = False
@@ -101,14 +106,42 @@ class Remote(Module):
             unit, limit = self._unit()
             raise InputError(f"{value!r} {unit} for {self} must be from -{limit:g} to {limit:g} {unit}")
         self.target = round(target)
-        if self._command is Command.CSP:
+        if self._command.leads_position:
             self.target = (self.target + self.origin + _HALF) % _TURN - _HALF
             return round(target) / self._factor
         return self.target / self._factor
 
     def hold(self) -> None:
         """The target at which nothing moves: no torque, no velocity, or the position where the axis is."""
-        self.target = self.counts if self._command is Command.CSP else 0
+        self.target = self.counts if self._command.leads_position else 0
+
+    @property
+    def resting(self) -> float:
+        """The target at which nothing moves, as `aim` takes it: axis unit, unit/s or V."""
+        return (self.counts - self.origin) * self.per_count if self._command.leads_position else 0.0
+
+    def forget_set_points(self) -> None:
+        """No set-point has been handed over: the next target is a new one, wherever it is."""
+        self._placed = self._handed = None
+
+    def operate(self) -> None:
+        """Set the controlword of an enabled drive, with the hand-over of a new set-point in mode pp.
+
+        Bit 4 rises one cycle after the target was there, since a drive may take the objects of an RPDO one after the
+        other, and falls once the drive acknowledges by bit 12 of the statusword. Bit 5: at once, whatever moves.
+        """
+        self.controlword = codes.ENABLE_OPERATION
+        if self._command is not Command.PP:
+            return
+        if self.status & codes.MODE_12:
+            self._placed = None
+        elif self._placed is not None and self._placed == self.target != self._handed:
+            self._handed = self._placed
+        elif self._handed != self.target:
+            self._placed = self.target
+            return
+        if self._placed is not None and self._handed == self._placed:
+            self.controlword |= codes.BIT_4 | codes.BIT_5
 
     def fill(self) -> can.Message:
         """The RPDO with controlword and target as they are."""
@@ -116,7 +149,7 @@ class Remote(Module):
         return self.message
 
     def quit(self) -> None:
-        """Set the controlword that takes the power: at once in mode cst, by a quick stop in csp and csv."""
+        """Set the controlword that takes the power: at once in mode cst, by a quick stop in the others."""
         self.controlword = codes.DISABLE_VOLTAGE if self._command is Command.CST else codes.QUICK_STOP
 
     def lead(self, arm: bool) -> None:
@@ -132,6 +165,7 @@ class Remote(Module):
         name = {
             Command.CST: "V",
             Command.CSP: unit,
+            Command.PP: unit,
             Command.CSV: unit if self._settings.reads_velocity else f"{unit}/s",
         }
         return name[self._command], self._counts_limit / abs(self._factor)

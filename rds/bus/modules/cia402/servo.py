@@ -1,6 +1,9 @@
 """What is behind the drive's bus interface: amplifier, axis, encoder, and the cascaded loop at 4 kHz.
 
-    velocity demand + position gain · (position demand - position)  ->  velocity PI  ->  voltage, limited
+    velocity demand + position gain · (position demand - position)  ->  velocity PI  ->  current limit -> voltage limit
+
+This is the cascade of mrm-control's figure 7 without the D part. The current limit is in V: what drives the current
+through the armature's resistance, above the back-EMF v/K.
 
 The loop's instants are whole multiples of 0.25 ms of bus time, and the axis moves exactly from one to the next,
 however late the drive learns of it. The amplifier is a voltage amplifier without a current loop: a torque of 1000 ‰
@@ -55,6 +58,8 @@ class Servo:
         self.position_gain = _BANDWIDTH / _RATIO  # 1/s
         self.integral_time = parameters.tau  # s
         self.voltage_limit = volts
+        self.current_limit = 2.0 * volts  # V above the back-EMF: none, as that is all there can be
+        self._emf = 1.0 / parameters.K  # V per unit/s
         self.motion: Motion | None = None  # leads the loop; None: no loop
         self.torque: float | None = None  # V of cyclic torque; None: no voltage by command
         self.guarded = True  # whether limit switches and software limits count (not while homing or stopping)
@@ -169,9 +174,11 @@ class Servo:
             self.position_demand, self.following_error, self._behind_since = self.position, 0.0, None
         error = velocity / self.counts_per_unit - self.axis.velocity
         voltage = self._integral + self.velocity_gain * error
-        allowed = self._allowed(max(-self.voltage_limit, min(self.voltage_limit, voltage)))
+        emf = self._emf * self.axis.velocity
+        driven = max(emf - self.current_limit, min(emf + self.current_limit, voltage))
+        allowed = self._allowed(max(-self.voltage_limit, min(self.voltage_limit, driven)))
         self.limited = allowed != voltage
-        if not self.limited or error * voltage < 0.0:  # no winding up
+        if not self.limited or error * (voltage - allowed) < 0.0:  # no winding up
             self._integral += self.velocity_gain * error * TICK / self.integral_time
         self.axis.command(allowed, now)
 

@@ -28,6 +28,7 @@ class Command(Enum):
     CST = (Mode.CYCLIC_TORQUE, 0x6071)
     CSP = (Mode.CYCLIC_POSITION, 0x607A)
     CSV = (Mode.CYCLIC_VELOCITY, 0x60FF)
+    PP = (Mode.PROFILE_POSITION, 0x607A)
 
     @property
     def mode(self) -> Mode:
@@ -38,6 +39,11 @@ class Command(Enum):
     def target(self) -> int:
         """The target object's index."""
         return self.value[1]
+
+    @property
+    def leads_position(self) -> bool:
+        """Whether the target is a position."""
+        return self.target == 0x607A
 
 
 @dataclass(frozen=True)
@@ -145,6 +151,24 @@ def read_settings(table: Mapping[str, Any], machine: Machine, axes: Sequence[str
     )
 
 
+# what the loop hands out, by the drive's mode: the names of rds.modes.loop.commands
+_HANDED_OUT = {Command.CST: "voltage", Command.CSV: "velocity", Command.CSP: "position", Command.PP: "profile"}
+
+
+def commands(table: Mapping[str, Any], machine: Machine, axes: Sequence[str]) -> dict[str, str]:
+    """What each axis is commanded by. InputError for a table that will not do, and a spindle led along positions."""
+    handed = {}
+    for drive in read_settings(table, machine, axes).drives:
+        name = drive.axis.name
+        if drive.axis.is_spindle and drive.command.leads_position:
+            raise InputError(
+                f'mode = "{drive.command.name.lower()}" leads along positions, and {name} is a spindle: give it '
+                f'[bus.cia402.axis.{name}] with mode = "csv" (or "cst")'
+            )
+        handed[name] = _HANDED_OUT[drive.command]
+    return handed
+
+
 def _command(name: Any, where: str) -> Command:
     names = {command.name.lower(): command for command in Command}
     if not isinstance(name, str) or name not in names:
@@ -191,7 +215,7 @@ def _home_offset(table: Mapping[str, Any], counts: float, where: str) -> int | N
         raise InputError(
             f"home = {table['home']!r} says where homing ends; give its method as well: homing = 17", where
         )
-    offset = round(-counts * Quantity("position that home gets", "axis unit").check(table["home"], "home", where))
+    offset: int = round(-counts * Quantity("position that home gets", "axis unit").check(table["home"], "home", where))
     if not -_HALF <= offset < _HALF:
         raise InputError(f"home = {table['home']!r} is beyond what a drive can count", where)
     return offset
@@ -236,4 +260,4 @@ def _whole(table: Mapping[str, Any], key: str, default: int, allowed: Sequence[i
 
 
 def _more_than_0(table: Mapping[str, Any], key: str, default: float, meaning: str, where: str) -> float:
-    return Quantity(meaning, above=0.0).check(table.get(key, default), key, where)
+    return float(Quantity(meaning, above=0.0).check(table.get(key, default), key, where))

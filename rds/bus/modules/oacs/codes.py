@@ -20,7 +20,7 @@ ACCELERATION = 0x150  # + node
 CURRENT = 0x160  # + node
 IDENTITY = 0x1E000000  # + node << 20 + serial number; 29 bits
 
-NODES = range(0x02, 0x10)  # 0x000 and 0x001 are taken by table 5, 0x010 begins the cyclic frames
+NODES = range(0x02, 0x0F)  # 0x000 and 0x001 are taken by table 5, 0x00F begins the cyclic frames
 SERIALS = 1 << 20
 VERSION = 1  # of the dialect
 DUTY = 255  # of the motor driver's pulse width: the whole supply
@@ -159,7 +159,7 @@ class Parameter(IntEnum):
 
 
 def check_node(node: int) -> int:
-    """`node` itself; InputError unless it is a module's number, 2 to 15."""
+    """`node` itself; InputError unless it is a module's number, 2 to 14."""
     if isinstance(node, bool) or not isinstance(node, int) or node not in NODES:
         raise InputError(f"module number {node!r} must be from {NODES[0]} to {NODES[-1]}")
     return node

@@ -6,8 +6,11 @@
     removed    a module that answers no more
     added      a module that answers, and did not before
     clash      two modules share a number
+    offered    after a change: the modules that are there make a machine (offers.py)
+    refused    after a change: they make none
+    moving     an axis of the machine that was accepted moves
     ready      after a change: as many modules are there as should be, no two share a number, and each has been asked
-               for its data and has given them whole
+               for its data and has given them whole; where machines are offered, one has been accepted
 
 Times are those at which the change was noticed, a second after it at most (watch.py).
 """
@@ -58,10 +61,25 @@ class Reconfigurations:
         self._changed = False
         self._described: set[tuple[int, int | None]] = set()  # modules that have given their data
 
+    def go_on(self, bus: can.BusABC) -> None:
+        """Look on this open bus from now on."""
+        self._bus = bus
+        self._watch.go_on(bus)
+
     @property
     def expected(self) -> int:
         """How many modules there should be; 1 before the first look, if nobody said."""
         return self._expected or 1
+
+    @property
+    def now(self) -> float:
+        """s since the first look; 0 before it."""
+        return 0.0 if self._began is None else self._clock() - self._began
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of the modules that are there."""
+        return sorted(module.id for module in self._watch.modules)
 
     def look(self) -> list[Happened]:
         """What has happened since the last look. MachineError if the bus fails."""

@@ -118,7 +118,7 @@ class Conversation:
 
     def _is_mine(self, message: Decoded) -> bool:
         if message.kind == "Reply":
-            return message.fields["BoardID"] == self.number
+            return bool(message.fields["BoardID"] == self.number)
         return message.node == self.number and message.kind not in ("Command", "Flow")
 
 

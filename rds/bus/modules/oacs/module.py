@@ -28,7 +28,7 @@ from rds.bus.modules.oacs.plant import Plant
 from rds.bus.modules.oacs.readings import Readings
 from rds.bus.modules.oacs.transfer import encode_description
 from rds.bus.modules.rds import frames
-from rds.bus.modules.rds.frames import Status
+from rds.bus.modules.rds.frames import HIGHEST_VOLTAGE, Status
 from rds.bus.modules.rds.module import AxisModule, machine_parameters
 from rds.core.errors import MachineError
 from rds.machines.machine import Axis
@@ -57,6 +57,7 @@ class OacsModule:
         sample_period: float,
         start: float,
         serial: int | None = None,
+        range: float = HIGHEST_VOLTAGE,
     ):
         self.name = axis.name
         self.node = data.node
@@ -64,12 +65,12 @@ class OacsModule:
         self.serial = secrets.randbelow(words.SERIALS) if serial is None else serial
         self.plant = Plant(machine_parameters(axis), data, start)
         self.mover = Mover(self.plant)
-        self.cyclic = AxisModule(axis, slot, sample_period, start)
+        self.cyclic = AxisModule(axis, slot, sample_period, start, range=range)
         self.cyclic.motion = self.plant
         self.readings = Readings(self)
         self.emergency_input = False
         self.draft: Tuning = self.mover.tuning  # parameters received that do not take effect yet
-        self._description = encode_description(data.describe(self.serial))
+        self._description = encode_description(data.describe(self.serial, slot + 1))
         self._sender: Sender | None = None
         self._queue: list[Due] = []
         self._order = count()
@@ -87,8 +88,7 @@ class OacsModule:
     @property
     def identifiers(self) -> list[int]:
         """What the module listens to; all are standard frames."""
-        cyclic = [frames.COMMAND, frames.DRY_COMMAND, frames.SETUP, frames.CALL]
-        return [words.GENERAL, words.COMMAND + self.node, words.FLOW + self.node, *cyclic]
+        return [words.GENERAL, words.COMMAND + self.node, words.FLOW + self.node, *self.cyclic.hears]
 
     @property
     def commanded(self) -> bool:
@@ -117,7 +117,7 @@ class OacsModule:
         if extended:
             return []
         try:
-            if frames.COMMAND <= identifier <= frames.CALL:
+            if frames.MORE_VOLTAGES <= identifier <= frames.CALL:
                 return self._cycle(identifier, data, at)
             if identifier == words.FLOW + self.node:
                 self._download(data, at)

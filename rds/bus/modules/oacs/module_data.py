@@ -1,7 +1,7 @@
 """What a distributed module knows of itself and what its board does: `[axis.NAME.module]` of a machine's file.
 
 The other tables of the file (rds/machines) have an axis's number, travel, resolution and physics; what this one does
-not say follows from them, with a quick board. So every machine can be served, if its nodes are from 2 to 15.
+not say follows from them, with a quick board. So every machine can be served, if its nodes are from 2 to 14.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from rds.bus.modules.oacs.codes import Kind, check_node
 from rds.bus.modules.oacs.transfer import JOINTS, UNITS, Matrix, ModuleDescription, encode_description
 from rds.bus.modules.rds.module import machine_parameters
 from rds.core.errors import InputError
+from rds.machines.library import Interface
 from rds.machines.machine import Axis, Machine
+from rds.machines.module_table import CARRIES_ON, MOUNTED_BY
 from rds.models.machine_axis import MachineParameters
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
@@ -54,19 +56,23 @@ class ModuleData:
     debounce: float = 0.1  # oacs-thesis 6.10
     current_start: float = 0.0  # A, at the supply and at rest
     current_run: float = 0.0  # A, at the supply and full speed
+    current_peak: float = 0.0  # A, the largest
     accelerometer: tuple[int, int, int] | None = None  # readings at rest; None: it has none
     vibration: tuple[int, int, int] = (0, 0, 0)  # amplitude of the readings at full speed
     interrupt_service: float = 4e-6
     interrupt_pause: float = 0.0  # during which no interrupt is served
     interrupt_every: float = 0.0  # from one such pause to the next; 0: none
+    mounted_by: Interface | None = None  # None: it does not say
+    carries_on: Interface | None = None
+    accessory: str = ""  # type text of the accessory mounted on it
 
     @property
     def unit(self) -> str:
         """Unit of positions and lengths."""
         return UNITS[self.kind]
 
-    def describe(self, serial: int) -> ModuleDescription:
-        """What a download of this module carries."""
+    def describe(self, serial: int, slot: int = 0) -> ModuleDescription:
+        """What a download of this module carries; `slot` is the place of its voltage in cyclic commands, from 1."""
         return ModuleDescription(
             self.kind,
             self.letter,
@@ -84,6 +90,10 @@ class ModuleData:
             self.supply,
             self.matrix,
             self.joint,
+            self.mounted_by,
+            self.carries_on,
+            self.accessory,
+            slot,
         )
 
 
@@ -117,6 +127,9 @@ def module_data(axis: Axis, supply: float, path: str = "") -> ModuleData:
         "start": inside,
     }
     values = defaults | values
+    for side in (MOUNTED_BY, CARRIES_ON):
+        if side in values:
+            values[side] = Interface(side, **values[side])
     if abs(values["counts_per_unit"] * axis.resolution - 1.0) > _ROUNDING:
         raise InputError(
             f"counts_per_unit = {values['counts_per_unit']:g} contradicts the axis's resolution of {axis.resolution:g}"

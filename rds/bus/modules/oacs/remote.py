@@ -49,6 +49,7 @@ class Information:
         """For JSON."""
         tuning = asdict(self.tuning) | {"controller": self.tuning.controller.name}
         description = asdict(self.description) | {"kind": self.description.kind.name.lower()}
+        description["version"] = self.description.version
         return {"number": self.number, **description, "unit": self.description.unit, "tuning": tuning}
 
 

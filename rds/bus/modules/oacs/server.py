@@ -54,7 +54,7 @@ def serve(
     data = read_modules(machine)
     messages.load()  # half a second, which must not fall between two cycles
     lines = lines or queue.SimpleQueue()
-    make_node = partial(_make_node, machine.sample_period, data, serials or {})
+    make_node = partial(_make_node, machine, data, serials or {})
     serve_nodes(
         *(machine, make_node, interface, channel, axes, ready, stop),
         chores=partial(_do_lines, lines),
@@ -64,7 +64,7 @@ def serve(
 
 
 def _make_node(
-    sample_period: float,
+    machine: Machine,
     data: Mapping[str, Any],
     serials: Mapping[str, int],
     slot: int,
@@ -72,7 +72,8 @@ def _make_node(
     opener: Opener,
 ) -> OacsNode:
     def make(start: float) -> OacsModule:
-        return OacsModule(axis, data[axis.name], slot, sample_period, start, serials.get(axis.name))
+        own, period = serials.get(axis.name), machine.sample_period
+        return OacsModule(axis, data[axis.name], slot, period, start, own, machine.converter.range)
 
     return OacsNode(axis.name, make, opener)
 

@@ -54,6 +54,10 @@ class Watch:
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
+    def go_on(self, bus: can.BusABC) -> None:
+        """Call on this open bus from now on; not while it watches in the background."""
+        self._bus = bus
+
     @property
     def modules(self) -> list[ModuleInfo]:
         """Those that are there."""

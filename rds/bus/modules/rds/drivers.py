@@ -1,4 +1,7 @@
-"""The host's side of the cyclic frames: one command out as the tick, one answer of each module in."""
+"""The host's side of the cyclic frames: one command out as the tick, one answer of each module in.
+
+Before the tick of a machine with more than four axes goes a frame with the voltages of the others.
+"""
 
 from __future__ import annotations
 
@@ -86,9 +89,11 @@ class AxisDrivers(CanDrivers[_Module]):
     ):
         names = list(machine.axes)
         used = [machine.axis(name) for name in (names if axes is None else axes)]
-        self._slots = [names.index(axis.name) for axis in used]
-        if max(self._slots, default=0) >= frames.SLOTS:
-            raise InputError(f"a command carries the voltages of {', '.join(names[: frames.SLOTS])} only", machine.path)
+        self._slots = [machine.slots[axis.name] for axis in used]
+        self._range = machine.converter.range  # V
+        self._scale = self._range / frames.HIGHEST_VOLTAGE
+        if len(names) > frames.MOST_AXES:
+            raise InputError(f"{len(names)} axes; commands carry {frames.MOST_AXES} voltages", machine.path)
         period = machine.sample_period if sample_period is None else sample_period
         self._setup = frames.encode_setup(period)
         modules = [_Module(axis) for axis in used]
@@ -99,7 +104,7 @@ class AxisDrivers(CanDrivers[_Module]):
                 frames.answer_identifier(axis.node): partial(self._take_answer, module)
                 for axis, module in zip(used, modules, strict=True)
             },
-            hosts=(frames.COMMAND, frames.DRY_COMMAND, frames.SETUP),
+            hosts=(frames.COMMAND, frames.DRY_COMMAND, frames.SETUP, frames.MORE_VOLTAGES),
             also=(frames.GENERAL,),
             bus=bus,
             interface=interface,
@@ -115,8 +120,11 @@ class AxisDrivers(CanDrivers[_Module]):
         self._number_per_second = 2.0 / period
         self._number_origin = secrets.randbelow(frames.NUMBERS)
         self._frame = can.Message(arbitration_id=self._identifier, is_extended_id=False, data=bytes(8))
+        self._more = None
+        if max(machine.slots.values()) >= frames.SLOTS:
+            self._more = can.Message(arbitration_id=frames.MORE_VOLTAGES, is_extended_id=False, data=bytes(8))
         self._zero = frames.encode_voltages(())
-        self._waiting = self._zero  # without its number
+        self._waiting = self._waiting_more = self._zero  # without their number
         self._waiting_voltages: tuple[float, ...] = (0.0,) * len(used)
         self._sent_voltages = self._waiting_voltages
 
@@ -138,7 +146,7 @@ class AxisDrivers(CanDrivers[_Module]):
 
     def _set_up(self, watch: Watch) -> None:
         """Set the sample period, and check by zero-volt ticks that every module answers."""
-        self._waiting = self._zero
+        self._waiting = self._waiting_more = self._zero
         self._waiting_voltages = (0.0,) * len(self._modules)
         self._send(frames.SETUP, self._setup)
         deadline = time.monotonic() + _STARTING
@@ -160,7 +168,11 @@ class AxisDrivers(CanDrivers[_Module]):
 
     def _tick(self) -> None:
         self._sent_voltages = self._waiting_voltages
-        self._frame.data[:] = frames.number_voltages(self._waiting, self._number())
+        number = self._number()
+        if self._more is not None:
+            self._more.data[:] = frames.number_voltages(self._waiting_more, number)
+            self._bus.send(self._more, self._timeout * SILENT_AFTER)
+        self._frame.data[:] = frames.number_voltages(self._waiting, number)
         self._bus.send(self._frame, self._timeout * SILENT_AFTER)
         for module in self._modules:
             module.order.tick()
@@ -246,19 +258,27 @@ class AxisDrivers(CanDrivers[_Module]):
     def write(self, voltages: Sequence[float]) -> tuple[float, ...]:
         """Take the voltages (V) that the next tick sends; return those of the last tick, which act from it on.
 
-        What is returned is what was sent, in whole units of 20/16384 V. InputError outside ±10 V.
+        What is returned is what was sent, in whole units of 1/8192 of the converter's range. InputError outside it.
         """
         if len(voltages) != len(self._slots):
             raise InputError(f"{len(voltages)} voltages for {len(self._slots)} axes")
         if any(module.missed >= SILENT_AFTER for module in self._modules):
             voltages = (0.0,) * len(self._slots)  # nobody moves by positions that are not known
             self.counters.cut += 1
-        command = [0.0] * frames.SLOTS
+        command = [0.0] * (frames.SLOTS if self._more is None else frames.MOST_AXES)
+        limit, highest, scale = self._range, frames.HIGHEST_VOLTAGE, self._scale
         for slot, voltage in zip(self._slots, voltages, strict=True):
-            command[slot] = voltage
-        self._waiting = frames.encode_voltages(command)
+            if not -limit <= voltage <= limit:  # false for NaN too
+                raise InputError(
+                    f"voltage {voltage!r} V of slot {slot} must be from -{limit:g} to {limit:g} V; limit it before"
+                )
+            command[slot] = max(-highest, min(highest, voltage / scale))  # the quotient's last bit may be beyond
+        self._waiting = frames.encode_voltages(command[: frames.SLOTS])
         sent = frames.decode_voltages(self._identifier, self._waiting)
-        self._waiting_voltages = tuple(sent[slot] for slot in self._slots)
+        if self._more is not None:
+            self._waiting_more = frames.encode_voltages(command[frames.SLOTS :])
+            sent += frames.decode_voltages(frames.MORE_VOLTAGES, self._waiting_more)
+        self._waiting_voltages = tuple(self._scale * sent[slot] for slot in self._slots)
         return self._sent_voltages
 
     def confirm(self) -> None:
@@ -272,10 +292,13 @@ class AxisDrivers(CanDrivers[_Module]):
 
     def stop(self) -> None:
         """Zero volts on all axes, now. If the bus is broken, the modules' watchdogs do it; the log says so."""
-        self._waiting = self._zero
+        self._waiting = self._waiting_more = self._zero
         self._waiting_voltages = (0.0,) * len(self._modules)
         try:
-            self._send(self._identifier, frames.number_voltages(self._zero, self._number()))
+            number = self._number()
+            if self._more is not None:
+                self._send(frames.MORE_VOLTAGES, frames.number_voltages(self._zero, number))
+            self._send(self._identifier, frames.number_voltages(self._zero, number))
             self._sent_voltages = self._waiting_voltages
             self.counters.ticks += 1
             for module in self._modules:

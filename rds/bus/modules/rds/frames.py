@@ -5,19 +5,29 @@ All frames are little-endian, and standard (11-bit) but for the last:
 | identifier | from   | bytes | content                                                                              |
 | ---------- | ------ | ----- | ------------------------------------------------------------------------------------ |
 | 0x001      | anyone | 1-8   | first byte 8: emergency stop of every module (the same frame as in the oacs dialect) |
+| 0x00F      | host   | 8     | voltages of axes 5 to 8, as in 0x010; only where there are such, just before 0x010   |
 | 0x010      | host   | 8     | cycle command and tick: four int16, see below                                        |
 | 0x011      | host   | 8     | the same as a dry run: modules answer, and apply zero volts                          |
 | 0x012      | host   | 8     | set-up: uint32 sample period in µs, uint32 reserved                                  |
 | 0x013      | host   | 0     | call: every module reports, nothing else happens                                     |
-|            |        | 1     | 8: emergency stop is reset, modules report; 9: every module says its identity        |
+|            |        | 1     | 8: emergency stop is reset, modules report; 9: every module says its identity;       |
+|            |        |       | 10: every module says what its clock showed when this frame was on the bus           |
+| 0x014 to   | host   | 2-8   | set points of methods A, B and C, and what goes with them: motion_frames.py          |
+| 0x016      |        |       |                                                                                      |
 | 0x020+node | module | 8     | int32 position counts, uint8 status, uint8 kind, uint16 count of ticks heard         |
 | 0x1C000000 | module | 8     | identity; + serial number (24 bits): uint8 node, uint8 version, 2 reserved,          |
 |            |        |       | uint32 process (0: firmware); extended, so that two modules of one node never collide |
+| 0x1D000000 | module | 8     | clock; + node; uint64 ns of the module's own clock; extended                          |
 
-A command's int16 are voltages in 20/65536 V with their two lowest bits clear, in axis order. Those bits, slot 0 lowest,
-make the command's number: its host's clock in half sample periods, 1 to 255 and round again; 0 is a command by hand
-(see freshness.py). The lower identifier wins arbitration: a tick is never delayed by an answer. The voltages' unit
-makes the levels of a 12-bit ±10 V converter (and of any other of up to 14 bits) exact.
+A command's int16 are voltages in 20/65536 V with their two lowest bits clear, in axis order (or in that of the axes'
+slots). Those bits, slot 0 lowest, make the command's number: its host's clock in half sample periods, 1 to 255 and
+round again; 0 is a command by hand (see freshness.py). The lower identifier wins arbitration: a tick is never delayed
+by an answer. The voltages' unit makes the levels of a 12-bit ±10 V converter (and of any other of up to 14 bits) exact.
+On a machine whose converter has another range, 10 V stand for that.
+
+A machine of five to eight axes gets its voltages in two frames and has one tick even so, 0x010 or 0x011, which is sent
+last: all modules latch and act at it. Those of axes 5 to 8 take the voltages of the 0x00F before it, which has the same
+number. A tick whose 0x00F was lost leaves their voltage as it was until its time is over; by hand, it means zero volts.
 """
 
 from __future__ import annotations
@@ -31,20 +41,25 @@ from rds.core.errors import InputError, MachineError
 from rds.core.shared_quantities import SAMPLE_PERIOD
 
 GENERAL = 0x001  # a call to all modules of all dialects
+MORE_VOLTAGES = 0x00F  # below the tick, for it goes first
 COMMAND = 0x010
 DRY_COMMAND = 0x011
 SETUP = 0x012
 CALL = 0x013
+MOTION = range(0x014, 0x017)  # methods A, B and C: motion_frames.py
 ANSWER = 0x020  # + node
 IDENTITY = 0x1C000000  # + serial number; extended
 SERIALS = 1 << 24
+CLOCK = 0x1D000000  # + node; extended
 
 EMERGENCY = b"\x08" + bytes(7)  # data of GENERAL: zero volts until it is reset
 RESET = b"\x08"  # data of CALL: release the latch of the emergency stop
 WHO = b"\x09"  # data of CALL: say your identity
+TIME = b"\x0a"  # data of CALL: say your clock at this frame
 VERSION = 1  # of these frames
 
-SLOTS = 4  # voltages in a command
+SLOTS = 4  # voltages in a frame
+MOST_AXES = 2 * SLOTS  # of a machine
 NODES = range(1, 0x60)  # so that answers end below 0x080, where CANopen's emergency and process data begin
 VOLTS_PER_UNIT = 20.0 / 16384.0  # of a voltage: four of the int16's, whose two lowest bits carry the number
 HIGHEST_VOLTAGE = 10.0  # V; sent as 10 V less one unit, for an int16 ends there
@@ -55,9 +70,11 @@ COUNT_TURNS = 1 << 16  # the tick count starts again at 0
 IDENTIFIERS = (
     (GENERAL, GENERAL, "stops every module"),
     (COMMAND, COMMAND, "sets voltages"),
+    (MORE_VOLTAGES, MORE_VOLTAGES, "sets the voltages of axes 5 to 8"),
     (DRY_COMMAND, DRY_COMMAND, "is a command's tick"),
     (SETUP, SETUP, "sets the sample period"),
     (CALL, CALL, "calls modules, or resets their emergency stop"),
+    (MOTION[0], MOTION[-1], "moves axes by set points"),
     (ANSWER + NODES[0], ANSWER + NODES[-1], "would pass for a module's measured position"),
 )
 
@@ -161,7 +178,7 @@ def decode_setup(identifier: int, data: bytes | bytearray) -> float:
     microseconds, _ = _SETUP.unpack(data)
     if microseconds == 0:
         raise MachineError(f"frame {identifier:#05x} sets a sample period of 0 µs")
-    return microseconds * 1e-6
+    return float(microseconds * 1e-6)
 
 
 def answer_identifier(node: int) -> int:
@@ -196,6 +213,18 @@ def decode_identity(identifier: int, data: bytes | bytearray) -> Identity | None
         return None
     node, version, _, process = _IDENTITY.unpack(data)
     return Identity(node, identifier - IDENTITY, process, version)
+
+
+def encode_clock(node: int, seconds: float) -> tuple[int, bytes]:
+    """Identifier (extended) and data of the answer to the call TIME."""
+    return CLOCK + node, round(seconds * 1e9).to_bytes(8, "little")
+
+
+def decode_clock(identifier: int, data: bytes | bytearray) -> tuple[int, float] | None:
+    """Node, and its clock in s, that this extended frame tells; None if it is another frame."""
+    if identifier - CLOCK not in NODES or len(data) != 8:
+        return None
+    return identifier - CLOCK, int.from_bytes(data, "little") * 1e-9
 
 
 def _wrong(identifier: int, data: bytes | bytearray, what: str, size: int) -> MachineError:

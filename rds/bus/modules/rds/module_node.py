@@ -9,22 +9,27 @@ import can
 from rds.bus.modules.bus_node import BusNode, Outgoing
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.module import AxisModule
+from rds.bus.modules.rds.motion_frames import CONTROL
 
 
 class ModuleNode(BusNode):
-    """The module that `make_module` makes, given the bus time now, s."""
+    """The module that `make_module` makes, given the bus time now, s; its own clock is `drift` ppm faster than that."""
 
     def __init__(
-        self, name: str, make_module: Callable[[float], AxisModule], open_bus: Callable[[list[int]], can.BusABC]
+        self,
+        name: str,
+        make_module: Callable[[float], AxisModule],
+        open_bus: Callable[[list[int]], can.BusABC],
     ):
         super().__init__(name, open_bus)
-        self.module = make_module(self.clock.now())
+        self._switched_on = self.clock.now()
+        self.module = make_module(self._switched_on)
         self.join()
 
     @property
     def identifiers(self) -> list[int]:
         """The cyclic exchange, and the emergency stop of all."""
-        return [frames.GENERAL, frames.COMMAND, frames.DRY_COMMAND, frames.SETUP, frames.CALL]
+        return [frames.GENERAL, *self.module.hears]
 
     @property
     def expires(self) -> float | None:
@@ -45,6 +50,12 @@ class ModuleNode(BusNode):
         """To the module; extended and remote frames mean nothing to it."""
         if message.is_extended_id or message.is_remote_frame:
             return []
+        if message.arbitration_id == frames.CALL and message.data == frames.TIME:
+            shown = max(0.0, at - self._switched_on) * (1.0 + self.module.drift)
+            return [(*frames.encode_clock(self.module.identity.node, shown), True)]
+        if message.arbitration_id == CONTROL:
+            told = self.module.control(message.data, at)
+            return [] if told is None else [(*told, True)]
         answers = self._answers(self.module.receive(message.arbitration_id, message.data, at))
         if message.arbitration_id == frames.CALL and message.data == frames.WHO:
             return [(*frames.encode_identity(self.module.identity), True), *answers]

@@ -14,17 +14,19 @@ if __name__ == "__main__":  # a program of our own
 import queue
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rds.bus.modules import server_program
 from rds.bus.modules.buttons import press_buttons
+from rds.bus.modules.drift import drift_by_axis
 from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.module_node import ModuleNode
 from rds.bus.modules.serve_loop import Opener, serve_nodes
 from rds.bus.tools.link import BUILTIN
-from rds.core.private_files import keep_process_private
+from rds.core.private_files import keep_process_private, write_private
 from rds.machines import Machine
 from rds.machines.machine import Axis
 
@@ -36,14 +38,39 @@ def serve(
     axes: Sequence[str] | None = None,
     ready: Callable[[], Any] | None = None,
     stop: threading.Event | None = None,
+    drift: Any = (),
+    trace: str | None = None,
     **options: Any,
 ) -> None:
-    """Serve the modules of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`."""
+    """Serve the modules of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`.
+
+    `drift` is how much too fast their clocks go, ppm by axis, as in "X:50,Y:-30", beside what the machine file says:
+    what they tell, and by which they move in methods B and C. At the end the file `trace` (CSV) gets where the
+    carriages really were at each step of such a motion.
+    """
+    drifting = drift_by_axis(drift, machine)
+    served: list[ModuleNode] = []
 
     def make_node(slot: int, axis: Axis, opener: Opener) -> ModuleNode:
-        return ModuleNode(axis.name, partial(AxisModule, axis, slot, machine.sample_period), opener)
+        off, volts = drifting[axis.name] * 1e-6, machine.converter.range
+        node = ModuleNode(
+            axis.name, partial(AxisModule, axis, slot, machine.sample_period, drift=off, range=volts), opener
+        )
+        node.module.by_itself.gauge = None if trace is None else []
+        served.append(node)
+        return node
 
-    serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
+    try:
+        serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
+    finally:
+        if trace is not None:
+            write_private(Path(trace), gauge_rows({node.name: node.module for node in served}).encode())
+
+
+def gauge_rows(modules: Mapping[str, AxisModule]) -> str:
+    """A row for each step of each module: axis, instant of the bus (s), position of the carriage."""
+    rows = ((name, *row) for name, module in modules.items() for row in module.by_itself.gauge or ())
+    return "".join(f"{name},{at:.7f},{position:.6f}\n" for name, at, position in rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,12 +10,12 @@ import time
 _NEW_USER = 0x10000000
 
 
-def identity():
+def identity() -> list[int]:
     """User, and process number: not root, and in a namespace of its own."""
     return [os.getuid(), os.getpid()]
 
 
-def open_socket():
+def open_socket() -> bool:
     """Whether there is a network to reach."""
     try:
         socket.socket().close()
@@ -24,17 +24,17 @@ def open_socket():
     return True
 
 
-def make_namespace():
+def make_namespace() -> bool:
     """Whether it could become root in a namespace of its own."""
-    return ctypes.CDLL(None).unshare(_NEW_USER) == 0
+    return bool(ctypes.CDLL(None).unshare(_NEW_USER) == 0)
 
 
-def trace_parent():
+def trace_parent() -> bool:
     """Whether it could attach to the process above it."""
-    return ctypes.CDLL(None).ptrace(16, os.getppid(), 0, 0) == 0
+    return bool(ctypes.CDLL(None).ptrace(16, os.getppid(), 0, 0) == 0)
 
 
-def write_system():
+def write_system() -> list[str]:
     """The places that it can write to and should not."""
     found = []
     for folder in ("/", "/dev", "/etc", "/opt/packages", "/opt/rds", "/proc", "/usr/lib"):
@@ -46,7 +46,7 @@ def write_system():
     return found
 
 
-def count_children(most):
+def count_children(most: int) -> int:
     """How many children it can have, up to `most`."""
     children: list[int] = []
     try:
@@ -64,7 +64,7 @@ def count_children(most):
     return len(children)
 
 
-def take_memory(size):
+def take_memory(size: int) -> bool:
     """Whether it gets `size` bytes at once."""
     try:
         mmap.mmap(-1, size, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS).close()
@@ -73,6 +73,6 @@ def take_memory(size):
     return True
 
 
-def cpu_limit():
+def cpu_limit() -> int:
     """Seconds of computing time of one process."""
     return resource.getrlimit(resource.RLIMIT_CPU)[1]

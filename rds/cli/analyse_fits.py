@@ -1,0 +1,90 @@
+"""`rds bus analyse` where it says what fits: methods on a serial line by baud rate, a CAN bus by bit rate."""
+
+from __future__ import annotations
+
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from rds.cli.common import print_json
+
+if TYPE_CHECKING:
+    from rds.machines import Machine
+
+_BITRATES = (125_000, 250_000, 500_000, 1_000_000)
+_CAN_COLUMNS = ("bit rate [bit/s]", "load at worst [%]", "last answer at worst [ms]", "margin [%]", "fits")
+
+
+def show_serial(
+    machine: Machine, baud: int | None, units: int | None, period: float | None, plot: Path | None, json: bool
+) -> bool:
+    """The table of methods on a serial line; whether method A with answers fits at `baud` (default 115200)."""
+    from rds.bus.analysis import serial_line
+    from rds.bus.hub.bus_settings import BAUD, DEFAULT_BAUD
+
+    rate = DEFAULT_BAUD if baud is None else BAUD.check(baud, "baud")
+    count = len(machine.axes) if units is None else units
+    T = machine.sample_period if period is None else period
+    bauds = sorted({*serial_line.BAUDS, rate}) if baud is None else [rate]
+    rows = serial_line.table(count, T, bauds)
+    _draw(plot, lambda: serial_line.plot(machine, T))
+    asked = serial_line.fits(count, rate, T)[1]
+    rest = serial_line.filling_time(count, rate)
+    found = {
+        "machine": machine.name,
+        "units": count,
+        "period_s": T,
+        "columns": list(serial_line.COLUMNS),
+        "rows": rows,
+        "baud": rate,
+        "fits": asked.fits,
+        "filling_s": rest,
+    }
+    if json:
+        print_json(found)
+        return asked.fits
+    from rds.cli.console import cell, show_table
+
+    title = f"{machine.name}: {count} units, a period of {T * 1e3:g} ms"
+    show_table(title, serial_line.COLUMNS, [[cell(value) for value in row] for row in rows])
+    typer.echo(
+        f"At {rate} bit/s a cycle with answers takes {asked.time * 1e3:.2f} ms: it "
+        f"{'fits, and leaves' if asked.fits else 'does not fit; it misses'} {abs(asked.left) * 1e3:.2f} ms. "
+        f"Filling the buffers of the thesis stops the motion for {rest:.2f} s."
+    )
+    if plot is not None:
+        typer.echo(f"plot: {plot}")
+    return asked.fits
+
+
+def can_rows(machine: Machine, period: float | None, **words: Any) -> list[list[Any]]:
+    """What fits on a CAN bus, by bit rate: load, the last answer at worst, and the margin to the period."""
+    from rds.bus.analysis.analysis_report import analyse
+
+    T = machine.sample_period if period is None else period
+    rows: list[list[Any]] = []
+    for bitrate in _BITRATES:
+        found = analyse(machine, bitrate, period, **words)
+        bounded = isfinite(found.worst_cycle)
+        last = found.worst_cycle * 1e3 if bounded else None
+        margin = 100.0 * (1.0 - found.worst_cycle / T) if bounded else None
+        rows.append([bitrate, found.worst_load_percent, last, margin, "yes" if found.met else "no"])
+    return rows
+
+
+def show_can(rows: list[list[Any]]) -> None:
+    """The table of `can_rows`."""
+    from rds.cli.console import cell, show_table
+
+    show_table("What fits", _CAN_COLUMNS, [[cell(value) for value in row] for row in rows])
+
+
+def _draw(plot: Path | None, draw: Any) -> None:
+    if plot is None:
+        return
+    from rds.core.atomic import write_files
+
+    picture, kind = draw(), plot.suffix.removeprefix(".") or "png"
+    write_files({plot: lambda stream: picture.savefig(stream, format=kind)})

@@ -1,0 +1,102 @@
+"""The Smith predictor: a law of the library, designed without delay, around a model of the axis.
+
+    ŷ = y + x̂(t) - x̂(t - delay)        (O. J. M. Smith, Chem. Eng. Prog. 53 (1957) 217-219)
+
+with x̂ the model's position on the voltages that were sent. For an axis, which integrates, the difference of both is
+the distance that the voltages on their way will move it; the inner law gets ŷ, and sees an axis without delay. It gets
+the reference of the instant at which its voltage will act, too. A constant disturbance leaves an error even under an
+inner law with an integral: use `lqg` where that matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import floor
+from typing import Any
+
+from rds.controllers import feedforward, modified_pid, pid, proportional, tracking
+from rds.controllers.axis_data import axis_data
+from rds.controllers.observer import held_axis
+from rds.core.errors import InputError
+from rds.core.quantities import Anything, Choice, Declaration, Quantity
+from rds.core.types import Controller, Reference, Source
+
+NAME = "smith"
+_INNER = {
+    "p": proportional,
+    "pid": pid,
+    "modified-pid": modified_pid,
+    "tracking": tracking,
+    "feedforward": feedforward,
+}
+OPTIONS: Mapping[str, Declaration] = {
+    "delay": Quantity("from a sampling instant until its voltage acts", "s", 0.0, 1000.0, default=0.0),
+    "law": Choice("the law that is designed without delay", tuple(_INNER), "tracking"),
+    "options": Anything("its options, as in a table of its own"),
+}
+_LONGEST = 200  # samples of delay
+_ROUNDING = 1e-9  # of a sample
+
+
+def control(t: float, r: Reference, y: float, state: Any, params: Mapping[str, Any]) -> tuple[float, Any]:
+    """Voltage (V) and next state: the inner law's; the model's velocity with and without delay; the voltages sent.
+
+    The state's second part is the distance that the voltages on their way move the axis, mm.
+    """
+    inner, ahead, fast, slow, sent = state
+    u, inner = params["inner"](t, _later(r, params["delay"]), y + ahead, inner, params["inner_params"])
+    whole, first, rest, over = params["prediction"]
+    x, fast = _moved(0.0, fast, u, over)
+    sent = (u, *sent)
+    late, slow = _moved(0.0, slow, sent[whole + 1], first)
+    late, slow = _moved(late, slow, sent[whole], rest)
+    return u, (inner, ahead + x - late, fast, slow, sent[:-1])
+
+
+def make(
+    axis_model: Mapping[str, Any], T: float, converter_range: float, *, unit: str = "mm", **options: Any
+) -> Controller:
+    """A Smith predictor around a law of the library; see `rds.controllers.library_controller` and `OPTIONS`.
+
+    InputError for a spindle, a delay of more than 200 samples, and what the inner law refuses.
+    """
+    from rds.core.options import check_known
+    from rds.core.quantities import checked
+
+    owner = f"controller {NAME!r}"
+    check_known(options, OPTIONS, owner)
+    values = {
+        name: checked(declared, options[name], name, owner) if name in options else declared.default
+        for name, declared in OPTIONS.items()
+    }
+    axis = axis_data(axis_model, T, converter_range, unit, owner)
+    if axis.spindle:
+        raise InputError(f"{owner} drives position axes; use the controller 'pid' for a spindle")
+    delay, of_inner = values["delay"], values["options"] or {}
+    if delay > _LONGEST * T:
+        raise InputError(f"{owner}: delay = {delay:g} s is more than {_LONGEST} samples of {T:g} s")
+    if not isinstance(of_inner, Mapping):
+        raise InputError(f"{owner}: options = {of_inner!r} must be a table of the inner law's options")
+    inner = _INNER[values["law"]].make(axis_model, T, converter_range, unit=unit, **of_inner)
+    whole = floor(delay / T + _ROUNDING)
+    left = max(delay - whole * T, 0.0)
+    parts = (held_axis(axis.tau, axis.K, time) for time in (left, T - left, T))
+    params = {
+        "delay": delay,
+        "law": values["law"],
+        "inner": inner.control,
+        "inner_params": dict(inner.params),
+        "prediction": (whole, *parts),
+    }
+    start = (inner.initial_state, 0.0, 0.0, 0.0, (0.0,) * (whole + 1))
+    return Controller(control, start, params, Source(NAME))
+
+
+def _later(r: Reference, time: float) -> Reference:
+    """The reference extrapolated by its velocity and acceleration: the inner law's voltage acts so much later."""
+    return Reference(r[0] + r[1] * time + 0.5 * r[2] * time * time, r[1] + r[2] * time, r[2])
+
+
+def _moved(x: float, v: float, u: float, over: tuple[float, float, float, float]) -> tuple[float, float]:
+    a12, a22, b1, b2 = over
+    return x + a12 * v + b1 * u, a22 * v + b2 * u

@@ -1,0 +1,245 @@
+"""The configuration script of mrm-control, section 5 (NCC): links, limits and assembly errors in words beside G-code.
+
+    N001 RF01 LN1 XA0 YA90 ZA0 X-80 Y0 Z75    a link: angles about x, y, z in degrees, offsets in mm
+    N003 RF01 LN3 XA0 YA0 ZA# X0 Y0 Z-140     # marks the joint variable
+    N004 RF02 LN3 UP180 LW-180                limits of a joint
+    N006 RF03 LN1 XA0 YA0 ZA0 X0 Y0 Z-5       assembly error, added to the link's numbers
+    N008 BUILD
+
+LN1 holds the tool, the last link the work: T = Mn ... M2 M1.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from rds.core.errors import InputError
+from rds.core.toml_table import TomlTable
+from rds.core.toml_text import toml_text
+from rds.machines.kinematics.kinematics import Kinematics
+from rds.machines.kinematics.transform import numbers_of, transformation
+from rds.machines.link_table import ENTRIES, ROTARY
+from rds.machines.machine import MACHINE, Machine, machine_from
+
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
+_WORD = re.compile(rf"\s*(XA|YA|ZA|X|Y|Z|UP|LW|LN)\s*(#|{_NUMBER})")
+_LINE = re.compile(r"\s*(?:N\d+(?:\.\d+)?)?\s*(?:(RF)\s*(\d+)|(BUILD)\b)?")
+_COMMENT = re.compile(r"\([^()]*\)|;.*")
+_WANTED = {1: ("LN", *ENTRIES), 2: ("LN", "UP", "LW"), 3: ("LN", *ENTRIES)}
+_LETTERS = {"X": "XU", "Y": "YV", "Z": "ZW", "XA": "A", "YA": "B", "ZA": "C"}  # of the axes, as they are taken
+_SAYS = "write RF01 (a link), RF02 (limits), RF03 (assembly error) or BUILD"
+
+
+@dataclass(frozen=True)
+class ScriptLink:
+    """A link of the script: its six numbers (XA, YA, ZA in degrees, X, Y, Z in mm), its variable, limits, errors."""
+
+    numbers: tuple[float, ...]
+    variable: str = ""  # which of ENTRIES is the joint's
+    limits: tuple[float, float] | None = None  # lower, upper
+    errors: tuple[float, ...] = (0.0,) * 6
+    line: int = 0
+
+
+@dataclass
+class Script:
+    """A configuration script, read line by line."""
+
+    name: str = ""  # of its file, for errors
+    links: list[ScriptLink] = field(default_factory=list)  # LN1, LN2...
+    built: int = 0  # line of the BUILD that everything before it counts in; 0: changed since
+    line: int = 0  # read last
+
+    def take(self, text: str, number: int) -> bool:
+        """Read a line; False if it is none of a script (then nothing has changed). InputError for one that is wrong."""
+        bare = _COMMENT.sub(" ", text).strip().upper()
+        found = _LINE.match(bare)
+        assert found is not None
+        if not found[1] and not found[3]:
+            return bare in ("", "%")
+        self.line = number
+        words = self._words(bare, found.end())
+        if found[3]:
+            self._build(words)
+        elif found[1]:
+            self._reconfigure(int(found[2]), words)
+        return True
+
+    def check_built(self, number: int, what: str) -> None:
+        """InputError where the configuration is not built."""
+        self.line = number
+        if not self.built:
+            raise self._error(f"{what} before BUILD: the links take effect by BUILD; write it behind the last RF word")
+
+    def _words(self, text: str, at: int) -> dict[str, str]:
+        words: dict[str, str] = {}
+        while text[at:].strip():
+            found = _WORD.match(text, at)
+            if found is None:
+                words_are = "words are LN, XA, YA, ZA, X, Y, Z, UP and LW"
+                raise self._error(f"{text[at:].strip():.20} cannot be read; {words_are}")
+            if found[1] in words:
+                raise self._error(f"{found[1]} stands twice in one line; write it once")
+            words[found[1]] = found[2]
+            at = found.end()
+        return words
+
+    def _reconfigure(self, which: int, words: dict[str, str]) -> None:
+        if which not in _WANTED:
+            raise self._error(f"RF{which:02d} is no word of the script; {_SAYS}")
+        for word in _WANTED[which]:
+            if word not in words:
+                raise self._error(f"RF{which:02d} needs {' '.join(_WANTED[which])}; {word} is missing")
+        if more := [word for word in words if word not in _WANTED[which]]:
+            raise self._error(f"RF{which:02d} has no word {more[0]}; it has {' '.join(_WANTED[which])}")
+        if not words["LN"].isdigit() or int(words["LN"]) < 1:
+            raise self._error(f"LN{words['LN']} must be a whole number from 1 on; LN1 holds the tool")
+        number = int(words.pop("LN"))
+        if which != 1 and number > len(self.links):
+            known = f"LN1 to LN{len(self.links)}" if self.links else "none yet"
+            raise self._error(f"there is no link LN{number} ({known}); write its RF01 first")
+        if which == 1:
+            self._link(number, words)
+        elif which == 2:
+            self._limit(number, words)
+        else:
+            self._correct(number, words)
+
+    def _link(self, number: int, words: dict[str, str]) -> None:
+        if number <= len(self.links):
+            first = self.links[number - 1].line
+            raise self._error(f"LN{number} is there already, from line {first}; name each link once")
+        if number != (due := len(self.links) + 1):
+            raise self._error(f"LN{number} out of order: LN{due} is missing; write the links from LN1 on")
+        variables = [word for word in ENTRIES if words[word] == "#"]
+        if len(variables) > 1:
+            raise self._error(f"{' and '.join(variables)} are both variable (#); a link has one joint at most")
+        numbers = tuple(0.0 if words[word] == "#" else float(words[word]) for word in ENTRIES)
+        self.links.append(ScriptLink(numbers, variables[0] if variables else "", line=self.line))
+        self.built = 0
+
+    def _limit(self, number: int, words: dict[str, str]) -> None:
+        link = self.links[number - 1]
+        if not link.variable:
+            raise self._error(f"LN{number} is fixed (line {link.line} has no #): limits belong to a joint")
+        lower, upper = (self._plain(word, words) for word in ("LW", "UP"))
+        if not lower < upper:
+            raise self._error(f"UP{upper:g} must be more than LW{lower:g}")
+        self.links[number - 1] = replace(link, limits=(lower, upper))  # in force without BUILD: the chain is the same
+
+    def _correct(self, number: int, words: dict[str, str]) -> None:
+        errors = tuple(self._plain(word, words) for word in ENTRIES)
+        self.links[number - 1] = replace(self.links[number - 1], errors=errors)
+        self.built = 0
+
+    def _plain(self, word: str, words: dict[str, str]) -> float:
+        if words[word] == "#":
+            raise self._error(f"{word}# must be a number here; # belongs to RF01")
+        return float(words[word])
+
+    def _build(self, words: dict[str, str]) -> None:
+        if words:
+            raise self._error(f"BUILD stands alone; remove {next(iter(words))}")
+        if not self.links:
+            raise self._error("BUILD without links: write RF01 LN1 first, the link that holds the tool")
+        self.built = self.line
+
+    def _error(self, said: str) -> InputError:
+        return InputError(said, f"{self.name}, line {self.line}" if self.name else f"line {self.line}")
+
+
+def read_script(text: str, name: str = "") -> Script:
+    """The script in a text that holds nothing else; InputError with the line of what is wrong."""
+    script, number = Script(name), 0
+    for number, line in enumerate(text.splitlines(), 1):
+        if not script.take(line, number):
+            script.line = number
+            if not script.built:
+                script.check_built(number, f"{line.strip():.30}")
+            raise script._error(f"{line.strip():.30} is no line of a configuration script; {_SAYS}")
+    if not script.links:
+        raise script._error("there is no link; write RF01 LN1 ..., and BUILD at its end")
+    script.check_built(number, "the end of the script")
+    return script
+
+
+def machine_of_script(script: Script, name: str = "script") -> Machine:
+    """The machine of a script, not yet in a file. InputError for a joint without limits."""
+    return machine_from(TomlTable(_table(script, name), MACHINE))
+
+
+def machine_text_of_script(script: Script, name: str) -> str:
+    """The machine's file, as TOML."""
+    about = (
+        f"A machine configured by the script {script.name or name}. Links are listed from the work on; LN1 holds "
+        "the tool.\nNodes, encoders and sample period are chosen; yours to add: axis.NAME.model and axis.NAME.limits."
+    )
+    return toml_text(_table(script, name), about)
+
+
+def _table(script: Script, name: str) -> dict[str, Any]:
+    axes: dict[str, Any] = {}
+    links = []
+    for number, link in reversed(list(enumerate(script.links, 1))):
+        table: dict[str, Any] = {"name": f"LN{number}"}
+        if link.variable:
+            script.line = link.line
+            if link.limits is None:
+                raise script._error(f"LN{number} moves and has no limits; write RF02 LN{number} UP... LW...")
+            axis = axis_name(link.variable, axes)
+            unit = "deg" if link.variable in ROTARY else "mm"
+            axes[axis] = {"node": len(axes) + 2, "unit": unit, "travel": list(link.limits), "resolution": 0.001}
+            table |= {"axis": axis, "joint": link.variable}
+        table |= {"angles": list(link.numbers[:3]), "offset": list(link.numbers[3:])}
+        if any(link.errors):
+            table |= {"error_angles": list(link.errors[:3]), "error_offset": list(link.errors[3:])}
+        links.append(table)
+    if not axes:
+        raise script._error("no link has a joint variable (#): nothing would move")
+    return {"name": name, "title": f"Configured by {name}", "sample_period": 0.001, "axis": axes, "link": links}
+
+
+def axis_name(variable: str, taken: Iterable[str]) -> str:
+    """The name of an axis by what it does (X, XA...): the first letter that is not taken."""
+    names = [*_LETTERS[variable], *(f"{_LETTERS[variable][0]}{count}" for count in range(2, 100))]
+    return next(name for name in names if name not in taken)
+
+
+def script_of(kinematics: Kinematics) -> str:
+    """A script of any machine's chain, from the tool to the work; read again it gives the same poses.
+
+    Its joints are those of the machine in the order of the chain; one that counts backwards is turned over by the links
+    beside it.
+    """
+    matrices, links = [kinematics.chain.fixed[0]], []
+    for joint, fixed in zip(kinematics.chain.joints, kinematics.chain.fixed[1:], strict=True):
+        over = np.eye(4)
+        if joint.sign < 0:  # half a turn about another axis turns the joint's own round
+            over = transformation([180.0 if k == (joint.along + 1) % 3 else 0.0 for k in range(3)] + [0.0] * 3)
+        matrices[-1] = matrices[-1] @ over
+        matrices.append(over @ fixed)
+        variable = ("XA", "YA", "ZA")[joint.along] if joint.turns else "XYZ"[joint.along]
+        links.append((variable, kinematics.limits[joint.number], kinematics.joints[joint.number]))
+    entries: list[tuple[list[str], Any, str]] = []
+    for place, matrix in enumerate(matrices):
+        if np.abs(matrix - np.eye(4)).max() > 1e-12:
+            entries.append(([_shown(value) for value in numbers_of(matrix)], None, "fixed"))
+        if place < len(links):
+            variable, limits, name = links[place]
+            entries.append((["#" if word == variable else "0" for word in ENTRIES], limits, name))
+    lines, limited = [f"({kinematics.name}: from the tool, LN1, to the work)"], []
+    for number, (values, limits, name) in enumerate(reversed(entries), 1):
+        words = " ".join(f"{word}{value}" for word, value in zip(ENTRIES, values, strict=True))
+        lines.append(f"RF01 LN{number} {words} ({name})")
+        if limits is not None:
+            limited.append(f"RF02 LN{number} UP{_shown(limits[1])} LW{_shown(limits[0])}")
+    return "\n".join([*lines, *limited, "BUILD"]) + "\n"
+
+
+def _shown(value: float) -> str:
+    return np.format_float_positional(value + 0.0, trim="-")

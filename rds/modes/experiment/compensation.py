@@ -1,0 +1,68 @@
+"""Error compensation by the host: what an axis misses is added to the values that are sent next (oacs-thesis, 7.2).
+
+"The error compensation module uses the sensor feedback data and compares the expected machine position with the actual
+position", and corrects "the next set of values" by what it has found. The thesis gives no equation; here
+
+    c[k+1] = c[k] + (T/τ) (r[k] - y[k]),   |c| at most `most`,   and the axis's controller follows r + c
+
+with the programmed position r and the measured one y: a deviation that stays (lag, friction, an error of a drive) goes
+with the time constant τ. What changes faster than τ is the controller's own work. The recorded reference is r, so that
+following and contour error stay those of what was programmed; c is the signal `compensation`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rds.core.quantities import Quantity, Table
+from rds.core.types import Controller, Reference
+
+NAME = "compensation"
+COMPENSATION = Table(
+    "what the axis misses is added to its reference, with a time constant (oacs-thesis, 7.2)",
+    {
+        "time": Quantity("time constant with which a deviation that stays is taken out", "s", 1e-3, 1e3, default=0.2),
+        "most": Quantity("largest compensation", "axis unit", above=0.0, default=1.0),
+    },
+)
+
+
+@dataclass(frozen=True)
+class _Compensated:
+    """The law of `inner` after a reference that is moved; the state is the inner one, and the compensation."""
+
+    inner: Controller
+    gain: float  # of a sample
+    most: float
+    names: tuple[str, ...]
+
+    def control(self, t: float, r: Reference, y: float, state: Any, params: Any) -> Any:
+        own, c = state
+        moved = Reference(r.position + c, r.velocity, r.acceleration)
+        answer = self.inner.control(t, moved, y, own, params)
+        tells = bool(self.names) and self.inner.observe is None
+        if not isinstance(answer, tuple | list) or len(answer) != 2 + tells:
+            return answer  # the loop says what is wrong with it
+        after = min(max(c + self.gain * (r.position - y), -self.most), self.most)
+        if self.inner.observe is not None:
+            return answer[0], (answer[1], after)
+        return answer[0], (answer[1], after), {**(answer[2] if tells else {}), NAME: c}
+
+    def observe(self, y: float, state: Any, following: Any, params: Any) -> Sequence[float]:
+        assert self.inner.observe is not None
+        return [*self.inner.observe(y, state[0], following[0], params), state[1]]
+
+
+def compensated(controller: Controller, T: float, time: float, most: float, unit: str) -> Controller:
+    """The controller of one axis with error compensation: time constant in s, largest compensation in the unit."""
+    law = _Compensated(controller, T / time, most, tuple(controller.signals))
+    return replace(
+        controller,
+        control=law.control,
+        initial_state=(controller.initial_state, 0.0),
+        source=replace(controller.source, name=f"{controller.source.name} with error compensation"),
+        signals={**controller.signals, NAME: unit},
+        observe=None if controller.observe is None else law.observe,
+    )

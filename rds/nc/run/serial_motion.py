@@ -1,0 +1,167 @@
+"""A part program as the motion of nodes, units on a serial line or modules on CAN: set points, and equations.
+
+Methods A and C take set points, whole steps on a serial line; method B takes equations.
+
+`plan` is the built-in planned motion, within the limits of the axes. `constant` is the thesis's: each segment at its
+feed from the first step to the last, without any ramp, rapids at the largest speed of the axes; method B knows no
+other. Rapids without synchronization let each axis go at its own speed (dcs-thesis, figure 6.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+
+from rds.bus.modules.dcs.buffers import pulses_of
+from rds.bus.modules.dcs.commands import BYTE_TIME
+from rds.bus.modules.segments import Equations, NodeSegment, arc, line
+from rds.core.errors import InputError
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.segments import AXES, LINE, in_plane
+from rds.machines import Machine
+from rds.modes.loop.program import Program
+from rds.nc.check import Setup
+from rds.nc.run.prepare import Prepared, Progress, prepare
+
+MOTIONS = ("plan", "constant")
+_MOST_STEPS = 65_535  # of a segment in method B
+
+
+@dataclass(frozen=True)
+class SerialMotion:
+    """What the nodes are to do, in steps of `period` s: 10 ms on a serial line, the sample period on CAN.
+
+    `positions` (m + 1 × n, axis units) are the samples, `pulses` (m × n) their whole BLU, `segment` (m + 1) says where
+    on the path each is; `nodes` are the equations of method B, a list for each axis, and `counts` the steps that each
+    segment of the path takes by them. `pulses` are none on CAN, where set points are no whole counts.
+    """
+
+    prepared: Prepared
+    axes: tuple[str, ...]
+    units: tuple[int, ...]
+    blu: np.ndarray
+    positions: np.ndarray
+    pulses: np.ndarray
+    segment: np.ndarray
+    nodes: list[list[NodeSegment]]
+    counts: tuple[int, ...]
+    notes: tuple[str, ...]
+    period: float = BYTE_TIME
+
+    @property
+    def start(self) -> np.ndarray:
+        """Where the motion begins, BLU."""
+        return np.rint(self.positions[0] / self.blu).astype(np.int64)
+
+
+def serial_motion(
+    file: Path,
+    machine: Machine,
+    setup: Setup | None = None,
+    *,
+    motion: str = "plan",
+    synchronized: bool = True,
+    progress: Progress | None = None,
+    period: float = BYTE_TIME,
+    whole: bool = True,
+) -> SerialMotion:
+    """The motion of the program in `file` for the nodes of `machine`, in steps of `period` s.
+
+    `whole`: position bytes of a serial line carry it, whole BLU. InputError as `prepare`.
+    """
+    if motion not in MOTIONS:
+        raise InputError(f"motion {motion!r} is unknown; known: {', '.join(MOTIONS)}")
+    prepared = prepare(file, machine, setup, period, progress)
+    program = prepared.program
+    axes = program.axes
+    blu = np.array([machine.axis(name).resolution for name in axes])
+    order = [AXES.index(name) for name in axes]
+    nodes, counts = _equations(prepared.path, order, blu, Limits.of(machine), synchronized, period)
+    notes = list(prepared.notes)
+    if kinds := sorted({each.kind for each in getattr(program, "happenings", ())} - {"end"}):
+        notes.append(f"nodes move axes only: {', '.join(kinds)} of the program are not carried out")
+    if motion == "plan":
+        assert isinstance(program, Program)
+        positions, segment = program.position, prepared.segment
+    else:
+        positions, segment = by_equations(nodes, blu, counts)
+    return SerialMotion(
+        prepared,
+        axes,
+        tuple(machine.axis(name).node for name in axes),
+        blu,
+        positions,
+        pulses_of(positions, blu.tolist()) if whole else np.zeros((0, len(axes)), np.int64),
+        np.asarray(segment),
+        nodes,
+        tuple(counts),
+        tuple(notes),
+        period,
+    )
+
+
+def _equations(
+    path: np.ndarray, order: Sequence[int], blu: np.ndarray, limits: Limits, synchronized: bool, period: float
+) -> tuple[list[list[NodeSegment]], list[int]]:
+    """The equations of each axis for all segments of the path, and each segment's steps."""
+    nodes: list[list[NodeSegment]] = [[] for _ in order]
+    counts = []
+    velocity = np.asarray(limits.velocity)[list(order)]
+    for row in path:
+        way = (row["end"] - row["start"])[list(order)]
+        own = np.ceil(np.abs(way) / (velocity * period) - 1e-9).astype(int)  # of a rapid
+        fast = max(int(own.max(initial=1)), 1)
+        steps = fast if row["rapid"] else max(ceil(row["length"] / (row["rate"] * period) - 1e-9), 1, fast)
+        if steps > _MOST_STEPS:
+            raise InputError(
+                f"line {row['line']} takes {steps * period:.0f} s; a segment of method B has {_MOST_STEPS} steps of "
+                f"{period:g} s at most: divide it, or raise its feed"
+            )
+        counts.append(steps)
+        for i, axis in enumerate(order):
+            start, end = row["start"][axis] / blu[i], row["end"][axis] / blu[i]
+            turning = row["plane"] != LINE and axis in in_plane(int(row["plane"]))[:2]
+            if turning:
+                nodes[i].append(_arc(row, axis, blu[i], steps))
+            elif row["rapid"] and not synchronized and own[i] < steps:
+                if own[i]:
+                    nodes[i].append(line(start, end, int(own[i])))
+                nodes[i].append(line(end, end, steps - int(own[i])))
+            else:
+                nodes[i].append(line(start, end, steps))
+    return nodes, counts
+
+
+def _arc(row: np.ndarray, axis: int, blu: float, steps: int) -> NodeSegment:
+    first, second, _ = in_plane(int(row["plane"]))
+    other = second if axis == first else first
+    centre = row["centre"][axis] / blu
+    return arc(
+        row["start"][axis] / blu,
+        (row["start"][other] - row["centre"][other]) / blu,
+        centre,
+        float(row["sweep"]),
+        steps,
+        axis == first,
+    )
+
+
+def by_equations(
+    nodes: Sequence[Sequence[NodeSegment]], blu: np.ndarray, counts: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the equations lead after each step (m + 1 × n, axis units), and the segment of each."""
+    positions = np.column_stack([_positions(found, blu[i]) for i, found in enumerate(nodes)])
+    return positions, np.concatenate(([0], np.repeat(np.arange(len(counts)), counts)))
+
+
+def _positions(nodes: Sequence[NodeSegment], blu: float) -> np.ndarray:
+    """Where the equations of one axis lead, axis units."""
+    found = [nodes[0].own]
+    for node in nodes:
+        equations = Equations(node)
+        found += [equations.next() for _ in range(node.steps)]
+    return np.array(found) * blu

@@ -1,0 +1,1 @@
+"""Loops over a network: measured on a machine, and analysed from an experiment."""

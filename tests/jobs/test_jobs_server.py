@@ -1,0 +1,231 @@
+"""`rds jobs serve`: what it refuses, and part programs that clients run, hold, stop and leave alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import stat
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import rds
+from rds.core.errors import InputError
+from rds.jobs.folder import Folder
+from rds.jobs.jobs import Jobs
+from rds.jobs.requests import VERBS, answer, parse, words_of
+from tests.documents import blocks, save
+from tests.jobs.conftest import Server
+
+Serve = Callable[..., Server]
+EXPERIMENT = """
+axis = "X"
+duration = 0.2
+[reference]
+kind = "constant"
+value = 0.1
+[controller]
+{controller}
+"""
+
+
+def test_files_are_read_checked_and_kept_inside_the_folder(serve: Serve, tmp_path: Path) -> None:
+    server = serve()
+    folder, client = server.folder, server.client()
+    told = client.ask(do="check", file="circle.ngc", id="mine")
+    assert told["ok"] and told["id"] == "mine" and told["kind"] == "part program"
+    assert told["seconds"] == pytest.approx(2 * 3.14159 * 20 / 10, rel=0.05)
+    (folder / "wrong.ngc").write_text("G1 X10\nM2\n")
+    told = client.ask(do="load", file="wrong.ngc")
+    assert not told["ok"] and "line 1" in told["error"] and "F" in told["error"]
+    assert client.ask(do="jobs") == {"ok": True, "jobs": []}
+
+    outside = tmp_path / "outside.ngc"
+    outside.write_text("M2\n")
+    (folder / "link.ngc").symlink_to(outside)
+    (folder / "away").symlink_to(tmp_path)
+    (folder / "round").symlink_to(folder / "round")
+    for name in ("../outside.ngc", str(outside), "link.ngc", "away/outside.ngc"):
+        assert "leads out of the served folder" in client.ask(do="load", file=name)["error"], name
+    assert not client.ask(do="load", file="round")["ok"]
+    assert "no file" in client.ask(do="load", file="absent.ngc")["error"]
+    assert not client.ask(do="load", file="a\0b")["ok"]
+
+    (tmp_path / "law.py").write_text("raise SystemExit\n")
+    (folder / "law.py").symlink_to(tmp_path / "law.py")
+    for law in ("../law.py", str(tmp_path / "law.py"), "law.py"):
+        (folder / "e.toml").write_text(EXPERIMENT.format(controller=f'file = "{law}"'))
+        assert "leads out of the served folder" in client.ask(do="load", file="e.toml")["error"], law
+    (folder / "e.toml").write_text(EXPERIMENT.format(controller='name = "p"'))
+    assert client.ask(do="load", file="e.toml", id=[1])["job"] == 1
+    assert client.ask(do="run", job=1)["out"] == "runs/e-1"
+    assert client.until_over(1)["ending"] == "done"
+    assert rds.open_result(folder / "runs" / "e-1").axes == ["X"]
+    assert "job 1 is over; a job runs once" in client.ask(do="run", job=1)["error"]
+    assert client.ask(do="drop", job=1)["ok"]
+    assert "no job 1" in client.ask(do="status", job=1)["error"]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('{"do": "jump"}', "do = 'jump' is unknown; known: load"),
+        ('{"do": "status"}', "job is missing"),
+        ('{"do": "status", "job": "1"}', "job = '1' must be a whole number"),
+        ('{"do": "status", "job": 1, "now": true}', "unknown key 'now'"),
+        ('{"do": "jobs", "do": "jobs"}', "given twice"),
+        ('{"do": "override", "job": 1, "share": NaN}', "NaN is no number"),
+        ('{"do": "load", "file": "circle.ngc", "mode": "dream"}', "mode = 'dream' is unknown"),
+        ('{"do": "load", "file": "circle.ngc", "machine": "/etc/passwd"}', "must be the name of a machine"),
+        ("[" * 60_000, "not JSON"),
+        ("7", "must be one JSON object"),
+        ("\x00\xff", "not JSON"),
+    ],
+)
+def test_what_is_wrong_is_a_sentence(tmp_path: Path, line: str, message: str) -> None:
+    (tmp_path / "circle.ngc").write_text("M2\n")
+    with pytest.raises(InputError) as refusal:
+        verb, values = words_of(parse(line.encode()))
+        answer(Jobs(Folder(tmp_path)), verb, values)
+    assert message in str(refusal.value)
+
+
+def test_without_the_secret_nothing_is_answered(serve: Serve) -> None:
+    server = serve()
+    assert stat.S_IMODE(server.socket.stat().st_mode) == 0o600
+    assert stat.S_IMODE(server.secret_file.stat().st_mode) == 0o600
+    for request in ({"secret": "0" * 32}, {"secret": 1}, {"do": "jobs"}):
+        stranger = server.client(with_secret=False)
+        told = stranger.ask(**request)
+        assert not told["ok"] and str(server.secret_file) in told["error"] and stranger.ended()
+    stranger = server.client(with_secret=False)
+    stranger.sock.sendall(b"POST / HTTP/1.1\r\n")
+    assert not stranger.read()["ok"] and stranger.ended()
+
+    client = server.client()
+    client.sock.sendall(b'{"do": "' + b"x" * 200_000)
+    assert "longer than 65536 bytes" in client.read()["error"] and client.ended()
+    assert server.client().ask(do="jobs")["ok"]
+
+
+def test_strangers_and_too_many_clients_keep_nobody_out(serve: Serve) -> None:
+    server = serve()
+    strangers = [server.client(with_secret=False) for _ in range(17)]
+    assert strangers[0].ended()
+    clients = [server.client() for _ in range(16)]
+    late = server.client()
+    assert "16 programs are connected" in late.read()["error"]
+    clients[0].close()
+    deadline = time.monotonic() + 20.0
+    while not (taken := server.client()).ask(do="jobs")["ok"] and time.monotonic() < deadline:
+        pass
+    assert taken.ask(do="jobs")["ok"]
+
+
+def test_a_port_needs_the_secret_and_a_socket_may_do_without(serve: Serve, alone: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    refused = subprocess.run(
+        [sys.executable, "-m", "rds", "jobs", "serve", "--port", str(port), "--no-secret", "."],
+        capture_output=True,
+        text=True,
+    )
+    assert refused.returncode == 2 and "it needs the secret" in refused.stderr
+    server = serve(port=port)
+    assert server.client().ask(do="jobs")["ok"]
+    assert not server.client(with_secret=False).ask(do="jobs")["ok"]
+    open_one = serve("--no-secret")
+    assert open_one.client(with_secret=False).ask(do="jobs")["ok"]
+    again = subprocess.run(
+        [sys.executable, "-m", "rds", "jobs", "serve", "--socket", str(open_one.socket), "."],
+        capture_output=True,
+        text=True,
+    )
+    assert again.returncode == 2 and "another server of jobs listens there" in again.stderr
+    sent = subprocess.run(
+        [sys.executable, "-m", "rds", "jobs", "send", "--socket", str(open_one.socket), '{"do": "jobs"}', '{"do": 1}'],
+        capture_output=True,
+        text=True,
+    )
+    assert sent.returncode == 1 and sent.stdout.startswith('{"ok": true, "jobs": []}\n{"ok": false'), sent
+
+
+@pytest.mark.realtime
+def test_a_program_is_held_resumed_and_stopped_by_two_clients(serve: Serve) -> None:
+    server = serve()
+    one, two = server.client(), server.client()
+    assert one.ask(do="load", file="circle.ngc", mode="emulation")["job"] == 1
+    assert two.ask(do="load", file="small.ngc")["job"] == 2
+    assert one.ask(do="run", job=1)["ok"]
+    assert "job 1 runs, and one runs at a time" in two.ask(do="run", job=2)["error"]
+    assert two.ask(do="run", job=2, queue=True)["state"] == "queued"
+    one.until(1, state="running", program="runs")
+    assert two.ask(do="hold", job=1)["ok"]
+    held = one.until(1, program="held")
+    assert two.until(1, program="held")["measured"]["X"] == pytest.approx(held["measured"]["X"], abs=0.2)  # mm
+    assert "from 0 to 2" in one.ask(do="override", job=1, share=3.0)["error"]
+    assert one.ask(do="override", job=1, share=0.5)["ok"]
+    assert one.ask(do="resume", job=1)["ok"]
+    one.until(1, program="runs", override=0.5)
+    assert "stop it first" in one.ask(do="drop", job=1)["error"]
+    # a client that is gone leaves the run alone
+    one.ask(do="watch", job=1, period=0.05)
+    one.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    one.close()
+    assert two.until(1, program="runs")["taken"] > held["taken"]
+    assert two.ask(do="stop", job=1)["ok"]
+    assert two.until_over(1)["ending"] == "stopped"
+    assert two.until_over(2)["ending"] == "done"
+    assert "job 2 does not run: it is over" in two.ask(do="hold", job=2)["error"]
+
+
+@pytest.mark.realtime
+def test_a_killed_server_leaves_the_run_to_its_safe_end(serve: Serve) -> None:
+    server = serve()
+    client = server.client()
+    client.ask(do="load", file="small.ngc", mode="emulation")
+    out = server.folder / client.ask(do="run", job=1)["out"]
+    client.until(1, state="running", program="runs")
+    os.kill(server.process.pid, signal.SIGKILL)
+    server.process.wait()
+    deadline = time.monotonic() + 60.0
+    while not (out / "ending.json").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    result = rds.open_result(out)
+    assert result.meta["ending"] == "stopped" and abs(result["X_reference_velocity"][-1]) < 1e-6  # at rest on its path
+    assert server.socket.exists()
+    again = serve()  # takes the place of the one that was killed
+    assert again.client().ask(do="jobs") == {"ok": True, "jobs": []}
+
+
+def test_the_documents_client(alone: Path) -> None:
+    found = blocks("docs/jobs.md")
+    save(found, alone)
+    (program,) = (block for block in found if block.file == "client.py")
+    assert sum(bool(line) for line in program.text.splitlines()) <= 12
+    run = subprocess.Popen(
+        [sys.executable, "-m", "rds", "jobs", "serve", "--socket", "jobs.sock", "."],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert run.stderr is not None and "Ctrl-C ends" in run.stderr.readline()
+        done = subprocess.run([sys.executable, "client.py"], capture_output=True, text=True, timeout=60.0)
+    finally:
+        run.terminate()
+        run.wait(30.0)
+        assert run.stderr is not None
+        run.stderr.close()
+    assert done.returncode == 0 and done.stdout.rstrip().endswith("done"), done
+
+
+def test_the_document_names_every_request() -> None:
+    text = Path(__file__).parents[2].joinpath("docs", "jobs.md").read_text()
+    for verb, table in VERBS.items():
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{verb}` |"))
+        assert all(f"`{key}`" in row for key in table.keys), verb

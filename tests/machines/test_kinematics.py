@@ -1,0 +1,175 @@
+"""Kinematics as numbers: LinuxCNC's 5-axis tables, the inverse of every machine, the Jacobian, singular poses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from machines.machine_text import link, machine
+
+from rds.core.errors import InputError
+from rds.machines import Machine, load_machine, machine_names
+from rds.machines.kinematics import identity_of
+from rds.machines.kinematics.kinematics import pose
+
+MACHINES = {name: load_machine(name) for name in machine_names()}
+
+
+def turned(axis: int, degrees: float) -> np.ndarray:
+    """The rotation about x, y or z."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    made = np.eye(3)
+    made[first, first] = made[second, second] = c
+    made[second, first], made[first, second] = s, -s
+    return made
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    joints=st.tuples(*[st.floats(-100, 100)] * 3, st.floats(-100, 100), st.floats(-350, 350)),
+    tilting=st.sampled_from(["xyzac", "xyzbc"]),
+)
+def test_the_five_axis_tables_move_as_linuxcnc_s_with_conventional_directions(
+    joints: tuple[float, ...], tilting: str
+) -> None:
+    """Its trtfuncs.c in vectors: the slides' place, seen from the tilting centre, turned, and turned with the table.
+
+    p = r + Rz(c)(Rx(a)(j - d - t - r) + d), with rot-point r, offset d and tool length t; LinuxCNC adds t again, as it
+    subtracts the tool's length elsewhere.
+    """
+    rotation_point, length = np.array([0.0, 0.0, -80.0]), np.array([0.0, 0.0, 50.0])
+    offset = np.array([0.0, 20.0, 10.0]) if tilting == "xyzac" else np.array([20.0, 0.0, 10.0])
+    slides = np.array(joints[:3])
+    tilt, table = turned(0 if tilting == "xyzac" else 1, joints[3]), turned(2, joints[4])
+    expected = rotation_point + table @ (tilt @ (slides - offset - length - rotation_point) + offset)
+    got = MACHINES[tilting].kinematics.forward(np.array(joints))
+    np.testing.assert_allclose(got[:3, 3], expected, atol=1e-9)
+    np.testing.assert_allclose(got[:3, :3], table @ tilt, atol=1e-12)
+
+
+def test_the_oracle_is_linuxcnc_s_formula() -> None:
+    """The first component of xyzacKinematicsForward, written out as there with con = 1, for one pose."""
+    x, y, z, a, c = 31.0, -17.0, 60.0, np.radians(35.0), np.radians(-70.0)
+    dy, dz, z_rot = 20.0, 10.0 + 50.0, -80.0
+    p = np.cos(c) * x - np.sin(c) * np.cos(a) * (y - dy) + np.sin(c) * np.sin(a) * (z - dz - z_rot) - np.sin(c) * dy
+    got = MACHINES["xyzac"].kinematics.forward({"X": 31.0, "Y": -17.0, "Z": 60.0, "A": 35.0, "C": -70.0})
+    assert got[0, 3] == pytest.approx(p, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_forward_and_inverse_return_to_where_they_started(name: str) -> None:
+    kinematics = MACHINES[name].kinematics
+    assert kinematics.structure.form, "each machine that is shipped has a closed form"
+    q = kinematics.random(500, seed=3)
+    poses = kinematics.forward(q)
+    np.testing.assert_allclose(kinematics.inverse(poses, near=q), q, atol=1e-7)
+    again = kinematics.forward(kinematics.inverse(poses))
+    np.testing.assert_allclose(again[:, :3, 2:], poses[:, :3, 2:], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_numeric_inverse_agrees_with_the_closed_form(name: str) -> None:
+    from rds.machines.kinematics.inverse import _numeric
+
+    kinematics = MACHINES[name].kinematics
+    q = kinematics.random(5, seed=4)
+    found = _numeric(kinematics, kinematics.forward(q), None, kinematics.limits)
+    np.testing.assert_allclose(kinematics.forward(found)[:, :3, 2:], kinematics.forward(q)[:, :3, 2:], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_jacobian_is_the_derivative_of_forward(name: str) -> None:
+    kinematics = MACHINES[name].kinematics
+    q, h = kinematics.random(20, seed=5), 1e-5
+    poses, jacobian = kinematics.forward(q), kinematics.jacobian(q)
+    for number, turns in enumerate(kinematics.turns):
+        step = np.zeros(len(kinematics.joints))
+        step[number] = h
+        change = (kinematics.forward(q + step) - kinematics.forward(q - step)) / (2.0 * (np.radians(h) if turns else h))
+        spin = change[:, :3, :3] @ poses[:, :3, :3].swapaxes(1, 2)
+        np.testing.assert_allclose(jacobian[:, :3, number], change[:, :3, 3], atol=1e-4)
+        np.testing.assert_allclose(
+            jacobian[:, 3:, number], np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], 1), atol=1e-5
+        )
+
+
+def ucx(tmp_path: Path) -> Machine:
+    """A drill on U, on a rotary table's slide: U turns with C, X does not."""
+    chain = link(axis="X", joint="X") + link(axis="C", joint="ZA") + link(axis="U", joint="X", offset=[5.0, 0.0, 0.0])
+    return machine(tmp_path, "UCX", chain)
+
+
+def test_a_chain_without_closed_form_is_solved_numerically(tmp_path: Path) -> None:
+    """X + (5 + U) cos C, (5 + U) sin C: by hand. U-C-X is redundant in nothing, though U is parallel to X at C = 0."""
+    kinematics = ucx(tmp_path).kinematics
+    assert kinematics.structure.form == ""
+    assert kinematics.forward({"X": 3.0, "C": 30.0, "U": 15.0})[:2, 3] == pytest.approx(
+        [3 + 20 * np.cos(np.pi / 6), 10]
+    )
+    q = kinematics.random(10, seed=6)
+    poses = kinematics.forward(q)
+    np.testing.assert_allclose(kinematics.inverse(poses, near=q), q, atol=1e-9)
+    np.testing.assert_allclose(kinematics.forward(kinematics.inverse(poses))[:, :3, 3], poses[:, :3, 3], atol=1e-5)
+
+
+def test_what_cannot_be_reached_is_nan() -> None:
+    mill = MACHINES["mrm-mill"].kinematics
+    assert np.isnan(mill.inverse(pose([[0.0, 0.0, 0.0]], (0.0, 0.1, 1.0)))).all()  # it cannot tilt
+    assert np.isnan(mill.inverse(pose([[0.0, 0.0, 101.0]]))).all()  # beyond the travel
+    five = MACHINES["xyzac"].kinematics
+    assert np.isnan(five.inverse(pose([[0.0, 0.0, 0.0]], (0.0, 0.0, -1.0)))).all()  # A is limited to ±110 degrees
+
+
+def test_a_singular_pose_keeps_the_joint_that_may_stand_anywhere() -> None:
+    """With the tool along C the angle of C is the one it has, and with the tip on the table's axis that of A."""
+    five = MACHINES["xyzac"].kinematics
+    q = np.array([10.0, 20.0, 30.0, 0.0, 123.0])
+    np.testing.assert_allclose(five.inverse(five.forward(q), near=q), q, atol=1e-9)
+    drill = MACHINES["mrmt-oacs"].kinematics
+    q = np.array([-83.5, 10.0, 77.0])
+    np.testing.assert_allclose(drill.inverse(drill.forward(q), near=q), q, atol=1e-9)
+
+
+def test_whole_turns_are_added_so_that_the_joint_stays_near() -> None:
+    five = MACHINES["xyzac"].kinematics
+    q = np.array([10.0, 20.0, 30.0, 40.0, 350.0])
+    np.testing.assert_allclose(five.inverse(five.forward(q), near=q), q, atol=1e-9)
+    assert five.inverse(five.forward(q))[4] == pytest.approx(-10.0)
+
+
+def test_frames_and_axes_of_the_links(tmp_path: Path) -> None:
+    kinematics = ucx(tmp_path).kinematics
+    frames = kinematics.frames(np.array([[15.0, 30.0, 3.0]]))
+    assert list(frames) == ["X", "C", "U", "tool tip", "work zero"]
+    np.testing.assert_allclose(frames["C"][0, :3, 3], [3.0, 0.0, 0.0])
+    directions, points = kinematics.axes(np.array([[15.0, 30.0, 3.0]]))
+    np.testing.assert_allclose(directions[0], [[np.cos(np.pi / 6), 0.5, 0], [0, 0, 1], [1, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(points[0, 1], [3.0, 0.0, 0.0])
+    tool = kinematics.frames(np.array([[15.0, 30.0, 3.0]]), relative_to="tool tip")["bed"]
+    np.testing.assert_allclose(tool[0] @ frames["tool tip"][0], np.eye(4), atol=1e-12)
+
+
+def test_the_identity_is_always_there() -> None:
+    """Each machine's axes can be moved by their letters, whatever its links are."""
+    for each in MACHINES.values():
+        kinematics = identity_of(each)
+        q = kinematics.random(3)
+        linear = [kinematics.joints.index(name) for name in "XYZ" if name in kinematics.joints]
+        rows = ["XYZ".index(kinematics.joints[number]) for number in linear]
+        np.testing.assert_allclose(kinematics.forward(q)[:, rows, 3], q[:, linear], atol=1e-12)
+
+
+def test_what_is_no_joint_or_pose_is_said() -> None:
+    mill = MACHINES["mrm-mill"].kinematics
+    with pytest.raises(InputError, match="has no joint 'A'; it has X, Y, Z"):
+        mill.forward({"A": 1.0})
+    with pytest.raises(InputError, match=r"must be \(n, 3\): X, Y, Z"):
+        mill.forward(np.zeros((2, 4)))
+    with pytest.raises(InputError, match=r"must be \(n, 4, 4\)"):
+        mill.inverse(np.zeros((2, 3)))
+    with pytest.raises(InputError, match="there is no frame 'spindle'"):
+        mill.frames(np.zeros((1, 3)), relative_to="spindle")

@@ -1,0 +1,78 @@
+"""A configuration script at a program's head is applied: its limits narrow the travel, its chain is the machine's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rds.core.errors import RdsError
+from rds.machines import load_machine
+from rds.machines.ncc import script_of
+from rds.nc.check import Setup, check_program, motion
+from rds.nc.language.dialect import Dialect
+from rds.nc.run.prepare import prepare
+
+NCC = Setup(options=Dialect(ncc=True))
+MILL = load_machine("mrm-mill")
+SCRIPT = script_of(MILL.kinematics)
+PROGRAM = "G21 G90\nG1 X{x} F100\nM2\n"
+
+
+def program(tmp_path: Path, script: str = SCRIPT, x: float = 5.0) -> Path:
+    path = tmp_path / "own.ngc"
+    path.write_text(script + PROGRAM.format(x=x), encoding="ascii")
+    return path
+
+
+def test_a_script_of_the_machine_itself_changes_nothing(tmp_path: Path) -> None:
+    found, compiled = check_program(program(tmp_path), MILL, NCC)
+    assert found.ok and compiled is not None
+    assert len(found.warnings) == 1, "that there is one"
+
+
+@pytest.mark.parametrize("x, ok", [(4.9, True), (5.1, False)])
+def test_its_limits_narrow_the_travel_of_check_and_run(tmp_path: Path, x: float, ok: bool) -> None:
+    path = program(tmp_path, SCRIPT.replace("RF02 LN6 UP100 LW-100", "RF02 LN6 UP5 LW-100"), x)
+    found, _ = check_program(path, MILL, NCC)
+    assert found.ok == ok
+    if ok:
+        notes = prepare(path, MILL, NCC).notes
+        assert any("RF02 narrows the travel of X (LN6) to -100 to 5 mm" in note for note in notes)
+        return
+    assert "5.1" in str(found.faults[0]) and found.faults[0].line == 14
+    with pytest.raises(RdsError, match=r"5\.1"):
+        prepare(path, MILL, NCC)
+    with pytest.raises(RdsError, match=r"5\.1"):
+        list(motion(path, MILL, NCC))
+
+
+def test_limits_beyond_the_travel_leave_it(tmp_path: Path) -> None:
+    found, _ = check_program(program(tmp_path, SCRIPT.replace("LN6 UP100", "LN6 UP500"), 101.0), MILL, NCC)
+    assert not found.ok
+
+
+def test_assembly_errors_are_noted(tmp_path: Path) -> None:
+    text = SCRIPT.replace("BUILD", "RF03 LN1 XA0 YA0 ZA0 X0 Y0 Z-5\nBUILD")
+    notes = prepare(program(tmp_path, text), MILL, NCC).notes
+    assert any("RF03 notes an assembly error of LN1, Z-5; the motion is not corrected" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("script", "machine", "says"),
+    [
+        (SCRIPT, "mini-cnc", "mini-cnc has no links to compare"),
+        (SCRIPT, "xyzac", r"the script has 3 joints, and xyzac has 5 \(C, A, X, Y, Z from the work\)"),
+        (SCRIPT.replace("Z-160", "Z-161"), "mrm-mill", "tip is 1 mm away with all joints at zero"),
+        (SCRIPT.replace("X0 Y0 Z# (Z)", "X0 Y# Z0"), "mrm-mill", "not that of mrm-mill: the tool's tip is 0 mm away"),
+        (SCRIPT.replace("LN2 XA0 YA0 ZA0 X0 Y0 Z#", "LN2 XA0 YA0 ZA# X0 Y0 Z0"), "mrm-mill", "not the joint Z"),
+        (SCRIPT.replace("LN1 XA0", "LN1 XA90"), "mrm-mill", "the tool's frame is turned against it"),
+        (SCRIPT.replace("LN6 UP100 LW-100", "LN6 UP300 LW200"), "mrm-mill", "outside the travel of X, -100 to 100"),
+    ],
+)
+def test_another_chain_is_refused_with_what_differs(tmp_path: Path, script: str, machine: str, says: str) -> None:
+    path = program(tmp_path, script)
+    with pytest.raises(RdsError, match=says):
+        check_program(path, load_machine(machine), NCC)
+    with pytest.raises(RdsError, match=says):
+        prepare(path, load_machine(machine), NCC)

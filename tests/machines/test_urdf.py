@@ -1,0 +1,79 @@
+"""URDF, checked by a library that reads it: the same frames there as here, and back."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.machines import load_machine, machine_names
+from rds.machines.urdf import TIP, ZERO, machine_text_of_urdf, urdf_text
+
+WITH_LINKS = [name for name in machine_names() if load_machine(name).links]
+
+
+@pytest.mark.parametrize("name", WITH_LINKS)
+def test_yourdfpy_sees_the_same_poses(name: str) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy")
+    kinematics = load_machine(name).kinematics
+    robot = yourdfpy.URDF.load(
+        io.BytesIO(urdf_text(load_machine(name)).encode()), build_scene_graph=True, load_meshes=False
+    )
+    assert set(robot.actuated_joint_names) == set(kinematics.joints)
+    for q in kinematics.random(10):
+        scale = {n: np.pi / 180 if t else 1e-3 for n, t in zip(kinematics.joints, kinematics.turns, strict=True)}
+        robot.update_cfg({n: value * scale[n] for n, value in zip(kinematics.joints, q, strict=True)})
+        theirs = np.array(robot.get_transform(TIP, ZERO))
+        theirs[:3, 3] *= 1000.0
+        np.testing.assert_allclose(theirs, kinematics.forward(q), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", WITH_LINKS)
+def test_a_machine_is_read_back(name: str, tmp_path: Path) -> None:
+    own = load_machine(name).kinematics
+    path = tmp_path / "again.toml"
+    path.write_text(machine_text_of_urdf(urdf_text(load_machine(name)), "again"), encoding="utf-8")
+    again = load_machine(str(path)).kinematics
+    q = own.random(20)
+    order = [own.joints.index(joint) for joint in again.joints]
+    np.testing.assert_allclose(again.forward(q[:, order]), own.forward(q), atol=1e-9)
+    np.testing.assert_allclose(again.limits, own.limits[order], atol=1e-9)
+
+
+ASKEW = """<robot name="r"><link name="base"/><link name="a"/>
+<joint name="q" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 1"/></joint></robot>"""
+
+
+def test_an_axis_that_is_askew(tmp_path: Path) -> None:
+    """By Rodrigues' formula: half a turn about (0, 1, 1) exchanges y and z, and turns x round."""
+    path = tmp_path / "own.toml"
+    path.write_text(machine_text_of_urdf(ASKEW, "own"), encoding="utf-8")
+    turned = load_machine(str(path)).kinematics.forward({"q": 180.0})
+    np.testing.assert_allclose(turned[:3, :3], [[-1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("<robot", "is no XML"),
+        ("<!DOCTYPE a><robot/>", "no DOCTYPE"),
+        ("<robot/>", "no URDF with joints"),
+        (ASKEW.replace("continuous", "planar"), "joint 'q' is 'planar'"),
+        (ASKEW.replace("continuous", "prismatic"), "has no <limit"),
+        (ASKEW.replace("continuous", "fixed"), "no joint moves"),
+        (ASKEW.replace("0 1 1", "0 1"), "must be three numbers"),
+        (ASKEW.replace('<child link="a"/>', ""), "has no <child link=>"),
+        (ASKEW.replace("</robot>", '<link name="c"/></robot>'), "must hang on one root; roots are base, c"),
+    ],
+)
+def test_what_is_no_chain(text: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        machine_text_of_urdf(text, "own", "own.urdf")
+
+
+def test_a_machine_without_links_has_no_urdf() -> None:
+    with pytest.raises(InputError, match="has no links"):
+        urdf_text(load_machine("mini-cnc"))

@@ -1,0 +1,131 @@
+"""An interpolator as a student writes it from docs/experiments.md, for lines and arcs: in all modes, on a circle and on
+a part program; held and slowed down by hand while it runs; too slow, which the verdict says and names.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rds
+from rds.modes.experiment.run import Run
+from rds.modes.loop.execution import State
+from rds.nc.run.run import PartProgram
+
+T = 0.005
+MINE = '''"""Lines and arcs at constant speed."""
+
+import time
+from math import atan2, ceil, cos, dist, hypot, pi, sin
+
+params = {"work": 0.0}  # s in each row, of nothing useful
+
+
+def interpolate(segment, T, params):
+    for row in (arc if hasattr(segment, "centre") else line)(segment, T):
+        until = time.perf_counter() + params["work"]
+        while time.perf_counter() < until:
+            pass
+        yield row
+
+
+def line(segment, T):
+    way = [b - a for a, b in zip(segment.start, segment.end)]
+    samples = max(1, ceil(dist(segment.start, segment.end) / segment.feed_rate / T))
+    for k in range(1, samples + 1):
+        at = [a + each * k / samples for a, each in zip(segment.start, way)]
+        yield at, [each / (samples * T) for each in way], [0.0] * len(way)
+
+
+def arc(segment, T):
+    (i, j), centre = segment.plane, segment.centre
+    x, y = segment.start[i] - centre[i], segment.start[j] - centre[j]
+    radius, begin = hypot(x, y), atan2(y, x)
+    sweep = atan2(segment.end[j] - centre[j], segment.end[i] - centre[i]) - begin
+    sweep = (-sweep if segment.clockwise else sweep) % (2 * pi) or 2 * pi
+    others = [b - a for a, b in zip(segment.start, segment.end)]
+    others[i] = others[j] = 0.0
+    samples = max(1, ceil(hypot(radius * sweep, *others) / segment.feed_rate / T))
+    turn = (-sweep if segment.clockwise else sweep) / (samples * T)
+    for k in range(1, samples + 1):
+        angle = begin + turn * k * T
+        at = [a + each * k / samples for a, each in zip(segment.start, others)]
+        velocity = [each / (samples * T) for each in others]
+        acceleration = [0.0] * len(at)
+        at[i], at[j] = centre[i] + radius * cos(angle), centre[j] + radius * sin(angle)
+        velocity[i], velocity[j] = -radius * turn * sin(angle), radius * turn * cos(angle)
+        acceleration[i], acceleration[j] = -turn * turn * (at[i] - centre[i]), -turn * turn * (at[j] - centre[j])
+        yield at, velocity, acceleration
+'''
+CIRCLE = {"start": [0.0, 0.0], "feed": 300, "segment": [{"kind": "arc", "end": [0.0, 0.0], "centre": [1.0, 0.0]}]}
+PART = "G21 G90 G17 F300\nG1 X1\nG3 X1 Y2 I0 J1 Z-0.5\nG2 X0 Y2 I-0.5 J0\nM2\n"
+MODES = ["simulation", pytest.param("emulation", marks=pytest.mark.realtime)]
+MODES.append(pytest.param("implementation", marks=pytest.mark.realtime))
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(MINE)
+    (tmp_path / "part.ngc").write_text(PART)
+    return tmp_path
+
+
+def circle(**words: Any) -> rds.Experiment:
+    reference = {"kind": "path", "interpolator": "mine.py", "acceleration": "s-shape", **CIRCLE, **words}
+    return rds.Experiment(axis=["X", "Y"], controller="tracking", sample_period=T, reference=reference)
+
+
+def part() -> PartProgram:
+    return PartProgram("part.ngc", interpolator="mine.py", acceleration="s-shape", sample_period=T)
+
+
+def by_hand(run: Run) -> rds.Result:
+    """Slow it down, hold it as soon as it moves, and let it go on."""
+    assert run.ready(60.0)
+    run.desk.set("override", 0.5)
+    run.desk.set("hold", 1.0)
+    deadline = time.monotonic() + 60.0
+    while not run.done and time.monotonic() < deadline:
+        if run.rows is not None and run.rows["program_state"][-1] == State.HELD:
+            break
+        time.sleep(0.02)
+    run.desk.set_all({"hold": 0.0, "override": 0.8})
+    return run.wait()
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("of", ["circle", "part program"])
+def test_it_runs_in_every_mode_held_and_slowed_down(here: Path, of: str, mode: str) -> None:
+    made = circle() if of == "circle" else part()
+    if mode == "simulation":
+        result = made.run(changes=[(0.2, "override", 0.5), (0.3, "hold", 1), (0.9, "hold", 0), (1.0, "override", 0.8)])
+    else:
+        result = by_hand(made.start(mode))
+    about = result.meta["program"]
+    assert result.meta["ending"] == "done" and about["interpolator"] == "mine.py"
+    assert (result["program_state"] == State.HELD).any() and result["program_override"].max() < 1.01
+    # the filter cuts corners; what it is off the path, and the loop, is told
+    assert about["path_error"]["max"] < 0.15 and about["contour_error"]["max"] < 0.3
+    assert all(about["limit_shares"][axis]["acceleration"] < 1.0 for axis in about["limit_shares"])
+    if mode == "emulation":
+        again = made.run("simulation", changes=[(at, name, new) for at, name, _, new in result.meta["changes"]])
+        for column in again.columns:
+            assert np.array_equal(again[column], result[column]), column
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("mode", ["emulation", "implementation"])
+def test_too_slow_it_has_missed_and_is_named_and_sends_no_axis_ahead(here: Path, mode: str) -> None:
+    short = [{"kind": "arc", "end": [0.0, 0.0], "centre": [0.2, 0.0]}]
+    result = circle(params={"work": 1.3 * T}, segment=short, acceleration=None).run(mode)
+    assert result.verdict == "missed", result.meta["verdict_reason"]
+    reason = result.meta["verdict_reason"]
+    assert "the interpolator (9" in reason or "the interpolator (100%" in reason
+    assert result.meta["program"]["completed"]
+    steps = np.hypot(np.diff(result["X_reference"]), np.diff(result["Y_reference"]))
+    assert steps.max() < 1.01 * 5.0 * T  # a row at each sample, however many periods were discarded before it

@@ -1,0 +1,48 @@
+"""Load and time left: the thesis's two numbers, formulas against measurement, and the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rds.bus.analysis import serial_line
+from rds.cli.main import app
+from rds.core.errors import InputError
+from rds.machines import load_machine
+
+
+def test_the_numbers_of_the_thesis() -> None:
+    assert serial_line.frame_time(6, 38_400) == pytest.approx(3.39e-3, abs=5e-6)
+    assert serial_line.filling_time(1, 38_400) == pytest.approx(0.39, abs=2.5e-3)
+
+
+@pytest.mark.parametrize("baud", [9_600, 38_400, 115_200])
+def test_measured_is_what_the_formulas_say(baud: int) -> None:
+    one = serial_line.measure(load_machine("starmill"), baud)
+    assert one.frame == pytest.approx(serial_line.frame_time(6, baud))
+    assert one.cycle == pytest.approx(serial_line.cycle_time(4, baud), rel=0.01)
+    assert one.filling == pytest.approx(serial_line.filling_time(4, baud), rel=0.01)
+    # the firmware's byte and answer are two; the thesis counts three
+    assert one.synchronization == pytest.approx(serial_line.synchronization_time(baud) * 2 / 3, rel=0.05)
+
+
+def test_fifteen_units_fit_where_the_baud_rate_is_high() -> None:
+    assert serial_line.most_units(1, 1_000_000, 0.01) == 15
+    assert serial_line.most_units(1, 19_200, 0.01) == 0
+    with pytest.raises(InputError, match="16 units; a serial line has 1 to 15"):
+        serial_line.fits(16, 38_400, 0.01)
+
+
+def test_the_command_says_what_fits(tmp_path: Path) -> None:
+    runner = CliRunner()
+    picture = tmp_path / "load.png"
+    told = runner.invoke(app, ["bus", "analyse", "starmill", "--dialect", "dcs", "--plot", str(picture)])
+    assert told.exit_code == 0 and "leaves 5.35 ms" in told.output
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    slow = runner.invoke(app, ["bus", "analyse", "starmill", "--dialect", "dcs", "--baud", "38400", "--json"])
+    assert slow.exit_code == 1 and json.loads(slow.stdout)["fits"] is False
+    can = runner.invoke(app, ["bus", "analyse", "mini-cnc", "--fits", "--json"])
+    assert [row[-1] for row in json.loads(can.stdout)["fits"]] == ["no", "no", "no", "yes"]
