@@ -82,6 +82,15 @@ def own_runtime_directory(worker_id: str) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True)
+def ordinary_scheduling() -> Iterator[None]:
+    """No test leaves this process real-time: all that it starts later would keep the computer to itself."""
+    yield
+    if hasattr(os, "sched_getscheduler") and (scheduler := os.sched_getscheduler(0)) != os.SCHED_OTHER:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        pytest.fail(f"the process of the tests was left with scheduling policy {scheduler}")
+
+
 @pytest.fixture
 def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     """A directory to run in, and a runtime directory that no other run shares.

@@ -42,8 +42,20 @@ def lock_memory() -> bool:
         return False
 
 
+def unlock_memory() -> None:
+    """Undo `lock_memory`."""
+    if not sys.platform.startswith("linux"):
+        return
+    try:
+        import ctypes
+
+        ctypes.CDLL(None).munlockall()
+    except (ImportError, OSError, AttributeError):
+        return
+
+
 def set_timer_slack(nanoseconds: int = 1) -> bool:
-    """Let sleeps of this thread end at most `nanoseconds` late by the kernel's choice (default there: 50 µs).
+    """Let sleeps of this thread end at most `nanoseconds` late by the kernel's choice (0: its default, 50 µs).
 
     Returns true if it was set. Without effect under SCHED_FIFO, whose sleeps have no slack.
     """

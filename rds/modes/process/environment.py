@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import platform
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rds.core.scheduling import lock_memory, raise_priority, set_timer_slack
+from rds.core.scheduling import lock_memory, raise_priority, set_timer_slack, unlock_memory
 
 
 def prepare(priority: int, cpu: int | None) -> dict[str, Any]:
@@ -19,6 +21,25 @@ def prepare(priority: int, cpu: int | None) -> dict[str, Any]:
     if cpu is not None:
         os.sched_setaffinity(0, {cpu})
     return got
+
+
+@contextmanager
+def prepared(priority: int, cpu: int | None) -> Iterator[dict[str, Any]]:
+    """The same for a while, in a process that goes on to other work afterwards.
+
+    Whatever that process, or one that it starts, computes later would otherwise keep the whole computer to itself.
+    """
+    if not hasattr(os, "sched_getscheduler"):
+        yield prepare(priority, cpu)
+        return
+    scheduler, parameters, cpus = os.sched_getscheduler(0), os.sched_getparam(0), os.sched_getaffinity(0)
+    try:
+        yield prepare(priority, cpu)
+    finally:
+        os.sched_setscheduler(0, scheduler, parameters)
+        os.sched_setaffinity(0, cpus)
+        unlock_memory()
+        set_timer_slack(0)  # back to the default
 
 
 def surroundings() -> dict[str, Any]:

@@ -11,6 +11,7 @@ wait in the drivers. It is a dry run: the machine does not move. A second node o
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -119,17 +120,18 @@ def measure(
 ) -> Measurement:
     """Measure the loop of all axes of a machine for `seconds`; one that is not there is started, on the built-in bus.
 
-    `bus` is a [bus] table. With `real_time` this process gets the scheduling of a run's target. Raises InputError for
-    what will not do, and MachineError for a machine that does not answer.
+    `bus` is a [bus] table. With `real_time` this process has the scheduling of a run's target while it
+    measures. Raises InputError for what will not do, and MachineError for a machine that does not answer.
     """
     SECONDS.check(seconds, "seconds", "measure")
     plan = _plan(machine, sample_period, bus or {}, controller)
-    if real_time:
-        from rds.modes.process.environment import prepare
+    with ExitStack() as stack:
+        if real_time:
+            from rds.modes.process.environment import prepared
 
-        prepare(plan.priority, plan.cpu)
-    host = HostLoad("started")
-    with machine_behind(plan) as reached:
+            stack.enter_context(prepared(plan.priority, plan.cpu))
+        host = HostLoad("started")
+        reached = stack.enter_context(machine_behind(plan))
         return _measured(reached, max(int(seconds / plan.T), 20), host)
 
 
