@@ -49,7 +49,8 @@ def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -
     assert left["program_sample"][-1] > 0.0
     assert np.isfinite(left["X_measured"]).all()
     for name in ("ring", "desk"):
-        Path(processes["desk"]).with_suffix(f".{name}").unlink()
+        # the next run on this computer removes them, and may have done so by now
+        Path(processes["desk"]).with_suffix(f".{name}").unlink(missing_ok=True)
 
 
 @ONE
