@@ -6,6 +6,7 @@ import ast
 import json
 import subprocess
 import sys
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -98,6 +99,7 @@ LAZY = [("results", "modes"), ("modes", "bus"), ("results.reports", "bus")]
 TOP = {"__main__", "cli", "panels"}
 
 
+@cache
 def imports(path: Path) -> list[tuple[str, bool]]:
     """The modules of rds that a file imports, and whether at its top."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -139,6 +141,7 @@ def imported_when_running(path: Path) -> set[str]:
     return {name for name in names if MODULES.get(name, path) != path}
 
 
+@cache
 def _packages() -> set[str]:
     return {".".join(path.parent.relative_to(ROOT.parent).parts) for path in ROOT.rglob("__init__.py")}
 
