@@ -15,7 +15,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT
-from rds.nc.language.canon import FEED, MOTION, RATE, Call, MotionBlock
+from rds.nc.language.canon import ARC, FEED, MOTION, RATE, SPEED, Call, MotionBlock
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import Frame, only_rotary, segments_of
 from rds.nc.path_block import DefaultFeed, Event, PathBlock
@@ -199,7 +199,12 @@ class _Converter:
 
     def take(self, block: MotionBlock) -> None:
         self._in_file(block.file)
-        self._rows.append(block.rows)
+        if self._per_revolution or self._pitch:  # the feed hangs on the speed
+            for rows in np.split(block.rows, np.flatnonzero(block.rows["kind"] == SPEED)):
+                self._convert()
+                self._rows += [rows] if len(rows) else []
+        else:
+            self._rows.append(block.rows)
         self._waiting += len(block.rows)
         if len(block.rows):
             self._last_line = int(block.rows["line"][-1])
@@ -251,8 +256,9 @@ class _Converter:
     def _fault(self, call: Call, message: str) -> None:
         self._report(ProgramError(message, file=call.file or self._file, line=call.line))
 
-    def _event(self, kind: str, value: float | str, line: int) -> None:
-        self._events.append(Event(self._count - 1, kind, value, line))
+    def _event(self, kind: str, value: float | str, line: int, segments: int = 0) -> None:
+        """Something that happens behind so many segments from now."""
+        self._events.append(Event(self._count + segments - 1, kind, value, line))
 
     def _hand_on(self) -> None:
         if self._segments or self._events:
@@ -267,10 +273,15 @@ class _Converter:
             return
         rows = np.concatenate(self._rows) if len(self._rows) > 1 else self._rows[0]
         self._rows, self._waiting = [], 0
+        speeds = np.flatnonzero(rows["kind"] == SPEED)
+        given = rows[speeds]
+        if len(speeds):
+            self._speed = float(given["values"][-1, 0])
         rates, angular, rate_lines = self._rates(rows)
-        moves = rows["kind"] != RATE
+        moves = np.flatnonzero(rows["kind"] <= ARC)
         rows, rates, angular, rate_lines = rows[moves], rates[moves], angular[moves], rate_lines[moves]
         if not len(rows):
+            self._turn(given, moves, speeds)
             return
         segments, tilted = segments_of(rows, self._position, self._frame)
         self._position = segments["end"][-1].copy()
@@ -295,15 +306,16 @@ class _Converter:
         still &= moving
         if still.any():
             self._no_feed(int(segments["line"][np.argmax(still)]))
-        segments, rate_lines = segments[moving], rate_lines[moving]
+        segments, rate_lines, moves = segments[moving], rate_lines[moving], moves[moving]
         centre = self._tool_centre
         if len(segments) and isinstance(centre, ToolCentre) and (self._for_tip or centre.correct):
             segments, owner = centre.chords(segments, self._joints, self._complain, not self._for_tip)
-            rate_lines = rate_lines[owner]
+            rate_lines, moves = rate_lines[owner], moves[owner]
         if len(segments):
             self._joints = segments["end"][-1].copy()
         self._segments.append(segments)
         self._feed_lines.append(rate_lines)
+        self._turn(given, moves, speeds)
         self._count += len(segments)
 
     def _complain(self, line: int, message: str) -> None:
@@ -416,24 +428,26 @@ class _Converter:
     def _dwell(self, call: Call) -> None:
         self._event("dwell", float(call.args[0]), call.line)
 
-    def _set_speed(self, call: Call) -> None:
-        self._speed = float(call.args[-1])
+    def _turn(self, given: np.ndarray, moves: np.ndarray, speeds: np.ndarray) -> None:
+        """A turning spindle follows the speeds `given`: each before the segments whose `moves` are behind it."""
         if self._turning:
-            self._spin(call.line)
+            behind = np.searchsorted(moves, speeds).tolist()
+            for speed, line, segments in zip(given["values"][:, 0].tolist(), given["line"].tolist(), behind, strict=True):
+                self._spin(speed, line, segments)
 
     def _clockwise(self, call: Call) -> None:
         self._turning = 1
-        self._spin(call.line)
+        self._spin(self._speed, call.line)
 
     def _counterclockwise(self, call: Call) -> None:
         self._turning = -1
-        self._spin(call.line)
+        self._spin(self._speed, call.line)
 
-    def _spin(self, line: int) -> None:
-        if not self._speed:
+    def _spin(self, speed: float, line: int, segments: int = 0) -> None:
+        if not speed:
             message = "the spindle is on at a speed of 0, and stands still; give one (S) on the line or before"
             self._warn(ProgramError(message, file=self._file, line=line))
-        self._event("spindle", self._turning * self._speed, line)
+        self._event("spindle", self._turning * speed, line, segments)
 
     def _stop_spindle(self, call: Call) -> None:
         if self._turning:
@@ -484,7 +498,6 @@ _ACTIONS: dict[str, Callable[[_Converter, Call], Any]] = {
     "STRAIGHT_PROBE": _Converter._probe,
     "CHANGE_TOOL_NUMBER": _Converter._rename_tool,
     "DWELL": _Converter._dwell,
-    "SET_SPINDLE_SPEED": _Converter._set_speed,
     "START_SPINDLE_CLOCKWISE": _Converter._clockwise,
     "START_SPINDLE_COUNTERCLOCKWISE": _Converter._counterclockwise,
     "STOP_SPINDLE_TURNING": _Converter._stop_spindle,

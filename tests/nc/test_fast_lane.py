@@ -52,6 +52,8 @@ PLAIN = [
     "G2 X0 Y0 R-20.5",
     "X7 Y7 R9",
     "N3",
+    "S1000 G1 X8 F100",
+    "g1 s 0",
     "",
     "; nothing",
     "G1",
@@ -68,7 +70,7 @@ def test_it_takes_plain_lines(taken: Callable[[bytes], int]) -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        *("G1 X1 X2", "G1 G0 X1", "X#1", "X[1+1]", "(note) X1", "G4 P1", "G91", "G17", "S100", "T1", "M3", "G90 G91"),
+        *("G1 X1 X2", "G1 G0 X1", "X#1", "X[1+1]", "(note) X1", "G4 P1", "G91", "G17", "S-100", "T1", "M3", "G90 G91"),
         *("/X1", "X1 P2", "G80", "G2 X1 Y1 I9 J9", "G2 X1", "G2 X1 R.01", "G2 R1", "G1 I1 X1", "N1.5 X1", "X1 N2"),
         *(
             "X",
@@ -162,7 +164,7 @@ numbers = st.one_of(
 )
 plain_words = st.builds(
     lambda letter, gap, number: letter + gap + number,
-    st.sampled_from("XYZABCIJKRFxyzabcijkrf"),
+    st.sampled_from("XYZABCIJKRFSxyzabcijkrfs"),
     st.sampled_from(["", "", " ", "\t"]),
     numbers,
 )

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, LINE, XY, YZ, ZX, point_at
-from rds.nc.language.canon import ARC, FEED, MOTION, RATE, TRAVERSE, Call, MotionBlock
+from rds.nc.language.canon import ARC, FEED, MOTION, RATE, SPEED, TRAVERSE, Call, MotionBlock
 from rds.nc.language.errors import ProgramError
 from rds.nc.path_block import PathBlock
 from rds.nc.toolpath import toolpath
@@ -117,12 +117,10 @@ def test_an_axis_that_stands_still_in_other_units_turns_no_rotary_move_into_a_li
 
 def test_feed_per_revolution_follows_the_spindle() -> None:
     block = path(
-        Call("SET_SPINDLE_SPEED", (0, 600.0)),
+        rows((SPEED, 1, 600.0)),
         Call("START_SPINDLE_COUNTERCLOCKWISE", (0,), 1),
         Call("SET_FEED_MODE", (0, 1)),
-        rows((RATE, 2, 0.1), (FEED, 3, 1.0)),
-        Call("SET_SPINDLE_SPEED", (0, 1200.0), 4),
-        rows((FEED, 5, 2.0)),
+        rows((RATE, 2, 0.1), (FEED, 3, 1.0), (SPEED, 4, 1200.0), (FEED, 5, 2.0)),
         Call("SET_FEED_MODE", (0, 0)),
         rows((RATE, 6, 30.0), (FEED, 6, 3.0)),
     )
@@ -216,20 +214,30 @@ numbers = st.floats(-50, 50).map(lambda value: round(value, 4))
 moves = st.lists(
     st.one_of(
         st.tuples(st.sampled_from([TRAVERSE, FEED]), st.lists(numbers, min_size=6, max_size=6)),
-        st.tuples(st.just(RATE), st.lists(st.floats(0.1, 5000.0), min_size=1, max_size=1)),
+        st.tuples(st.sampled_from([RATE, SPEED]), st.lists(st.floats(0.1, 5000.0), min_size=1, max_size=1)),
     ),
     min_size=1,
     max_size=40,
 )
 
 
-@given(moves, st.integers(1, 12))
-def test_how_the_stream_is_cut_into_blocks_changes_nothing(made: list[tuple[int, list[float]]], size: int) -> None:
+@given(moves, st.integers(1, 12), st.integers(0, 1))
+def test_how_the_stream_is_cut_into_blocks_changes_nothing(
+    made: list[tuple[int, list[float]]], size: int, per_revolution: int
+) -> None:
     table = [(RATE, 1, 60.0), *((kind, line, *values) for line, (kind, values) in enumerate(made, start=2))]
-    whole = path(rows(*table))
+    turning = [rows((SPEED, 1, 90.0)), Call("START_SPINDLE_CLOCKWISE", (0,), 1)]
+    turning.append(Call("SET_FEED_MODE", (0, per_revolution)))
+    whole = path(*turning, rows(*table))
     pieces = [rows(*table[at : at + size]) for at in range(0, len(table), size)]
     items = [item for piece in pieces for item in (piece, Call("COMMENT", ("x",)), Call("SELECT_PLANE", ("XY",)))]
-    parts = path(*items)
+    parts = path(*turning, *items)
+    assert whole.events == parts.events
+    speeds = [(line, values[0]) for line, (kind, values) in enumerate(made, start=2) if kind == SPEED]
+    assert [(event.line, event.value) for event in whole.events if event.kind == "spindle"] == [(1, 90.0), *speeds]
+    for event in whole.events[:-1]:
+        lines = whole.segments["line"]
+        assert np.all(lines[: event.after + 1] <= event.line) and np.all(lines[event.after + 1 :] > event.line)
     assert np.array_equal(whole.segments, parts.segments)
     assert np.array_equal(whole.feed_lines, parts.feed_lines)
     assert whole.segments["start"][1:].tolist() == whole.segments["end"][:-1].tolist()

@@ -113,7 +113,7 @@ class Compensation:
         return self._done(end)
 
     def other(self, item: Item) -> list[Item]:
-        """A feed rate (row) or a call: passed on at once unless it must keep its place behind held moves."""
+        """A feed rate or speed (row) or a call: passed on at once unless it must keep its place behind held moves."""
         if not self._queue or (isinstance(item, Call) and item.name not in IN_ORDER):
             return [item]
         self._queue.keep(item)

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from rds.nc.language.canon import ARC, FEED, RATE, TRAVERSE, Call, MotionBlock
+from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE, Call, MotionBlock
 
 MANY = 1024  # rows that are worth writing by compiled code
 LONG_TEXT = 200_000  # lines that Python writes in the time that numba takes to load
@@ -61,6 +61,7 @@ _ROW_FORMATS = {
     FEED: ("STRAIGHT_FEED" + _STRAIGHT, 6),
     ARC: ("ARC_FEED(%.4f, %.4f, %.4f, %.4f, %d, %.4f, %.4f, %.4f, %.4f)", 9),
     RATE: ("SET_FEED_RATE(%.4f)", 1),
+    SPEED: ("SET_SPINDLE_SPEED(0, %.4f)", 1),
 }
 
 

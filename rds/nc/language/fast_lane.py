@@ -1,4 +1,4 @@
-"""The fast lane: plain lines (moves, feed rates) are read by compiled code, many at a time; others go the usual way.
+"""The fast lane: plain lines (moves, feed rates, speeds) are read by compiled code, many at a time; others go the usual way.
 
 It gives the same items as the interpreter without it, bit for bit. Without numba (extra `fast`) it stays closed.
 """
@@ -55,7 +55,7 @@ class FastLane:
         self._pause = 0
         self._rows: np.ndarray | None = None
         self._columns: list[np.ndarray] = []
-        self._state = np.zeros(7)
+        self._state = np.zeros(8)
         self._modes = np.zeros(5, np.int64)
 
     def take(self, control: Control) -> int:
@@ -71,7 +71,7 @@ class FastLane:
         return self._pause
 
     def _open(self, control: Control) -> bool:
-        """Whether plain lines mean nothing but moves and feed rates now."""
+        """Whether plain lines mean nothing but moves, feed rates and speeds now."""
         m = self._context
         state = m.state
         return (
@@ -93,12 +93,12 @@ class FastLane:
             self._rows = np.zeros(ROWS, MOTION)
             self._columns = [self._rows[name] for name in ("kind", "digits", "n", "line", "values")]
         values, modes = self._state, self._modes
-        values[:] = state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate
+        values[:] = state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate, state.speed
         modes[:] = state.motion, state.absolute, state.arc_absolute, state.plane, state.inches
         data = np.frombuffer(source.buffer, np.uint8)
         size, lines, rows = read(data, source.at, len(data), source.next_line, values, modes, *self._columns)
         if lines:
-            state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate = values.tolist()
+            state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate, state.speed = values.tolist()
             state.motion = int(modes[0])
             out.file = source.name
             out.rows(self._rows[:rows])

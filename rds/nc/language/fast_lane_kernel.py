@@ -1,4 +1,5 @@
-"""The compiled reader of plain lines: N, G0 to G3, G90 and G91 that change nothing, X Y Z A B C, I J K, R and F.
+"""The compiled reader of plain lines: N, G0 to G3, G90 and G91 that change nothing, X Y Z A B C, I J K, R, F
+and S.
 
 What it accepts it reads, checks and works out with the interpreter's own arithmetic, operation by operation, so that
 the rows are the same to the last bit. At the first line that has anything else in it, that is doubtful, or wrong, it
@@ -21,12 +22,12 @@ from rds.nc.language.arcs import (
     SPIRAL_RELATIVE,
     SPIRAL_TOLERANCE,
 )
-from rds.nc.language.canon import ARC, FEED, RATE, TRAVERSE
+from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE
 from rds.nc.language.source import LONGEST
 from rds.nc.language.state import NO_MOTION, XY, XZ
 
 # Where the words are put: the axes at 0 to 5, I J K at 6 to 8.
-_R, _F = 9, 10
+_R, _F, _S = 9, 10, 11
 _AXES, _IJK = 0b000_111111, 0b111_000000
 # What a byte is, when it is not a letter with a place.
 _G, _N, _BLANK, _NEWLINE, _SEMICOLON, _OTHER = 20, 21, 30, 31, 32, -1
@@ -39,7 +40,7 @@ _LARGEST = 1e9  # of coordinates of arcs: beyond, squares may lose digits or ove
 
 def _byte_table() -> np.ndarray:
     table = np.full(256, _OTHER, np.int8)
-    for letters in ("xyzabcijkrf", "XYZABCIJKRF"):
+    for letters in ("xyzabcijkrfs", "XYZABCIJKRFS"):
         for place, letter in enumerate(letters):
             table[ord(letter)] = place
     for character, meaning in (("gG", _G), ("nN", _N), (" \t\r", _BLANK), ("\n", _NEWLINE), (";", _SEMICOLON)):
@@ -177,13 +178,13 @@ def _centre(words, given, first, second, third, clockwise, arc_absolute, inches,
 def read_lines(data, at, end, line, state, modes, kinds, digits, ns, lines, values):
     """Read and execute plain lines of `data` from `at` until one that is not plain, the end, or no room for rows.
 
-    `line` is the line number at `at`; `state` holds the position (X Y Z A B C) and the feed rate, `modes` the active
+    `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes` the active
     motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both are left as
     the last line that was read leaves them. The other arrays, one element or row per row of MOTION, are filled.
     Returns bytes and lines read, and rows written.
     """
-    words, target = np.zeros(11), np.zeros(6)
-    begin, first_line, row, room = at, line, 0, len(kinds) - 1
+    words, target = np.zeros(12), np.zeros(6)
+    begin, first_line, row, room = at, line, 0, len(kinds) - 2
     absolute, arc_absolute, plane, inches = modes[1], modes[2], modes[3], modes[4]
     if plane == XY:
         first, second, third = 0, 1, 2
@@ -211,7 +212,7 @@ def read_lines(data, at, end, line, state, modes, kinds, digits, ns, lines, valu
             feed = words[_F]
             if feed < 0.0:
                 break
-        if motion > 0 and feed == 0.0:
+        if (motion > 0 and feed == 0.0) or (given >> _S & 1 and words[_S] < 0.0):
             break
         for axis in range(6):
             target[axis] = state[axis]
@@ -240,6 +241,12 @@ def read_lines(data, at, end, line, state, modes, kinds, digits, ns, lines, valu
             state[6] = feed
             kinds[row], digits[row], ns[row], lines[row] = RATE, n_digits, n, line
             values[row, 0] = feed
+            values[row, 1:] = 0.0
+            row += 1
+        if given >> _S & 1:
+            state[7] = words[_S]
+            kinds[row], digits[row], ns[row], lines[row] = SPEED, n_digits, n, line
+            values[row, 0] = words[_S]
             values[row, 1:] = 0.0
             row += 1
         if motion != -1:

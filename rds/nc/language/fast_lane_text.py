@@ -12,18 +12,24 @@ from collections.abc import Iterator
 import numpy as np
 from numba import njit
 
-from rds.nc.language.canon import ARC, FEED, RATE, TRAVERSE
+from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE
 
 _LIMIT = 1e11  # ten thousand times this is below 2^53, where every whole number is a float
 _LONGEST = 256  # bytes of a line: 9 numbers of at most 18 with their commas, and what stands before them
 _SIZE = 1 << 20
 _SPLIT = 134217729.0  # 2^27 + 1: cuts a float into two halves of 26 digits (Dekker 1971)
-_NUMBERS = {TRAVERSE: 6, FEED: 6, ARC: 9, RATE: 1}
-_NAMES = {TRAVERSE: b"STRAIGHT_TRAVERSE(", FEED: b"STRAIGHT_FEED(", ARC: b"ARC_FEED(", RATE: b"SET_FEED_RATE("}
+_NUMBERS = {TRAVERSE: 6, FEED: 6, ARC: 9, RATE: 1, SPEED: 1}
+_NAMES = {
+    TRAVERSE: b"STRAIGHT_TRAVERSE(",
+    FEED: b"STRAIGHT_FEED(",
+    ARC: b"ARC_FEED(",
+    RATE: b"SET_FEED_RATE(",
+    SPEED: b"SET_SPINDLE_SPEED(0, ",
+}
 
 _COUNTS = np.array([_NUMBERS[kind] for kind in sorted(_NUMBERS)])
 _LENGTHS = np.array([len(_NAMES[kind]) for kind in sorted(_NAMES)])
-_LETTERS = np.array([list(_NAMES[kind].ljust(20)) for kind in sorted(_NAMES)], np.uint8)
+_LETTERS = np.array([list(_NAMES[kind].ljust(24)) for kind in sorted(_NAMES)], np.uint8)
 
 
 @njit(cache=True)

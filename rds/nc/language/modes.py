@@ -71,7 +71,7 @@ def execute(m: Context, block: Block) -> bool:
         m.out.rate(words["f"])
     if "s" in words:
         m.state.speed = words["s"]
-        m.out.call("SET_SPINDLE_SPEED", 0, words["s"])
+        m.out.speed(words["s"])
     if "t" in words:
         select_tool(m, int(words["t"]))
     if block.m:

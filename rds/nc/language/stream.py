@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rds.nc.language.canon import BLOCK_ROWS, MOTION, RATE, Call, MotionBlock
+from rds.nc.language.canon import BLOCK_ROWS, MOTION, RATE, SPEED, Call, MotionBlock
 
 if TYPE_CHECKING:
     from rds.nc.compensation.compensation import Compensation
@@ -21,8 +21,8 @@ FEW = 1024  # rows handed over that are worth no block of their own
 class Stream:
     """Takes rows and calls in program order; `items` is what can be handed on.
 
-    `line`, `digits`, `n` and `file` say which block is being executed. While `compensation` is set, feed rates and
-    calls go through it to keep their place among the moves that it holds back.
+    `line`, `digits`, `n` and `file` say which block is being executed. While `compensation` is set, feed rates,
+    speeds and calls go through it to keep their place among the moves that it holds back.
     """
 
     def __init__(self) -> None:
@@ -69,10 +69,17 @@ class Stream:
 
     def rate(self, rate: float) -> None:
         """SET_FEED_RATE."""
+        self._number(RATE, rate)
+
+    def speed(self, speed: float) -> None:
+        """SET_SPINDLE_SPEED."""
+        self._number(SPEED, speed)
+
+    def _number(self, kind: int, value: float) -> None:
         if self.compensation is None:
-            self.row(RATE, (rate, *_ONLY))
+            self.row(kind, (value, *_ONLY))
         else:
-            self.put(self.compensation.other((RATE, self.digits, self.n, self.line, (rate, *_ONLY))))
+            self.put(self.compensation.other((kind, self.digits, self.n, self.line, (value, *_ONLY))))
 
     def call(self, name: str, *args: Any) -> None:
         """Any other canonical call."""
