@@ -431,8 +431,9 @@ class _Converter:
     def _turn(self, given: np.ndarray, moves: np.ndarray, speeds: np.ndarray) -> None:
         """A turning spindle follows the speeds `given`: each before the segments whose `moves` are behind it."""
         if self._turning:
-            behind = np.searchsorted(moves, speeds).tolist()
-            for speed, line, segments in zip(given["values"][:, 0].tolist(), given["line"].tolist(), behind, strict=True):
+            behind = np.searchsorted(moves, speeds)
+            columns = (given["values"][:, 0].tolist(), given["line"].tolist(), behind.tolist())
+            for speed, line, segments in zip(*columns, strict=True):
                 self._spin(speed, line, segments)
 
     def _clockwise(self, call: Call) -> None:

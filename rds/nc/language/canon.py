@@ -32,7 +32,7 @@ MOTION = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class MotionBlock:
-    """Moves, feed rates and spindle speeds in program order: at most BLOCK_ROWS rows of dtype MOTION, all from one file."""
+    """Moves, feed rates and speeds in program order: at most BLOCK_ROWS rows of dtype MOTION, all from one file."""
 
     rows: np.ndarray
     file: str = ""

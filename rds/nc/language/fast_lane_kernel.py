@@ -178,9 +178,9 @@ def _centre(words, given, first, second, third, clockwise, arc_absolute, inches,
 def read_lines(data, at, end, line, state, modes, kinds, digits, ns, lines, values):
     """Read and execute plain lines of `data` from `at` until one that is not plain, the end, or no room for rows.
 
-    `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes` the active
-    motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both are left as
-    the last line that was read leaves them. The other arrays, one element or row per row of MOTION, are filled.
+    `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes` the
+    active motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both are
+    left as the last line that was read leaves them. The other arrays, one element or row per row of MOTION, are filled.
     Returns bytes and lines read, and rows written.
     """
     words, target = np.zeros(12), np.zeros(6)
