@@ -159,6 +159,7 @@ class _Converter:
         self._off: dict[str, tuple[str, int]] = {}  # where overrides were locked that are so still
         self._speed = 0.0  # rev/min, as last said
         self._turning = 0  # +1 clockwise, −1 counter-clockwise
+        self._stood = False  # has been told to turn at no speed
         self._tool = self._selected = 0
         self._position = self._joints = np.zeros(6)  # as programmed, and of the joints
         self._tool_centre, self._for_tip = tool_centre, False
@@ -445,7 +446,8 @@ class _Converter:
         self._spin(self._speed, call.line)
 
     def _spin(self, speed: float, line: int, segments: int = 0) -> None:
-        if not speed:
+        if not speed and not self._stood:
+            self._stood = True
             message = "the spindle is on at a speed of 0, and stands still; give one (S) on the line or before"
             self._warn(ProgramError(message, file=self._file, line=line))
         self._event("spindle", self._turning * speed, line, segments)

@@ -1,6 +1,7 @@
 """The fast lane: plain lines (moves, feed rates, speeds) are read by compiled code, many at a time.
 
-Other lines go the usual way. It gives the same items as the interpreter without it, bit for bit. Without numba (extra `fast`) it stays closed.
+Other lines go the usual way. It gives the same items as the interpreter without it, bit for bit.
+Without numba (extra `fast`) it stays closed.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""The compiled reader of plain lines: N, G0 to G3, G90 and G91 that change nothing, X Y Z A B C, I J K, R, F
-and S.
+"""The compiled reader of plain lines: N, G0 to G3, G90 and G91 that change nothing, X Y Z A B C, I J K, R, F, S.
 
 What it accepts it reads, checks and works out with the interpreter's own arithmetic, operation by operation, so that
 the rows are the same to the last bit. At the first line that has anything else in it, that is doubtful, or wrong, it
@@ -178,10 +177,10 @@ def _centre(words, given, first, second, third, clockwise, arc_absolute, inches,
 def read_lines(data, at, end, line, state, modes, kinds, digits, ns, lines, values):
     """Read and execute plain lines of `data` from `at` until one that is not plain, the end, or no room for rows.
 
-    `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes` the
-    active motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both are
-    left as the last line that was read leaves them. The other arrays, one element or row per row of MOTION, are filled.
-    Returns bytes and lines read, and rows written.
+    `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes`
+    the active motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both
+    are left as the last line that was read leaves them. The other arrays, one element or row per row of MOTION, are
+    filled. Returns bytes and lines read, and rows written.
     """
     words, target = np.zeros(12), np.zeros(6)
     begin, first_line, row, room = at, line, 0, len(kinds) - 2
