@@ -32,8 +32,12 @@ def analyse(
         int | None, typer.Option(help="Baud rate of a serial line (default: a table of several).", min=1)
     ] = None,
     units: Annotated[int | None, typer.Option(help="Units on a serial line (default: one for each axis).")] = None,
-    fits: Annotated[bool, typer.Option("--fits", help="On CAN: what fits, by bit rate, with margin.")] = False,
-    plot: Annotated[Path | None, typer.Option(help="Write the timeline and response times as a PNG.")] = None,
+    fits: Annotated[
+        bool, typer.Option("--fits", help="On CAN: what fits, by bit rate, with margin; with --plot curves.")
+    ] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Write the timeline and response times, or curves, as a PNG.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Bus load, and every message's worst-case response time (Davis, Burns, Bril and Lukkien, 2007).
@@ -73,11 +77,9 @@ def analyse(
             errors=Errors(errors or 1, interval) if errors or error_interval is not None else None,
         )
         if plot is not None:
-            from rds.bus.analysis.analysis_plot import plot as draw
-            from rds.core.atomic import write_files
+            from rds.cli.analyse_fits import draw_can
 
-            picture, kind = draw(analysis), plot.suffix.removeprefix(".") or "png"
-            write_files({plot: lambda stream: picture.savefig(stream, format=kind)})
+            draw_can(plot, analysis, load_machine(machine), sample_period, dialect, fits)
         rows = []
         if fits:
             from rds.cli.analyse_fits import can_rows

@@ -9,8 +9,12 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from rds.cli.common import print_json
+from rds.core.errors import InputError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rds.bus.analysis.analysis_report import Analysis
     from rds.machines import Machine
 
 _BITRATES = (125_000, 250_000, 500_000, 1_000_000)
@@ -29,7 +33,8 @@ def show_serial(
     T = machine.sample_period if period is None else period
     bauds = sorted({*serial_line.BAUDS, rate}) if baud is None else [rate]
     rows = serial_line.table(count, T, bauds)
-    _draw(plot, lambda: serial_line.plot(machine, T))
+    if plot is not None:
+        _save(plot, serial_line.plot(machine, T))
     asked = serial_line.fits(count, rate, T)[1]
     rest = serial_line.filling_time(count, rate)
     found = {
@@ -81,10 +86,22 @@ def show_can(rows: list[list[Any]]) -> None:
     show_table("What fits", _CAN_COLUMNS, [[cell(value) for value in row] for row in rows])
 
 
-def _draw(plot: Path | None, draw: Any) -> None:
-    if plot is None:
+def draw_can(plot: Path, analysis: Analysis, machine: Machine, period: float | None, dialect: str, fits: bool) -> None:
+    """The timeline of an analysis; with `fits` the curves of methods A, B and C, which are of dialect rds."""
+    if not fits:
+        from rds.bus.analysis.analysis_plot import plot as draw
+
+        _save(plot, draw(analysis))
         return
+    if dialect != "rds":
+        raise InputError(f"--fits --plot draws the curves of dialect rds, not of {dialect}; leave --fits or --plot out")
+    from rds.bus.analysis.can_curves import plot as draw_curves
+
+    _save(plot, draw_curves(machine, machine.sample_period if period is None else period))
+
+
+def _save(plot: Path, picture: Figure) -> None:
     from rds.core.atomic import write_files
 
-    picture, kind = draw(), plot.suffix.removeprefix(".") or "png"
+    kind = plot.suffix.removeprefix(".") or "png"
     write_files({plot: lambda stream: picture.savefig(stream, format=kind)})

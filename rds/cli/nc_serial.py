@@ -101,9 +101,10 @@ def run_methods(
     settings = {"machine": where, "mode": how, "motion": motion, **rate, **words}
     report = methods_report(runs, file, settings)
     files = [*write(report, out), *write_records(runs, out)] if out is not None else []
+    astray = any(any(run.astray.values()) for run in runs)
     if json:
         print_json({**report.to_json(), "files": [str(path) for path in files]})
-        return
+        raise typer.Exit(int(astray))
     from rds.cli.console import cell, show_table
 
     for table in report.tables:
@@ -112,6 +113,7 @@ def run_methods(
         typer.echo(f"- {sentence}")
     if files:
         typer.echo(f"page: {files[0]}")
+    raise typer.Exit(int(astray))
 
 
 def by_method(

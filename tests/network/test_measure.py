@@ -54,7 +54,9 @@ def test_a_machine_is_measured_and_its_trace_drives_an_experiment(tmp_path: Path
     if not delays["sensor"]["lost"]:
         assert sum(whole.values()) == pytest.approx(delays["total"]["mean"])
     assert 5.0 < told["bus_load_percent"] < 50.0
-    assert {"set up", "running"} >= set(told["host_load_percent"])
+    load = told["host_load_percent"]
+    assert {"steady", "running"} <= set(load) <= {"started", "steady", "set up", "running"}
+    assert load["steady"]["process_mean"] < load["running"]["process_mean"]
     assert picture.read_bytes().startswith(b"\x89PNG")
     columns = read_trace(trace)
     result = rds.Experiment(
@@ -66,6 +68,18 @@ def test_a_machine_is_measured_and_its_trace_drives_an_experiment(tmp_path: Path
     ).run()
     wanted = np.where(np.isnan(columns["actuator"]), -1.0, columns["actuator"])
     assert result["X_delay_ca"][: len(wanted)] == pytest.approx(wanted[:100], abs=1e-9)
+
+
+@pytest.mark.realtime
+@pytest.mark.usefixtures("alone")
+def test_a_serial_line_is_as_full_as_the_formula_says() -> None:
+    """At 115,200 bit/s a frame and four answers take 4.65 ms."""
+    words = ["network", "measure", "starmill", "--interface", "serial", "--seconds", "0.4", "--sample-period", "0.02"]
+    ran = CliRunner().invoke(app, [*words, "--json"])
+    assert ran.exit_code == 0, ran.output
+    told = json.loads(ran.stdout)
+    assert told["bitrate"] == 115_200
+    assert told["bus_load_percent"] == pytest.approx(100 * 4.64583e-3 / 0.02, rel=1e-3)
 
 
 def test_no_time_is_refused() -> None:

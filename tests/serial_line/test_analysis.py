@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from rds.bus.analysis import serial_line
+from rds.bus.analysis import can_curves, serial_line
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
@@ -46,3 +46,22 @@ def test_the_command_says_what_fits(tmp_path: Path) -> None:
     assert slow.exit_code == 1 and json.loads(slow.stdout)["fits"] is False
     can = runner.invoke(app, ["bus", "analyse", "mini-cnc", "--fits", "--json"])
     assert [row[-1] for row in json.loads(can.stdout)["fits"]] == ["no", "no", "no", "yes"]
+
+
+@pytest.mark.parametrize("units", [1, 3])
+def test_can_measured_lies_between_the_formulas(units: int) -> None:
+    """The least has no stuff bit, the most all that can be; what the modules' frames take lies between."""
+    least, most = (can_curves.by_formula(units, 500_000, most) for most in (False, True))
+    one = can_curves.measure(load_machine("mini-cnc"), units, 500_000)
+    for name in ("cycle", "filling", "clocks"):
+        assert getattr(least, name) < getattr(one, name) < getattr(most, name)
+    assert most.cycle == pytest.approx((1 + units) * 135 / 500_000)
+
+
+def test_the_curves_of_can_are_one_picture(tmp_path: Path) -> None:
+    picture = tmp_path / "can.png"
+    words = ["bus", "analyse", "mini-cnc", "--fits", "--plot", str(picture)]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    refused = CliRunner().invoke(app, [*words, "--dialect", "oacs"])
+    assert refused.exit_code == 2 and "leave --fits or --plot out" in refused.stderr

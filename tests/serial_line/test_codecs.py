@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.bus.modules.dcs import buffers, commands, frames
+from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.commands import Report
 from rds.bus.modules.dcs.frames import Answer, Info, Mode, Status
 from rds.core.errors import InputError
@@ -107,3 +109,25 @@ def test_the_thesiss_axes_do_not_arrive_together_and_ours_do() -> None:
 
 def test_fillings_are_1500_bytes_each() -> None:
     assert [len(each) for each in buffers.fillings(bytes(3001))] == [1500] * 3
+
+
+def test_noise_makes_no_answers_that_nobody_sent() -> None:
+    """Of the bytes of 20,000 answers one in a hundred has a turned bit: what comes through was sent."""
+    random = np.random.default_rng(5)
+    counts = random.integers(-90_000, 90_000, 20_000).tolist()
+    sent = [Answer(2 + i % 3, i % 4, Status.NONE, count) for i, count in enumerate(counts)]
+    stream, data = AnswerStream(), bytearray(b"".join(map(frames.encode_answer, sent)))
+    for place in np.flatnonzero(random.random(len(data)) < 0.01):
+        data[place] ^= 1 << int(random.integers(8))
+    stream.add(bytes(data))
+    found = list(iter(stream.next, None))
+    assert len(found) > 0.9 * len(sent) and stream.damaged > 1000
+    assert sum(answer not in sent for answer in set(found)) <= 1
+
+
+def test_lost_bytes_cost_two_answers() -> None:
+    sent = [Answer(2 + i % 3, i % 4, Status.NONE, 100 * i) for i in range(9)]
+    data = b"".join(map(frames.encode_answer, sent))
+    stream = AnswerStream()
+    stream.add(data[:10] + data[11:])
+    assert list(iter(stream.next, None)) == [sent[0], *sent[3:]]

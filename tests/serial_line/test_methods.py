@@ -15,6 +15,7 @@ from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.nc.run.serial_methods import METHODS, MethodRun, run_method
 from rds.nc.run.serial_motion import serial_motion
+from rds.nc.run.serial_report import methods_report
 
 from .conftest import Bench
 
@@ -180,6 +181,17 @@ def test_noise_is_retried_and_moves_nothing_wrong(bench: Maker) -> None:
     course = methods.method_c(b.host, steps(3000), UNITS)
     assert course.retries > 0
     assert [b.host.inquire(unit).counts for unit in UNITS] == [3000, 3000, 3000]
+
+
+def test_steps_that_noise_took_from_a_frame_are_told(tmp_path: Path) -> None:
+    """Method A sends increments once: one in fifty frames damaged leaves units short, and the host says so."""
+    found = runs(tmp_path, CIRCLE, "AC", noise=2e-3, seed=3)
+    assert any(found["A"].astray.values()) and not any(found["C"].astray.values())
+    for name, steps_off in found["A"].astray.items():
+        assert found["A"].lost[name] == steps_off  # the motors made all that they got
+    said = methods_report(list(found.values()), Path("part.ngc"), {}).findings
+    assert sum("did not get" in sentence for sentence in said) == 1
+    assert not any("lost by motors" in sentence for sentence in said)
 
 
 def test_what_cannot_be_is_refused(tmp_path: Path) -> None:

@@ -147,6 +147,8 @@ def bus_note(drivers: Mapping[str, Any], bus: Mapping[str, Any]) -> str | None:
         came = f", {late} of them came later" if late else ""
         of = "the position before stood in for " + ("it" if missing == 1 else "each")
         parts.append(f"{_some(missing, 'answer')} of modules did not come within the period{came} ({of})")
+    if damaged := drivers.get("damaged", 0):
+        parts.append(f"{_some(damaged, 'answer')} came damaged, by noise on the line: see to its cable and shield")
     if lost := drivers.get("lost_ticks", 0):
         parts.append(f"modules missed {_some(lost, 'command')}")
     if cut := drivers.get("cut", 0):

@@ -58,6 +58,7 @@ class MethodRun:
     bytes: int = 0  # of the host
     load: float = 0.0  # share of the motion's time in which the host's wires are busy
     segment: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # of the path, at each instant of `time`
+    astray: Mapping[str, int] = field(default_factory=dict)  # steps that a unit was sent and did not get, by axis
 
 
 def check_method(method: str, mode: str) -> None:
@@ -101,8 +102,9 @@ def run_method(
         course = _carry_out(method, host, motion, machine)
         port.sleep(port.now() + _SETTLE)
         traffic = (simulated.down.bytes - sent, simulated.down.busy - busy)
+        astray = _astray(method, host, motion, machine)
         names = [unit.name for unit in simulated.units]
-        return _measured(method, motion, course, np.array(rows), names, traffic)
+        return replace(_measured(method, motion, course, np.array(rows), names, traffic), astray=astray)
     if mode == EMULATION:
         simulation = run_method(method, motion, machine, baud=baud, **line)
         dry = _dry_run(method, motion, machine, titles, baud, channel, line)
@@ -117,16 +119,18 @@ def run_method(
         _approach(host, motion)
         counted.bytes = 0
         course = _carry_out(method, host, motion, machine)
+        traffic = (counted.bytes, counted.bytes * 10 / baud)
         real.sleep(real.now() + _SETTLE)
-    traffic = (counted.bytes, counted.bytes * 10 / baud)
+        astray = _astray(method, host, motion, machine)
     if trace is None:
-        return MethodRun(method, motion, course, bytes=traffic[0], load=traffic[1] / (course.ended - course.begun))
+        load = traffic[1] / (course.ended - course.begun)
+        return MethodRun(method, motion, course, bytes=traffic[0], load=load, astray=astray)
     with open(trace, newline="") as file:
         names, *found = list(csv.reader(file))
     trace.unlink()
     trace.parent.rmdir()
     table = np.array([[float(cell) for cell in row] for row in found]).reshape(-1, len(names))
-    return _measured(method, motion, course, table, names[1:], traffic)
+    return replace(_measured(method, motion, course, table, names[1:], traffic), astray=astray)
 
 
 def _dry_run(
@@ -206,6 +210,19 @@ def _carry_out(method: str, host: Host, motion: SerialMotion, machine: Machine) 
         return on_line.method_b(host, dict(zip(motion.units, motion.nodes, strict=True)), synchronize=synchronize)
     thesis = method == "C-thesis"
     return on_line.method_c(host, motion.pulses, motion.units, as_thesis=thesis, synchronize=synchronize)
+
+
+def _astray(method: str, host: Host, motion: SerialMotion, machine: Machine) -> dict[str, int]:
+    """Steps that each unit with a stepper was to get, less those that it says it got: what the line lost."""
+    if method.startswith("B"):
+        last = np.rint(by_equations(motion.nodes, motion.blu, motion.counts)[0][-1] / motion.blu)
+    else:
+        last = motion.start + motion.pulses.sum(axis=0)
+    return {
+        name: int(end) - host.inquire(unit).counts
+        for name, unit, end in zip(motion.axes, motion.units, last, strict=True)
+        if machine.axis(name).module.get("motor") == "stepper"
+    }
 
 
 def _measured(

@@ -33,6 +33,7 @@ _NOTE = (
     "none). Commanded: the same of the steps sent. Steps off: sent less made, where the motion ended. Pauses: while "
     "buffers were filled. Load: share of the time in which the host's wires, or the CAN bus, are busy."
 )
+_LATE = 0.01  # share of late frames that is worth a sentence
 _WORDS = {
     "A": "each period a frame",
     "B": "equations of segments",
@@ -52,9 +53,7 @@ def methods_report(runs: Sequence[MethodRun], file: Path, settings: Mapping[str,
         best = min(measured, key=lambda run: float(run.error.max()))
         said.append(f"Method {best.method} keeps nearest to the path: {best.error.max() * 1e3:.2f} µm at most.")
     for run in runs:
-        if off := {name: count for name, count in run.lost.items() if count}:
-            lost = ", ".join(f"{name} {count}" for name, count in off.items())
-            said.append(f"Method {run.method} ends with steps lost: {lost}; nobody on the line knows.")
+        said += _losses(run)
     return Report(
         kind="methods",
         title=f"{file.name} by methods A, B and C",
@@ -64,6 +63,31 @@ def methods_report(runs: Sequence[MethodRun], file: Path, settings: Mapping[str,
         figures={"contour": lambda: _picture(measured)} if measured else {},
         findings=[*said, *dict.fromkeys(note for run in runs for note in run.motion.notes)],
     )
+
+
+def _losses(run: MethodRun) -> list[str]:
+    """What the host sent late, what the line lost, and what the motors did."""
+    said, course = [], run.course
+    if course.late > _LATE * course.steps:
+        said.append(
+            f"Method {run.method}: the host sent {course.late} of {course.steps} frames late, which made steps longer "
+            "and shorter than planned: see to what else keeps this computer busy, or take B or C, which go by the "
+            "nodes' clocks."
+        )
+    if off := _counts(run.astray):
+        said.append(
+            f"Method {run.method}: steps that the units were sent and did not get: {off} ({course.missing} answers "
+            "missed): frames were damaged or lost on the line. Home the axes; see to the cable, its shield and the "
+            "baud rate, or take B or C, which send again what is lost."
+        )
+    motors = {name: count - run.astray.get(name, 0) for name, count in run.lost.items()}
+    if lost := _counts(motors):
+        said.append(f"Method {run.method} ends with steps lost by motors: {lost}; nobody on the line knows.")
+    return said
+
+
+def _counts(steps: Mapping[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in steps.items() if count)
 
 
 def _row(run: MethodRun) -> list[Any]:

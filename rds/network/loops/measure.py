@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.bus.hub.bus_settings import DEFAULT_BAUD, SERIAL
 from rds.core.clock import LatePolicy, RealTimeClock
 from rds.core.contracts import Drivers
 from rds.core.errors import InputError
@@ -33,7 +34,7 @@ from rds.network.trace import write_trace
 
 PERCENTILES = (50.0, 95.0, 99.0, 99.9)
 SECONDS = Quantity("how long to measure", "s", 0.05, 3600.0, default=5.0)
-SERIAL = "serial"  # an interface that is no bus of python-can
+_STEADY = 1.0  # s at most of the host's load with nothing to do
 _WARM = 50  # samples before the first that counts
 
 
@@ -132,6 +133,8 @@ def measure(
             stack.enter_context(prepared(plan.priority, plan.cpu))
         host = HostLoad("started")
         reached = stack.enter_context(machine_behind(plan))
+        host.enter("steady")
+        host.rest(min(seconds, _STEADY))
         return _measured(reached, max(int(seconds / plan.T), 20), host)
 
 
@@ -163,21 +166,20 @@ def _measured(plan: Plan, samples: int, host: HostLoad) -> Measurement:
     bus.pop("faults", None)
     dialect = bus.pop("dialect", DEFAULT)
     interface, channel = bus["interface"], bus.get("channel")
-    bitrate = int(bus.get("bitrate", BITRATE))
+    bitrate = int(bus.get("baud", DEFAULT_BAUD) if interface == SERIAL else bus.get("bitrate", BITRATE))
     watcher = None
     if interface != SERIAL:  # nobody else can listen there
         watcher = open_bus(interface, channel, None, node="watcher", **bus_options(bus))
     clock = RealTimeClock(round(plan.T * 1e9), LatePolicy(discard=True))
     drivers = None
     try:
-        host.phase = "set up"
+        host.enter("set up")
         drivers = open_drivers(dialect, plan.machine, plan.names, plan.T, True, bus)
         drivers.start()
-        host.read()
         while watcher is not None and watcher.recv(0.0) is not None:
             pass  # frames of the start
         statistics = Statistics(bitrate, bus.get("data_bitrate"))
-        host.phase = "running"
+        host.enter("running")
         times, frames = _loop(plan, drivers, clock, watcher, statistics, samples, host)
     finally:
         if drivers is not None:
@@ -196,10 +198,18 @@ def _measured(plan: Plan, samples: int, host: HostLoad) -> Measurement:
         actuator=found.actuator,
         lateness=late,
         split_error=found.split_error,
-        bus_load=statistics.snapshot().load,
+        bus_load=statistics.snapshot().load if watcher is not None else _line_load(plan, bus),
         bitrate=bitrate,
         host=host,
     )
+
+
+def _line_load(plan: Plan, bus: dict[str, Any]) -> float:
+    """Share of the period that a frame and the answers of all units take on a serial line, %."""
+    from rds.bus.modules.dcs.drivers import exchange_time
+
+    baud, checksum = float(bus.get("baud", DEFAULT_BAUD)), bool(bus.get("checksum", True))
+    return 100.0 * exchange_time(baud, len(plan.machine.axes), checksum) / plan.T
 
 
 def _loop(

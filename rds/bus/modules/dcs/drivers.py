@@ -17,6 +17,7 @@ from math import ceil
 from rds.bus.hub.bus_settings import BAUD, DEFAULT_BAUD, SERIAL
 from rds.bus.modules import drivers_base
 from rds.bus.modules.dcs import frames
+from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.commands import TURN_ROUND
 from rds.bus.modules.dcs.frames import ANSWER_SIZE, Answer, Info, Mode, Status
 from rds.bus.modules.dcs.port import Port, SerialPort
@@ -38,7 +39,7 @@ _MARGIN = 0.8  # of a period that a frame and its answers may take
 class Counters(contracts.Counters):
     """What a serial line shows besides."""
 
-    damaged: int = 0  # bytes that are no part of an answer
+    damaged: int = 0  # answers that came as something else
     watchdogs: int = 0  # answers of units that had stopped by themselves
     cut: int = 0  # periods of zero volts because a unit was silent
 
@@ -46,11 +47,12 @@ class Counters(contracts.Counters):
 class _Unit(drivers_base.Module):
     """A unit of the line."""
 
-    __slots__ = ("number",)
+    __slots__ = ("number", "unset")
 
     def __init__(self, axis: Axis):
         super().__init__(f"{axis.name} (unit {axis.node})", axis.resolution, absolute=axis.is_spindle)
         self.number = axis.node
+        self.unset = 0  # answers in a row by which it has been reset
 
 
 class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
@@ -106,7 +108,7 @@ class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
         self._waiting = self._zero
         self._waiting_voltages: tuple[float, ...] = (0.0,) * len(used)
         self._sent_voltages = self._waiting_voltages
-        self._kept = bytearray()
+        self._answers = AnswerStream()
 
     @staticmethod
     def _check_time(baud: float, period: float, units: int, checksum: bool) -> None:
@@ -154,25 +156,23 @@ class DcsDrivers(drivers_base.DriversBase[_Unit, Answer]):
         """The next answer on the line, within so many s."""
         deadline = self._port.now() + timeout
         while True:
-            while len(self._kept) >= ANSWER_SIZE:
-                answer = frames.decode_answer(self._kept[:ANSWER_SIZE])
-                if answer is not None:
-                    del self._kept[:ANSWER_SIZE]
-                    return answer
-                self.counters.damaged += 1
-                del self._kept[0]
+            answer = self._answers.next()
+            self.counters.damaged = self._answers.damaged
+            if answer is not None:
+                return answer
             left = max(0.0, deadline - self._port.now())
             more = self._port.read(left)
             if not more and self._port.now() >= deadline:
                 return None
-            self._kept += more
+            self._answers.add(more)
 
     def _take(self, frame: Answer, late: bool) -> _Unit | None:
         unit = self._by_number.get(frame.unit)
         if unit is None:
             self.counters.foreign += 1
             return None
-        if frame.status & Status.NOT_SET_UP and self._started:
+        unit.unset = unit.unset + 1 if frame.status & Status.NOT_SET_UP else 0
+        if unit.unset > 1 and self._started:  # one alone may be noise
             raise MachineError(
                 f"{unit} on line {self._bus_name} has been reset in the run; its position is lost: start the run again"
             )

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from rds.bus.modules.course import LATE, Course
 from rds.bus.modules.dcs import frames
+from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.commands import BYTE_TIME
 from rds.bus.modules.dcs.frames import Info, Mode
 from rds.bus.modules.dcs.host import Host
@@ -26,13 +27,13 @@ def calls(host: Host, units: Sequence[int], steps: int) -> Course:
     port.read(0.0)
     begun = port.now() + BYTE_TIME
     course = Course(begun, begun + steps * BYTE_TIME, steps)
-    silent, kept = dict.fromkeys(units, 0), bytearray()
+    silent, answers = dict.fromkeys(units, 0), AnswerStream()
     for k in range(steps):
         due = begun + k * BYTE_TIME
         port.sleep(due)
         course.late += port.now() - due > LATE
         port.write(frames.encode(Info(Mode.CALL, k), frames.words([0] * frames.SLOTS)))
-        collect(host, kept, k, due + 0.9 * BYTE_TIME, silent, course)
+        collect(host, answers, k, due + 0.9 * BYTE_TIME, silent, course)
     return course
 
 

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING
 from rds.bus.modules import segments
 from rds.bus.modules.course import LATE, Course
 from rds.bus.modules.dcs import commands, frames
+from rds.bus.modules.dcs.answers import AnswerStream
 from rds.bus.modules.dcs.buffers import bytes_of, fillings
 from rds.bus.modules.dcs.commands import BUFFER, BYTE_TIME, Report
-from rds.bus.modules.dcs.frames import ANSWER_SIZE, Info, Mode, Status
+from rds.bus.modules.dcs.frames import Info, Mode, Status
 from rds.bus.modules.dcs.host import Host
 from rds.bus.modules.segments import NodeSegment
 from rds.core.errors import MachineError
@@ -47,7 +48,7 @@ def method_a(host: Host, pulses: np.ndarray, slots: Mapping[int, int], period: f
     begun = port.now() + period
     course = Course(begun, begun, len(pulses))
     silent = dict.fromkeys(slots, 0)
-    kept = bytearray()
+    answers = AnswerStream()
     places = list(slots.values())
     for k, row in enumerate(pulses):
         due = begun + k * period
@@ -57,25 +58,25 @@ def method_a(host: Host, pulses: np.ndarray, slots: Mapping[int, int], period: f
         for place, count in zip(places, row, strict=True):
             values[place] = int(count)
         port.write(frames.encode(Info(Mode.INCREMENTS, k), frames.words(values)))
-        collect(host, kept, k, due + 0.9 * period, silent, course)
+        collect(host, answers, k, due + 0.9 * period, silent, course)
     course.ended = begun + len(pulses) * period
     port.sleep(course.ended + period)
     return course
 
 
-def collect(host: Host, kept: bytearray, number: int, deadline: float, silent: dict[int, int], course: Course) -> None:
+def collect(
+    host: Host, answers: AnswerStream, number: int, deadline: float, silent: dict[int, int], course: Course
+) -> None:
     """The answers of a frame, as far as they come."""
     awaited = set(silent)
     while awaited:
-        kept += host.port.read(max(0.0, deadline - host.port.now()))
-        while len(kept) >= ANSWER_SIZE:
-            answer = frames.decode_answer(kept[:ANSWER_SIZE])
-            if answer is None:
-                del kept[0]
+        answers.add(host.port.read(max(0.0, deadline - host.port.now())))
+        while (answer := answers.next()) is not None:
+            if answer.status & Status.NOT_SET_UP and answer.unit in silent:  # or noise that looks like it
+                answers.clear()
+                if host.inquire(answer.unit).status & Status.NOT_SET_UP:
+                    raise _reset(host, answer.unit)
                 continue
-            del kept[:ANSWER_SIZE]
-            if answer.status & Status.NOT_SET_UP and answer.unit in silent:
-                raise _reset(host, answer.unit)
             if answer.number == number % frames.NUMBERS:
                 awaited.discard(answer.unit)
                 if answer.unit in silent:
@@ -86,7 +87,7 @@ def collect(host: Host, kept: bytearray, number: int, deadline: float, silent: d
     for unit in awaited:
         silent[unit] += 1
         if silent[unit] >= _SILENT:  # the unit's doing, or that of a host which is late itself
-            kept.clear()
+            answers.clear()
             if host.inquire(unit).status & Status.NOT_SET_UP:
                 raise _reset(host, unit)
             silent[unit] = 0
