@@ -51,7 +51,7 @@ ALLOWED: dict[str, set[str]] = {
         *("core", "machines", "interpolators", "nc", "modes", "modes.experiment", "results", "results.reports"),
     },
     "jobs": {
-        *("core", "bus", "modes", "modes.experiment", "nc.run"),  # see ONLY
+        *("core", "machines", "bus", "modes", "modes.experiment", "nc.run"),  # see ONLY
     },
     "grading": {
         *("core", "checks", "models", "controllers", "references", "interpolators", "machines", "nc", "nc.run"),

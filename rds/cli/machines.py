@@ -78,7 +78,9 @@ def _from_file(path: Path | None, name: str) -> str:
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeError:
-        raise InputError("is no text", str(path)) from None
+        raise InputError("is no text; name a configuration script or a .urdf file", str(path)) from None
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror}); check the path", str(path)) from error
     if path.suffix.lower() == ".urdf":
         return machine_text_of_urdf(text, name, str(path))
     return machine_text_of_script(read_script(text, str(path)), name)

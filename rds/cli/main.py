@@ -164,9 +164,9 @@ def run(
 
         for each in made:
             show_result(*each)
-    code = exit_code(result)
-    explain(result)
-    raise typer.Exit(code)
+    for each in made:
+        explain(each[0])
+    raise typer.Exit(exit_code(result))
 
 
 @app.command()

@@ -216,10 +216,10 @@ def run(
     if json:
         told = {"program": result.meta["program"], "changes": result.meta["changes"]}
         print_json(run_json(result, files) | told | ({} if exchange is None else runs_json(made)))
-    else:
-        for each in made:
+    for each in made:
+        if not json:
             _show(*each)
-    explain(result)
+        explain(each[0])
     raise typer.Exit(exit_code(result))
 
 

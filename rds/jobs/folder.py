@@ -25,12 +25,25 @@ class Folder:
 
     def file(self, name: str) -> Path:
         """The file of this name. InputError for one that is not there, or outside of the folder, be it by a link."""
-        if not name or len(name) > _LONGEST or "\0" in name:
-            raise InputError(f"file = {name[:40]!r} must be the path of a file in the served folder")
-        found = self._inside(self.path / name, f"file = {name!r}")
+        found = self._named(name)
         if not found.is_file():
             raise InputError(f"file = {name!r} is no file in {self.path}")
         return found
+
+    def new_file(self, name: str, suffix: str) -> Path:
+        """Where a new file of this name goes. InputError for one that is there, or would be outside of the folder."""
+        found = self._named(name)
+        if found.suffix != suffix:
+            raise InputError(f"file = {name!r} must end with {suffix}")
+        if found.exists() or not found.parent.is_dir():
+            why = "is there already" if found.exists() else "is in a folder that is not there"
+            raise InputError(f"file = {name!r} {why}; choose another name")
+        return found
+
+    def _named(self, name: str) -> Path:
+        if not name or len(name) > _LONGEST or "\0" in name:
+            raise InputError(f"file = {name[:40]!r} must be the path of a file in the served folder")
+        return self._inside(self.path / name, f"file = {name!r}")
 
     def check_words(self, file: Path) -> None:
         """Refuse an experiment whose words name files outside of the folder, those of its own TOML files included."""

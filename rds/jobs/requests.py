@@ -29,6 +29,11 @@ def _of_job(meaning: str, **more: Declaration) -> Table:
 VERBS: dict[str, Table] = {
     "load": Table("read and check a file; the job's number", _FILE, needed=("file",)),
     "check": Table("the same, and forget it", _FILE, needed=("file",)),
+    "configure": Table(
+        "a machine from a configuration script (NCC), judged; a new file in the folder where it is a machine",
+        {"script": Text("the script, its lines from RF01 to BUILD"), "file": Text("the new file, as in mine.toml")},
+        needed=("script", "file"),
+    ),
     "run": Table(
         "begin",
         {"job": _JOB, "queue": Flag("wait for the job that runs, instead of a refusal", False)},
@@ -105,6 +110,19 @@ def _check(jobs: Jobs, **words: Any) -> dict[str, Any]:
     return jobs.load(words["file"], words["mode"], words["machine"], words["experiment"], keep=False).about()
 
 
+def _configure(jobs: Jobs, script: str, file: str) -> dict[str, Any]:
+    from rds.core.atomic import write_whole
+    from rds.machines.configuration import verdict
+    from rds.machines.ncc import machine_of_script, machine_text_of_script, read_script
+
+    place = jobs.folder.new_file(file, ".toml")
+    read = read_script(script, "script")
+    judged = verdict(machine_of_script(read, place.stem))
+    if judged.ok:
+        write_whole(place, machine_text_of_script(read, place.stem).encode())
+    return {"file": jobs.folder.relative(place) if judged.ok else None, "verdict": judged.to_json()}
+
+
 def _run(jobs: Jobs, job: int, queue: bool) -> dict[str, Any]:
     begun = jobs.run(job, queue)
     out = None if begun.out is None else jobs.folder.relative(begun.out)
@@ -137,6 +155,7 @@ def _drop(jobs: Jobs, job: int) -> dict[str, Any]:
 _ANSWERS: dict[str, Callable[..., dict[str, Any]]] = {
     "load": _load,
     "check": _check,
+    "configure": _configure,
     "run": _run,
     "hold": _operator("hold"),
     "resume": _operator("resume"),

@@ -81,9 +81,9 @@ def assembled(name: str, order: Order, data: Mapping[int, Data]) -> Machine:
 def machine_text(name: str, order: Order, data: Mapping[int, Data], before: Machine | None = None) -> str:
     """The machine's file, as TOML; InputError with the first fault of the order.
 
-    What no module knows is taken from `before`, the machine that was reconfigured: its converter, and model, limits and
-    physics of the axes whose module is of the same number and type; else from a machine of the package that has a
-    module of this type.
+    What no module knows is taken from `before`, the machine that was reconfigured: its converter, and model, limits,
+    power and physics of the axes whose module is of the same number and type; else from a machine of the
+    package that has a module of this type.
     """
     found = judged(order, data, name)
     if not found.ok:
@@ -106,7 +106,8 @@ def _kept(axis: Mapping[str, Any], before: Machine) -> dict[str, Any]:
         if known.module.get("type_text") == said:
             tables = {"model": known.model, "machine": known.machine}
             limits = {"limits": asdict(known.limits)} if known.limits is not None else {}
-            return {key: dict(value) for key, value in tables.items() if value} | limits
+            power = {"power": known.power} if known.power is not None else {}
+            return {key: dict(value) for key, value in tables.items() if value} | limits | power
     return {}
 
 

@@ -44,6 +44,7 @@ LIMITS = Table(
     },
     needed=("velocity", "acceleration", "jerk"),
 )
+SPINDLE_POWER = Quantity("power of a spindle's motor: the limit of cuts that name none", "W", above=0.0)
 SLOT = Quantity("place of its voltage in cyclic commands; by default its place among the axes", "", 1, 8, whole=True)
 AXIS = Table(
     "an axis of the machine",
@@ -59,6 +60,7 @@ AXIS = Table(
             needed=("name",),
         ),
         "slot": SLOT,
+        "power": SPINDLE_POWER,
         "limits": LIMITS,
         "machine": Table("the axis behind the bus, for `rds machine serve`", others=PARAMETER),
         "module": MODULE,
@@ -132,6 +134,7 @@ class Axis:
     module: dict[str, Any] = field(default_factory=dict)
     limits: AxisLimits | None = None
     slot: int | None = None  # from 1; None: its place among the axes
+    power: float | None = None  # W, of a spindle's motor
 
     @property
     def is_spindle(self) -> bool:
@@ -169,6 +172,11 @@ class Machine:
         from rds.machines.kinematics import kinematics_of
 
         return kinematics_of(self)
+
+    @property
+    def spindle_power(self) -> float | None:
+        """What the motor of its spindle has, W; None where nobody says so."""
+        return next((axis.power for axis in self.axes.values() if axis.power is not None), None)
 
     @cached_property
     def slots(self) -> dict[str, int]:
@@ -253,7 +261,12 @@ def _axis(name: str, tables: TomlTable) -> Axis:
         module={key: _of_module(module, key) for key in MODULE.keys if key in module},
         limits=_limits(table.inner("limits")),
         slot=table.read("slot", None),
+        power=table.read("power", None),
     )
+    if made.power is not None and not made.is_spindle:
+        raise InputError(
+            f"power is that of a spindle's motor, and {name} is none (unit {made.unit!r}); leave it away", table.path
+        )
     for each in (module, table):
         each.done()
     return made

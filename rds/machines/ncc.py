@@ -30,6 +30,7 @@ _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
 _WORD = re.compile(rf"\s*(XA|YA|ZA|X|Y|Z|UP|LW|LN)\s*(#|{_NUMBER})")
 _LINE = re.compile(r"\s*(?:N\d+(?:\.\d+)?)?\s*(?:(RF)\s*(\d+)|(BUILD)\b)?")
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
+_MOTION = re.compile(rf"\s*(?:N\d+(?:\.\d+)?)?\s*[A-Z]\s*{_NUMBER}", re.IGNORECASE)  # a line of a part program
 _WANTED = {1: ("LN", *ENTRIES), 2: ("LN", "UP", "LW"), 3: ("LN", *ENTRIES)}
 _LETTERS = {"X": "XU", "Y": "YV", "Z": "ZW", "XA": "A", "YA": "B", "ZA": "C"}  # of the axes, as they are taken
 _SAYS = "write RF01 (a link), RF02 (limits), RF03 (assembly error) or BUILD"
@@ -118,7 +119,7 @@ class Script:
             raise self._error(f"LN{number} out of order: LN{due} is missing; write the links from LN1 on")
         variables = [word for word in ENTRIES if words[word] == "#"]
         if len(variables) > 1:
-            raise self._error(f"{' and '.join(variables)} are both variable (#); a link has one joint at most")
+            raise self._error(f"{' and '.join(variables)} are both variable (#); a link has one joint; divide it")
         numbers = tuple(0.0 if words[word] == "#" else float(words[word]) for word in ENTRIES)
         self.links.append(ScriptLink(numbers, variables[0] if variables else "", line=self.line))
         self.built = 0
@@ -126,10 +127,10 @@ class Script:
     def _limit(self, number: int, words: dict[str, str]) -> None:
         link = self.links[number - 1]
         if not link.variable:
-            raise self._error(f"LN{number} is fixed (line {link.line} has no #): limits belong to a joint")
+            raise self._error(f"LN{number} is fixed (line {link.line} has no #): limits belong to a joint; remove them")
         lower, upper = (self._plain(word, words) for word in ("LW", "UP"))
         if not lower < upper:
-            raise self._error(f"UP{upper:g} must be more than LW{lower:g}")
+            raise self._error(f"UP{upper:g} must be more than LW{lower:g}; exchange them")
         self.links[number - 1] = replace(link, limits=(lower, upper))  # in force without BUILD: the chain is the same
 
     def _correct(self, number: int, words: dict[str, str]) -> None:
@@ -158,9 +159,9 @@ def read_script(text: str, name: str = "") -> Script:
     script, number = Script(name), 0
     for number, line in enumerate(text.splitlines(), 1):
         if not script.take(line, number):
-            script.line = number
-            if not script.built:
+            if not script.built and _MOTION.match(line):
                 script.check_built(number, f"{line.strip():.30}")
+            script.line = number
             raise script._error(f"{line.strip():.30} is no line of a configuration script; {_SAYS}")
     if not script.links:
         raise script._error("there is no link; write RF01 LN1 ..., and BUILD at its end")

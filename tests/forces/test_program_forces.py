@@ -76,6 +76,12 @@ def test_the_spindles_power_along_a_program(tmp_path):
     assert said.startswith("line 3") and f"and the spindle has {limit:g} W" in said
     assert "and in 1 more line" in said, "line 4 as fast; half the feed takes 0.59 of the power"
     assert "power" not in {one.name for one in forces_of(tmp_path, SQUARE).worst}
+    mill = forces_of(
+        tmp_path, "G21 G90 G94 G61\nS2000 M3\nG1 X15 F1100\nM2\n", "starmill", **{**own, "width": 5.0, "depth": 6.0}
+    )
+    assert "and the spindle has 160 W" in mill.warnings()[0], "table 5.1 of dcs-thesis, which no cut need name"
+    at_160 = forces_of(tmp_path, SQUARE, **own, limits={"power": limit}).cut.limits
+    assert at_160 == {"power": limit} and mill.cut.limits == {"power": 160.0}
     with pytest.raises(InputError, match="W is a limit of a power that does not follow: width is missing"):
         forces_of(tmp_path, SQUARE, limits={"power": 10.0})
     part = PartProgram(tmp_path / "part.ngc", "mini-cnc", cut=cut_of({**CUT, **own, "limits": {"power": limit}}))

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rds
@@ -19,6 +20,7 @@ from rds.core.errors import InputError
 from rds.jobs.folder import Folder
 from rds.jobs.jobs import Jobs
 from rds.jobs.requests import VERBS, answer, parse, words_of
+from rds.machines import load_machine
 from tests.documents import blocks, save
 from tests.jobs.conftest import Server
 
@@ -201,6 +203,26 @@ def test_a_killed_server_leaves_the_run_to_its_safe_end(serve: Serve) -> None:
     assert server.socket.exists()
     again = serve()  # takes the place of the one that was killed
     assert again.client().ask(do="jobs") == {"ok": True, "jobs": []}
+
+
+def test_a_configuration_script_comes_over_the_socket(serve: Serve) -> None:
+    """The chain of mrm-control's script: judged, written, and used by name in the next request."""
+    links = ["RF01 LN1 XA0 YA90 ZA0 X-80 Y0 Z75", "RF01 LN2 XA0 YA0 ZA0 X0 Y0 Z-370"]
+    script = "\n".join([*links, "RF01 LN3 XA0 YA0 ZA# X0 Y0 Z-140", "RF02 LN3 UP180 LW-180", "BUILD"])
+    server = serve()
+    client = server.client()
+    told = client.ask(do="configure", script=script, file="own.toml")
+    assert told["ok"] and told["file"] == "own.toml" and told["verdict"]["ok"]
+    own = load_machine(str(server.folder / "own.toml"))
+    tip = own.kinematics.forward({"C": 0.0})[:3, 3]
+    assert np.abs(tip - [-80.0, 0.0, -435.0]).max() < 1e-9
+    for file, said in (("own.toml", "is there already"), ("../x.toml", "leads out of"), ("a.txt", "end with .toml")):
+        assert said in client.ask(do="configure", script=script, file=file)["error"]
+    wrong = client.ask(do="configure", script=script.replace("LN2", "LN4"), file="wrong.toml")
+    assert wrong["error"].startswith("script, line 2: LN4 out of order") and not (server.folder / "wrong.toml").exists()
+    fixed = client.ask(do="configure", script=script.replace("X-80", "X0").replace("YA90", "YA0"), file="none.toml")
+    assert fixed["ok"] and not fixed["verdict"]["ok"] and fixed["file"] is None, "turns the tool about itself"
+    assert not (server.folder / "none.toml").exists()
 
 
 def test_the_documents_client(alone: Path) -> None:

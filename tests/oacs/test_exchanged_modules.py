@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import re
+import select
 import subprocess
 import sys
 import time
@@ -27,6 +31,7 @@ from rds.nc.run.run import PartProgram
 from rds.results import Result
 from rds.results.reports import make_report
 
+_CONTROLS = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")  # of a terminal: colours, the cursor
 Serve = Callable[..., subprocess.Popen[str]]
 
 
@@ -176,6 +181,52 @@ def test_an_exchange_is_refused_where_none_can_be(words: dict[str, Any], says: s
     given = {"mode": "implementation", "reference": rds.sinusoid(1.0, 0.5), "controller": {"name": "pid"}}
     with pytest.raises(InputError, match=says):
         run_through_exchanges(Experiment(machine="mrmt-oacs", **given | words), file, Hands(lambda offer: True))
+
+
+@pytest.mark.realtime
+def test_a_slide_is_exchanged_in_a_part_program_and_accepted_at_the_prompt(
+    serve: Serve, channel: str, tmp_path: Path
+) -> None:
+    """All of it in processes of their own: the command in a terminal, the modules; the slide's is killed."""
+    serve("drill,Z,A")
+    slide = serve("X")
+    (tmp_path / "part.ngc").write_text("G21 G90 G94 G61\nG1 X2 Z-1 F60\nX0 Z0\nM2\n")
+    bus = f'[bus]\ndialect = "oacs"\nchannel = "{channel}"\n'
+    (tmp_path / "bus.toml").write_text(f'machine = "mrmt-oacs"\nsample_period = 0.01\ncontroller = "pid"\n{bus}')
+    command = [sys.executable, "-m", "rds", "nc", "run", "part.ngc", "--controller", "bus.toml", "-m", "implementation"]
+    command += ["--exchange", "own.toml", "--events", "events.csv", "-o", "out"]
+    terminal, inner = pty.openpty()
+    said = ""
+
+    def until(text: str, seconds: float = 40.0) -> None:
+        nonlocal said
+        ends = time.monotonic() + seconds
+        while text not in said:
+            assert time.monotonic() < ends, f"no {text!r} in {said}"
+            if select.select([terminal], [], [], 0.1)[0]:
+                said += _CONTROLS.sub("", os.read(terminal, 65536).decode(errors="replace"))
+
+    with subprocess.Popen(command, stdin=inner, stdout=inner, stderr=inner, cwd=tmp_path) as running:
+        until("% of", 60.0)
+        end(slide)
+        until("lost LinrXa 4")
+        until("does not fit on 'A'")
+        serve("X")
+        until("accept it, and run again on it?")
+        assert "own" not in {path.stem for path in tmp_path.iterdir()}, "nothing is written before it is accepted"
+        os.write(terminal, b"y\n")
+        until("accepted own.toml")
+        until("csv: out-2", 60.0)
+        os.close(inner)
+    os.close(terminal)
+    assert running.returncode == 0 and "the run ended early (machine lost): no answer from X" in said
+    first, second = (rds.open_result(tmp_path / folder) for folder in ("out", "out-2"))
+    assert first.meta["machine"] == "mrmt-oacs" and first.meta["program"]["completed"] is False
+    assert second.meta["machine"] == "own" and second.meta["program"]["completed"] is True
+    assert second["X_measured"].max() == pytest.approx(2.0, abs=0.1), "from its first line, on the new slide"
+    report: Any = make_report("reconfiguration", [tmp_path / "events.csv"], {})
+    times = {row[0]: row[2] for row in report.tables[0].rows}
+    assert 0.0 < times["last module plugged in until moving"] < 60.0
 
 
 def test_a_part_program_goes_on_on_another_machine(tmp_path: Path) -> None:

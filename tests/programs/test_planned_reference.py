@@ -73,6 +73,20 @@ def test_a_part_program_moves_as_rds_nc_run_moves_it(here: Path) -> None:
     assert "the spindle stands" in " ".join(result.meta["notes"])
 
 
+@pytest.mark.parametrize("file", ["path.toml", "part.ngc"])
+def test_the_motion_is_planned_once_until_something_changes(here: Path, file: str) -> None:
+    experiment = follow(("X", "Y", "Z")[: 2 if file == "path.toml" else 3], file=file)
+    first, second = experiment.plan().program, experiment.plan("emulation").program
+    assert first is not None and second is not None and second.position is first.position
+    text = (here / file).read_text()
+    (here / file).write_text(text.replace("X3", "X5").replace("6.0", "7.0"))
+    changed = experiment.plan().program
+    assert changed is not None and changed.position.max() != first.position.max()
+    (here / "mine.toml").write_text(Path(rds.load_machine("mini-cnc").path).read_text().replace("200.0", "150.0"))
+    slower = experiment.with_machine("mine.toml").plan().program
+    assert slower is not None and slower.samples > changed.samples
+
+
 def test_it_is_held_and_hurried_on_its_path(here: Path) -> None:
     result = follow().run(changes=[(0.3, "hold", 1), (0.6, "hold", 0), (0.8, "override", 1.5)])
     assert (result["program_state"] == State.HELD).sum() > 100 and result["program_override"].max() > 1.49

@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from rds.core.errors import ContractError, InputError, MachineError, RdsError
 from rds.core.folder_kept import folder_kept
+from rds.core.last_made import LastMade
 from rds.core.toml_table import TomlTable
 from rds.core.types import Ending
 from rds.machines import Machine, load_machine
@@ -254,8 +256,13 @@ class Experiment:
                 (Path(out) / CHANGES).unlink(missing_ok=True)  # of an earlier run
         return result
 
+    @cached_property
+    def _planned(self) -> LastMade:
+        """The path that was planned last, as its reference."""
+        return LastMade()
+
     def _resolve(self, mode: str | None) -> tuple[Plan, dict[str, Any]]:
-        return resolve(self._words, self._folder, mode)
+        return resolve(self._words, self._folder, mode, planned=self._planned)
 
     def _complete(self, result: Result, plan: Plan) -> Result:
         """What else is to be said of a result; a run of another kind adds to it."""

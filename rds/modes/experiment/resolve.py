@@ -15,6 +15,7 @@ from rds.bus.modules.dialects import SERIAL_DIALECTS
 from rds.core.clock import LatePolicy
 from rds.core.errors import InputError
 from rds.core.folder_kept import folder_kept
+from rds.core.last_made import LastMade
 from rds.core.quantities import Choice
 from rds.core.toml_table import TomlTable
 from rds.core.types import Controller
@@ -48,10 +49,12 @@ def resolve(
     folder: Path,
     mode_name: str | None = None,
     program: Program | InterpolatedProgram | None = None,
+    planned: LastMade | None = None,
 ) -> tuple[Plan, dict[str, Any]]:
     """The plan of the experiment, in `mode_name` if that is given, and what is known of it for the result's meta.
 
     With a part program, that drives its axes and the spindle: the words say their controllers, and no reference.
+    `planned` keeps the motion of a path from one time to the next.
     Raises InputError with file, line, key, value and remedy for anything that will not do.
     """
     words.read("title")
@@ -59,7 +62,7 @@ def resolve(
     written = words.read("mode")
     mode = load_mode(written if mode_name is None else mode_name)
     T = words.read("sample_period", machine.sample_period)
-    drawn, own_file = _path(words, folder, machine, T) if program is None else (None, None)
+    drawn, own_file = _path(words, folder, machine, T, planned or LastMade()) if program is None else (None, None)
     leads = program or drawn
     samples = _samples(words, T) if leads is None else leads.samples
     words.read("compiled")
@@ -105,7 +108,7 @@ def resolve(
 
 
 def _path(
-    words: TomlTable, folder: Path, machine: Machine, T: float
+    words: TomlTable, folder: Path, machine: Machine, T: float, planned: LastMade
 ) -> tuple[InterpolatedProgram | Program | None, str | None]:
     """The path that all axes of the run follow, and the file of its interpolator, if the user wrote one."""
     given = words.any("reference")
@@ -124,7 +127,7 @@ def _path(
     names = [axis.name for axis, _ in _axes(words, machine)]
     try:
         made: tuple[InterpolatedProgram | Program, str | None]
-        made = PATHS.module(kind).program(table, folder, machine, names, T)
+        made = PATHS.module(kind).program(table, folder, machine, names, T, planned)
     except InputError as error:
         raise error if error.where else InputError(str(error), table.place()) from error
     return made

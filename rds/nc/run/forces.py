@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -124,12 +124,16 @@ class ProgramForces:
 def program_forces(prepared: Prepared, machine: Machine, cut: CutFile) -> ProgramForces:
     """Force and loads of a planned program: every feed move cuts, no rapid does.
 
+    A cut whose power follows and which limits none may take what the machine says of its spindle.
+
     Raises InputError for a limit of a joint that there is not, and for a feed move while the spindle stands.
     """
     program, kinematics = prepared.program, machine.kinematics
     if not isinstance(program, Program):
         raise InputError("forces are worked out for planned motion; leave --interpolator away")
     require_joints(cut, kinematics.joints, machine.name)
+    if cut.has_power and POWER not in cut.limits and machine.spindle_power is not None:
+        cut = replace(cut, limits={**cut.limits, POWER: machine.spindle_power})
     path = prepared.path
     number = np.clip(prepared.segment, 0, max(len(path) - 1, 0))  # the first row belongs to none
     feeds = ~path["rapid"][number] if len(path) else np.zeros(program.samples, bool)

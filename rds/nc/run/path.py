@@ -15,6 +15,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.geometry import PLANES, length
+from rds.core.last_made import LastMade
 from rds.core.load import StudentFile, from_function
 from rds.core.quantities import Anything, Choice, Flag, Items, Quantity, Table, Text
 from rds.core.toml_table import TomlTable
@@ -97,10 +98,11 @@ class Method:
 
 
 def program(
-    words: TomlTable, folder: Path, machine: Machine, axes: Sequence[str], T: float
+    words: TomlTable, folder: Path, machine: Machine, axes: Sequence[str], T: float, last: LastMade
 ) -> tuple[InterpolatedProgram | Program, str | None]:
     """The program of a `[reference]` table for the axes of a run, and the path of the user's interpolator.
 
+    Of a planned motion, what was planned last is in `last`, and is taken where nothing has changed.
     InputError with the place of the words that won't do.
     """
     profile = words.read("profile")
@@ -125,7 +127,7 @@ def program(
         if method is not None:
             made = of_part_program(folder / file, machine, None, T, method)
         else:
-            made = _with_origin(prepare(folder / file, machine, None, T, None, profile), profile)
+            made = _with_origin(prepare(folder / file, machine, None, T, None, profile, last), profile)
         if set(axes) - {made.spindle} != set(made.axes):
             raise InputError(
                 f"a part program moves {', '.join(made.axes)}, and the run has {', '.join(axes)}; "
@@ -155,7 +157,8 @@ def program(
         made = program_of(name, segments, lines, rests, (), method, machine, axes, T)
         made = replace(made, about={**made.about, "counted_in": "segment"})
     else:
-        made = _planned(name, segments, lines, rests, profile, machine, axes, T)
+        of = (name, segments, lines, rests, profile, machine, axes, T)
+        made = last.get(of, lambda: _planned(*of))
     if is_led:
         made = _noted(made, f"the axes begin at 0: a straight line leads to the start of the path, {first.end}")
     return made, own_file

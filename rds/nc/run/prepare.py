@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.last_made import LastMade
 from rds.interpolators.motion.certificate import Certificate
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import PASSING
@@ -21,7 +22,7 @@ from rds.machines import Machine
 from rds.machines.kinematics.tip import Tip
 from rds.modes.loop.program import Happening, InterpolatedProgram, Program
 from rds.nc.check import Setup, check_program, compiled_if_current
-from rds.nc.compiled_file import open_compiled
+from rds.nc.compiled_file import Compiled, open_compiled
 from rds.nc.path_block import PathBlock
 from rds.nc.tool_centre import ToolCentre, path_of_tip
 
@@ -77,13 +78,15 @@ def prepare(
     T: float | None = None,
     progress: Progress | None = None,
     profile: str = "planned",
+    last: LastMade | None = None,
 ) -> Prepared:
     """Check the program in `file` for `machine`, and plan its motion with samples of `T` s (default: the machine's).
 
     `profile` is one of `rds.interpolators.motion.profiles`.
 
-    A current compiled form beside the file is used, and made if there is none. Raises InputError with all faults if the
-    machine cannot run it, and ProgramError or InputError for what cannot be read.
+    A current compiled form beside the file is used, and made if there is none. `last` keeps what was planned, and
+    nothing is planned again where all is as it was. Raises InputError with all faults if the machine cannot run it,
+    and ProgramError or InputError for what cannot be read.
     """
     setup = setup or Setup()
     T = machine.sample_period if T is None else T
@@ -93,6 +96,13 @@ def prepare(
         if place is None:
             raise InputError(str(validation))
         compiled = open_compiled(place)
+    return (last or LastMade()).get(
+        (file, compiled.header, compiled.trailer, machine, T, profile),
+        lambda: _of_compiled(compiled, file, machine, setup, T, profile),
+    )
+
+
+def _of_compiled(compiled: Compiled, file: Path, machine: Machine, setup: Setup, T: float, profile: str) -> Prepared:
     require_room(least_seconds(compiled.blocks()), machine, T, file)
     found = planned(compiled.blocks(), machine, T, file, profile)
     if (found.path["tip"] != JOINTS).any():
