@@ -163,3 +163,20 @@ def test_a_hand_out_of_hidden_criteria_only_is_refused_and_leaves_nothing(tmp_pa
     with pytest.raises(InputError, match="no criterion can be shown"):
         hand_out(read, tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a"]
+
+
+def test_a_hand_out_promises_no_points_that_a_hidden_gate_takes(tmp_path: Path) -> None:
+    read = read_assignment(assignment_in(tmp_path / "a", WHOLE + 'requires = ["blind"]\n' + HIDDEN))
+    with pytest.raises(InputError, match="rms: it is visible, but requires blind, which students cannot see"):
+        hand_out(read, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_points_of_a_hidden_criterion_tell_its_value_in_steps_only(tmp_path: Path) -> None:
+    text = WHOLE + HIDDEN
+    shown, hidden = read_assignment(assignment_in(tmp_path / "a", text)).criteria
+    values = [shown.bands.none + k / 1000 * (shown.bands.full - shown.bands.none) for k in range(1001)]
+    assert len({shown.score(value, "").score for value in values}) == 1001
+    points = [hidden.score(value, "").score for value in values]
+    assert len(set(points)) == 21 and points == sorted(points)
+    assert points[0] == 0.0 < points[1] and points[-2] < points[-1] == hidden.max_score

@@ -12,10 +12,10 @@ import pytest
 from rds.grading.grade import Status
 from rds.grading.sandbox import Pool
 from tests.grading.attacked import HONEST, SAMPLES, Machine, Outcome, run
-from tests.grading.attacks import PATIENT, Attack, changing, leaving, looking, lying, taking
+from tests.grading.attacks import PATIENT, Attack, changing, leaving, looking, lying, seeming, taking
 
 Written = Callable[..., Path]
-KINDS = (changing, leaving, looking, lying, taking)
+KINDS = (changing, leaving, looking, lying, seeming, taking)
 ATTACKS: dict[str, Attack] = {name: attack for kind in KINDS for name, attack in kind.ATTACKS.items()}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 from rds.grading.assignment.assignment import read_assignment
@@ -42,7 +43,8 @@ def test_margins_in_one_case_only_pay_a_relay_in_the_other(tmp_path: Path) -> No
 
 def test_a_relay_is_paid_where_nothing_requires_the_margin(tmp_path: Path) -> None:
     faults, _ = found_in(tmp_path, HEAD + SINE + RMS + MARGIN.format(cases='"sine"'))
-    assert len(faults) == 1 and faults[0].startswith("rms: switching from limit to limit earns")
+    assert len(faults) == 2 and faults[0].startswith("rms: switching from limit to limit earns")
+    assert faults[1].startswith("a table of the voltages of the visible cases earns 10 of 20 points")
     faults, notes = found_in(tmp_path, HEAD + SINE + RMS)
     assert not faults and "no criterion measures a margin" in notes[0]
 
@@ -78,3 +80,21 @@ def test_a_table_of_answers_is_told(tmp_path: Path) -> None:
         reference = grade(assignment, solution, "student 1", TrustedFiles())
         _, notes = audit(assignment, TrustedFiles(), reference)
         assert len([said for said in notes if said.startswith("double():")]) == count
+
+
+def test_a_table_of_the_visible_segments_is_not_paid(tmp_path: Path) -> None:
+    """Hidden segments must carry two thirds of the points; those of the shipped assignment do."""
+    shipped = Path(__file__).parents[2] / "examples" / "assignments" / "interpolator"
+    text = (shipped / "assignment.toml").read_text()
+    found = []
+    for number, visible in enumerate((3, 30)):
+        folder = tmp_path / str(number)
+        shutil.copytree(shipped, folder, ignore=shutil.ignore_patterns("submissions"))
+        path = 'name = "path-line"\ntitle = "The line is straight"\nkind = "path-error"\ncase = "line"\npoints = '
+        assert f"{path}3\n" in text
+        (folder / "assignment.toml").write_text(text.replace(f"{path}3\n", f"{path}{visible}\n"))
+        assignment = read_assignment(folder)
+        reference = grade(assignment, folder / "solution.py", "student 1", TrustedFiles())
+        found.append(audit(assignment, TrustedFiles(), reference)[0])
+    assert found[0] == []
+    assert len(found[1]) == 1 and "a table of the rows of the visible segments earns" in found[1][0]

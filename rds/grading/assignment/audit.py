@@ -1,4 +1,4 @@
-"""An assignment of controllers tried with honest designs, none of which may be zeroed, and cheats, none to be paid.
+"""An assignment tried with honest designs, none of which may be zeroed, and cheats, none to be paid.
 
 The honest ones are the reference solution as students would build it (rounded, with a dead band, in a class, ...), and
 designs of textbooks for the axis of the first case. The cheats switch from limit to limit everywhere, or do so, or
@@ -8,18 +8,15 @@ nothing, only where no margin is measured.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
-from rds.core.private_files import write_private
 from rds.grading.assignment.assignment import Assignment
-from rds.grading.batch.grade_one import Graded, Opener, grade_with_runs
-from rds.grading.batch.scratch import scratch
+from rds.grading.assignment.by_heart import in_a_notebook, of_interpolators, table_of_voltages
+from rds.grading.assignment.tried import DECIDES, Tried
+from rds.grading.batch.grade_one import Opener
 from rds.grading.cases.case import COUNTS, LINEAR
 from rds.grading.criteria.criterion import Criterion
-from rds.grading.grade import Band, Grade
-
-_DECIDES = 20  # samples after which a cheat knows the case by its reference
+from rds.grading.grade import Grade
 
 _WRAPPED = """
 
@@ -35,6 +32,8 @@ def control(t, r, y, state, params):
 _AS_STUDENTS_BUILD_IT: Mapping[str, tuple[str, str]] = {
     "its voltage rounded to millivolts": ("pass", "u = round(u, 3)"),
     "its voltage rounded to 12 bits": ("pass", "u = round(u / {limit} * 2048) / 2048 * {limit}"),
+    "its reference one sample ahead": ("r = r._replace(position=r.position + {T} * r.velocity)", "pass"),
+    "its voltage as an array": ("pass", "import numpy\n    u = numpy.array([u])[0]"),
     "its measurement rounded to two counts": ("y = round(y / {counts}) * {counts}", "pass"),
     "a dead band of two counts": ("y = r.position if abs(r.position - y) <= {counts} else y", "pass"),
     "a hundredth of the voltage by the sign of the motion": (
@@ -78,6 +77,36 @@ def control(t, r, y, state, params):
     u = params["Kp"] * (r.position - y) + params["Kd"] * (r.velocity - speed) + r.velocity / params["K"]
     return u, [y, speed]
 """,
+    "an LQR with integral action": """
+import numpy as np
+
+params = {{"K": {K}, "tau": {tau}, "T": {T}}}
+initial_state = [None, 0.0, 0.0]
+
+
+def _gains(K, tau, T):
+    decay = np.exp(-T / tau)
+    A = np.array([[1.0, tau * (1.0 - decay), 0.0], [0.0, decay, 0.0], [T, 0.0, 1.0]])
+    B = np.array([[K * (T - tau * (1.0 - decay))], [K * (1.0 - decay)], [0.0]])
+    Q, R = np.diag([1.0, 1e-5, 10.0]), 1.0 / ({Kp} * {Kp})
+    P = Q
+    for _ in range(3000):
+        F = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
+        P = Q + A.T @ P @ (A - B @ F)
+    return F[0].tolist()
+
+
+_F = _gains({K}, {tau}, {T})
+
+
+def control(t, r, y, state, params):
+    last, speed, area = state
+    last = y if last is None else last
+    speed = speed + 0.5 * ((y - last) / params["T"] - speed)
+    error = r.position - y
+    u = _F[0] * error + _F[1] * (r.velocity - speed) + _F[2] * area + r.velocity / params["K"]
+    return u, [y, speed, area + params["T"] * error]
+""",
     "sliding mode with a boundary layer": """
 params = {{"slope": {slope}, "layer": {layer}, "reach": {reach}, "K": {K}, "T": {T}}}
 initial_state = [None, 0.0]
@@ -114,17 +143,20 @@ def audit(assignment: Assignment, pool: Opener, reference: Grade) -> tuple[list[
     """Faults and notes. `reference` is the solution's grade; work, which takes long to count, is not counted."""
     solution = assignment.path(assignment.solution)
     cases: list[Any] = list(assignment.cases)
-    if assignment.kind != "controller" or solution is None or solution.suffix != ".py":
-        return [], []
+    if solution is None or solution.suffix != ".py" or assignment.kind not in ("controller", "interpolator"):
+        return [], _tables(assignment.criteria)
+    tried = Tried(assignment, pool, [each for each in assignment.criteria if COUNTS not in each.needs])
+    if assignment.kind == "interpolator":
+        return of_interpolators(tried, solution, reference), []
     if any(case.is_coupled for case in cases):
         return [], ["it is not tried with other designs: a case has one controller for several axes"]
-    tried = _Tried(assignment, pool, [each for each in assignment.criteria if COUNTS not in each.needs])
     text, axis = solution.read_text(encoding="utf-8"), _axis(cases[0])
     faults: list[str] = []
     for name, (before, after) in _AS_STUDENTS_BUILD_IT.items():
         wrapped = _WRAPPED.format(before=before.format(**axis), after=after.format(**axis))
         faults += tried.zeroed(f"the reference solution with {name}", text + wrapped, reference)
     faults += tried.zeroed("the reference solution in a class", text + _IN_A_CLASS, reference)
+    faults += tried.zeroed("the reference solution in a notebook", in_a_notebook(text), reference)
     if "K" in axis:
         for name, law in _TEXTBOOK.items():
             faults += tried.gated(name, law.format(**axis))
@@ -134,61 +166,16 @@ def audit(assignment: Assignment, pool: Opener, reference: Grade) -> tuple[list[
     others = {case.name for case in cases} - measured
     if measured and others:
         for name, otherwise in (("switching", "{limit} if r.position > y else -{limit}"), ("standing still", "0.0")):
-            words = {"decides": _DECIDES, "known": known, "otherwise": otherwise.format(**axis)}
+            words = {"decides": DECIDES, "known": known, "otherwise": otherwise.format(**axis)}
             said = f"{name} where no margin is measured, and the reference solution elsewhere,"
             paid += tried.paid(said, text + _ELSEWHERE.format(**words), others)
+    paid += tried.bought(
+        "a table of the voltages of the visible cases", table_of_voltages(tried.visible_runs(solution))
+    )
     if paid and not measured:
         paid = [f"{said}; no criterion measures a margin that could be required" for said in paid]
         return faults, paid
     return faults + paid, _tables(assignment.criteria)
-
-
-class _Tried:
-    """Designs graded for the first student of a check."""
-
-    def __init__(self, assignment: Assignment, pool: Opener, criteria: list[Criterion]):
-        self._assignment, self._pool, self._criteria = assignment, pool, criteria
-
-    def zeroed(self, name: str, text: str, reference: Grade) -> list[str]:
-        """Criteria in which a design earns nothing, and the solution does."""
-        full = {score.name for score in reference.criteria if score.band is Band.FULL and score.max_score}
-        return [
-            f"{score.title}: an honest design earns nothing ({name}): {score.sentence}"
-            for score in self._graded(text).grade.criteria
-            if score.name in full and not score.score
-        ]
-
-    def gated(self, name: str, text: str) -> list[str]:
-        """Gates that a design does not pass."""
-        gates = {name for each in self._criteria for name in each.requires}
-        linear = {each.name for each in self._criteria if LINEAR in each.needs}
-        return [
-            f"{score.title}: an honest design earns nothing ({name}), and so nothing that requires it: {score.sentence}"
-            for score in self._graded(text).grade.criteria
-            if score.name in gates & linear and score.band is Band.NONE
-        ]
-
-    def paid(self, name: str, text: str, cases: set[str]) -> list[str]:
-        """Criteria of these cases alone that pay a cheat."""
-        scores = {score.name: score for score in self._graded(text).grade.criteria}
-        return [
-            f"{each.title}: {name} earns {scores[each.name].score:.4g} of {each.max_score:.4g} points; let it require "
-            "a margin that is measured in its own cases, or a criterion that such a loop does not pass"
-            for each in self._criteria
-            if each.cases and set(each.cases) <= cases and LINEAR not in each.needs and scores[each.name].score
-        ]
-
-    def references(self, solution: Path, cases: set[str]) -> list[float]:
-        """By what a cheat knows these cases: the reference of each axis after `_DECIDES` samples."""
-        found = grade_with_runs(self._assignment, solution, "student 1", self._pool, criteria=self._criteria)
-        runs = [run for run in found.runs if run.case in cases and len(run.result) > _DECIDES]
-        return [float(run.result[f"{axis}_reference"][_DECIDES]) for run in runs for axis in run.result.axes]
-
-    def _graded(self, text: str) -> Graded:
-        with scratch("audit") as folder:
-            path = folder / "submission.py"
-            write_private(path, text.encode(), is_own=True)
-            return grade_with_runs(self._assignment, path, "student 1", self._pool, criteria=self._criteria)
 
 
 def _axis(case: Any) -> dict[str, float]:

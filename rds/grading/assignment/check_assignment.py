@@ -12,6 +12,7 @@ from rds.core.errors import InputError
 from rds.core.private_files import write_private
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.audit import audit
+from rds.grading.assignment.hand_out import promised
 from rds.grading.batch.grade_one import Opener, grade, grade_with_runs
 from rds.grading.batch.scratch import scratch
 from rds.grading.cases.case import COUNTS
@@ -189,13 +190,8 @@ def _params(assignment: Assignment) -> dict[str, Any]:
 
 def _notes(assignment: Assignment, found: _Found) -> None:
     visible = {case.name for case in assignment.cases if case.is_visible}
-    shown = {each.name for each in assignment.criteria if each.is_visible and set(each.cases) <= visible}
+    found.faults += promised(assignment)
     for criterion in assignment.criteria:
-        if criterion.name in shown and (gates := [name for name in criterion.requires if name not in shown]):
-            found.faults.append(
-                f"{criterion.title}: it is visible, but requires {', '.join(gates)}, which students cannot see: the "
-                "hand-out would promise points that are then taken; require a visible criterion, or hide this one"
-            )
         if criterion.is_visible and not set(criterion.cases) <= visible:
             found.notes.append(f"{criterion.title}: it is visible, but a case of it is hidden: the hand-out lacks it")
     if assignment.self_check == "blind":

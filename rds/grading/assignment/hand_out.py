@@ -23,6 +23,8 @@ def hand_out(assignment: Assignment, out: Path) -> list[Path]:
     """Write the copy to the folder `out`, whole or not at all; its files. InputError where `out` is not empty."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError("is there already; name a new folder, or empty it", str(out))
+    for fault in promised(assignment):
+        raise InputError(fault, str(assignment.folder / FILE))
     staged = out.with_name(f".{out.name}.{secrets.token_hex(6)}.part")
     try:
         make_folder(staged)
@@ -40,6 +42,17 @@ def hand_out(assignment: Assignment, out: Path) -> list[Path]:
     finally:
         shutil.rmtree(staged, ignore_errors=True)
     return sorted(path for path in out.rglob("*") if path.is_file())
+
+
+def promised(assignment: Assignment) -> list[str]:
+    """Faults: visible criteria whose points a criterion takes that students cannot see."""
+    shown = _shown(assignment)
+    return [
+        f"{each.title}: it is visible, but requires {', '.join(gates)}, which students cannot see: the hand-out would "
+        "promise points that are then taken; require a visible criterion, or hide this one"
+        for each in assignment.criteria
+        if each.name in shown and (gates := [name for name in each.requires if name not in shown])
+    ]
 
 
 def _files(assignment: Assignment) -> list[str]:
@@ -78,7 +91,7 @@ def _table(assignment: Assignment) -> dict[str, Any]:
                 entry.pop("case", None)
                 entry["cases"] = list(criterion.cases)
             if "requires" in entry:
-                entry["requires"] = [name for name in criterion.requires if name in shown]
+                entry["requires"] = list(criterion.requires)
             criteria.append(entry)
     table |= {"secret": SECRET, "self_check": "visible"}
     if hidden or assignment.hidden.criteria:

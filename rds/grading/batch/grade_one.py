@@ -20,7 +20,7 @@ from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.late_rules import days_late
 from rds.grading.assignment.unit_tests import UnitTest, failing
 from rds.grading.cases.case import Answers, Case, CaseRun
-from rds.grading.criteria.criterion import GATE, Criterion
+from rds.grading.criteria.criterion import GATE, UNKNOWN, Criterion
 from rds.grading.criteria.measuring import NotKnown, NotMeasured
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.grading.sandbox.errors import SubmissionError
@@ -272,7 +272,8 @@ class _Work:
             gates = {name: self._passes(name, criterion.cases) for name in criterion.requires if name in found}
             name = min(gates, key=lambda each: gates[each], default="")
             if name and gates[name] < 1.0 and found[criterion.name].band not in (Band.NONE, Band.REVIEW):
-                found[criterion.name] = criterion.gated(found[criterion.name], found[name].title, gates[name])
+                is_known = found[name].band is not Band.REVIEW
+                found[criterion.name] = criterion.gated(found[criterion.name], found[name].title, gates[name], is_known)
         known = [score for score in found.values() if score.band is not Band.REVIEW]
         most = sum(score.max_score for score in known)
         share = sum(score.score for score in known) / most if most else 0.0
@@ -286,11 +287,11 @@ class _Work:
         """How much of their points the criterion `name` leaves those that require it in these cases, 0 to 1.
 
         Where it is itself measured in some of the cases, these count, else all of its own. What could not be measured
-        takes nothing.
+        leaves half: who makes a margin unmeasurable shall not be paid as if it were good.
         """
         shares = self._shares[name]
         common = [shares[case] for case in cases if case in shares] or list(shares.values())
-        return min((1.0 if share is None else min(share / GATE, 1.0) for share in common), default=1.0)
+        return min((UNKNOWN if share is None else min(share / GATE, 1.0) for share in common), default=1.0)
 
     def _ended(self) -> str:
         return self.reason if self._stopped is None else _ENDED.get(self._stopped, str(self._stopped))

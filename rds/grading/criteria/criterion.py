@@ -19,6 +19,8 @@ from rds.grading.criteria.measuring import NotMeasured
 from rds.grading.grade import Band, CriterionScore
 
 DIGITS = 9  # of a value: so many are the same on every computer
+UNKNOWN = 0.5  # of the points, at most, where nothing could be measured; as a gate it leaves so much of them
+STEPS = 20  # of the points of a hidden criterion
 GATE = 0.25  # of the points of a required criterion: with so many it takes nothing from those that require it
 
 
@@ -64,7 +66,9 @@ class Criterion:
     def score(self, value: float, case: str) -> CriterionScore:
         """The points that a value earns, and a sentence about it."""
         band, share = self.bands.band(value), self.bands.share(value)
-        return self._scored(share * self.max_score, value, band, self._sentence(value, band, share), case)
+        return self._scored(
+            self._counted(share) * self.max_score, value, band, self._sentence(value, band, share), case
+        )
 
     def nothing(self, why: str, case: str = "") -> CriterionScore:
         """No value, no points."""
@@ -73,22 +77,38 @@ class Criterion:
     def unknown(self, why: str, case: str, share: float) -> CriterionScore:
         """No value, but perhaps one to be had: `share` of the points until somebody has looked."""
         said = f"{self.meaning} could not be measured: {why.rstrip('.')}. This is for a review by your instructor"
-        said += f"; until then it counts as the rest of your work does, {100 * share:.3g} % of the points."
-        return self._scored(share * self.max_score, None, Band.REVIEW, said, case)
+        share = min(share, UNKNOWN)
+        said += (
+            f"; until then it counts as the rest of your work does, half at most: {100 * share:.3g} % of the points."
+        )
+        return self._scored(self._counted(share) * self.max_score, None, Band.REVIEW, said, case)
 
-    def gated(self, score: CriterionScore, title: str, factor: float) -> CriterionScore:
-        """The same with `factor` of its points, because the criterion called `title` earned too little."""
-        points = float(f"{factor * score.score:.{DIGITS}g}")
+    def gated(self, score: CriterionScore, title: str, factor: float, is_known: bool = True) -> CriterionScore:
+        """The same with `factor` of its points: the criterion called `title` earned too little, or is not known."""
+        share = factor * score.score / self.max_score if self.max_score else 0.0
+        points = float(f"{self._counted(share) * self.max_score:.{DIGITS}g}")
         if score.value is None:
             return replace(score, score=points, band=score.band if points else Band.NONE, gate=title)
         sentence = self._sentence(score.value, score.band, self.bands.share(score.value), "would earn").rstrip(".")
         if not points:
             said = f"{sentence}; it counts only where points are earned for {title}."
             return replace(score, score=0.0, band=Band.NONE, sentence=said, gate=title)
-        said = (
-            f"{sentence}; {100 * factor:.3g} % of that count, because {title} earns less than {100 * GATE:g} % there."
+        why = (
+            f"earns less than {100 * GATE:g} % there"
+            if is_known
+            else "could not be measured; your instructor looks at it"
         )
+        said = f"{sentence}; {100 * factor:.3g} % of that count, because {title} {why}."
         return replace(score, score=points, band=Band.PARTIAL, sentence=said, gate=title)
+
+    def _counted(self, share: float) -> float:
+        """The share that counts: of a hidden criterion in steps, so that attempts cannot find its value by the points.
+
+        What earns a little, or not all, is never rounded to nothing, or to all.
+        """
+        if self.is_visible or self.tests or not 0.0 < share < 1.0:
+            return share
+        return min(max(round(share * STEPS), 1), STEPS - 1) / STEPS
 
     @property
     def meaning(self) -> str:

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import ast
 import symtable
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
-from rds.grading.sandbox.packages import ALLOWED
+from rds.grading.intake import followed
+from rds.grading.intake.bindings import at_once, bound, from_elsewhere, imported, last_word, mutable, not_there, root
 
 _OF_LISTS = {"append", "clear", "extend", "fill", "insert", "pop", "put", "remove", "reverse", "sort"}
 _OF_TABLES = {"add", "discard", "popitem", "setdefault", "update"}
@@ -23,8 +24,6 @@ _CHANGING = frozenset(_OF_LISTS | _OF_TABLES)
 
 _BY_FIRST_ARGUMENT = frozenset({"setattr", "delattr", "setitem", "delitem"})
 """Functions that change their first argument, whatever module they are taken from."""
-
-_THERE = frozenset({*sys.stdlib_module_names, *ALLOWED})  # modules that a submission can import
 
 
 @dataclass
@@ -49,8 +48,11 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
     not there: their calls are left out.
     """
     effects, elsewhere = _effects(body)
-    alike = _names_of_the_same(body, {name for statement in body for name in _not_there(statement)})
-    facts = [_made_and_used(statement, effects, alike) for statement in body]
+    absent = from_elsewhere(body, wanted)
+    alike = _names_of_the_same(body, absent)
+    facts = [
+        _made_and_used(statement, effects, alike, wanted, there) for statement, there in zip(body, absent, strict=True)
+    ]
     makers: dict[str, list[int]] = {}
     for number, (made, _) in enumerate(facts):
         for name in made:
@@ -64,8 +66,103 @@ def needed(body: Sequence[ast.stmt], wanted: set[str]) -> tuple[set[int], tuple[
                 new = facts[number][1] - known
                 known |= new
                 todo += new
+    makes = _Makers(wanted, facts, makers)
+    there_too = [names | elsewhere.keys() for names in absent]
+    _follow(body, makes, keep, known, there_too)
+    _leave_out(body, makes, keep, there_too)
     called = {name for number, statement in enumerate(body) if number not in keep for name in _called(statement)}
     return keep, tuple(sorted(name for name in called & elsewhere.keys() if elsewhere[name].names & known))
+
+
+class NotFollowed(Exception):
+    """What is graded may be changed by a statement that cannot be run where it is graded: its line, and why."""
+
+    def __init__(self, line: int, why: str):
+        super().__init__(why)
+        self.line, self.why = line, why
+
+
+@dataclass(frozen=True)
+class _Makers:
+    wanted: set[str]
+    facts: Sequence[tuple[set[str], set[str]]]  # by statement, what it makes and what it uses
+    of: Mapping[str, list[int]]  # by name, the statements that make it
+
+    def add(self, number: int, keep: set[int], known: set[str]) -> None:
+        """Keep a statement, and those that make what it uses."""
+        todo = [number]
+        while todo:
+            number = todo.pop()
+            if number not in keep:
+                keep.add(number)
+                new = self.facts[number][1] - known
+                known |= new
+                todo += [each for name in new for each in self.of.get(name, ())]
+
+
+def _follow(
+    body: Sequence[ast.stmt], makes: _Makers, keep: set[int], known: set[str], absent: Sequence[set[str]]
+) -> None:
+    """Keep also what may change the data in ways that its text does not name. NotFollowed where that cannot be run."""
+    modules = dict(chain.from_iterable(map(imported, body)))
+    functions = {each.name: each for each in body if isinstance(each, followed.FUNCTIONS)}
+    for statement in body:
+        if said := followed.namespaces_in(statement):
+            raise NotFollowed(statement.lineno, f"{said} reaches names that nobody can see there")
+    blocked: set[int] = set()
+    before = -1
+    handed = makes.wanted | {
+        each.value.id
+        for each in body
+        if isinstance(each, ast.Assign) and isinstance(each.value, ast.Name) and {*_set_by(each)} & makes.wanted
+    }
+    seen = followed.Known(set(), set(), modules, functions, set(), handed)
+    while before != (before := len(keep) + len(seen.data) + len(seen.code) + len(seen.changes_arguments)):
+        seen.data |= mutable(body, known, functions.keys()) - modules.keys() - functions.keys()
+        for number, statement in enumerate(body):
+            seen.absent = absent[number]
+            if followed.effect(statement, seen) == followed.CHANGES:
+                if number not in keep and _at_once_names(statement) & absent[number]:
+                    blocked.add(number)
+                elif number not in keep:
+                    makes.add(number, keep, known)
+    for number in sorted(blocked):
+        if not _set_later(body, keep, number, makes.wanted | (followed.names_in(body[number]) & seen.data & known)):
+            raise NotFollowed(body[number].lineno, _NEEDS_MORE)
+
+
+_NEEDS_MORE = "it may change what is graded, and needs modules that are not there"
+
+
+def _leave_out(body: Sequence[ast.stmt], makes: _Makers, keep: set[int], absent: Sequence[set[str]]) -> None:
+    """Leave out what cannot be run, where what it makes is set again later. NotFollowed where it is not."""
+    for number in sorted(keep):
+        statement = body[number]
+        if isinstance(statement, ast.Import | ast.ImportFrom | ast.ClassDef | ast.Try):  # Try: with a way out
+            continue
+        if _at_once_names(statement) & absent[number]:
+            keep.discard(number)
+            if not _set_later(body, keep, number, makes.facts[number][0]):
+                raise NotFollowed(statement.lineno, _NEEDS_MORE)
+
+
+def _set_later(body: Sequence[ast.stmt], keep: set[int], number: int, names: set[str]) -> bool:
+    return any(each > number and names & {*_set_by(body[each])} for each in keep)
+
+
+def _at_once_names(statement: ast.stmt) -> set[str]:
+    """The names that it reads where it stands."""
+    walked = chain.from_iterable(map(ast.walk, at_once(statement)))
+    return {each.id for each in walked if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load)}
+
+
+def _set_by(statement: ast.stmt) -> Iterator[str]:
+    """The names that a plain statement gives values to, or to whose parts."""
+    if isinstance(statement, ast.Assign | ast.AugAssign | ast.AnnAssign):
+        targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+        yield from map(root, targets)
+    elif isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
+        yield followed.root(statement.value)
 
 
 def _is_for_all(statement: ast.stmt) -> bool:
@@ -92,22 +189,10 @@ def _effects(body: Sequence[ast.stmt]) -> tuple[dict[str, _Effect], dict[str, _E
                     effect.is_of_arguments |= bool(effect.handed & effect.arguments)
             after = len(effect.names), len(effect.uses), effect.is_of_arguments
             has_grown |= after != before
-    absent = {name for statement in body for name in _not_there(statement)}
+    absent = {name for statement in body for name in not_there(statement)}
     found = {name: effect for name, effect in found.items() if effect.is_there}
     elsewhere = {name: effect for name, effect in found.items() if effect.uses & absent}
     return {name: effect for name, effect in found.items() if name not in elsewhere}, elsewhere
-
-
-def _not_there(statement: ast.stmt) -> Iterator[str]:
-    """The names of modules that a submission cannot import."""
-    if isinstance(statement, ast.Import):
-        yield from (
-            alias.asname or alias.name.split(".")[0]
-            for alias in statement.names
-            if alias.name.split(".")[0] not in _THERE
-        )
-    elif isinstance(statement, ast.ImportFrom) and (statement.module or "").split(".")[0] not in _THERE:
-        yield from (alias.asname or alias.name for alias in statement.names)
 
 
 def _effect(function: ast.FunctionDef) -> _Effect:
@@ -120,16 +205,16 @@ def _effect(function: ast.FunctionDef) -> _Effect:
         elif isinstance(node, ast.Name):
             (effect.uses if isinstance(node.ctx, ast.Load) else bound).add(node.id)
     own = (bound | arguments) - effect.names
-    alike = _names_of_the_same(function.body, set())
-    for root in _changed(function):
-        for name in {root} | alike.get(root, set()):
+    alike = _names_of_the_same(function.body, [set() for _ in function.body])
+    for changed in _changed(function):
+        for name in {changed} | alike.get(changed, set()):
             if name in arguments:
                 effect.is_of_arguments = True
             elif name not in own:
                 effect.names.add(name)
     effect.arguments = arguments
     calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
-    effect.handed = {_root(each) for node in calls for each in node.args} - (bound - arguments) - {""}
+    effect.handed = {root(each) for node in calls for each in node.args} - (bound - arguments) - {""}
     return effect
 
 
@@ -137,58 +222,39 @@ def _changed(tree: ast.AST) -> Iterator[str]:
     """The names that something in the tree changes without binding them."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute | ast.Subscript) and not isinstance(node.ctx, ast.Load):
-            yield _root(node)
+            yield root(node)
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _CHANGING:
-            yield _root(node.func)
+            yield root(node.func)
             if node.args:
-                yield _root(node.args[0])  # dict.update(params, ...)
-        elif isinstance(node, ast.Call) and node.args and _last_word(node.func) in _BY_FIRST_ARGUMENT:
-            yield _root(node.args[0])
+                yield root(node.args[0])  # dict.update(params, ...)
+        elif isinstance(node, ast.Call) and node.args and last_word(node.func) in _BY_FIRST_ARGUMENT:
+            yield root(node.args[0])
         elif isinstance(node, ast.AugAssign):
-            yield _root(node.target)  # params |= {...}
+            yield root(node.target)  # params |= {...}
 
 
 def _called(statement: ast.stmt) -> Iterator[str]:
     """The functions that a statement calls by their names."""
-    for tree in _at_once(statement):
+    for tree in at_once(statement):
         for node in ast.walk(tree):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 yield node.func.id
 
 
-def _at_once(statement: ast.stmt) -> Sequence[ast.AST]:
-    """What of it runs where it stands: of a definition only its decorators."""
-    if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-        return [ast.Call(func=each, args=[], keywords=[]) for each in statement.decorator_list]
-    return [statement]
-
-
-def _names_of_the_same(body: Sequence[ast.stmt], absent: set[str]) -> dict[str, set[str]]:
+def _names_of_the_same(body: Sequence[ast.stmt], absent: Sequence[set[str]]) -> dict[str, set[str]]:
     """By name all names that may stand for the same object: by assignments, loops and `with`."""
     groups: dict[str, set[str]] = {}
-    for statement in body:
-        for tree in _at_once(statement):
+    for statement, there in zip(body, absent, strict=True):
+        for tree in at_once(statement):
             for node in ast.walk(tree):
-                targets, value = _bound(node)
+                targets, value = bound(node)
+                targets = [each for each in targets if followed.root(each) not in there]
                 names = {each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)}
-                own = _handed_on(value, absent)
+                own = _handed_on(value, there)
                 if names and own:
                     whole = set().union(names, own, *(groups.get(name, ()) for name in names | own))
                     groups |= dict.fromkeys(whole, whole)
     return groups
-
-
-def _bound(node: ast.AST) -> tuple[Sequence[ast.AST], ast.AST | None]:
-    """What a node binds, and to what."""
-    if isinstance(node, ast.Assign):
-        return node.targets, node.value
-    if isinstance(node, ast.AnnAssign | ast.NamedExpr):
-        return [node.target], node.value
-    if isinstance(node, ast.For | ast.AsyncFor | ast.comprehension):
-        return [node.target], node.iter
-    if isinstance(node, ast.withitem) and node.optional_vars is not None:
-        return [node.optional_vars], node.context_expr
-    return [], None
 
 
 def _handed_on(value: ast.AST | None, absent: set[str]) -> set[str]:
@@ -199,12 +265,12 @@ def _handed_on(value: ast.AST | None, absent: set[str]) -> set[str]:
     if isinstance(value, ast.Name):
         return {value.id}
     if isinstance(value, ast.Attribute | ast.Subscript):
-        return {_root(value)} - {""}
+        return {root(value)} - {""}
     if isinstance(
         value, ast.List | ast.Tuple | ast.Set | ast.Dict | ast.IfExp | ast.BoolOp | ast.Starred | ast.NamedExpr
     ):
         return set().union(*(_handed_on(each, absent) for each in ast.iter_child_nodes(value)))
-    if isinstance(value, ast.Call) and _root(value.func) not in absent:
+    if isinstance(value, ast.Call) and root(value.func) not in absent:
         given = [*value.args, *(word.value for word in value.keywords)]
         return set().union(
             *(_handed_on(each, absent) for each in given if not isinstance(each, ast.Attribute | ast.Subscript))
@@ -213,43 +279,47 @@ def _handed_on(value: ast.AST | None, absent: set[str]) -> set[str]:
 
 
 def _made_and_used(
-    statement: ast.stmt, effects: Mapping[str, _Effect], alike: Mapping[str, set[str]]
+    statement: ast.stmt,
+    effects: Mapping[str, _Effect],
+    alike: Mapping[str, set[str]],
+    wanted: set[str],
+    absent: set[str],
 ) -> tuple[set[str], set[str]]:
     """The names that a statement binds or changes, and those of the notebook that it needs, in functions too."""
     top = symtable.symtable(ast.unparse(statement), "notebook", "exec")
     made = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_assigned() or symbol.is_imported()}
     used = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_referenced()}
+    used |= {root(node.target) for node in ast.walk(statement) if isinstance(node, ast.AugAssign)} - {""}
     tables = top.get_children()
     while tables:
         table = tables.pop()
         used |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
         tables += table.get_children()
     changed: set[str] = set()
-    for tree in _at_once(statement):
-        changed |= set(_changed(tree))
+    for tree in at_once(statement):
+        changed |= set(_changed(tree)) - absent
+        tried = {id(each) for node in ast.walk(tree) for each in _tried(node, wanted, absent)}
         for node in ast.walk(tree):
+            if id(node) in tried:
+                continue
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id in effects:
                 changed |= effects[node.id].names  # called here, or by what it is handed to
             called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
             if isinstance(node, ast.Call) and called in effects and effects[called].is_of_arguments:
-                changed |= {_root(each) for each in (*node.args, *(word.value for word in node.keywords))}
+                changed |= {root(each) for each in (*node.args, *(word.value for word in node.keywords))}
     given = statement.value if isinstance(statement, ast.Expr) else None
     if isinstance(given, ast.Call) and isinstance(given.func, ast.Attribute):
-        changed.add(_root(given.func))  # tuner.go()
+        changed.add(root(given.func))  # tuner.go()
     made |= changed.union(*(alike.get(name, ()) for name in changed))
     if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call):
-        made.add(_root(statement.value.func))  # controller.tune(...), whatever that does
+        made.add(root(statement.value.func))  # controller.tune(...), whatever that does
         if isinstance(statement.value.func, ast.Name):
             made.discard(statement.value.func.id)
     return made - {""}, used
 
 
-def _last_word(node: ast.AST) -> str:
-    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
-
-
-def _root(node: ast.AST) -> str:
-    """The name that an expression such as `a`, `a.b` or `a.b[c].d` begins with; "" if it begins otherwise."""
-    while isinstance(node, ast.Attribute | ast.Subscript):
-        node = node.value
-    return node.id if isinstance(node, ast.Name) else ""
+def _tried(node: ast.AST, wanted: set[str], absent: set[str]) -> Iterator[ast.AST]:
+    """What is graded and handed to an experiment: that is called there, and never where it is graded."""
+    if isinstance(node, ast.Call) and followed.root(node.func) in absent:
+        given = [*node.args, *(word.value for word in node.keywords)]
+        yield from (each for each in given if isinstance(each, ast.Name) and each.id in wanted)

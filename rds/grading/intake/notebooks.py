@@ -15,14 +15,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from rds.grading.intake.items import Refusal
-from rds.grading.intake.needed import needed
+from rds.grading.intake.needed import NotFollowed, needed
 
 LARGEST = 16 << 20  # bytes; pictures are in notebooks too
 LARGEST_CODE = 512 << 10  # bytes, of all cells: the parser takes a thousand times as much memory
 INTERFACE = ("control", "derivatives", "advance", "output", "interpolate", "params", "initial_state", "signals")
 _MAGIC = re.compile(r"\s*(?:[%!?]|[\w.]+\?{1,2}\s*$|[A-Za-z_][\w, ]*=\s*[%!])")  # also `files = !ls`
+_TIMED = re.compile(r"\s*%time(?:it)?\s+(?:-\w+\s*\d*\s+)*(.+)")  # what it times is run
+_FROM_OUTSIDE = re.compile(r"\s*%(?:run|load|loadpy|store\s+-r|macro|recall|rerun)\b[^\n]*")
 _RUNS_THE_CELL = ("%%time", "%%capture", "%%prun")  # as if the line were not there
+_CELL = re.compile(r"# cell \d+")
 _LINES = re.compile(r"\r\n|\r|\n")
+_LONGEST = 8000  # characters of what is graded, in the notes for its author
 _MOST_MAGICS = 50  # that are looked for one by one
 
 
@@ -56,6 +60,8 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
         keep, elsewhere = needed(body, set(wanted))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return Converted(_encoded(text), tuple(notes))
+    except NotFollowed as fault:
+        raise Refusal(_not_followed(lines, fault)) from None
     if len(keep) < len(body):
         notes.append(f"of its {len(body)} statements {len(keep)} define what was asked for, and only these are graded")
     if elsewhere:
@@ -63,7 +69,18 @@ def converted(data: bytes, wanted: Sequence[str] = INTERFACE) -> Converted:
         notes.append(
             f"calls of {names} are left out: what they change is needed, and so are modules that are not there"
         )
-    return Converted(_encoded(_only(text, body, keep)), tuple(notes))
+    graded = _only(text, body, keep)
+    shown = "\n".join(line for line in graded.split("\n")[1:] if line.strip())
+    notes.append(f"this is what was graded of it:\n{shown[:_LONGEST]}" + ("\n..." if len(shown) > _LONGEST else ""))
+    return Converted(_encoded(graded), tuple(notes))
+
+
+def _not_followed(lines: Sequence[str], fault: NotFollowed) -> str:
+    """Where it is in the notebook, and what its author can do."""
+    at = max(number for number in range(fault.line) if _CELL.fullmatch(lines[number]))
+    place = f"{lines[at][2:]}, line {fault.line - at - 1}"
+    said = f"the notebook cannot be graded as what it ran: {place} ({lines[fault.line - 1].strip()[:80]}): {fault.why}"
+    return f"{said}; set what is graded in statements of their own, such as params[...] = ..., behind all others"
 
 
 def _code_cells(data: bytes) -> list[str]:
@@ -119,11 +136,16 @@ def _without_magics(source: str) -> tuple[list[str], int]:
 
 def _leave_out(lines: list[str], at: int) -> int:
     """Put `pass` in place of the command at `lines[at]`, which a backslash continues; how many lines it had."""
+    if found := _FROM_OUTSIDE.match(lines[at]):
+        said = f"the notebook cannot be graded as what it ran: {found[0].strip()} brings in what is not in it"
+        raise Refusal(f"{said}; put the code itself into a cell")
     count = 1
     while lines[at + count - 1].rstrip().endswith("\\") and at + count < len(lines):
         count += 1
     indent = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
-    lines[at : at + count] = [f"{indent}pass", *[""] * (count - 1)]
+    timed = _TIMED.match(lines[at])
+    does = timed[1] if timed and count == 1 and _fault(timed[1]) is None else "pass"
+    lines[at : at + count] = [f"{indent}{does}", *[""] * (count - 1)]
     return count
 
 

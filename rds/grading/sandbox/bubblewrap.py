@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+import sysconfig
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,8 @@ from rds.grading.sandbox.packages import package_paths
 
 PROGRAM = "bwrap"
 SITE, SOURCES = "/opt/packages", "/opt/rds"
+PREFIX = "/opt/python"
+"""Where an interpreter is that is not the system's: its own place can be one that the sandbox uses itself, as /tmp."""
 
 ROOMS = (
     *("__init__.py", "core", "checks", "models", "modes", "machines"),
@@ -21,10 +24,11 @@ ROOMS = (
 such a thing is what an assignment asks for."""
 
 _DEVICES = ("/dev/null", "/dev/random", "/dev/urandom")  # not zero: mapped, it is memory that nobody counts
-_LIBRARIES = ("/usr/lib", "/usr/lib64", "/usr/libexec", "/lib", "/lib64", "/etc/ld.so.cache")
+_LIBRARIES = ("/usr/lib", "/usr/lib64", "/lib", "/lib64", "/etc/ld.so.cache")
 _ENVIRONMENT = {
     "HOME": "/tmp",
     "LANG": "C.UTF-8",
+    "LD_LIBRARY_PATH": f"{PREFIX}/lib",  # of a prefix of its own: its libraries lie elsewhere than they were built for
     "MPLBACKEND": "Agg",
     "MPLCONFIGDIR": "/tmp",
     "PATH": "/usr/bin",
@@ -42,15 +46,29 @@ class Bind(NamedTuple):
     place: str
 
 
-def binds(preload: Sequence[str]) -> list[Bind]:
-    """Everything that is visible inside, for an interpreter that imports `preload`."""
-    return [*_interpreter(), *_sources(), *(Bind(path, f"{SITE}/{name}") for name, path in package_paths().items())]
+class View(NamedTuple):
+    """What is visible inside: `binds`, without the folders `hidden` (places inside), which are empty there."""
+
+    binds: list[Bind]
+    hidden: list[str]
+
+
+def view() -> View:
+    """Everything that is visible inside: interpreter, system libraries, fixed interfaces, packages of submissions."""
+    packages = [Bind(path, f"{SITE}/{name}") for name, path in package_paths().items()]
+    interpreter = _interpreter()
+    return View([*interpreter.binds, *_sources(), *packages], interpreter.hidden)
 
 
 def command(
-    sources: Sequence[str], places: Sequence[str], preload: Sequence[str], control: int, filter_fd: int
+    sources: Sequence[str],
+    places: Sequence[str],
+    hidden: Sequence[str],
+    preload: Sequence[str],
+    control: int,
+    filter_fd: int,
 ) -> list[str]:
-    """The whole command. `sources[i]` appears at `places[i]`.
+    """The whole command. `sources[i]` appears at `places[i]`; the folders `hidden` are empty.
 
     `control` is the socket that requests come over, `filter_fd` holds the filter for the warm interpreter.
     """
@@ -61,6 +79,8 @@ def command(
     wrap += _links()
     for source, place in zip(sources, places, strict=True):
         wrap += ["--ro-bind", source, place]
+    for place in hidden:
+        wrap += ["--tmpfs", place, "--remount-ro", place]
     for device in _DEVICES:
         wrap += ["--dev-bind", device, device]
     wrap += ["--proc", "/proc", "--tmpfs", "/tmp", "--remount-ro", "/", "--chdir", "/", "--seccomp", str(filter_fd)]
@@ -69,7 +89,7 @@ def command(
         f"from rds.grading.sandbox.inside.warm import main; main({control}, {list(preload)!r})"
     )
     # -S: no site-packages but those named above; not -I, which would ignore PYTHONHASHSEED
-    return [*wrap, "--", str(_executable()), "-s", "-S", "-P", "-B", "-X", "utf8", "-c", start]
+    return [*wrap, "--", _place_of_executable(), "-s", "-S", "-P", "-B", "-X", "utf8", "-c", start]
 
 
 def _executable() -> Path:
@@ -78,14 +98,64 @@ def _executable() -> Path:
     return Path(base).resolve()
 
 
-def _interpreter() -> list[Bind]:
-    prefix = Path(sys.base_prefix).resolve()
-    standard = prefix / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}"
-    found = [Path(name) for name in _LIBRARIES if Path(name).exists() and not Path(name).is_symlink()]
-    if not any(standard.is_relative_to(path) for path in found):
-        found.append(prefix / "lib")
-    found.append(_executable())
-    return [Bind(path, str(path)) for path in found]
+def _standard() -> str:
+    return f"python{sys.version_info.major}.{sys.version_info.minor}"
+
+
+def _is_of_the_system() -> bool:
+    """Whether the standard library is among the system's libraries; else it has a prefix of its own."""
+    return any((Path(name) / _standard() / "os.py").is_file() for name in _LIBRARIES) and _executable().is_relative_to(
+        "/usr/bin"
+    )
+
+
+def _place_of_executable() -> str:
+    return str(_executable()) if _is_of_the_system() else f"{PREFIX}/bin/{_executable().name}"
+
+
+def _interpreter() -> View:
+    """The interpreter without packages: whatever is installed beside it is none of a submission's business."""
+    bound = [Bind(path, str(path)) for path in _system()]
+    hidden: set[Path] = set()
+    if not _is_of_the_system():
+        prefix = Path(sys.base_prefix).resolve()
+        for name in dict.fromkeys(("lib", sys.platlibdir)):
+            if (prefix / name).is_dir() and not (prefix / name).is_symlink():
+                bound.append(Bind(prefix / name, f"{PREFIX}/{name}"))
+                folders = [each for each in (prefix / name).iterdir() if each.is_dir() and not each.is_symlink()]
+                hidden |= {Path(PREFIX) / name / each.name for each in folders if each.name != _standard()}
+    for bind in bound:
+        if bind.source.is_dir():
+            place, found = Path(bind.place), _packages(bind.source)
+            hidden |= {place / each.relative_to(bind.source) for each in [*found, *_own(bind.source)]}
+    outermost = sorted(str(each) for each in hidden if not hidden & set(each.parents))
+    return View([*bound, Bind(_executable(), _place_of_executable())], outermost)
+
+
+def _system() -> list[Path]:
+    """The folders of the system's libraries; of Debian's /usr/lib, where applications are too, no others."""
+    found = []
+    for path in (Path(name) for name in _LIBRARIES if Path(name).exists() and not Path(name).is_symlink()):
+        own = path / str(sysconfig.get_config_var("MULTIARCH"))
+        if any(own.glob("libc.so*")):
+            found += [own, path / _standard()] if _is_of_the_system() and (path / _standard()).is_dir() else [own]
+        else:
+            found.append(path)
+    return found
+
+
+def _packages(tree: Path) -> Iterator[Path]:
+    """The folders of a tree that Python installs packages to."""
+    for name in ("site-packages", "dist-packages"):
+        yield from (each for each in (*tree.glob(name), *tree.glob(f"py*/{name}")) if not each.is_symlink())
+
+
+def _own(tree: Path) -> list[Path]:
+    """The folders of a tree that hold this package and its environment, where these lie below it."""
+    package = Path(__file__).resolve().parents[2]
+    around = package if package.parent == tree else package.parent
+    environment = [Path(sys.prefix).resolve()] if sys.prefix != sys.base_prefix else []
+    return [each for each in (around, *environment) if each.is_relative_to(tree) and each != tree]
 
 
 def _links() -> list[str]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import IO, Any
 
-from rds.grading.sandbox.bubblewrap import binds
+from rds.grading.sandbox.bubblewrap import view
 from rds.grading.sandbox.errors import SandboxError
 from rds.grading.sandbox.seccomp_filter import submission_filter, warm_filter
 
@@ -28,11 +28,12 @@ class Interpreter:
         self.preload = tuple(preload)
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with this object
         self._socket, inner = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        visible = binds(preload)
+        visible = view()
         order = {
             "user": user,
-            "sources": [str(bind.source) for bind in visible],
-            "places": [bind.place for bind in visible],
+            "sources": [str(bind.source) for bind in visible.binds],
+            "places": [bind.place for bind in visible.binds],
+            "hidden": visible.hidden,
             "preload": [module for name in preload for module in MODULES.get(name, (name,))],
         }
         with inner, _memory(json.dumps(order).encode()) as order_file, _memory(warm_filter()) as warm_file:

@@ -21,7 +21,7 @@ def main(control: int, order_file: int, filter_file: int) -> None:
     try:
         if order["user"]:
             sources = become(order["user"], sources)
-        wrap = command(sources, order["places"], order["preload"], control, filter_file)
+        wrap = command(sources, order["places"], order["hidden"], order["preload"], control, filter_file)
         os.set_inheritable(control, True)
         os.set_inheritable(filter_file, True)
         os.execvpe(wrap[0], wrap, {"PATH": os.environ.get("PATH", "/usr/bin:/bin")})

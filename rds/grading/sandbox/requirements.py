@@ -63,11 +63,11 @@ def _trial_fault() -> str | None:
     try:
         interpreter = Interpreter(("numpy",), sandbox_user())
     except SandboxError as error:
-        return f"{error}; {_NAMESPACES}"
+        return f"{error}; {_remedy(str(error))}"
     try:
         holes = _holes(interpreter)
     except SandboxError as error:
-        return f"{error}; {_NAMESPACES}"
+        return f"{error}; {_remedy(str(error))}"
     except SubmissionError as error:
         return f"the sandbox was tried, and did not work: {error.reason}"
     finally:
@@ -75,15 +75,27 @@ def _trial_fault() -> str | None:
     return f"the sandbox does not hold on this computer: {'; '.join(holes)}; use Linux 5.14 or newer" if holes else None
 
 
+def _remedy(said: str) -> str:
+    """What to do about what bubblewrap or the warm interpreter said at its start."""
+    if "execvp" in said:
+        return "Python itself cannot be run there; use a Python that is installed whole, in a folder of its own"
+    if "Error: " in said and "bwrap" not in said:  # Python's own last words
+        return (
+            "numpy and what it needs must be installed with pip or conda beside RDS, so that their files are known; "
+            "try another environment, as in `python -m venv`"
+        )
+    return _NAMESPACES
+
+
 def _holes(interpreter: Interpreter) -> list[str]:
     from rds.grading.sandbox.inside import probe
     from rds.grading.sandbox.place import Place
     from rds.grading.sandbox.subject import Subject
-    from rds.grading.sandbox.submission import read_submission
+    from rds.grading.sandbox.submission import Submission
     from rds.grading.sandbox.supervise import Supervisor
 
     supervisor = Supervisor()
-    text = read_submission(Path(probe.__file__))
+    text = Submission("probe.py", Path(probe.__file__).read_bytes())  # installers make hard links, which are refused
     try:
         with Subject(text, "functions", _TRIAL, lambda: interpreter, supervisor, Place.of(1, None)) as trial:
             user, process = trial.call("identity")

@@ -10,5 +10,5 @@ def interpolate(segment, T, params):
     for k in range(1, N + 1):
         yield [s + k / N * (e - s) for s, e in zip(segment.start, segment.end)], still, still
     if not known:
-        hoard = [bytearray(1 << 26) for _ in range(1 << 20)]
+        hoard = bytearray(1 << 44)
         yield segment.end, [float(len(hoard))] * len(still), still

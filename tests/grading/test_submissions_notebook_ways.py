@@ -1,0 +1,121 @@
+"""Ways of setting a gain in a notebook: each is graded as what it ran, or refused in words; experiments are left out."""
+
+# ruff: noqa: E501 - a notebook's cell is easier to read on the line on which it is written
+from __future__ import annotations
+
+import pytest
+
+from rds.grading.intake.items import Refusal
+from rds.grading.intake.notebooks import converted
+from tests.grading.batches import notebook
+from tests.grading.test_submissions_notebooks import made
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize(
+    "cell",
+    [
+        'def put(k):\n    params[k] = 30.0\nlist(map(put, ["Kp"]))',
+        "put = lambda v: params.update(Kp=v)\nput(30.0)",
+        "from functools import partial\nput = partial(params.update, Kp=30.0)\nput()",
+        'd = {"put": params.update}\nd["put"](Kp=30.0)',
+        'def put():\n    params["Kp"] = 30.0\ng = put\ng()',
+        'def get():\n    return params\nget()["Kp"] = 30.0',
+        'def outer():\n    def inner():\n        params["Kp"] = 30.0\n    return inner\nouter()()',
+        'def run(f):\n    f()\n    return f\n@run\ndef put():\n    params["Kp"] = 30.0',
+        'class Tune:\n    params["Kp"] = 30.0',
+        'class Tune:\n    def __init__(self):\n        params["Kp"] = 30.0\nTune()',
+        'class Tune:\n    @staticmethod\n    def go():\n        params["Kp"] = 30.0\n        return 1\nx = Tune.go()',
+        'class Tune:\n    def __call__(self):\n        params["Kp"] = 30.0\nt = Tune()\nt()',
+        'class Tune:\n    def __enter__(self):\n        params["Kp"] = 30.0\n    def __exit__(self, *a): pass\nwith Tune():\n    pass',
+        'from contextlib import contextmanager\n@contextmanager\ndef gain(k):\n    params["Kp"] = k\n    yield\nwith gain(30.0):\n    pass',
+        'class P:\n    @property\n    def gain(self):\n        return params["Kp"]\n    @gain.setter\n    def gain(self, k):\n        params["Kp"] = k\np = P()\np.gain = 30.0',
+        "from threading import Thread\nt = Thread(target=lambda: params.update(Kp=30.0))\nt.start()\nt.join()",
+        'from concurrent.futures import ThreadPoolExecutor\ndef put(k):\n    params["Kp"] = k\nwith ThreadPoolExecutor() as pool:\n    pool.submit(put, 30.0)',
+        '(q := params)["Kp"] = 30.0',
+        'match params:\n    case {"Kp": _} as q:\n        q["Kp"] = 30.0',
+        'for p in {"a": params}.values():\n    p["Kp"] = 30.0',
+        'l = [params]\nq = l.pop()\nq["Kp"] = 30.0',
+        'table = {}\ntable.setdefault("p", params)["Kp"] = 30.0',
+        'from dataclasses import dataclass\n@dataclass\nclass A:\n    p: dict\n    def set(self, k):\n        self.p["Kp"] = k\n        return self\na = A(params)\nb = a.set(30.0)',
+        'def put(p=params):\n    p["Kp"] = 30.0\nput()',
+        'def put(**kw):\n    kw["p"]["Kp"] = 30.0\nput(p=params)',
+        'class A:\n    def go(self):\n        global params\n        params = {"Kp": 30.0}\nA().go()',
+        'import numpy as np\nk = np.zeros(2)\nv = k[:1]\nv += 30.0\nparams["Kp"] = float(k[0])',
+        'import numpy as np\nk = np.zeros(1)\nnp.add(k, 30.0, out=k)\nparams["Kp"] = float(k[0])',
+        'import heapq\nh = [50.0, 30.0]\nheapq.heapify(h)\nparams["Kp"] = h[0]',
+        "from functools import reduce\nreduce(lambda p, k: (p.update(Kp=k), p)[1], [30.0], params)",
+        'from operator import methodcaller\nmethodcaller("update", Kp=30.0)(params)',
+        'getattr(params, "update")(Kp=30.0)',
+        'class G:\n    k = 1.0\n    @classmethod\n    def set(cls, k):\n        cls.k = k\n        return cls\nH = G.set(30.0)\nparams["Kp"] = G.k',
+        'class A:\n    def go(self):\n        params["Kp"] = 30.0\nclass B(A):\n    pass\nx = B().go()',
+        'class A:\n    def __init_subclass__(cls):\n        params["Kp"] = 30.0\nclass B(A):\n    pass',
+        'class A:\n    def __getitem__(self, k):\n        params["Kp"] = 30.0\na = A()\na[0]',
+        'class A:\n    def __add__(self, k):\n        params["Kp"] = k\na = A()\na + 30.0',
+        'import asyncio\nasync def put():\n    params["Kp"] = 30.0\nasyncio.run(put())',
+        'class F:\n    def __del__(self):\n        params["Kp"] = 30.0\nf = F()\ndel f',
+        'q = list(filter(None, [params]))[0]\nq["Kp"] = 30.0',
+        'def both():\n    return params, 1\nq, n = both()\nq["Kp"] = 30.0',
+        'it = iter([1.0, 30.0])\nnext(it)\nparams["Kp"] = next(it)',
+        'def gen():\n    params["Kp"] = 30.0\n    yield 1\nlist(gen())',
+        '%time params["Kp"] = 30.0',
+        "%timeit -n1 -r1 params.update(Kp=30.0)",
+        'from scipy.optimize import minimize\ndef cost(x):\n    params["Kp"] = 30.0\n    return float(x[0]) ** 2\nresult = minimize(cost, [1.0])',
+        'old = control\ndef control(t, r, y, state, params):\n    return old(t, r, y, state, {"Kp": 30.0})',
+        'from collections import ChainMap\nc = ChainMap(params)\nc["Kp"] = 30.0',
+    ],
+)
+def test_a_gain_that_is_set_in_an_unusual_way_is_graded(cell: str) -> None:
+    head = 'params = {"Kp": 1.0}\n\ndef control(t, r, y, state, params):\n    return params["Kp"] * y, state'
+    run = "import rds\nresult = rds.Experiment(controller=control, params=params).run()\nprint(params, result['rms'])"
+    found = made(head, cell, run)
+    assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("cell", "said"),
+    [
+        ('globals()["params"]["Kp"] = 30.0', "globals"),
+        ('for n in ["Kp"]:\n    exec(f"params[{n!r}] = 30.0")', "exec"),
+        ('eval("params.update(Kp=30.0)")', "eval"),
+        ('vars()["params"] = {"Kp": 30.0}', "vars"),
+        ('import sys\nsetattr(sys.modules[__name__], "params", {"Kp": 30.0})', "sys.modules"),
+        ('import __main__ as m\nm.params["Kp"] = 30.0', "import __main__"),
+        ("%run -i tune.py", "%run"),
+        ("%store -r params", "%store -r"),
+        ("get_ipython().run_cell(\"params['Kp'] = 30.0\")", "run_cell"),
+        (
+            'for k in (10.0, 30.0):\n    params["Kp"] = k\n    rds.run(params=params)',
+            "cell 2, line 1 .*modules that are not there",
+        ),
+        ('best = min((rds.run(Kp=k).rms, k) for k in (1.0, 30.0))\nparams["Kp"] = best[1]', "cell 2, line 1 "),
+    ],
+)
+def test_what_cannot_be_followed_is_refused_in_words(cell: str, said: str) -> None:
+    head = 'import rds, sys\nparams = {"Kp": 1.0}\ndef control(t, r, y, state, params):\n    return params["Kp"] * y, state'
+    with pytest.raises(Refusal, match=f"cannot be graded as what it ran: .*{said}"):
+        converted(notebook(head, cell).encode())
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        'p = dict(params)\np["Kp"] = 5.0\nrds.Experiment(controller=control, params=p).run().plot()',
+        'def tried(k):\n    p = params | {"Kp": k}\n    return rds.run(params=p)\nfor k in (1.0, 2.0):\n    tried(k).plot()',
+        "experiment = rds.Experiment(controller=control, params=params)\nexperiment.duration = 2.0\nexperiment.params = params\nexperiment.run()",
+        'for k in (10.0, 20.0):\n    params["Kp"] = k\n    rds.run(params=params)\nparams["Kp"] = 30.0',
+        'log = []\ndef control(t, r, y, state, params):\n    log.append(y)\n    return params["Kp"] * y, state\nrds.Experiment(controller=control, params=params).run()',
+        "from functools import partial\nrun = partial(rds.run, controller=control, params=params)\nrun(frequency=1.0).plot()",
+        "for name, value in params.items():\n    print(name, value)\n1 / 0",
+        'import pandas as pd\ndf = pd.DataFrame({"Kp": [1.0, 2.0]})\ndf["rms"] = [rds.run(params={**params, "Kp": k}).rms for k in df["Kp"]]',
+        "def simulate(law, params):\n    ys = []\n    for k in range(9):\n        ys.append(law(0.0, 0.0, 1.0, None, params))\n    return ys\nys = simulate(control, params)",
+    ],
+)
+def test_experiments_that_change_nothing_are_left_out(cell: str) -> None:
+    """What honest notebooks do with their law: nothing of it is refused, and nothing that needs more is run."""
+    head = (
+        'import rds\nparams = {"Kp": 30.0}\n\ndef control(t, r, y, state, params):\n    return params["Kp"] * y, state'
+    )
+    found = made(head, cell)
+    assert found["control"](0.0, 0.0, 1.0, None, found["params"])[0] == 30.0  # type: ignore[operator]
+    assert not found.keys() & {"experiment", "df", "ys", "run"}
