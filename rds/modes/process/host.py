@@ -32,7 +32,7 @@ from rds.modes.loop.stopwatch import TIMING_COLUMNS
 from rds.modes.process.blame import fault
 from rds.modes.process.live import Live
 from rds.modes.process.machine import BUILTIN, machine_behind
-from rds.modes.process.processes import is_alive, wait_for_end
+from rds.modes.process.processes import end_group, is_alive, wait_for_end
 from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
 from rds.modes.process.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
 from rds.modes.process.ring import Ring
@@ -290,6 +290,8 @@ def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
             os.kill(target, signal.SIGKILL)
             break
         time.sleep(_POLL)
+    if target:
+        end_group(target)
     recorder.close()
     kept = "; the samples up to then are kept" if ring.head else ", before the first sample"
     finish(directory, ring, {"ending": Ending.KILLED, "reason": f"{reason}{kept}", "rows": ring.head})

@@ -23,7 +23,7 @@ from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import STOP, as_text, read_changes, timed
 from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.program import HOLD
-from rds.modes.process.processes import is_stopped, wait_for_end
+from rds.modes.process.processes import adopt_orphans, end_adopted, end_group, is_stopped, wait_for_end
 from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
 from rds.modes.process.ring import Ring
 
@@ -163,6 +163,7 @@ def _death(directory: Path, rows: int, code: int | None) -> str:
 def main(arguments: list[str]) -> int:
     """Start the target, record it, conclude."""
     directory, ring = Path(arguments[0]), Ring.open(arguments[1])
+    adopt_orphans()
     recorder = Recorder(directory, ring)
     with open_private(directory / LOG, "wb") as output:
         target = subprocess.Popen(
@@ -170,12 +171,15 @@ def main(arguments: list[str]) -> int:
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
+            start_new_session=True,
         )
         # where a user in trouble finds them, and the host if the recorder is killed
         processes = {"recorder": os.getpid(), "target": target.pid, "desk": str(ring.desk_path)}
         processes["channel"] = ring.about.get("channel")  # of the built-in bus: where an emergency stop goes
         write_private(directory / PROCESSES, json.dumps(processes).encode())
         hung = watch(target, recorder, ring.about["sample_period"])
+    end_group(target.pid)
+    end_adopted()
     recorder.close()
     finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
     ring.close()

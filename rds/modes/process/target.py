@@ -48,7 +48,7 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
     clock = RealTimeClock(round(plan.T * 1e9), plan.late)
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()
-    drivers = loop = watch = None
+    drivers = loop = watch = stopwatch = None
     counted: dict[str, int] = {}  # by the drivers before the first sample
     bus = dict(plan.bus)
     faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
@@ -63,6 +63,8 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
             watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
         stopwatch = Stopwatch(clock, ring.append, ring.stop_asked)
+        if hasattr(signal, "SIGCONT"):
+            signal.signal(signal.SIGCONT, stopwatch.thread.went_on)
         loop = stopwatch.time(mode.build(plan, drivers))
         assert loop.changes is not None
         loop.changes.desk = desk
@@ -95,7 +97,9 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
             if watch is not None:
                 report["bus"] = watch.summary()
         stack.close()
-        clock.close()
+        if stopwatch is not None:
+            environment |= {"stops": stopwatch.thread.stops, "page_faults": stopwatch.thread.page_faults}
+            stopwatch.thread.close()
     after = stolen_ticks()
     environment["stolen_ticks"] = after - stolen if after is not None and stolen is not None else None
     report["samples"] = ring.head
