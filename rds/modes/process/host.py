@@ -21,7 +21,7 @@ import numpy as np
 
 from rds.core.blame import STUDENT_ERRORS
 from rds.core.errors import ContractError, InputError
-from rds.core.interrupt import Endless, interruptible
+from rds.core.interrupt import Endless, interruptible, limited
 from rds.core.private_files import make_folder
 from rds.core.types import Ending
 from rds.modes import load_mode
@@ -111,7 +111,8 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
         process = os.getpid()
         while ending is None:
             try:
-                ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+                with limited(lambda: len(recorded)) if live is None else contextlib.nullcontext():
+                    ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
             finally:
                 if os.getpid() != process:  # the student's code has forked: the copy must not go on as the program
                     os._exit(0)

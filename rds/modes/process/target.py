@@ -8,6 +8,7 @@ ended, and the environment that its timing was measured in. Whatever happens, th
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import logging
 import os
@@ -22,7 +23,7 @@ from typing import Any
 from rds.core.clock import RealTimeClock
 from rds.core.contracts import Drivers
 from rds.core.errors import MachineError, RdsError
-from rds.core.private_files import keep_process_private
+from rds.core.private_files import keep_process_private, open_private
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.loop.live_values import LiveValues
@@ -31,7 +32,7 @@ from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
 from rds.modes.process.blame import fault
 from rds.modes.process.environment import prepare, stolen_ticks, surroundings
 from rds.modes.process.record import write_whole
-from rds.modes.process.recorder import PLAN, READY, REPORT
+from rds.modes.process.recorder import ASK_WHERE, PLAN, READY, REPORT, TRACE
 from rds.modes.process.ring import Ring
 
 log = logging.getLogger(__name__)
@@ -116,6 +117,8 @@ def main(arguments: list[str]) -> None:
     # The end of the terminal's session, or a polite kill, is a request to stop: the axes come to rest first.
     for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
         signal.signal(number, lambda *_: ring.ask_to_stop())
+    if ASK_WHERE is not None:
+        faulthandler.register(ASK_WHERE, open_private(directory / TRACE, "w", is_own=True), all_threads=False)
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     plan = load(directory / PLAN)
     report = run(plan, ring, LiveValues.open(ring.desk_path))
