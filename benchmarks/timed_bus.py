@@ -151,7 +151,6 @@ def _cycles(drivers: AxisDrivers, bus: NotingBus, line: Faults, count: int) -> C
     strange = found.hub["error_frames"] or any(node["frames"] for node in line.nodes() if node["name"] not in ours)
     for late, unread in suspects:
         found.missed["bus" if strange else "host" if late > LATE or unread > LATE else "system"] += 1
-    clock.close()
     return found
 
 

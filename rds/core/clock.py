@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from dataclasses import dataclass
 
@@ -35,7 +34,6 @@ class RealTimeClock:
         self._spin = min(spin_ns, period_ns // 4)
         self._origin = self.now() + period_ns
         self._late_in_a_row = 0
-        self._schedstat = _open_schedstat()
 
     def start(self) -> None:
         """Sample 0 is due one period from now."""
@@ -45,18 +43,6 @@ class RealTimeClock:
         """Sample `k` is due one period from now."""
         self._origin = self.now() + (1 - k) * self.period
         self._late_in_a_row = 0
-
-    def taken(self) -> int:
-        """Nanoseconds so far in which this thread was ready to run but not run (0 where the kernel doesn't tell)."""
-        if self._schedstat < 0:
-            return 0
-        return int(os.pread(self._schedstat, 64, 0).split()[1])
-
-    def close(self) -> None:
-        """Let go of the kernel's statistics."""
-        if self._schedstat >= 0:
-            os.close(self._schedstat)
-            self._schedstat = -1
 
     def wait(self, k: int) -> int:
         """Wait until sample `k` is due; the sample to take now: later than `k` where periods are discarded."""
@@ -89,11 +75,3 @@ class RealTimeClock:
             return False
         self._late_in_a_row += k > 0
         return 0 < self.policy.stop_after <= self._late_in_a_row
-
-
-def _open_schedstat() -> int:
-    """The kernel's account of this thread (on the processor, waiting for it, in ns), or -1 where there is none."""
-    try:
-        return os.open("/proc/thread-self/schedstat", os.O_RDONLY)
-    except OSError:
-        return -1

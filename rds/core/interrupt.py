@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 PATIENCE = 1.0  # s in which work that was asked to end may do so by itself
+LIMIT = 60.0  # s for one step of a user's code, such as running a file's top level, or one call
 _POLL = 0.05  # s
 
 
 class Endless(BaseException):
     """Raised in a user's code that was asked to end and did not. No Exception, which such code may catch and go on."""
 
-    def __init__(self) -> None:
-        super().__init__("it was still here when it was asked to end; look for a loop without an end")
+    def __init__(self, seconds: float | None = None) -> None:
+        when = "when it was asked to end" if seconds is None else f"after {seconds:g} s"
+        super().__init__(f"it was still here {when}; look for a loop without an end")
 
 
 def interruptible(
@@ -56,9 +59,48 @@ def interruptible(
     raise errors[0] if errors else Endless()  # none where it was interrupted once more while it ended
 
 
-def _raise_in(thread: threading.Thread, error: type[BaseException]) -> None:
+@contextlib.contextmanager
+def limited(steps: Callable[[], Any] = lambda: None, seconds: float | None = None) -> Iterator[None]:
+    """Endless is raised in what is done here, at the line where it is, once `steps()` has not changed for `seconds`.
+
+    By default for `LIMIT`. A single call into compiled code that takes long ends only when that returns. Where no
+    thread can be started there is no limit.
+    """
+    limit = LIMIT if seconds is None else seconds
+    here, ended, lock = threading.current_thread(), threading.Event(), threading.Lock()
+
+    class Overdue(Endless):
+        def __init__(self) -> None:
+            super().__init__(limit)
+
+    def look() -> None:
+        last, since = steps(), time.monotonic()
+        while not ended.wait(min(max(since + limit - time.monotonic(), _POLL), limit)):
+            now, step = time.monotonic(), steps()
+            if step != last:
+                last, since = step, now
+            elif now - since >= limit:
+                with lock:
+                    if not ended.is_set():
+                        _raise_in(here, Overdue)
+                since = now - limit + PATIENCE  # once more if the code has caught it
+
+    watcher = threading.Thread(target=look, name="rds limit", daemon=True)
+    with contextlib.suppress(RuntimeError):
+        watcher.start()
+    try:
+        yield
+    finally:
+        with lock:
+            ended.set()
+            _raise_in(here, None)
+
+
+def _raise_in(thread: threading.Thread, error: type[BaseException] | None) -> None:
+    """None takes back what has not been raised yet."""
     if thread.ident is not None:
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(error))
+        raised = ctypes.py_object(error) if error is not None else None
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), raised)
 
 
 class SignalEvent(threading.Event):

@@ -20,6 +20,7 @@ from typing import Any
 from rds.core.blame import STUDENT_ERRORS, student_error, student_line
 from rds.core.errors import ContractError, InputError
 from rds.core.folder_kept import folder_kept
+from rds.core.interrupt import Endless, limited
 from rds.core.signals import declaration_fault
 from rds.core.signature import ARGUMENTS, INTERFACES, argument_fault, form, near_misses
 from rds.core.types import Controller, Reference, Source
@@ -186,7 +187,10 @@ def _is_written_here(value: Any, variables: Mapping[str, Any]) -> bool:
 def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source: Source) -> None:
     """A trial call with the empty state: "index out of range" in a running loop does not say what is missing."""
     try:
-        control(0.0, Reference(0.0, 0.0, 0.0), 0.0, (), copy.deepcopy(params))
+        with limited():
+            control(0.0, Reference(0.0, 0.0, 0.0), 0.0, (), copy.deepcopy(params))
+    except Endless as error:
+        raise ContractError(student_error(error, source), source.path or source.name) from error
     except (IndexError, KeyError, TypeError, ValueError) as error:
         if (
             isinstance(error, KeyError)
@@ -285,7 +289,7 @@ def _run(text: str, file: Path) -> dict[str, Any]:
     module.__file__ = str(file)
     sys.modules[module.__name__] = module  # dataclasses and pickle look it up there
     try:
-        with _siblings(file.parent), folder_kept():
+        with _siblings(file.parent), folder_kept(), limited():
             exec(compile(text, str(file), "exec", dont_inherit=True), module.__dict__)
     except BaseException as error:
         del sys.modules[module.__name__]

@@ -53,7 +53,6 @@ def run(time: Time, work_ms: dict[int, float], policy: LatePolicy, samples: int 
         if clock.finish(k, time.ns):
             break
         k += 1
-    clock.close()
     return taken
 
 
@@ -140,6 +139,3 @@ def test_a_real_clock_keeps_its_due_times() -> None:
     for k in range(20):
         clock.wait(k)
         assert clock.lateness(k, clock.now()) >= 0
-    assert clock.taken() >= 0
-    clock.close()
-    assert clock.taken() == 0

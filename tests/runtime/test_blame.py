@@ -57,6 +57,31 @@ def test_a_single_slow_call_comes_back_when_it_is_made_again(experiment: Maker) 
     assert result.verdict == "missed"
 
 
+@pytest.mark.parametrize("wait", [busy, time.sleep])
+def test_a_stall_longer_than_any_patience_is_missed(experiment: Maker, wait: Any) -> None:
+    """A second look that goes through the whole run with a fixed patience gave up, and called the computer slow."""
+    stalls_once = experiment(every(300, lambda: wait(2.6)), duration=0.4)
+    result = unless_lost(lambda: stalls_once.run("emulation"))
+    assert result.verdict == "missed"
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_what_a_run_started_is_started_once_and_ends_with_it(experiment: Maker, alone: Path, apart: bool) -> None:
+    noted = alone / "started"
+
+    def start() -> None:
+        child = subprocess.Popen(["sleep", "600"], start_new_session=apart)
+        with open(noted, "a") as file:
+            file.write(f"{child.pid}\n")
+        time.sleep(0.02)
+
+    result = unless_lost(lambda: experiment(every(150, start), duration=0.2).run("emulation"))
+    assert result.verdict in ("missed", "void")
+    numbers = noted.read_text().split()
+    assert len(numbers) == 1
+    assert not Path(f"/proc/{numbers[0]}").exists()
+
+
 def test_a_thread_that_takes_the_processor_is_missed(experiment: Maker) -> None:
     def spin() -> None:
         busy(2.0)
@@ -85,6 +110,7 @@ def test_who_is_stopped_is_not_blamed(experiment: Maker, alone: Path) -> None:
     assert len(stops) >= 3
     assert result.verdict == "void"
     assert result.meta["timing"]["late"] >= 3 * 40
+    assert f"stopped from outside {len(stops)} times (SIGSTOP" in result.meta["verdict_reason"]
     assert "repeat it on a quieter machine" in result.meta["verdict_reason"]
 
 

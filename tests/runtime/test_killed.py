@@ -386,7 +386,9 @@ def test_a_controller_that_hangs_is_killed(experiment: Maker, alone: Path) -> No
             pass
 
     started = time.monotonic()
-    with pytest.raises(rds.ContractError, match=r"did not return for 5 s at t = 0\.500 s; look for a loop without"):
+    with pytest.raises(
+        rds.ContractError, match=r"did not return for 5 s at t = 0\.500 s, in test_killed\.py, line \d+, in hang; look"
+    ):
         unless_lost(lambda: experiment(at_once(0.5, hang)).run("implementation", out=alone / "run"))
     assert time.monotonic() - started > 5.0
     assert len(check_readable(alone / "run", "fault", 400)) <= 500

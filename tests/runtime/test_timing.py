@@ -104,14 +104,14 @@ class TestWhoseFault:
             inside = {} if expected is Verdict.MISSED else dict.fromkeys(range(60, N, 250), 4.0)
             timing, counts = ran(compute, waits, inside=inside, discard=discard)
             repeated = np.broadcast_to(np.asarray(compute, dtype=float), N)[timing.sample] * MS
-            assert judge(timing, MS, **counts, again=lambda own=repeated: own).verdict == expected
+            assert judge(timing, MS, **counts, again=lambda _, own=repeated: own).verdict == expected
 
     def test_a_single_overrun_is_timed_again(self, discard: bool) -> None:
         timing, counts = ran(inside={500: 3.0}, discard=discard)
         quick = np.full(len(timing.sample), 0.05 * MS)
-        assert judge(timing, MS, **counts, again=lambda: quick).verdict == Verdict.VOID
-        assert judge(timing, MS, **counts, again=lambda: timing.compute).verdict == Verdict.MISSED
-        assert judge(timing, MS, **counts, again=lambda: None).verdict == Verdict.MISSED
+        assert judge(timing, MS, **counts, again=lambda _: quick).verdict == Verdict.VOID
+        assert judge(timing, MS, **counts, again=lambda _: timing.compute).verdict == Verdict.MISSED
+        assert judge(timing, MS, **counts, again=lambda _: None).verdict == Verdict.MISSED
         assert judge(timing, MS, **counts, stalls=1).verdict == Verdict.VOID
 
     def test_a_slow_bus_missed_and_is_named(self, discard: bool) -> None:
@@ -156,7 +156,7 @@ class TestWhoseFault:
 
 
 def test_without_doubt_nothing_is_called_again() -> None:
-    def never() -> None:
+    def never(_: object) -> None:
         raise AssertionError
 
     for arguments in ({}, {"compute": SLOW}, {"waits": {100: 50.0}}, {"io": 2.0}):
@@ -165,7 +165,7 @@ def test_without_doubt_nothing_is_called_again() -> None:
 
 
 def test_code_that_starts_threads_is_not_called_again() -> None:
-    def never() -> None:
+    def never(_: object) -> None:
         raise AssertionError
 
     timing, counts = ran(inside={500: 3.0})

@@ -75,6 +75,7 @@ def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
         missing=drivers.get("missing", 0),
         silent=drivers.get("silent", 0),
         again=partial(own_times, plan, rows),
+        environment=environment,
     )
     return {
         "verdict": str(judgement.verdict),

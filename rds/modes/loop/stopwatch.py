@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from rds.core.clock import RealTimeClock
+from rds.core.thread_time import ThreadTime
 from rds.core.types import Ending
 from rds.modes.loop.loop import Law, Loop
 
@@ -19,21 +20,20 @@ class Stopwatch:
 
     Lateness is from the due time to the start; I/O is `read` and `write`; interpolate is the law that sets references,
     0 where there is none; compute is the other laws; model is `follow`; taken is what the scheduler took from these
-    three (see `core.clock`).
+    three (see `core.thread_time`).
     """
 
     def __init__(self, clock: RealTimeClock, append: Callable[[list[float]], None], stop: Callable[[], bool]):
         self._clock, self._append, self._stop = clock, append, stop
-        self._k = self._started = self._read = self._referred = self._computed = self._written = self._ended = (
-            self._taken
-        ) = 0
+        self.thread = ThreadTime()
+        self._k = self._started = self._read = self._referred = self._computed = self._written = self._ended = 0
         self._is_copy = False  # of the process, made by a fork in the student's code: it must neither drive nor record
         if hasattr(os, "register_at_fork"):
             os.register_at_fork(after_in_child=self._copied)
 
     def time(self, loop: Loop) -> Loop:
         """The same loop, timed; its rows go to `append`, and it ends when `stop()` is true or by the late policy."""
-        clock, now, taken = self._clock, self._clock.now, self._clock.taken
+        clock, now, begin = self._clock, self._clock.now, self.thread.begin
         wait_until, read, write, follow = clock.wait, loop.read, loop.write, loop.follow
 
         def wait(k: int) -> int:
@@ -44,7 +44,7 @@ class Stopwatch:
         def timed_read() -> Sequence[float]:
             positions = read()
             self._read = now()
-            self._taken = taken()
+            begin()
             self._referred = self._read
             return positions
 
@@ -101,7 +101,7 @@ class Stopwatch:
             referred - read,
             computed - referred,
             ended - written,
-            self._clock.taken() - self._taken,
+            self.thread.taken(ended - read),
         )
         self._append(row)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from rds.core.scheduling import lock_memory, raise_priority, set_timer_slack, unlock_memory
+
+TICK = 0.01  # s, in which the kernel counts what a hypervisor takes
 
 
 def prepare(priority: int, cpu: int | None) -> dict[str, Any]:
@@ -57,6 +59,8 @@ def surroundings() -> dict[str, Any]:
         "virtual_machine": _virtual(),
         "python": platform.python_version(),
         "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "rt_runtime_us": _number("/proc/sys/kernel/sched_rt_runtime_us"),
+        "rt_period_us": _number("/proc/sys/kernel/sched_rt_period_us"),
     }
 
 
@@ -65,6 +69,34 @@ def stolen_ticks() -> int | None:
     line = _first_line("/proc/stat")
     fields = line.split() if line else []
     return int(fields[8]) if len(fields) > 8 else None
+
+
+def causes(environment: Mapping[str, Any], held: float) -> list[str]:
+    """What the system is known to have done in a run that it held up for `held` seconds at most, at one time."""
+    found = []
+    if stops := environment.get("stops"):
+        found.append(
+            f"the process was stopped from outside {stops} time{'s' if stops > 1 else ''} (SIGSTOP, or a debugger)"
+        )
+    if faults := environment.get("page_faults"):
+        found.append(f"the code waited for {faults} page{'s' if faults > 1 else ''} of memory from the disk")
+    if stolen := environment.get("stolen_ticks"):
+        found.append(f"the hypervisor took {stolen * TICK:.2f} s")
+    if (throttled := throttling(environment)) and 0.7 * throttled <= held <= 1.5 * throttled:
+        found.append(
+            f"it held the loop up for about the {throttled * 1e3:.0f} ms of each second in which real-time throttling "
+            "lets no real-time process run (/proc/sys/kernel/sched_rt_runtime_us; something with real-time priority "
+            "keeps a processor busy: end it, or give it another one)"
+        )
+    return found
+
+
+def throttling(environment: Mapping[str, Any]) -> float:
+    """For how long in each period of the kernel's real-time throttling no real-time process runs, s; 0: never."""
+    runtime, period = environment.get("rt_runtime_us"), environment.get("rt_period_us")
+    if not str(environment.get("scheduler", "")).startswith("SCHED_FIFO") or runtime is None or not period:
+        return 0.0
+    return max(period - runtime, 0) / 1e6 if runtime >= 0 else 0.0
 
 
 def sentence(environment: dict[str, Any]) -> str:
@@ -85,6 +117,11 @@ def _first_line(path: str) -> str | None:
     except OSError:
         return None
     return text.splitlines()[0] if text else None
+
+
+def _number(path: str) -> int | None:
+    line = _first_line(path)
+    return int(line) if line and line.lstrip("-").isdigit() else None
 
 
 def _virtual() -> bool | None:

@@ -21,7 +21,7 @@ import numpy as np
 
 from rds.core.blame import STUDENT_ERRORS
 from rds.core.errors import ContractError, InputError
-from rds.core.interrupt import Endless, interruptible
+from rds.core.interrupt import Endless, interruptible, limited
 from rds.core.private_files import make_folder
 from rds.core.types import Ending
 from rds.modes import load_mode
@@ -32,7 +32,7 @@ from rds.modes.loop.stopwatch import TIMING_COLUMNS
 from rds.modes.process.blame import fault
 from rds.modes.process.live import Live
 from rds.modes.process.machine import BUILTIN, machine_behind
-from rds.modes.process.processes import is_alive, wait_for_end
+from rds.modes.process.processes import end_group, is_alive, wait_for_end
 from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, claim, read_ending, read_raw, write_whole
 from rds.modes.process.recorder import HANG_AFTER, PLAN, READY, Recorder, finish
 from rds.modes.process.ring import Ring
@@ -111,7 +111,8 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
         process = os.getpid()
         while ending is None:
             try:
-                ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
+                with limited(lambda: len(recorded)) if live is None else contextlib.nullcontext():
+                    ending = loop.run(loop.k + _CHUNK) if progress else loop.run()
             finally:
                 if os.getpid() != process:  # the student's code has forked: the copy must not go on as the program
                     os._exit(0)
@@ -290,6 +291,8 @@ def _take_over(directory: Path, ring: Ring, period: float, reason: str) -> None:
             os.kill(target, signal.SIGKILL)
             break
         time.sleep(_POLL)
+    if target:
+        end_group(target)
     recorder.close()
     kept = "; the samples up to then are kept" if ring.head else ", before the first sample"
     finish(directory, ring, {"ending": Ending.KILLED, "reason": f"{reason}{kept}", "rows": ring.head})

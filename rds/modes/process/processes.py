@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import signal
 import subprocess
 from pathlib import Path
 
@@ -50,3 +51,33 @@ def is_stopped(process: int) -> bool:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] in "Tt"
     except (OSError, IndexError):
         return False
+
+
+def adopt_orphans() -> None:
+    """Processes whose parent ends become children of this one, where the system has that (Linux)."""
+    subreaper = 36  # PR_SET_CHILD_SUBREAPER, <linux/prctl.h>
+    with contextlib.suppress(ImportError, OSError, AttributeError):
+        import ctypes
+
+        ctypes.CDLL(None).prctl(subreaper, 1, 0, 0, 0)
+
+
+def end_group(leader: int) -> None:
+    """End what a process that led a group of its own had started, and what that had."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.killpg(leader, signal.SIGKILL)
+
+
+def end_adopted() -> None:
+    """End all children of this process, and what they leave to it: those that went into a group of their own."""
+    for _ in range(100):
+        try:
+            children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+        except OSError:
+            return
+        if not children:
+            return
+        for child in map(int, children):
+            with contextlib.suppress(OSError):
+                os.kill(child, signal.SIGKILL)
+                os.waitpid(child, 0)

@@ -11,19 +11,22 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
+from rds.core.blame import is_installed
 from rds.core.private_files import keep_process_private, open_private, write_private
 from rds.core.types import Ending
 from rds.modes.loop.changes import FILE as CHANGES
 from rds.modes.loop.changes import STOP, as_text, read_changes, timed
 from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.program import HOLD
-from rds.modes.process.processes import is_stopped, wait_for_end
+from rds.modes.process.processes import adopt_orphans, end_adopted, end_group, is_stopped, wait_for_end
 from rds.modes.process.record import ENDING, PROCESSES, UNSTARTED, RecordFile, write_ending, write_whole
 from rds.modes.process.ring import Ring
 
@@ -32,7 +35,9 @@ HANG_AFTER = 5.0  # s without a new sample, or 20 periods if that is longer
 HELD_UP = 1.0  # s for one look: this process did not run
 READY_WITHIN = 60.0  # s from the start of the target to its first sample
 READY = 2  # heartbeats of the target when its loop begins
-PLAN, REPORT, LOG = "plan.pickle", "target.json", "target.log"
+PLAN, REPORT, LOG, TRACE = "plan.pickle", "target.json", "target.log", "target.trace"
+ASK_WHERE = getattr(signal, "SIGUSR1", None)  # the target answers in the file TRACE
+ANSWERS_WITHIN = 1.0  # s
 
 
 class Recorder:
@@ -109,6 +114,7 @@ def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) ->
         is_running = recorder.ring.heartbeat >= recorder.ring.about["ready"]
         if quiet > (hang_after if is_running else READY_WITHIN):
             stopped = is_stopped(target.pid)
+            where = "" if stopped else _where(recorder.directory, target)
             target.kill()
             target.wait()
             at = f"at t = {rows * period:.3f} s"
@@ -119,11 +125,33 @@ def watch(target: subprocess.Popen[bytes], recorder: Recorder, period: float) ->
                 )
             if is_running:
                 return Ending.FAULT, (
-                    f"control() or the model did not return for {quiet:.0f} s {at}; "
+                    f"control() or the model did not return for {quiet:.0f} s {at}{where}; "
                     "look for a loop without an end in it. The target was killed; the watchdogs cut the voltage"
                 )
-            return Ending.FAULT, f"the target was not ready within {READY_WITHIN:.0f} s"
+            return Ending.FAULT, (
+                f"the target was not ready within {READY_WITHIN:.0f} s{where}; look there for a loop without an end, "
+                "or for what it waits for"
+            )
     return None
+
+
+def _where(directory: Path, target: subprocess.Popen[bytes]) -> str:
+    """Where the target is, as the end of a sentence: the innermost line of the student's, if it has one; or nothing."""
+    trace = directory / TRACE
+    if ASK_WHERE is None or not trace.exists():  # it does not listen yet: the signal would end it
+        return ""
+    target.send_signal(ASK_WHERE)
+    end = time.monotonic() + ANSWERS_WITHIN
+    text, before = "", None
+    while (not text or text != before) and time.monotonic() < end:
+        time.sleep(DRAIN_EVERY)
+        with contextlib.suppress(OSError):
+            before, text = text, trace.read_text(errors="replace")
+    for file, line, function in re.findall(r'File "(.+)", line (\d+) in (.+)', text):
+        if not file.startswith("<frozen") and not is_installed(file):
+            name = "a notebook cell" if "ipykernel" in file else Path(file).name
+            return f", in {name}, line {line}, in {function}"
+    return ""
 
 
 def conclude(directory: Path, rows: int, code: int | None, hung: tuple[Ending, str] | None) -> dict[str, Any]:
@@ -140,7 +168,7 @@ def conclude(directory: Path, rows: int, code: int | None, hung: tuple[Ending, s
 def finish(directory: Path, ring: Ring, ending: dict[str, Any]) -> None:
     """Write how the run ended, and remove what only its processes needed; of a run without a sample, all the rest."""
     write_ending(directory, ending, ENDING if ring.head else UNSTARTED)
-    names = [PLAN, REPORT, PROCESSES]
+    names = [PLAN, REPORT, PROCESSES, TRACE]
     with contextlib.suppress(OSError):
         if not ring.head or not (directory / LOG).stat().st_size:
             names.append(LOG)
@@ -163,6 +191,7 @@ def _death(directory: Path, rows: int, code: int | None) -> str:
 def main(arguments: list[str]) -> int:
     """Start the target, record it, conclude."""
     directory, ring = Path(arguments[0]), Ring.open(arguments[1])
+    adopt_orphans()
     recorder = Recorder(directory, ring)
     with open_private(directory / LOG, "wb") as output:
         target = subprocess.Popen(
@@ -170,12 +199,15 @@ def main(arguments: list[str]) -> int:
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
+            start_new_session=True,
         )
         # where a user in trouble finds them, and the host if the recorder is killed
         processes = {"recorder": os.getpid(), "target": target.pid, "desk": str(ring.desk_path)}
         processes["channel"] = ring.about.get("channel")  # of the built-in bus: where an emergency stop goes
         write_private(directory / PROCESSES, json.dumps(processes).encode())
         hung = watch(target, recorder, ring.about["sample_period"])
+    end_group(target.pid)
+    end_adopted()
     recorder.close()
     finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
     ring.close()

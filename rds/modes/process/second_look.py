@@ -1,93 +1,147 @@
-"""A second look at a run's timing: the same calls made again, off the clock.
+"""A second look at a run's timing: the same calls made again, off the clock, in a process without effects.
+
+    python -m rds.modes.process.second_look PLAN CALLS TIMES
 
 A stall that struck while the student's code ran looks like running time. The code is deterministic by contract, so
 calls with the same arguments take as long again if they took long by their own doing, and don't if they didn't.
+What else the code does must not happen twice: where it starts a process, writes a file, or opens a connection, the
+second look ends without an answer (see `no_effects`).
 """
 
 from __future__ import annotations
 
 import os
-import time
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from time import perf_counter_ns as now
+from typing import IO
 
 import numpy as np
 
-from rds.core.blame import STUDENT_ERRORS
-from rds.core.clock import RealTimeClock
-from rds.core.contracts import Motion
-from rds.modes.loop.plan import Plan
+from rds.core.thread_time import ThreadTime
+from rds.modes.loop.plan import Plan, dump, load
 from rds.modes.loop.program import InterpolatedProgram
 from rds.modes.parts import start
 from rds.modes.process.host import Rows
+from rds.modes.process.no_effects import forbid_effects
+from rds.modes.process.record import write_whole
 from rds.modes.process.replay import as_recorded
 
-PASSES = 2
-PATIENCE = 5.0  # s for all of them
+PASSES = 3
+STARTING = 10.0  # s for the process to begin
 
 
-def own_times(plan: Plan, rows: Rows) -> np.ndarray | None:
+def own_times(plan: Plan, rows: Rows, which: np.ndarray) -> np.ndarray | None:
     """The time of each sample's interpolate(), control() and model, ns, at the least of some passes.
 
-    None if they can't be repeated.
+    None if they can't be repeated. `which` are the samples in question, one flag for each row: the passes end with
+    the last of them (what was not repeated is infinite), and when each of them has been quick once.
     Each pass starts from the initial states and gets the positions and the voltages that were recorded, and the
     changes of live values.
     """
-    if not plan.repeatable:
+    if not plan.repeatable or not which.any():
         return None
     made = isinstance(plan.program, InterpolatedProgram)  # by the student's code, whose time counts
-    plan = plan.with_changes(rows.changes) if made else as_recorded(plan, rows)
+    same = plan.with_changes(rows.changes) if made else as_recorded(plan, rows)
     of = dict(zip(rows.columns, rows.values.T, strict=True))
-    samples = of["sample"].astype(int).tolist()
-    measured = np.array([of[f"{name}_measured"] for name in plan.names]).T.tolist()
-    acting = np.array([of[axis.acting] for axis in plan.axes]).T.tolist()
-    clock = RealTimeClock(round(plan.T * 1e9))
-    deadline = time.monotonic() + PATIENCE
-    best: np.ndarray | None = None
-    process = os.getpid()
-    try:
-        for _ in range(PASSES):
-            motions = [start(axis.model, plan.T) for axis in plan.axes]
-            times = _pass(plan, clock, motions, samples, measured, acting, deadline)
-            if times is None:
-                return None
-            best = times if best is None else np.minimum(best, times)
-    except STUDENT_ERRORS:  # it did not raise in the run: not the same calls, so nothing to learn from them
+    last = int(np.flatnonzero(which)[-1]) + 1
+    calls = np.column_stack(
+        [
+            of["sample"],
+            which,
+            *(of[f"{name}_measured"] for name in plan.names),
+            *(of[axis.acting] for axis in plan.axes),
+        ]
+    )[:last]
+    took = sum(float(of[stage][:last].sum()) for stage in ("interpolate", "compute", "model")) / 1e9
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / name for name in ("plan", "calls", "times")]
+        write_whole(paths[0], dump(same), is_own=True)
+        write_whole(paths[1], calls.tobytes())
+        write_whole(paths[2], b"")
+        _look(paths, STARTING + 2 * PASSES * took)
+        times = np.frombuffer(paths[2].read_bytes())
+    if not len(times) or len(times) % last:
         return None
+    least = np.full(len(which), np.inf)
+    least[:last] = times.reshape(-1, last).min(axis=0)
+    return least
+
+
+def _look(paths: list[Path], patience: float) -> None:
+    """Let a process of its own make the calls; it and all that belongs to it is gone afterwards."""
+    command = [sys.executable, "-P", "-m", "rds.modes.process.second_look", *map(str, paths)]
+    nowhere = subprocess.DEVNULL
+    process = subprocess.Popen(command, stdin=nowhere, stdout=nowhere, stderr=nowhere, start_new_session=True)
+    try:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(patience)
     finally:
-        if os.getpid() != process:  # the student's code has forked: the copy must not go on as the program
-            os._exit(0)
-        clock.close()
-    return best
+        with suppress(OSError, AttributeError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
+        process.wait()
 
 
-def _pass(
-    plan: Plan,
-    clock: RealTimeClock,
-    motions: list[Motion],
-    samples: list[int],
-    measured: list[list[float]],
-    acting: list[list[float]],
-    deadline: float,
-) -> np.ndarray | None:
-    drive, now, taken = plan.start(), clock.now, clock.taken
+def _repeat(plan: Plan, calls: np.ndarray, written: IO[bytes], had_effect: list[str]) -> None:
+    """Write the time of each call to `written`, pass by pass, as long as the code had no effect."""
+    axes, period = len(plan.axes), plan.T * 1e9
+    which = calls[:, 1] > 0
+    least = np.full(len(calls), np.inf)
+    for _ in range(PASSES):
+        times = _pass(plan, calls[:, 0].astype(int).tolist(), calls[:, 2 : 2 + axes], calls[:, 2 + axes :])
+        if had_effect:
+            return
+        written.write(times.tobytes())
+        written.flush()
+        least = np.minimum(least, times)
+        if (least[which] < period / 2).all():
+            return
+
+
+def _pass(plan: Plan, samples: list[int], measured: np.ndarray, acting: np.ndarray) -> np.ndarray:
+    drive, thread = plan.start(), ThreadTime()
+    motions = [start(axis.model, plan.T) for axis in plan.axes]
     laws, changes = drive.laws, drive.changes
     times = np.empty(len(samples))
     next_sample = 0
     voltages: list[float] = []
+    positions, applied = measured.tolist(), acting.tolist()
     for i, k in enumerate(samples):
         for _ in range(next_sample, k):  # as the loop does with discarded periods
             for motion, voltage in zip(motions, voltages, strict=False):
                 motion.write(voltage)
         next_sample = k + 1
         changes(k)
-        before, started = taken(), now()
+        started = now()
+        thread.begin()
         row: list[float] = [k]
         for law in laws:
-            law(k, measured[i], row, [])
-        voltages = acting[i]
+            law(k, positions[i], row, [])
+        voltages = applied[i]
         for motion, voltage in zip(motions, voltages, strict=False):
             motion.read()
             motion.write(voltage)
-        times[i] = max(now() - started - (taken() - before), 0)
-        if time.monotonic() > deadline:
-            return None
+        span = now() - started
+        times[i] = max(span - thread.taken(span), 0)
+    thread.close()
     return times
+
+
+def main(arguments: list[str]) -> None:
+    """Make the calls again, and write their times."""
+    plan_path, calls_path, times_path = map(Path, arguments)
+    values = np.frombuffer(calls_path.read_bytes())
+    with open(times_path, "r+b") as written:
+        had_effect = forbid_effects()
+        plan = load(plan_path)
+        _repeat(plan, values.reshape(-1, 2 + 2 * len(plan.axes)), written, had_effect)
+        os._exit(0)  # without what the code may have left for the end
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

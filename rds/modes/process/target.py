@@ -8,6 +8,7 @@ ended, and the environment that its timing was measured in. Whatever happens, th
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import logging
 import os
@@ -22,7 +23,7 @@ from typing import Any
 from rds.core.clock import RealTimeClock
 from rds.core.contracts import Drivers
 from rds.core.errors import MachineError, RdsError
-from rds.core.private_files import keep_process_private
+from rds.core.private_files import keep_process_private, open_private
 from rds.core.types import Ending
 from rds.modes import load_mode
 from rds.modes.loop.live_values import LiveValues
@@ -31,7 +32,7 @@ from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
 from rds.modes.process.blame import fault
 from rds.modes.process.environment import prepare, stolen_ticks, surroundings
 from rds.modes.process.record import write_whole
-from rds.modes.process.recorder import PLAN, READY, REPORT
+from rds.modes.process.recorder import ASK_WHERE, PLAN, READY, REPORT, TRACE
 from rds.modes.process.ring import Ring
 
 log = logging.getLogger(__name__)
@@ -48,7 +49,7 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
     clock = RealTimeClock(round(plan.T * 1e9), plan.late)
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()
-    drivers = loop = watch = None
+    drivers = loop = watch = stopwatch = None
     counted: dict[str, int] = {}  # by the drivers before the first sample
     bus = dict(plan.bus)
     faults, dialect = bus.pop("faults", ()), bus.pop("dialect", DEFAULT)
@@ -63,6 +64,8 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
             watch = stack.enter_context(RunWatch(bus["channel"], faults))
         ring.beat(1)
         stopwatch = Stopwatch(clock, ring.append, ring.stop_asked)
+        if hasattr(signal, "SIGCONT"):
+            signal.signal(signal.SIGCONT, stopwatch.thread.went_on)
         loop = stopwatch.time(mode.build(plan, drivers))
         assert loop.changes is not None
         loop.changes.desk = desk
@@ -95,7 +98,9 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
             if watch is not None:
                 report["bus"] = watch.summary()
         stack.close()
-        clock.close()
+        if stopwatch is not None:
+            environment |= {"stops": stopwatch.thread.stops, "page_faults": stopwatch.thread.page_faults}
+            stopwatch.thread.close()
     after = stolen_ticks()
     environment["stolen_ticks"] = after - stolen if after is not None and stolen is not None else None
     report["samples"] = ring.head
@@ -112,6 +117,8 @@ def main(arguments: list[str]) -> None:
     # The end of the terminal's session, or a polite kill, is a request to stop: the axes come to rest first.
     for number in (signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGTERM)):
         signal.signal(number, lambda *_: ring.ask_to_stop())
+    if ASK_WHERE is not None:
+        faulthandler.register(ASK_WHERE, open_private(directory / TRACE, "w", is_own=True), all_threads=False)
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     plan = load(directory / PLAN)
     report = run(plan, ring, LiveValues.open(ring.desk_path))

@@ -8,27 +8,32 @@ I/O takes its median of the periods in which every module answered: where one wa
 vain, and how long says nothing about the bus. If the replay keeps the period and the run did not, the system alone
 (or the machine) could not keep it, and the verdict is void: it says nothing about the student's code.
 
-What the replay cannot see is a stall that struck while the student's code ran (a virtual machine that is not
-given its processor, a process that is stopped): it looks like running time. Such stalls strike waiting as well.
-So a few overruns, or no more of them than there were stalls of that length while waiting, are in doubt. Then
-the same calls are made again, off the clock (`modes.second_look`), and the replay is repeated with the time that
-they take then. The student's code is deterministic by contract: what was its own doing comes back, a stall does not.
+What the code's own time is, the kernel's accounts say (`core.thread_time`): what the scheduler took from it, a
+process that was stopped, a page that came from the disk do not count. What they cannot say is whether a hypervisor
+ran something else while the student's code seemed to run. Such stalls strike waiting as well. So a few overruns, or
+no more of them than there were stalls of that length while waiting, are in doubt. Then the calls in question are made
+again, off the clock and without effects outside (`process.second_look`), and the replay is repeated with the time
+that they take then. The student's code is deterministic by contract: what was its own doing comes back, a stall does
+not. Where it cannot be called again, an overrun that is several times as long as all that the system did in the run
+is the code's own; where nothing is proved, the verdict is void.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from rds.core.types import Verdict
+from rds.modes.process.environment import TICK, causes
 
 STAGES = ("lateness", "io", "interpolate", "compute", "model")
 LASTING = 9  # periods of silence, the shortest that ends a run (with a tenth, which has no row)
 FEW = 3  # overruns that may be stalls even if nothing stalled while waiting
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9}
+BEYOND = 3.0  # times the longest stall of the system: an overrun that none of them explains
 BIN_EDGES_US = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
 
 
@@ -42,7 +47,7 @@ class Timing:
     interpolate: np.ndarray
     compute: np.ndarray
     model: np.ndarray
-    taken: np.ndarray  # of the three before it: not run although ready to, the scheduler's doing
+    taken: np.ndarray  # of the three before it: not run, and not by the code's own doing
 
     @property
     def total(self) -> np.ndarray:
@@ -97,15 +102,17 @@ def judge(
     threads: int = 0,
     missing: int = 0,
     silent: int = 0,
-    again: Callable[[], np.ndarray | None] | None = None,
+    again: Callable[[np.ndarray], np.ndarray | None] | None = None,
+    environment: Mapping[str, Any] | None = None,
 ) -> Judgement:
     """Met, missed or void (see the module's text).
 
     `limit` is how many late samples are allowed; `stalls` is how often the same clock, without the student's
     code, was late by more than a period in the rehearsal before the run; `threads` is how many threads the student's
     code left running; `missing` is how many answers had not come over the bus at the end of their period, `silent` in
-    how many periods no answer of a module came at all. `again()` makes the run's calls once more and gives each one's
-    time in ns, or None if it can't.
+    how many periods no answer of a module came at all. `again(which)` makes the run's calls once more and gives each
+    one's time in ns, of the samples in question (`which`) at least, or None if it can't. `environment` is what is known
+    of that of the run (see `environment`).
     """
     count = int(late_samples(timing, period).sum())
     lost = f"{count} of {len(timing.sample)} samples were late"
@@ -119,11 +126,11 @@ def judge(
     alone = _late_alone(own + io, timing, period)
     if alone > limit and _is_doubtful(own + io, timing, period, stalls):
         # Not of code that starts threads: they would go on here.
-        repeated = again() if again is not None and not threads else None
+        repeated = again(own + io > period) if again is not None and not threads else None
         if repeated is not None:
             own = np.minimum(own, repeated)
             alone = _late_alone(own + io, timing, period)
-        elif _overruns(own + io, period) <= _stalls(own + io, timing, period) + stalls:
+        elif not _is_proven(own + io, timing, period, stalls, environment or {}):
             alone = 0
     if alone > limit:
         reason = f"{lost}, and {alone} would have been on a system without delays: {_overrun(own, io, period, timing)}"
@@ -143,11 +150,13 @@ def judge(
         return Judgement(Verdict.VOID, reason, count, alone, discarded)
     owner = "the system's own" if not missing else "the system's or the bus's"
     answers = f", {missing} answer{'s' if missing > 1 else ''} did not come within the period" if missing else ""
+    held = max(float(own_wait(timing, period).max(initial=0.0)), float(timing.taken.max(initial=0.0))) / 1e9
+    known = "".join(f"; {cause}" for cause in causes(environment or {}, held))
     reason = (
         f"{lost}, but by {owner} doing: the system woke the loop up to "
         f"{float(own_wait(timing, period).max(initial=0.0)) / 1e6:.2f} ms late with a period of {period / 1e6:g} ms, "
         f"took {float(timing.taken.sum()) / 1e6:.2f} ms from the running code, "
-        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{answers}; "
+        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{answers}{known}; "
         "the run says nothing about the code that it tried: repeat it on a quieter machine"
     )
     return Judgement(Verdict.VOID, reason, count, alone, discarded)
@@ -219,6 +228,16 @@ def _stalls(work: np.ndarray, timing: Timing, period: int) -> int:
 def _is_doubtful(work: np.ndarray, timing: Timing, period: int, stalls: int) -> bool:
     """Whether the overruns may be stalls that struck while the student's code ran."""
     return _overruns(work, period) <= max(_stalls(work, timing, period) + stalls, FEW)
+
+
+def _is_proven(work: np.ndarray, timing: Timing, period: int, stalls: int, environment: Mapping[str, Any]) -> bool:
+    """Whether more calls overran than the system can have held up, or one for longer than it held anything up."""
+    if _overruns(work, period) > _stalls(work, timing, period) + stalls:
+        return True
+    longest = environment.get("rehearsal", {}).get("lateness_max", np.inf if stalls else 0.0) * 1e3
+    longest = max(longest, float(own_wait(timing, period).max(initial=0.0)), float(timing.taken.max(initial=0)))
+    longest += (environment.get("stolen_ticks") or 0) * TICK * 1e9
+    return bool(work.max() > period + BEYOND * longest)
 
 
 def _overrun(own: np.ndarray, io: float, period: int, timing: Timing) -> str:

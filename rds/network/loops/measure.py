@@ -186,7 +186,6 @@ def _measured(plan: Plan, samples: int, host: HostLoad) -> Measurement:
             drivers.close()
         if watcher is not None:
             watcher.shutdown()
-        clock.close()
     late, sent, received, computed = (np.array(column) * 1e-9 for column in zip(*times, strict=True))
     found: Directions = directions(sent, received, frames, len(plan.axes))
     return Measurement(

@@ -1,0 +1,70 @@
+"""Code without an end: it has a limit, and the line where it hangs is named."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+import rds
+from rds.core import interrupt
+from rds.core.interrupt import Endless, limited
+
+LAW = "def control(t, r, y, state, params):\n    return 0.0, state\n"
+
+
+@pytest.fixture(autouse=True)
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interrupt, "LIMIT", 0.3)
+
+
+def test_what_is_quick_is_left_alone() -> None:
+    for _ in range(100):
+        with limited(seconds=0.05):
+            pass
+    time.sleep(0.1)
+
+
+def test_steps_keep_it_going() -> None:
+    with limited(time.monotonic_ns, 0.1):
+        end = time.monotonic() + 0.3
+        while time.monotonic() < end:
+            pass
+
+
+def test_what_catches_everything_ends_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interrupt, "PATIENCE", 0.1)
+    caught = 0
+    with pytest.raises(Endless, match=r"after 0\.1 s"), limited(seconds=0.1):
+        while True:
+            try:
+                while True:
+                    pass
+            except BaseException:
+                caught += 1
+                if caught == 2:
+                    raise
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        ("while True:\n    pass\n" + LAW, "line [12]"),
+        ("class C:\n    def __init__(self):\n        while True: pass\nc = C()\n" + LAW, "line 3, in __init__"),
+        ("def control(t, r, y, state, params):\n    while True: pass\n", "line 2, in control"),
+        (
+            "initial_state = 0\ndef control(t, r, y, state, params):\n    while t > 0.1: pass\n    return 0.0, 0\n",
+            "line 3",
+        ),
+    ],
+    ids=["top level", "constructor", "first call", "in the middle"],
+)
+def test_the_line_is_named(text: str, where: str, tmp_path: Path) -> None:
+    (tmp_path / "endless.py").write_text(text)
+    began = time.monotonic()
+    with pytest.raises(rds.RdsError, match=rf"endless\.py, {where}.* after 0\.3 s; look for a loop without an end"):
+        rds.Experiment(
+            duration=0.5, reference=rds.sinusoid(2.0, 1.0), controller={"file": str(tmp_path / "endless.py")}
+        ).run("simulation")
+    assert time.monotonic() - began < 10.0
