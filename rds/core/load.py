@@ -12,7 +12,7 @@ import tokenize
 import types
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -76,20 +76,23 @@ class StudentFile:
         return Controller(control, state, merged, self.source, coupled, signals=dict(self.signals))
 
 
-def load_student(path: str | Path, validate: bool = True) -> StudentFile:
+def load_student(path: str | Path, validate: bool = True, limit: bool = True) -> StudentFile:
     """Run the student's file at `path` as a module of its own and find what it defines.
 
     Files next to it can be imported, but do not come before the standard library and installed packages.
     InputError, with file and line, for a file that cannot be read or run or that defines no interface;
     ContractError for a function with the wrong arguments or `params` that is no dict, unless `validate` is
     off (the conformance check reports these itself). Only the student's own errors are caught: Ctrl-C is not.
+    A file that does not come to its end is ended where it is after 60 s, unless `limit` is off.
     """
     file = Path(path)
     data = _read(file)
     file = file.resolve()
     text = _decode(data, file)
     source = Source(file.name, str(file), hashlib.sha256(data).hexdigest(), text)
-    return _student(_run(text, file), source, validate)
+    with limited() if limit else nullcontext():
+        variables = _run(text, file)
+    return _student(variables, source, validate)
 
 
 def from_namespace(namespace: Mapping[str, Any] | types.ModuleType, validate: bool = True) -> StudentFile:
@@ -187,8 +190,7 @@ def _is_written_here(value: Any, variables: Mapping[str, Any]) -> bool:
 def _needs_no_state(control: Callable[..., Any], params: dict[str, Any], source: Source) -> None:
     """A trial call with the empty state: "index out of range" in a running loop does not say what is missing."""
     try:
-        with limited():
-            control(0.0, Reference(0.0, 0.0, 0.0), 0.0, (), copy.deepcopy(params))
+        control(0.0, Reference(0.0, 0.0, 0.0), 0.0, (), copy.deepcopy(params))
     except Endless as error:
         raise ContractError(student_error(error, source), source.path or source.name) from error
     except (IndexError, KeyError, TypeError, ValueError) as error:
@@ -289,7 +291,7 @@ def _run(text: str, file: Path) -> dict[str, Any]:
     module.__file__ = str(file)
     sys.modules[module.__name__] = module  # dataclasses and pickle look it up there
     try:
-        with _siblings(file.parent), folder_kept(), limited():
+        with _siblings(file.parent), folder_kept():
             exec(compile(text, str(file), "exec", dont_inherit=True), module.__dict__)
     except BaseException as error:
         del sys.modules[module.__name__]

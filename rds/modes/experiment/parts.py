@@ -11,6 +11,7 @@ from typing import Any
 from rds.controllers import controller_names, library_controller
 from rds.core.adapt import as_controller, as_model, is_control_system
 from rds.core.errors import ContractError, InputError
+from rds.core.interrupt import limited
 from rds.core.load import StudentFile, from_function, from_namespace, load_student
 from rds.core.signals import declaration_fault
 from rds.core.toml_table import TomlTable
@@ -98,7 +99,7 @@ def make_controller(words: TomlTable, setting: Setting, model: Model) -> Control
     if student is not None:
         is_coupled, params = table.read("coupled"), _params(table)
         table.done()
-        with named(table):
+        with named(table), limited():  # it is called once
             return student.controller(coupled=is_coupled, params=params)
     name, options = _name_and_options(table, "controller", controller_names())
     if model.motion is MachineAxisMotion:
