@@ -47,7 +47,7 @@ import os, time
 for _ in range(5):
     if os.fork() == 0: time.sleep(60)  # each has less than a fork is allowed to begin with
 os.fork()
-kept = bytearray(os.urandom(1 << 20)) * 105
+kept = bytearray(os.urandom(1 << 20)) * 125
 time.sleep(60)
 """
 _DAEMON = """
