@@ -24,6 +24,7 @@ from rds.panels.kit.button import attempt, button, follow, run_order, say_error
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
+from rds.panels.session.session import RUNS
 from rds.results import Result, html
 
 TABS = ("Live", "Code", "Results", "Timing", "What runs", "Earlier runs")
@@ -40,7 +41,7 @@ class EquipmentView:
         self.settings = EquipmentSettings(equipment)
         self.bar = WorkBar(shell.ticker)
         self.notice = Notice()
-        self.live = LiveView(shell, equipment.machine)
+        self.live = LiveView(equipment.machine, self.settings.parameters)
         self.results = ResultView(shell)
         self.what = WhatRuns(equipment, shell.ticker)
         self.earlier = EarlierRuns(shell, self._reopened, self.live.show_ghost)
@@ -211,20 +212,18 @@ class EquipmentView:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif run.error is not None:
             say_error("the run", run.error, self.notice)
-            if run.result is not None:
-                self.results.saved(run.folder)
             if run.result is None:  # its file may be at fault
                 checked = self.equipment.builds.latest()
                 self.what.show_checked(checked)
                 if self.code is not None and self.code.shows(checked):
                     self.tabs.selected_index = CODE
                     self.code.show_checked(checked)
-        else:
-            self.results.saved(run.folder)
+        if run.result is not None:
+            self.results.follow_files(run)
         self.earlier.refresh()
 
     def _show(self, result: Result) -> None:
-        """The loop is over; its files are still being written."""
+        """The loop is over; its tables are there, pictures and reports still to come."""
         self._shown = result
         self.results.show(result, self.run.prepared if self.run is not None else None)
         self.notice.say(*_verdict(result))
@@ -234,7 +233,7 @@ class EquipmentView:
     def _reopened(self, results: list[Result], names: list[str], short: list[str]) -> None:
         if len(results) == 1:
             self.results.show(results[0])
-            self.results.saved(self.equipment.session.folder / "runs" / names[0])
+            self.results.saved(self.equipment.session.folder / RUNS / names[0])
             self.notice.say(f"{names[0]}: {_verdict(results[0])[0]}", _verdict(results[0])[1])
         else:
             self.results.overlay(results, short)

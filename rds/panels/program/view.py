@@ -6,7 +6,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.equipment.strip import StripChart
+from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.interpolator.motion import MADE
 from rds.panels.kit.button import attempt, say_error
 from rds.panels.kit.field import FieldView, field_group
@@ -183,6 +183,7 @@ class ProgramView:
         result = work.result
         assert result is not None
         ending = result.meta.get("ending")
+        self.strip.events = end_marks(result)
         if ending not in (None, "done"):
             self.notice.say(f"ended early: {result.meta.get('ending_reason')}", "warning")
         elif result.verdict:
@@ -206,6 +207,5 @@ class ProgramView:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif work.error is not None:
             say_error("the run", work.error, self.notice)
-        else:
-            self.result.saved(work)
+        self.result.saved(work)
         self.files.refresh()
