@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -129,6 +130,14 @@ _STAGE_NAMES = {
     "compute": "compute (the controller)",
     "model": "model",
 }
+
+
+def timing_line(result: Result) -> tuple[str, str, str]:
+    """The verdict on the timing in one line, its kind of notice, and the whole reason."""
+    reason = str(result.meta.get("verdict_reason") or "")
+    first = re.split(r"[;:(]|, but|\. ", reason, maxsplit=1)[0].strip()
+    kind = {"met": "good", "missed": "error"}.get(str(result.verdict), "warning")
+    return f"timing {result.verdict}{f': {first}' if first else ''}", kind, reason if reason != first else ""
 
 
 def _contour(result: Result) -> str:

@@ -8,13 +8,14 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.core.types import Ending
 from rds.panels.code.state import Code
 from rds.panels.code.view import CodeView
 from rds.panels.equipment.build import Checked
 from rds.panels.equipment.earlier_runs import EarlierRuns
 from rds.panels.equipment.fields import USER
 from rds.panels.equipment.live_view import LiveView
-from rds.panels.equipment.result_view import ResultView
+from rds.panels.equipment.result_view import ResultView, timing_line
 from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.settings import EquipmentSettings
 from rds.panels.equipment.state import Equipment
@@ -74,7 +75,7 @@ class EquipmentView:
         self.tabs.observe(self._turned, "selected_index")
         main = widgets.VBox([row(*self.bar.locks), self.bar, self.notice, self.tabs])
         main.add_class("rds-main")
-        self.widget = widgets.HBox([self.settings.widget, main])
+        self.widget = widgets.HBox([main, self.settings.widget])  # Tab comes to Run before the settings
         self.widget.add_class("rds-columns")
         equipment.choices.watch(self._chosen)
         self._stale = False  # whether something was chosen since what runs was shown
@@ -114,6 +115,7 @@ class EquipmentView:
 
     def _follow(self, run: EquipmentRun | TakenUpRun) -> None:
         self.run, self._shown = run, None
+        self.notice.say("the run begins")
         self.tabs.selected_index = LIVE
         self.results.clear()
         self.live.follow(run)
@@ -234,7 +236,8 @@ class EquipmentView:
         if len(results) == 1:
             self.results.show(results[0])
             self.results.saved(self.equipment.session.folder / RUNS / names[0])
-            self.notice.say(f"{names[0]}: {_verdict(results[0])[0]}", _verdict(results[0])[1])
+            said, *how = _verdict(results[0])
+            self.notice.say(f"{names[0]}: {said}", *how)
         else:
             self.results.overlay(results, short)
             self.notice.say(f"{len(results)} runs over each other")
@@ -264,11 +267,10 @@ class EquipmentView:
             self.earlier.refresh()
 
 
-def _verdict(result: Result) -> tuple[str, str]:
-    """What to say of a result in one line, and how."""
-    if result.meta.get("ending") not in (None, "done"):
-        return f"ended early: {html.ending(result)}", "warning"
+def _verdict(result: Result) -> tuple[str, str, str]:
+    """What to say of a result in one line, how, and what *why?* opens."""
+    if result.meta.get("ending") not in (None, Ending.DONE):
+        return f"ended early: {html.ending(result)}", "warning", ""
     if result.verdict:
-        kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
-        return f"timing {result.verdict}: {result.meta.get('verdict_reason')}", kind
-    return f"done: {len(result)} samples", "good"
+        return timing_line(result)
+    return f"done: {len(result)} samples", "good", ""
