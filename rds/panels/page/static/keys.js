@@ -30,7 +30,8 @@ function render({ el }) {
       set(control, "aria-invalid", String(field.classList.contains("rds-refused")));
     }
     for (const each of app.querySelectorAll("input[title], select[title], textarea[title]")) {
-      if (each.title && !each.labels?.length && !each.hasAttribute("aria-label")) set(each, "aria-label", each.title);
+      const named = [...(each.labels ?? [])].some((label) => label.textContent.trim());
+      if (each.title && !named && !each.hasAttribute("aria-label")) set(each, "aria-label", each.title);
     }
     for (const notice of app.querySelectorAll(".rds-notice")) set(notice, "aria-live", "polite");
     const nav = app.querySelector(".rds-nav");
