@@ -53,7 +53,7 @@ class Equipment:
         self.page.wait_for_function("window.settled")
 
     def type(self, label: str, value: str) -> None:
-        box = self.field(label).locator("input")
+        box = self.field(label).locator("input[type=text]")
         if box.input_value() == value:
             return
         box.fill(value)
@@ -180,19 +180,43 @@ def test_a_gain_changes_while_it_runs_and_a_run_is_stopped(at: Callable[..., Equ
     control.press("Load")
     assert "loaded: 60000 samples, 1 ms each" in control.notice()
     control.press("Run")
-    gain = control.page.locator(".rds-live-values .rds-field", has_text="Pgain")
-    gain.locator("input").fill("-3")
-    gain.locator("input").press("Enter")
+    gain = control.page.locator(".rds-live-values .rds-field:visible", has_text="Pgain")
+    number, slider = gain.locator("input[type=text]"), gain.locator("input[type=range]")
+    before = number.input_value()
+    new = f"{round(float(before)) + 1}"  # a try again begins with what an earlier one has left
+    number.fill("-3")
+    number.press("Enter")
     gain.locator("[role=alert]").wait_for()
+    assert control.page.locator('.rds-field:visible:has-text("Pgain")').count() == 1  # one box, which is live
     assert "Pgain, proportional gain must be at least 0 V/mm, not -3" in gain.inner_text()
     control.page.wait_for_function("+(document.querySelector('[data-samples]')?.dataset.samples || 0) > 20")
-    gain.locator("input").fill("25")
-    gain.locator("input").press("Enter")
+    number.fill(new)
+    number.press("Enter")
     control.page.wait_for_selector('td:text-is("X.Pgain"):visible')
+    slider.press("ArrowRight")
+    control.page.wait_for_selector('.rds-live-values + button:text-is("Undo"):enabled')
+    control.page.wait_for_function(
+        "document.querySelectorAll('td').length && "
+        "document.querySelector('[data-marks]').dataset.marks.split('X.Pgain').length === 3"
+    )
+    for count in (4, 5):
+        control.press("Undo")
+        control.page.wait_for_function(
+            f"document.querySelector('[data-marks]').dataset.marks.split('X.Pgain').length === {count}"
+        )
+    marks = control.page.locator("[data-marks]").get_attribute("data-marks")
+    assert marks.endswith(f"X.Pgain {float(before):g}"), marks
+    number.fill(new)
+    number.press("Enter")
+    control.page.wait_for_selector(f'[data-marks$="X.Pgain {new}"]')
     control.press("Stop")
     control.sees("ended early: stopped")
     control.saved()
-    control.page.wait_for_selector('td:text-is("25"):visible')
+    control.page.wait_for_selector(f'td:text-is("{new}"):visible')
+    control.tab("Live")
+    control.page.wait_for_selector('[data-marks$=" stopped"]')
+    control.page.click('.jupyter-widget-Collapse-header:visible:has-text("1 changed")')
+    assert control.field("Pgain").locator("input[type=text]").input_value() == new  # what it became is the next run's
     control.tab("Timing")
     control.page.wait_for_selector('td:has-text("lateness"):visible')
     control.page.wait_for_selector(".rds-figure canvas:visible")

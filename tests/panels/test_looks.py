@@ -35,7 +35,7 @@ def test_a_projector_of_1024_and_the_keyboard_alone(open_page: Callable[..., Any
     header.focus()
     page.keyboard.press("Enter")
     page.wait_for_selector('.jupyter-widget-Collapse-header[aria-expanded="true"]:visible')
-    gain = page.locator('.rds-field:visible:has-text("Kp, V/mm") input')
+    gain = page.locator('.rds-field:visible:has-text("Kp, V/mm") input[type=text]')
     assert gain.input_value() == "" and gain.get_attribute("placeholder") == "20"
     style = "getComputedStyle(document.querySelector('.rds-field input[placeholder]'), '::placeholder').fontStyle"
     assert page.evaluate(style) == "italic"  # the file's value, not one that was typed

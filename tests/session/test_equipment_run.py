@@ -8,16 +8,18 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rds.core.errors import InputError
+from rds.core.errors import InputError, RdsError
 from rds.modes.process.record import PROCESSES
 from rds.panels.equipment.state import Equipment
 from rds.panels.session import Session
+from rds.panels.session.beside import made_beside
 from rds.panels.session.kept_runs import State
 from rds.panels.session.live_values import LiveValues
 from rds.panels.session.save_as import save_as
@@ -42,14 +44,14 @@ def test_a_simulation_leaves_its_files_and_its_traces(tmp_path: Path) -> None:
 def test_a_run_that_is_being_saved_is_not_cut_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
 
-    def save(result: object, program: object, folder: Path, title: str) -> dict[str, Path]:
+    def save(_: object, result: object, program: object, folder: Path, title: str) -> dict[str, Path]:
         for early in folder.glob("result.*"):
             early.unlink()
         (folder / "record.rds").touch()  # as a loop against the clock leaves it
         seen.extend(kept.state for kept in Session(tmp_path).runs())
         return {}
 
-    monkeypatch.setattr("rds.panels.equipment.run.save_run", save)
+    monkeypatch.setattr("rds.panels.equipment.run.made_beside", save)
     equipment = Equipment(Session(tmp_path), "control")
     equipment.choices.set("duration", 0.01)
     run = equipment.run().start()
@@ -214,3 +216,30 @@ def test_a_run_of_which_all_processes_were_killed_goes_on_no_more(tmp_path: Path
         Path(processes["desk"]).with_suffix(kind).unlink()
     assert [run.state for run in session.runs()] == [State.CUT_SHORT]
     session.take_machine("another run", object())
+
+
+def test_the_next_run_begins_while_pictures_of_the_last_one_are_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn = threading.Event()
+
+    def draw(save: object, *of: object) -> dict[str, Path]:
+        assert drawn.wait(60)
+        return {}
+
+    monkeypatch.setattr("rds.panels.equipment.run.made_beside", draw)
+    equipment = Equipment(Session(tmp_path), "control")
+    equipment.choices.set("duration", 0.01)
+    runs = [equipment.run().start() for _ in range(2)]
+    for run in runs:
+        while not run.done:
+            time.sleep(0.01)
+        assert not run.written and (run.folder / "result.csv").is_file()  # the tables are there at once
+    drawn.set()
+    assert all(run.wait(60) and run.written and run.unwritten is None for run in runs)
+
+
+def test_what_goes_wrong_with_pictures_is_said_and_takes_no_result_away(tmp_path: Path) -> None:
+    with pytest.raises(RdsError, match=r"not made: ValueError: .*tables are kept"):
+        made_beside(int, "no number")
+    assert made_beside(os.nice, 0) == 19

@@ -11,6 +11,7 @@ import rds
 from rds.core.errors import ContractError
 from rds.modes.experiment.experiment import FailedRun
 from rds.panels.equipment.state import Equipment
+from rds.panels.equipment.strip import end_marks
 from rds.panels.session import Session
 from rds.panels.session.kept_runs import State
 from rds.results.plots import response
@@ -50,4 +51,23 @@ def test_a_panel_shows_the_run_up_to_its_fault(tmp_path: Path) -> None:
     assert run.wait(60) and run.result is not None and "line 3" in str(run.error)
     rows = run.new_rows()
     assert rows[-1, 0] == pytest.approx(0.4) and len(rows) == 401
+    assert [kept.state for kept in Session(tmp_path).runs()] == [State.WHOLE]
+    assert end_marks(run.result) == [{"time": pytest.approx(0.4), "text": "fault", "fault": True}]
+
+
+@pytest.mark.realtime
+def test_a_panel_shows_a_run_against_the_clock_up_to_its_fault(tmp_path: Path) -> None:
+    (tmp_path / "late.py").write_text(LATE)
+    equipment = Equipment(Session(tmp_path), "control")
+    chosen = {"mode": "emulation", "controller": "user", "controller_file": "late.py", "sample_period": 0.005}
+    for name, value in (chosen | {"duration": 1.0}).items():
+        equipment.choices.set(name, value)
+    run = equipment.run()
+    run._prepare = None  # as above
+    run.start()
+    assert run.wait(60) and run.result is not None and "line 3" in str(run.error) and run.unwritten is None
+    assert run.result.meta["ending"] == "fault" and "line 3" in run.result.meta["ending_reason"]
+    assert run.new_rows()[-1, 0] == run.result["time"][-1] == pytest.approx(0.25)
+    assert end_marks(run.result) == [{"time": pytest.approx(0.25), "text": "fault", "fault": True}]
+    assert (run.folder / "report.html").is_file()
     assert [kept.state for kept in Session(tmp_path).runs()] == [State.WHOLE]

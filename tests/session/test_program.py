@@ -243,7 +243,7 @@ def test_a_run_saves_the_program_and_has_its_results_in_a_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     saved: list[Path] = []  # pictures take seconds, and are not this test's subject
-    monkeypatch.setattr("rds.panels.program.run.save_run", lambda result, prepared, folder: saved.append(folder))
+    monkeypatch.setattr("rds.panels.equipment.run.made_beside", lambda save, result, prepared, to: saved.append(to))
     made = program(tmp_path, "G21 G90", "G1 X2 F600", "M2")
     assert looked(made).ok
     work = made.run().start()
@@ -259,7 +259,7 @@ def test_a_run_saves_the_program_and_has_its_results_in_a_folder(
 
 
 def test_an_interpolator_makes_the_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rds.panels.program.run.save_run", lambda result, prepared, folder: None)
+    monkeypatch.setattr("rds.panels.equipment.run.made_beside", lambda save, result, prepared, folder: None)
     made = program(tmp_path, "G21 G90", "G1 X2 F600", "G2 X0 Y0 I-1 J0", "M2")
     assert looked(made).ok and set(MADE) <= made.idle()
     made.choices.set("interpolator", "tustin")
@@ -285,7 +285,7 @@ def test_an_interpolator_makes_the_motion(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_one_controller_for_all_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rds.panels.program.run.save_run", lambda result, prepared, folder: None)
+    monkeypatch.setattr("rds.panels.equipment.run.made_beside", lambda save, result, prepared, folder: None)
     made = program(tmp_path, "G21 G90", "G1 X1 F600", "M2")
     assert looked(made).ok
     made.choices.set("coupled", True)

@@ -1,4 +1,4 @@
-"""A run while it goes on: the strip, the machine in motion, and the values that can be changed meanwhile."""
+"""A run while it goes on: the strip with a mark at each change, and the machine in motion."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import ipywidgets as widgets
 import numpy as np
 
 from rds.machines import Machine
+from rds.panels.equipment.parameters import Parameters
 from rds.panels.equipment.run import EquipmentRun
-from rds.panels.equipment.strip import StripChart
+from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.equipment.taken_up import TakenUpRun
-from rds.panels.kit.field import FieldView
 from rds.panels.session.live_values import LiveValues
 from rds.results import Result, html
 
@@ -26,11 +26,12 @@ _HINT = (
 class LiveView:
     """`follow(run)`, then `look()` ten times a second until `ended()`."""
 
-    def __init__(self, shell: Any, machine: Machine):
-        self._shell, self._machine = shell, machine
+    def __init__(self, machine: Machine, parameters: Parameters):
+        """In `parameters` the values of a run can be changed while it goes on."""
+        self._machine, self._parameters = machine, parameters
         self._run: EquipmentRun | TakenUpRun | None = None
         self._traces: list[tuple[str, str]] = []
-        self._values: list[FieldView] = []
+        self._is_live = False  # whether the run's values can be changed now
         self._said = 0
         self._ghost: tuple[Result | None, str] = (None, "")
         self.strip = StripChart()
@@ -43,10 +44,8 @@ class LiveView:
         self.show_machine.observe(lambda change: self._toggle(change["new"]), "value")
         self.picture = widgets.VBox([])
         self._view: Any = None  # the machine's picture, once somebody wants it
-        self._live = widgets.VBox([])
-        self._live.add_class("rds-live-values")
         self._changes = widgets.HTML()
-        self.widget = widgets.VBox([self.hint, self.strip, self._live, self._changes, self.show_machine, self.picture])
+        self.widget = widgets.VBox([self.hint, self.strip, self._changes, self.show_machine, self.picture])
 
     def follow(self, run: EquipmentRun | TakenUpRun) -> None:
         """Show this run from its beginning."""
@@ -54,7 +53,8 @@ class LiveView:
         self.hint.value = "<p>The loop is being started; the first samples come in a moment.</p>"
         self._changes.value = ""
         self.strip.layout.display = "none"
-        self._clear_values()
+        self._is_live = False
+        self._parameters.lock()
 
     def look(self) -> None:
         """What has come since."""
@@ -71,8 +71,9 @@ class LiveView:
                 self._view.begin(traces)
         if self._traces and len(rows := run.new_rows()):
             self.strip.add(rows)
-        if run.real_time and not self._values and run.live_values:
-            self._offer_values(run)
+        if run.real_time and not self._is_live and run.live_values:
+            self._is_live = True
+            self._parameters.show_live(LiveValues(run), isinstance(run, EquipmentRun))
         self._list_changes(run)
         if self._view is not None and self.show_machine.value:
             self._view.show(self.strip.at(self.strip.shown))
@@ -90,25 +91,13 @@ class LiveView:
     def ended(self) -> None:
         """The run is over; its strip stays, to be scrubbed through."""
         run, self._run = self._run, None
-        self._clear_values()
+        self._is_live = False
+        self._parameters.rest()
         if run is not None:
             self._list_changes(run)
+            self._mark_end(run)
             if not self._traces:
                 self.hint.value = _HINT
-
-    def _offer_values(self, run: EquipmentRun | TakenUpRun) -> None:
-        choices = LiveValues(run)
-        self._values = [FieldView(choices, name) for name in choices.fields]
-        box = widgets.Box(self._values)
-        box.add_class("rds-fields")
-        box.add_class("rds-group")
-        self._live.children = [widgets.HTML("<h3>Change while it runs (Enter sends it)</h3>"), box]
-
-    def _clear_values(self) -> None:
-        for view in self._values:
-            view.close()
-        self._values = []
-        self._live.children = []
 
     def _list_changes(self, run: EquipmentRun | TakenUpRun) -> None:
         changes = run.changes
@@ -116,6 +105,11 @@ class LiveView:
             self._said = len(changes)
             self.strip.events = [{"time": time, "text": f"{name} {new:g}"} for time, name, _, new in changes]
             self._changes.value = changes_table(changes)
+
+    def _mark_end(self, run: EquipmentRun | TakenUpRun) -> None:
+        """Where a run ended early, and why; a fault in red."""
+        if run.result is not None:
+            self.strip.events = [*self.strip.events, *end_marks(run.result)]
 
     def _toggle(self, on: bool) -> None:
         self.strip.tells = on

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.kit.button import button, follow
+from rds.panels.kit.button import button, follow, say_error
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
@@ -23,11 +23,28 @@ from rds.results import Result
 from rds.results.serve import server_of
 
 
+class Saved(Protocol):
+    """A run that is over, and whose pictures and reports may be still to come."""
+
+    folder: Path
+
+    @property
+    def written(self) -> bool:
+        """Whether nothing more comes."""
+        ...
+
+    @property
+    def unwritten(self) -> BaseException | None:
+        """Why pictures and reports could not be made."""
+        ...
+
+
 class ResultActions:
-    """`writing()` while the files are being written, `offer(result, folder, sent)` when they are there, `clear()`."""
+    """`writing()` when the loop is over, `follow(...)` once its tables are there, `offer(...)` all files; `clear()`."""
 
     def __init__(self, shell: Any):
-        self._session = shell.session
+        self._session, self._ticker = shell.session, shell.ticker
+        self._end: Callable[[], None] = lambda: None  # of waiting for pictures and reports
         self._result: Result | None = None
         self._folder: Path | None = None
         self._sent: list[str] = []
@@ -45,12 +62,30 @@ class ResultActions:
 
     def offer(self, result: Result, folder: Path, sent: Sequence[str]) -> None:
         """The files are in `folder`; those of the names `sent` go by e-mail, and the first of them is the report."""
+        self._end()
         self._result, self._folder, self._sent = result, folder, list(sent)
         self.where.value = f"<p>Saved with its report in <code>{escape(str(folder))}</code>{self._link()}</p>"
         self._rows.layout.display = ""
 
+    def follow(self, result: Result, run: Saved, sent: Sequence[str]) -> None:
+        """As `offer`, once the pictures and the report are there; the table can be saved elsewhere at once."""
+        self.offer(result, run.folder, sent)
+        if run.written and run.unwritten is None:
+            return
+        where = f"<code>{escape(str(run.folder))}</code>"
+        self.where.value = f"<p>Its tables are in {where}; pictures and report follow …</p>"
+
+        def look() -> None:
+            if run.written:
+                self.offer(result, run.folder, sent)
+                if run.unwritten is not None:
+                    say_error("the report", run.unwritten, self.notice)
+
+        self._end = self._ticker.add(look)
+
     def clear(self) -> None:
         """There is nothing to save or send."""
+        self._end()
         self._result = self._folder = None
         self.where.value = ""
         self._rows.layout.display = "none"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import ipywidgets as widgets
 
 from rds.panels.equipment.live_view import changes_table
-from rds.panels.equipment.result_actions import ResultActions
+from rds.panels.equipment.result_actions import ResultActions, Saved
 from rds.panels.kit.figure import FigureView
 from rds.results import Result, html
 
@@ -25,11 +26,12 @@ _NO_TIMING = (
     "<p>No result yet. After a run against the clock here is the verdict, met, missed or void, with its reason: how "
     "long each part of a sample took, and the samples that were late.</p>"
 )
+SENT = ("report.html", "result.csv")  # by e-mail; the report first
 _STAGES = ("p50", "p99", "p999", "max")
 
 
 class ResultView:
-    """`show(result, prepared)` when a run is over, `saved(folder)` when its files are there."""
+    """`show(result, prepared)` when a loop is over, `follow_files(run)` when its run is; `saved(folder)` of others."""
 
     def __init__(self, shell: Any):
         self._shell, self._session = shell, shell.session
@@ -63,7 +65,12 @@ class ResultView:
     def saved(self, folder: Path) -> None:
         """Its files are written."""
         if self.result is not None:
-            self.actions.offer(self.result, folder, ("report.html", "result.csv"))
+            self.actions.offer(self.result, folder, SENT)
+
+    def follow_files(self, run: Saved) -> None:
+        """Its tables are there; its pictures and reports are offered once they are, too."""
+        if self.result is not None:
+            self.actions.follow(self.result, run, SENT)
 
     def overlay(self, results: Sequence[Result], names: Sequence[str]) -> None:
         """Several results over each other."""
@@ -123,6 +130,14 @@ _STAGE_NAMES = {
     "compute": "compute (the controller)",
     "model": "model",
 }
+
+
+def timing_line(result: Result) -> tuple[str, str, str]:
+    """The verdict on the timing in one line, its kind of notice, and the whole reason."""
+    reason = str(result.meta.get("verdict_reason") or "")
+    first = re.split(r"[;:(]|, but|\. ", reason, maxsplit=1)[0].strip()
+    kind = {"met": "good", "missed": "error"}.get(str(result.verdict), "warning")
+    return f"timing {result.verdict}{f': {first}' if first else ''}", kind, reason if reason != first else ""
 
 
 def _contour(result: Result) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rds.core.errors import InputError
+from rds.core.errors import ContractError, InputError
 from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.experiment import Experiment, FailedRun
 from rds.modes.experiment.experiment_file import PATHS
@@ -19,11 +19,12 @@ from rds.modes.experiment.report import save_run
 from rds.modes.experiment.run import Run
 from rds.modes.loop.plan import Plan
 from rds.modes.loop.program import HOLD, OVERRIDE
+from rds.panels.session.beside import made_beside
 from rds.panels.session.run_table import keep_choices
 from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session
 from rds.panels.session.task import Stopped, Task
-from rds.results import Result
+from rds.results import Result, open_result
 
 if TYPE_CHECKING:
     from rds.nc.run.prepare import Prepared
@@ -36,8 +37,8 @@ class EquipmentRun:
     """One run of `table`, the words of an experiment. `start()` returns at once, whatever has to be loaded first.
 
     It is work that a progress bar can follow: share, seconds_left, note, done, stop(). What goes wrong is in `error`
-    when it is over. `prepare(pulse)` is called first, beside the page (a check of the student's files); `pulse` is of
-    `Builds.check`.
+    when it is over. Its tables are saved by then; pictures and reports follow, until it is `written`.
+    `prepare(pulse)` is called first, beside the page (a check of the student's files); `pulse` is of `Builds.check`.
     """
 
     def __init__(
@@ -56,10 +57,11 @@ class EquipmentRun:
         self.files: dict[str, Path] = {}
         self.plan: Plan | None = None
         self.prepared: Prepared | None = None  # the path, where the axes follow one together
-        self.result: Result | None = None  # as soon as the loop is over; its files come later
+        self.result: Result | None = None  # as soon as the loop is over; of one that failed, what there is up to then
         self._prepare = prepare
         self._run: Run | None = None
         self._task: Task[Result] | None = None
+        self._writing: Task[None] | None = None
         self._seen = 0
 
     def start(self) -> EquipmentRun:
@@ -92,15 +94,26 @@ class EquipmentRun:
                     self.result = run.wait(
                         lambda taken, of: task.advance(taken, of, running if taken and not task.stopping else "")
                     )
-                except FailedRun as error:  # what there is up to the fault is a result
-                    self.result = error.result
+                except ContractError as error:  # what there is up to the fault is a result
+                    self.result = error.result if isinstance(error, FailedRun) else recorded(self.folder)
                     raise
             finally:
                 self.session.give_machine_back(self)
-            keep_choices(self.folder, self.table)
-            task.note = "saving tables, pictures and the report"
-            self.files = save_run(self.result, self.plan.program, self.folder, self.title)
+                if self.result is not None and self.plan is not None:
+                    keep_choices(self.folder, self.table)
+                    judged = self.plan.program if "program" in self.result.meta else None  # one that failed may not be
+                    self._write_files(save_run, self.result, judged, self.folder, self.title, held=held)
             return self.result
+
+    def _write_files(self, save: Callable[..., dict[str, Path]], *of: Any, held: contextlib.ExitStack) -> None:
+        """Pictures and reports, from now on and after those of earlier runs; `held` is held until they are there."""
+        until = held.pop_all()
+
+        def work(_: Task[None]) -> None:
+            with until, self.session.writing:
+                self.files = made_beside(save, *of)
+
+        self._writing = self.session.work(f"pictures and report of {self.folder.name}", work)
 
     def _tell(self, task: Task[Result], note: str) -> None:
         if task.stopping:
@@ -135,8 +148,18 @@ class EquipmentRun:
 
     @property
     def done(self) -> bool:
-        """Whether it is over, files and all."""
+        """Whether it is over, and its tables are saved."""
         return self._task is not None and self._task.done
+
+    @property
+    def written(self) -> bool:
+        """Whether its pictures and reports are there, too, or never will be."""
+        return self.done and (self._writing is None or self._writing.done)
+
+    @property
+    def unwritten(self) -> BaseException | None:
+        """Why its pictures and reports could not be made."""
+        return self._writing.error if self._writing is not None else None
 
     def stop(self) -> None:
         """Ask for a safe end; what was recorded is kept."""
@@ -144,8 +167,9 @@ class EquipmentRun:
             self._task.stop()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for its end; false after `timeout` s."""
-        return self._task is None or self._task.wait(timeout)
+        """Wait until it is over and all its files are written; false after `timeout` s, for each of the two."""
+        over = self._task is None or self._task.wait(timeout)
+        return over and (self._writing is None or self._writing.wait(timeout))
 
     @property
     def error(self) -> BaseException | None:
@@ -220,6 +244,17 @@ class EquipmentRun:
     def changes(self) -> list[Any]:
         """The changes that the loop has taken: time in s, name, old value, new value each."""
         return list(self._run.changes) if self._run is not None else []
+
+
+def recorded(folder: Path) -> Result | None:
+    """What a loop against the clock recorded until it failed, saved as tables; None where it has no sample."""
+    try:
+        result = open_result(folder)
+        if len(result):
+            result.save(folder)
+    except InputError:
+        return None
+    return result if len(result) else None
 
 
 def contour_errors(of: Mapping[str, np.ndarray], prepared: Prepared) -> np.ndarray:

@@ -16,6 +16,8 @@ import numpy as np
 import traitlets
 
 from rds.core.colours import BLUE, QUANTITIES
+from rds.core.types import Ending
+from rds.results import Result
 
 _STATIC = Path(__file__).parent / "static"
 DASHES: tuple[list[int], ...] = ([], [9, 4], [3, 3], [9, 3, 3, 3])  # by axis, of several
@@ -41,7 +43,7 @@ class StripChart(anywidget.AnyWidget):
     traces: Any = traitlets.List([]).tag(sync=True)
     window = traitlets.Float(5.0).tag(sync=True)  # s that are shown
     height = traitlets.Int(430).tag(sync=True)  # px of all lanes together
-    events: Any = traitlets.List([]).tag(sync=True)  # marks: {"time": s, "text": what happened}
+    events: Any = traitlets.List([]).tag(sync=True)  # marks: {"time": s, "text": what happened, "fault": red?}
     ghost = traitlets.Unicode("").tag(sync=True)  # the name of an earlier run that stands behind; none: ""
     tells = traitlets.Bool(False).tag(sync=True)  # whether the page says in `shown` which time it shows
     shown = traitlets.Float(0.0).tag(sync=True)  # s, the right edge
@@ -102,6 +104,14 @@ class StripChart(anywidget.AnyWidget):
                 self._deliver(self._rows)
             if len(self._ghost):
                 self._deliver_ghost()
+
+
+def end_marks(result: Result) -> list[dict[str, Any]]:
+    """The mark where a run ended early, in red for a fault; none for one that came to its end."""
+    ending = result.meta.get("ending")
+    if ending in (None, Ending.DONE) or not len(result):
+        return []
+    return [{"time": float(result["time"][-1]), "text": str(ending), "fault": ending == Ending.FAULT}]
 
 
 def dressed(traces: Sequence[tuple[str, str]]) -> list[dict[str, Any]]:

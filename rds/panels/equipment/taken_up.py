@@ -39,6 +39,7 @@ class TakenUpRun:
     real_time = True
     prepared = None  # its path is known to whoever began it
     stopped_early = False
+    written, unwritten = True, None  # whoever began it makes its pictures and report
 
     def __init__(self, kept: KeptRun):
         self.kept = kept

@@ -8,13 +8,14 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.core.types import Ending
 from rds.panels.code.state import Code
 from rds.panels.code.view import CodeView
 from rds.panels.equipment.build import Checked
 from rds.panels.equipment.earlier_runs import EarlierRuns
 from rds.panels.equipment.fields import USER
 from rds.panels.equipment.live_view import LiveView
-from rds.panels.equipment.result_view import ResultView
+from rds.panels.equipment.result_view import ResultView, timing_line
 from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.settings import EquipmentSettings
 from rds.panels.equipment.state import Equipment
@@ -24,6 +25,7 @@ from rds.panels.kit.button import attempt, button, follow, run_order, say_error
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
+from rds.panels.session.session import RUNS
 from rds.results import Result, html
 
 TABS = ("Live", "Code", "Results", "Timing", "What runs", "Earlier runs")
@@ -40,7 +42,7 @@ class EquipmentView:
         self.settings = EquipmentSettings(equipment)
         self.bar = WorkBar(shell.ticker)
         self.notice = Notice()
-        self.live = LiveView(shell, equipment.machine)
+        self.live = LiveView(equipment.machine, self.settings.parameters)
         self.results = ResultView(shell)
         self.what = WhatRuns(equipment, shell.ticker)
         self.earlier = EarlierRuns(shell, self._reopened, self.live.show_ghost)
@@ -73,7 +75,7 @@ class EquipmentView:
         self.tabs.observe(self._turned, "selected_index")
         main = widgets.VBox([row(*self.bar.locks), self.bar, self.notice, self.tabs])
         main.add_class("rds-main")
-        self.widget = widgets.HBox([self.settings.widget, main])
+        self.widget = widgets.HBox([main, self.settings.widget])  # Tab comes to Run before the settings
         self.widget.add_class("rds-columns")
         equipment.choices.watch(self._chosen)
         self._stale = False  # whether something was chosen since what runs was shown
@@ -113,6 +115,7 @@ class EquipmentView:
 
     def _follow(self, run: EquipmentRun | TakenUpRun) -> None:
         self.run, self._shown = run, None
+        self.notice.say("the run begins")
         self.tabs.selected_index = LIVE
         self.results.clear()
         self.live.follow(run)
@@ -211,20 +214,18 @@ class EquipmentView:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif run.error is not None:
             say_error("the run", run.error, self.notice)
-            if run.result is not None:
-                self.results.saved(run.folder)
             if run.result is None:  # its file may be at fault
                 checked = self.equipment.builds.latest()
                 self.what.show_checked(checked)
                 if self.code is not None and self.code.shows(checked):
                     self.tabs.selected_index = CODE
                     self.code.show_checked(checked)
-        else:
-            self.results.saved(run.folder)
+        if run.result is not None:
+            self.results.follow_files(run)
         self.earlier.refresh()
 
     def _show(self, result: Result) -> None:
-        """The loop is over; its files are still being written."""
+        """The loop is over; its tables are there, pictures and reports still to come."""
         self._shown = result
         self.results.show(result, self.run.prepared if self.run is not None else None)
         self.notice.say(*_verdict(result))
@@ -234,8 +235,9 @@ class EquipmentView:
     def _reopened(self, results: list[Result], names: list[str], short: list[str]) -> None:
         if len(results) == 1:
             self.results.show(results[0])
-            self.results.saved(self.equipment.session.folder / "runs" / names[0])
-            self.notice.say(f"{names[0]}: {_verdict(results[0])[0]}", _verdict(results[0])[1])
+            self.results.saved(self.equipment.session.folder / RUNS / names[0])
+            said, *how = _verdict(results[0])
+            self.notice.say(f"{names[0]}: {said}", *how)
         else:
             self.results.overlay(results, short)
             self.notice.say(f"{len(results)} runs over each other")
@@ -265,11 +267,10 @@ class EquipmentView:
             self.earlier.refresh()
 
 
-def _verdict(result: Result) -> tuple[str, str]:
-    """What to say of a result in one line, and how."""
-    if result.meta.get("ending") not in (None, "done"):
-        return f"ended early: {html.ending(result)}", "warning"
+def _verdict(result: Result) -> tuple[str, str, str]:
+    """What to say of a result in one line, how, and what *why?* opens."""
+    if result.meta.get("ending") not in (None, Ending.DONE):
+        return f"ended early: {html.ending(result)}", "warning", ""
     if result.verdict:
-        kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
-        return f"timing {result.verdict}: {result.meta.get('verdict_reason')}", kind
-    return f"done: {len(result)} samples", "good"
+        return timing_line(result)
+    return f"done: {len(result)} samples", "good", ""

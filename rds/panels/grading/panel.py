@@ -8,7 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels.grading.state import GradingDesk, rows
-from rds.panels.kit.button import attempt, button, follow, watch
+from rds.panels.kit.button import attempt, button, follow, runs, watch
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
@@ -46,7 +46,7 @@ class GradingView:
         self._said = widgets.HTML()
         say = self.notice
         tip = "Grade all submissions, or go on with those that are left"
-        self._run = button("Grade", tip, self.grade, say, primary=True)
+        self._run = runs(button("Grade", tip, self.grade, say, primary=True))
         check = button("Check assignment", "Its solution gets full marks, an empty one none", self.check, say)
         export = button("Export", "Write the gradebook into the folder of the grades", self.export, say)
         batch = self._fields("assignment", "submissions", "out", "jobs", "scheduler")

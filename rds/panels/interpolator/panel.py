@@ -16,7 +16,7 @@ from rds.panels.equipment.what_runs import source_html
 from rds.panels.interpolator.fields import USER
 from rds.panels.interpolator.segment_table import SegmentTable
 from rds.panels.interpolator.state import Interpolating
-from rds.panels.kit.button import button, follow
+from rds.panels.kit.button import button, follow, runs
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import row
@@ -65,7 +65,8 @@ class InterpolatorView:
         self._side.add_class("rds-side")
         self.segments = SegmentTable(interpolating.choices, "rows")
         say = self.notice
-        self.run_button = button("Interpolate", "Work out the motion along the path", self.start, say, primary=True)
+        tip = "Work out the motion along the path"
+        self.run_button = runs(button("Interpolate", tip, self.start, say, primary=True))
         tip = "In a process of its own; faults show at their lines"
         self.check_button = button("Check my file", tip, self.check, say)
         tip = "Interpolate with this file (Ctrl+Enter in the editor)"
@@ -95,7 +96,7 @@ class InterpolatorView:
             ]
         )
         main.add_class("rds-main")
-        self.widget = widgets.HBox([self._side, main])
+        self.widget = widgets.HBox([main, self._side])  # Tab comes to the button before the settings
         self.widget.add_class("rds-columns")
         interpolating.choices.watch(lambda name: self._arrange())
         self._arrange()

@@ -59,10 +59,17 @@ def run_order(
         if name == "mode":
             (made.remove_class if not load_mode(str(choices["mode"])).moves_machine else made.add_class)(_ORDER)
 
-    made = order(shell, text, tip, act, notice, primary=True)
+    made = runs(order(shell, text, tip, act, notice, primary=True))
     follow_mode("mode")
     choices.watch(follow_mode)
     return made
+
+
+def runs(button: widgets.Button) -> widgets.Button:
+    """The button that Ctrl+Enter presses on its panel (static/keys.js)."""
+    button.add_class("rds-run")
+    button.tooltip = f"{button.tooltip} (Ctrl+Enter; Escape stops)"
+    return button
 
 
 def halt(text: str, tip: str, act: Callable[[], Any], notice: Notice) -> widgets.Button:

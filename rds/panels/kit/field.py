@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.panels.kit.slider import Slider
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Flag, Number, Several, Text
 
@@ -17,7 +18,16 @@ _BUTTONS = 4  # as many options or fewer are all in sight; more are a list
 class FieldView(widgets.VBox):
     """One field of `choices`, kept equal to it. A value that will not do stays in sight with the reason under it."""
 
-    def __init__(self, choices: Choices, name: str, *, buttons: bool | None = None, disabled: bool = False):
+    def __init__(
+        self,
+        choices: Choices,
+        name: str,
+        *,
+        buttons: bool | None = None,
+        disabled: bool = False,
+        slider: bool = False,
+    ):
+        """`buttons` shows a choice as buttons or (False) as a list; `slider` adds one to a number."""
         super().__init__()
         self.add_class("rds-field")
         self.add_class(f"rds-field-{type(choices.fields[name]).__name__.lower()}")
@@ -28,6 +38,7 @@ class FieldView(widgets.VBox):
         self._loading = False
         self._end = choices.watch(self._changed)
         self._disabled = disabled
+        self._slider = Slider(self._slid) if slider else None
         self._shown: Field | None = None
         self._build()
 
@@ -50,24 +61,33 @@ class FieldView(widgets.VBox):
     def disabled(self, off: bool) -> None:
         self._disabled = off
         self.control.disabled = off
+        if self._slider is not None:
+            self._slider.disabled = off
 
     def close(self) -> None:
         """No longer watch the choices."""
         self._end()
+        if self._slider is not None:
+            self._slider.close()
         super().close()
 
     def _build(self) -> None:
         self._shown = field = self.field
         unit = f" [{field.unit}]" if isinstance(field, Number) and field.unit else ""
         tip = field.tooltip + (f" ({field.range})" if isinstance(field, Number) else "")
-        label = "" if isinstance(field, Flag) else f'<span title="{escape(tip)}">{escape(field.label + unit)}</span>'
+        label = "" if isinstance(field, Flag) else f'<label title="{escape(tip)}">{escape(field.label + unit)}</label>'
         self._label = widgets.HTML(label)
         self._label.add_class("rds-label")
         self.control = self._control(field, tip)
         self.control.disabled = self._disabled
         self.control.observe(self._typed, "value")
         self._refusal.value = ""
-        self.children = [self._label, self.control, self._refusal] if label else [self.control, self._refusal]
+        beside: list[Any] = [self.control, self._refusal]
+        if self._slider is not None and isinstance(field, Number):
+            self._slider.show(field, self._choices[self._name])
+            self._slider.disabled = self._disabled
+            beside.insert(1, self._slider)
+        self.children = [self._label, *beside] if label else beside
 
     def _control(self, field: Field, tip: str) -> Any:
         value = self._choices[self._name]
@@ -87,9 +107,14 @@ class FieldView(widgets.VBox):
         return widgets.Text(value, continuous_update=False, tooltip=tip, placeholder=field.placeholder)
 
     def _typed(self, change: Any) -> None:
-        if self._loading:
-            return
-        value = change["new"]
+        if not self._loading:
+            self._set(change["new"])
+
+    def _slid(self, value: float) -> None:
+        if not self._disabled:
+            self._set(round(value) if isinstance(self.field, Number) and self.field.whole else value)
+
+    def _set(self, value: Any) -> None:
         try:
             self._choices.set(self._name, list(value) if isinstance(value, tuple) else value)
             self._refuse("")
@@ -107,6 +132,8 @@ class FieldView(widgets.VBox):
             self._build()
             return
         value = self._choices[name]
+        if self._slider is not None and isinstance(self.field, Number):
+            self._slider.show(self.field, value)
         wanted = _text(value) if isinstance(self.field, Number) else tuple(value) if isinstance(value, list) else value
         self._refuse("")
         if self.control.value != wanted:

@@ -26,6 +26,6 @@ def columns(side: list[Any], main: list[Any]) -> widgets.HBox:
     left, right = widgets.VBox(side), widgets.VBox(main)
     left.add_class("rds-side")
     right.add_class("rds-main")
-    box = widgets.HBox([left, right])
+    box = widgets.HBox([right, left])  # Tab comes to the buttons before the settings
     box.add_class("rds-columns")
     return box

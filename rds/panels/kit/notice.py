@@ -17,16 +17,17 @@ class Notice(widgets.HTML):
         self._said = ""
         self.add_class("rds-notice")
 
-    def say(self, text: str, kind: str = "note") -> None:
-        """Show `text`; kind is note, good, warning or error. Empty text shows nothing."""
+    def say(self, text: str, kind: str = "note", why: str = "") -> None:
+        """Show `text`; kind is note, good, warning or error. Empty text shows nothing. *why?* opens the rest, `why`."""
         self._said = text
         if not text:
             self.value = ""
             return
         role = "alert" if kind == "error" else "status"
         lines = escape(text).replace("\n", "<br>")
+        more = f" <details><summary>why?</summary><p>{escape(why)}</p></details>" if why else ""
         self.value = (
-            f'<div class="rds-notice-{kind}" role="{role}"><b aria-hidden="true">{_SIGNS[kind]}</b> {lines}</div>'
+            f'<div class="rds-notice-{kind}" role="{role}"><b aria-hidden="true">{_SIGNS[kind]}</b> {lines}{more}</div>'
         )
 
     def take_back(self, text: str) -> None:

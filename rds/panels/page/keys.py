@@ -1,4 +1,4 @@
-"""Lets the keyboard open what folds away, which ipywidgets leaves to the mouse (static/keys.js)."""
+"""A panel by the keyboard and by ear: what ipywidgets leaves to mouse and eye (static/keys.js)."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Operator:
         buttons = [self.run_button, self.hold_button, self.resume_button, self.home_button]
         self.mode = FieldView(choices, "mode")
         self.mode.add_class("rds-program-mode")
-        self.widget = row(self.mode, *buttons, self.override, self.bar)
+        self.widget = row(*buttons, self.mode, self.override, self.bar)
         self.enable()
 
     def enable(self) -> None:

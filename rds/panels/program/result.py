@@ -37,7 +37,7 @@ class ProgramResult:
         from rds.nc.run.report import program_report
 
         result, prepared = work.result, work.prepared
-        if result is None or prepared is None:
+        if result is None or prepared is None or "program" not in result.meta:  # one that failed may not be judged
             return
         report = program_report(result, prepared)
         found = "".join(f"<p>{escape(sentence)}</p>" for sentence in report.findings)
@@ -55,9 +55,9 @@ class ProgramResult:
         self.along.draw(session, ticker, lambda: along(result, prepared))
 
     def saved(self, work: ProgramWork) -> None:
-        """Its files are written."""
+        """Its tables are written; pictures and reports follow."""
         if work.result is not None:
-            self.actions.offer(work.result, work.folder, ("program.html", "result.csv"))
+            self.actions.follow(work.result, work, ("program.html", "result.csv"))
 
     def clear(self) -> None:
         """Nothing to show."""

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.errors import InputError
+from rds.core.errors import ContractError, InputError
+from rds.modes.experiment.experiment import FailedRun
 from rds.nc.check import Setup
 from rds.nc.run.report import save_run
 from rds.nc.run.run import PartProgram, ProgramRun, Status
-from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors
+from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors, recorded
 from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session
 from rds.panels.session.task import Task
@@ -68,13 +69,17 @@ class ProgramWork(EquipmentRun):
                 if task.stopping:
                     run.stop()
                 note = "running" if self.real_time else "simulating"
-                self.result = run.wait(
-                    lambda taken, of: task.advance(taken, max(of, taken), "" if task.stopping else note)
-                )
+                try:
+                    self.result = run.wait(
+                        lambda taken, of: task.advance(taken, max(of, taken), "" if task.stopping else note)
+                    )
+                except ContractError as error:  # what there is up to the fault is a result
+                    self.result = error.result if isinstance(error, FailedRun) else recorded(self.folder)
+                    raise
             finally:
                 self.session.give_machine_back(self)
-            task.note = "saving tables, pictures and the report"
-            self.files = save_run(self.result, part.prepared, self.folder)
+                if self.result is not None and "program" in self.result.meta:
+                    self._write_files(save_run, self.result, self.prepared, self.folder, held=held)
             return self.result
 
     # what a progress bar follows: waiting is no progress

@@ -6,7 +6,8 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.equipment.strip import StripChart
+from rds.panels.equipment.result_view import timing_line
+from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.interpolator.motion import MADE
 from rds.panels.kit.button import attempt, say_error
 from rds.panels.kit.field import FieldView, field_group
@@ -71,7 +72,8 @@ class ProgramView:
         right.add_class("rds-main")
         columns = self._columns = widgets.HBox([left, right])
         columns.add_class("rds-columns")
-        view = widgets.VBox([self.files.widget, self.operator.widget, self.notice, columns])
+        self.files.widget.add_class("rds-program-files")
+        view = widgets.VBox([self.operator.widget, self.files.widget, self.notice, columns])
         view.add_class("rds-program")
         return view
 
@@ -146,6 +148,7 @@ class ProgramView:
         self._traced = self._shown = False
         self.editor.locked = True
         self.result.clear()
+        self.notice.say("the run begins")
         self.tabs.selected_index = RUN
         self.operator.enable()
         self.operator.bar.follow(work, lambda: attempt("showing the run", self._ended, self.notice))
@@ -183,11 +186,12 @@ class ProgramView:
         result = work.result
         assert result is not None
         ending = result.meta.get("ending")
+        self.strip.events = end_marks(result)
         if ending not in (None, "done"):
             self.notice.say(f"ended early: {result.meta.get('ending_reason')}", "warning")
         elif result.verdict:
-            kind = {"met": "good", "missed": "error"}.get(result.verdict, "warning")
-            self.notice.say(f"done; timing {result.verdict}: {result.meta.get('verdict_reason')}", kind)
+            said, kind, why = timing_line(result)
+            self.notice.say(f"done; {said}", kind, why)
         else:
             self.notice.say(f"done: {len(result)} samples", "good")
         self.result.show(work)
@@ -206,6 +210,5 @@ class ProgramView:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif work.error is not None:
             say_error("the run", work.error, self.notice)
-        else:
-            self.result.saved(work)
+        self.result.saved(work)
         self.files.refresh()

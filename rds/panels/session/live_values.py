@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rds.modes.loop.live_values import Channel
@@ -14,6 +14,13 @@ from rds.panels.session.fields import Number
 
 class LiveValues(Choices):
     """The live values of a run. One that the loop will not take stays what it was, with InputError."""
+
+    def at_rest(self, name: str, parameters: Iterable[str]) -> str | None:
+        """Which of `parameters`, the run's own, a live value is: that of one axis alone, or of its one controller."""
+        called = name.rpartition(".")[2]
+        alone = sum(other.rpartition(".")[2] == called for other in self.fields) == 1
+        found = (each for each in parameters if each.rpartition(".")[2] == called)
+        return next(found, None) if alone and "." in name else None
 
     def __init__(self, run: EquipmentRun | TakenUpRun):
         channels: Mapping[str, Channel] = run.live_values

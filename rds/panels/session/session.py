@@ -54,6 +54,7 @@ class Session:
         self.channels: set[str] = set()  # of the built-in bus, on which this page has started other machines
         self._choices: dict[str, Choices] = {}
         self._watchers: list[Callable[[Message], None]] = []
+        self.writing = threading.Lock()  # held by whoever makes pictures and reports of a run: one after another
         self._lock = threading.Lock()
         self._claim: Claim | None = None
         self._kept = self._read_kept()

@@ -161,10 +161,13 @@ function render({ model, el }) {
       Object.assign(ctx, { strokeStyle: color, fillStyle: color, lineWidth: 1.4 * ratio, font: `600 ${11 * ratio}px system-ui, sans-serif` });
       ctx.setLineDash(dash.map((each) => each * ratio));
       ctx.beginPath(); ctx.moveTo(x, top); ctx.lineTo(x, top + height); ctx.stroke();
-      if (named && word) ctx.fillText(word, x + 3 * ratio, top + 11 * ratio);
+      if (named && word) { // beside its line, on the side that has room
+        const wide = ctx.measureText(word).width + 3 * ratio;
+        ctx.fillText(word, x + wide > u.bbox.left + u.bbox.width ? x - wide : x + 3 * ratio, top + 11 * ratio);
+      }
       ctx.restore();
     };
-    for (const event of model.get("events")) line(event.time, ink("--rds-warning", "#8a4b00"), [3, 3], event.text);
+    for (const event of model.get("events")) line(event.time, event.fault ? ink("--rds-error", "#a4001d") : ink("--rds-warning", "#8a4b00"), event.fault ? [] : [3, 3], event.text);
     if (marks) marks.forEach((time, i) => line(time, ink("--rds-accent", "#00598c"), [], "AB"[i]));
   }
 
@@ -222,6 +225,8 @@ function render({ model, el }) {
     el.dataset.samples = columns.length ? columns[0].length : 0;
     el.dataset.state = state;
     el.dataset.lanes = plots.length;
+    el.dataset.until = last().toFixed(3);
+    el.dataset.marks = model.get("events").map((event) => `${event.time.toFixed(3)} ${event.text}${event.fault ? " (red)" : ""}`).join("; ");
     el.dataset.from = left().toFixed(3);
     el.dataset.ghost = ghost ? ghost.name : "";
     tell();

@@ -1,7 +1,13 @@
-// What folds away can be opened without a mouse: its header takes the focus, and Enter or space does what a click does.
-// And a panel begins at its top, however far the one before was scrolled.
+// A panel without a mouse. Ctrl+Enter presses its Run, Escape its Stop, which ends the run and is no emergency stop. What
+// folds away is opened by Enter or space. The list of panels is one stop of Tab, within which arrows move. Labels belong
+// to their fields, and what is said in a notice is read out. And a panel begins at its top, however far the one before
+// was scrolled.
 
 const HEADER = ".jupyter-widget-Collapse-header";
+const RUN = "button.rds-run", STOP = ".rds-work button";
+const STEPS = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 };
+const set = (element, name, value) => { if (element.getAttribute(name) !== value) element.setAttribute(name, value); };
+let count = 0;
 
 function render({ el }) {
   el.style.display = "none";
@@ -11,17 +17,54 @@ function render({ el }) {
     for (const header of app.querySelectorAll(HEADER)) {
       const open = String(header.parentElement.classList.contains("jupyter-widget-Collapse-open"));
       if (header.tabIndex !== 0) { header.tabIndex = 0; header.setAttribute("role", "button"); }
-      if (header.getAttribute("aria-expanded") !== open) header.setAttribute("aria-expanded", open);
+      set(header, "aria-expanded", open);
+    }
+    for (const field of app.querySelectorAll(".rds-field")) {
+      const name = field.querySelector("label[title]:not(.widget-label)");
+      const buttons = field.querySelector(".widget-toggle-buttons"), control = field.querySelector("input, select, textarea");
+      if (!name) continue;
+      if (buttons) { set(buttons, "role", "group"); set(buttons, "aria-label", name.textContent); continue; }
+      if (!control) continue;
+      if (!control.id) { count += 1; control.id = `rds-field-${count}`; }
+      set(name, "for", control.id);
+      set(control, "aria-invalid", String(field.classList.contains("rds-refused")));
+    }
+    for (const each of app.querySelectorAll("input[title], select[title], textarea[title]")) {
+      const named = [...(each.labels ?? [])].some((label) => label.textContent.trim());
+      if (each.title && !named && !each.hasAttribute("aria-label")) set(each, "aria-label", each.title);
+    }
+    for (const notice of app.querySelectorAll(".rds-notice")) set(notice, "aria-live", "polite");
+    const nav = app.querySelector(".rds-nav");
+    if (nav) { set(nav, "role", "toolbar"); set(nav, "aria-label", "Panels"); }
+    for (const each of app.querySelectorAll(".rds-nav button")) set(each, "tabindex", each.matches(".rds-here") ? "0" : "-1");
+    for (const [what, name] of [[".rds-progress [role=progressbar], .rds-progress .progress", "progress"]]) {
+      for (const each of app.querySelectorAll(what)) { set(each, "role", "progressbar"); set(each, "aria-label", name); }
     }
   };
+  const press = (which) => [...app.querySelectorAll(which)].find((each) => each.offsetParent && !each.disabled);
   const pressed = (event) => {
-    if (!(event.target instanceof Element) || !event.target.matches(HEADER)) return;
-    if (event.key !== "Enter" && event.key !== " ") return;
-    event.preventDefault();
-    event.target.click();
+    if (!(event.target instanceof Element) || event.defaultPrevented) return;
+    if (event.target.matches(HEADER) && (event.key === "Enter" || event.key === " ") && !event.ctrlKey) {
+      event.preventDefault();
+      event.target.click();
+    } else if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) {
+      const button = press(RUN), at = document.activeElement;
+      if (!button) return;
+      event.preventDefault();
+      at.blur(); // what was typed holds
+      at.focus();
+      button.click();
+    } else if (event.key === "Escape" && !event.target.closest(".cm-editor")) {
+      press(STOP)?.click();
+    } else if (event.key in STEPS && event.target.matches(".rds-nav button")) {
+      const all = [...app.querySelectorAll(".rds-nav button")];
+      event.preventDefault();
+      all[(all.indexOf(event.target) + STEPS[event.key] + all.length) % all.length].focus();
+    }
   };
+  let due = 0;
   const seen = new MutationObserver((changes) => {
-    label();
+    due ||= setTimeout(() => { due = 0; label(); }, 50); // once for what comes together
     if (changes.some((each) => each.type === "childList" && each.target.matches(".rds-panel"))) app.scrollTop = 0;
   });
   const begun = requestAnimationFrame(() => {
@@ -33,6 +76,7 @@ function render({ el }) {
   });
   return () => {
     cancelAnimationFrame(begun);
+    clearTimeout(due);
     seen.disconnect();
     if (app) app.removeEventListener("keydown", pressed);
   };
