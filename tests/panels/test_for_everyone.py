@@ -69,7 +69,7 @@ def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     page.get_by_label("Final time").fill("0.25")  # its label is its name
     page.keyboard.press("Control+Enter")  # what was typed holds
     page.wait_for_selector('.rds-notice[aria-live=polite] [role=status]:has-text("done: 250 samples"):visible')
-    page.get_by_label("Mode").select_option(label="Emulation")
+    page.get_by_label("Mode", exact=True).select_option(label="Emulation")
     page.get_by_label("Final time").fill("60")
     page.keyboard.press("Control+Enter")
     page.wait_for_selector('[aria-live=polite] :text("the run begins"):visible')

@@ -47,7 +47,7 @@ function render({ el }) {
     if (event.target.matches(HEADER) && (event.key === "Enter" || event.key === " ") && !event.ctrlKey) {
       event.preventDefault();
       event.target.click();
-    } else if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) {
+    } else if (event.key === "Enter" && (event.ctrlKey || event.metaKey) && !event.target.closest(".cm-editor")) {
       const button = press(RUN), at = document.activeElement;
       if (!button) return;
       event.preventDefault();
@@ -72,13 +72,13 @@ function render({ el }) {
     if (!app) return;
     label();
     seen.observe(app, { childList: true, subtree: true, attributes: true, attributeFilter: ["class"] });
-    app.addEventListener("keydown", pressed);
+    app.addEventListener("keydown", pressed, true); // before the fields, which let no key out of them
   });
   return () => {
     cancelAnimationFrame(begun);
     clearTimeout(due);
     seen.disconnect();
-    if (app) app.removeEventListener("keydown", pressed);
+    if (app) app.removeEventListener("keydown", pressed, true);
   };
 }
 
