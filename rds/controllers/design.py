@@ -1,8 +1,9 @@
-"""Design functions: gains, observer parameters and controller systems, from poles, through python-control.
+"""Design functions: gains, observer parameters and controller systems, from poles.
 
 They reproduce Table 2 of mini-cnc-rds to its last printed digit, but for the sign of Z's g₂: the table says 22.0
 where equations 6 and 7 give g₂ = 64 - 1/τ = -22.0 (X and Y carry the sign), so that is a misprint.
-python-control is imported inside the functions, because it takes seconds: who has gains doesn't need it.
+Up to two poles are placed by the closed form, which a test holds against python-control; the rest is python-control's.
+It is imported inside the functions, because that takes seconds: who has gains doesn't need it.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ _PACKAGES = {
     "pyseccomp": ("grading", "pyseccomp"),
     "nbformat": ("grading", "nbformat"),
     "yaml": ("grading", "pyyaml"),
-    **{name: ("lab", name) for name in ("ipywidgets", "jupyterlab", "voila", "ipympl", "anywidget", "k3d", "sphinx")},
+    **{name: ("lab", name) for name in "ipywidgets jupyterlab voila ipympl anywidget k3d sphinx furo".split()},
     "traitlets": ("lab", "ipywidgets"),
     "IPython": ("lab", "ipywidgets"),
     "myst_parser": ("lab", "myst-nb"),

@@ -1,4 +1,7 @@
-"""TOML text of tables, for files that people read and edit: the standard library reads TOML but does not write it."""
+"""TOML text of tables, for files that people read and edit: the standard library reads TOML but does not write it.
+
+tomli-w writes no comments and puts each item of a list on a line of its own: a link's matrix would take 22 lines.
+"""
 
 from __future__ import annotations
 

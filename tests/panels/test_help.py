@@ -132,11 +132,11 @@ def test_help_opens_at_the_page_of_the_panel(open_page: Callable[..., Any]) -> N
     frame.locator('input[name="q"]').press("Enter")
     frame.locator("#search-results li").first.wait_for()
     page.click('.rds-head button:text-is("Dark")')  # the help follows, and stays where it is
-    frame.locator(':root[data-colours="dark"] #search-results li').first.wait_for()
+    frame.locator('body[data-theme="dark"] #search-results li').first.wait_for()
     assert page.locator('.rds-guide a[href$="colours=dark"]').count() == 1
     page.click('.rds-nav button:text-is("Main menu")')
     page.click('.rds-nav button:text-is("Help")')  # and when it is shown again
-    frame.locator(':root[data-colours="dark"] h1:has-text("Equipment")').wait_for()
+    frame.locator('body[data-theme="dark"] h1:has-text("Equipment")').wait_for()
     page.wait_for_selector('.rds-guide a[href$="colours=dark"]')
 
 
@@ -149,6 +149,6 @@ def test_a_page_is_dark_as_its_address_says_or_the_browser_prefers(
     page.goto(server.url("oacs.html"))
     assert page.evaluate(back) == "rgb(20, 24, 29)"
     page.goto(server.url("oacs.html") + "?colours=light")
-    page.click('.sphinxsidebar a:has-text("Safety")')  # what was named holds on the next page too
+    page.click('.sidebar-tree a:has-text("Safety")')  # what was named holds on the next page too
     page.wait_for_selector('h1:has-text("Safety")')
     assert page.evaluate(back) == "rgb(255, 255, 255)"

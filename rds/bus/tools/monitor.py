@@ -1,4 +1,8 @@
-"""Watching a bus: statistics of what goes over it, its state and its failures. Views are elsewhere."""
+"""Watching a bus: statistics of what goes over it, its state and its failures. Views are elsewhere.
+
+python-can's viewer and cantools' monitor work on the built-in bus as well; this one adds bus load, periods with their
+jitter, error states, and what the modules' dialect says without a DBC file.
+"""
 
 from __future__ import annotations
 

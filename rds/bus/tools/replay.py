@@ -1,4 +1,8 @@
-"""Replaying a log onto a bus, at the times at which its frames were recorded."""
+"""Replaying a log onto a bus, at the times at which its frames were recorded.
+
+python-can's player sends whatever the log holds; this one refuses frames that would move a machine that is on the bus,
+and says how late it was.
+"""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def page_file(name: str) -> str:
 
 
 def _built(documents: dict[str, Path], work: Path, pulse: Callable[[], None]) -> Path:
-    for package in ("sphinx", "myst_parser"):
+    for package in ("sphinx", "myst_parser", "furo"):
         if importlib.util.find_spec(package) is None:
             raise missing(package, "building the help")
     source, target = work / "source", work / "html"
