@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     no_args_is_help=True,
-    help="Make a part program of a line, a quadrilateral, an arc, a spiral cone, points or a drawing.",
+    help="Make a part program of a line, a quadrilateral, an arc, a cone, points, a drawing, or a job of operations.",
 )
 
 
@@ -244,22 +244,47 @@ def outline(
     ] = 0.0,
     arcs: Annotated[bool, typer.Option("--arcs", help="Cut the smoothed outline in arcs as well as lines.")] = False,
     holes: Annotated[str, typer.Option(help="refuse, fill (outer outline alone) or cut (each hole too).")] = "refuse",
-    level: Annotated[float, typer.Option(help="Darkness, 0 to 1, from which on a pixel belongs to the shape.")] = 0.5,
+    level: Annotated[
+        str | None,
+        typer.Option(help="Darkness, 0 to 1, from which on a pixel belongs to the shape (0.5), or auto: Otsu's."),
+    ] = None,
     invert: Annotated[bool, typer.Option("--invert", help="The shape is light on dark.")] = False,
-    specks: Annotated[int, typer.Option(min=0, help="Leave out islands and holes of at most so many pixels.")] = 0,
+    specks: Annotated[
+        int | None, typer.Option(min=0, help="Leave out islands and holes of at most so many pixels.")
+    ] = None,
+    blur: Annotated[float | None, typer.Option(min=0.0, help="Smooth the darkness over so many pixels first.")] = None,
+    photo: Annotated[
+        bool,
+        typer.Option(
+            "--photo",
+            help="Clean a photograph: --level auto, --blur 1.5, --specks of 0.1 % of the pixels, unless given; parts "
+            "one pixel wide are left out, and parts that touch at a corner joined.",
+        ),
+    ] = False,
 ) -> Made:
     """The outline of the shape in a drawing, counter-clockwise and closed."""
     from rds.nc.paths.drawing import read_drawing
     from rds.nc.paths.outlines import outline as make
 
-    options: dict[str, Any] = {"method": trace, "holes": holes, "level": level, "invert": invert, "arcs": arcs}
+    darkness = read_drawing(file)
+    if specks is None:
+        specks = darkness.size // 1000 if photo else 0
+    options: dict[str, Any] = {"method": trace, "holes": holes, "invert": invert, "arcs": arcs, "photo": photo}
+    options |= {"level": _level(level, photo), "blur": (1.5 if photo else 0.0) if blur is None else blur}
     options |= {"specks": specks, "tolerance": tolerance, "at": _numbers(at, "--at"), "depth": depth, "passes": passes}
-    traced = make(read_drawing(file), pixel, feed / 60, name=str(file), **options)
+    traced = make(darkness, pixel, feed / 60, name=str(file), **options)
     rows, columns = traced.darkness.shape
     said = f"outline of {file.name}, {columns} x {rows} pixels of {pixel:g} mm"
     more = {"deviation_mm": traced.deviation, "tolerance_mm": tolerance, "outlines": len(traced.rings)}
     more["specks_left_out"] = traced.specks
     return Made(traced.segments, said, more, traced, file)
+
+
+def _level(text: str | None, photo: bool) -> float | None:
+    """The level as a number; None for the automatic one."""
+    if text == "auto" or (text is None and photo):
+        return None
+    return 0.5 if text is None else _numbers(text, "--level")[0]
 
 
 def _numbers(text: str, option: str) -> list[float]:

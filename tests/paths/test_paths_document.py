@@ -34,7 +34,7 @@ def test_commands_and_code_do_what_is_shown(
         elif block.words == "run":
             exec(compile(block.text, DOCUMENT, "exec"), {})
             ran += 1
-    assert ran == 11
+    assert ran == 14
     program, said = capsys.readouterr().out.split("M2\n")
     agreed(f"{program}M2\n")
     assert re.search(r"0\.\d{3} mm of 0\.4 mm", said)
@@ -45,7 +45,7 @@ def test_commands_and_code_do_what_is_shown(
 
 def test_every_option_is_named() -> None:
     named = set(re.findall(r"--[a-z-]+", TEXT))
-    for command in ("line", "quad", "arc", "cone", "points", "outline"):
+    for command in ("line", "quad", "arc", "cone", "points", "outline", "job"):
         shown = (
             CliRunner().invoke(app, ["nc", "make", command, "--help"], env={"COLUMNS": "200", "TERM": "dumb"}).stdout
         )

@@ -17,6 +17,7 @@ from rds.interpolators.motion.pieces import (
     AXIS_1,
     AXIS_2,
     BEND,
+    BENDING,
     CAP,
     CIRCULAR,
     DISTANCE,
@@ -27,6 +28,7 @@ from rds.interpolators.motion.pieces import (
     LENGTH,
     PUSH,
     RATIO,
+    SHARE,
     SLOPE,
     STRAIGHT,
     TWIST,
@@ -92,7 +94,7 @@ def _along(segment: np.ndarray, within: Limits, tau: float) -> tuple[np.ndarray,
         drift = make_circular(f, segment["start"], segment["end"], centre, sweep, u[AXIS_1], u[AXIS_2], length)
     rate = np.inf if segment["rapid"] else float(segment["rate"])
     f[FEED] = rate * length / (f[RATIO] * (length + drift))
-    f[DISTANCE] = 0.0
+    f[DISTANCE], f[SHARE] = 0.0, BENDING
     work = np.empty((3, 6))
     bound(f, u[KIND], u[AXIS_1], u[AXIS_2], *work)
     piece_limits(rows, within.velocity, within.acceleration, within.jerk, tau)

@@ -1,10 +1,12 @@
 """From the programmed path to pieces: lines that are nearly one are joined, corners blended or stopped at.
 
-A corner between two segments in mode BLEND becomes a quintic polynomial that leaves the one and reaches the other with
-their position, tangent and curvature, at most the tolerance away from them: for two lines that meet at unit tangents
-t₀ and t₁ and a blend from −d to d its derivative goes over from t₀ to t₁ as 3x² − 2x³, and it is 3/16 d |t₁ − t₀| from
-the corner at most. Lines are joined within Q of G64 as far as that leaves half of P, and corners get what joining left
-over: so the motion is off the path by P at most, or by Q where that is more.
+A corner between two segments in mode BLEND is cut by a curve that leaves the one and reaches the other with their
+position, tangent and curvature, at most the tolerance away from the path. For two lines that meet at unit tangents t₀
+and t₁ and a curve from −d to d, its derivative goes over from t₀ to t₁ as 2x² and then 1 − 2(1 − x)²: the jerk of each
+axis has one size all along, as in the fastest change of speed. It passes the corner in d/6 |t₁ − t₀|, and is d/6 sin θ
+from the lines at most, θ being the turn. Where one of the two is an arc, the curve is a quintic polynomial. Lines are
+joined within Q of G64 as far as that leaves half of P, and corners get what joining left over: so the motion is off the
+path by P at most, or by Q where that is more.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from rds.core.compiling import kernel
 from rds.interpolators.motion.pieces import (
     AXIS_1,
     AXIS_2,
+    BENDING,
     BLENDED,
     CIRCULAR,
     DISTANCE,
@@ -30,12 +33,14 @@ from rds.interpolators.motion.pieces import (
     LENGTH,
     RATIO,
     REST,
+    SHARE,
     STRAIGHT,
     bound,
     evaluate,
     make_blend,
     make_circular,
     make_straight,
+    make_turn,
     quickening,
     trim,
 )
@@ -80,39 +85,59 @@ def _off_line(begin, ends, first, last, nearest):
 
 
 @kernel
+def _away(b, f, u, q, p, dp, ddp):
+    """Distance of b to the piece f near its parameter q: Newton's steps to the nearest point."""
+    for _ in range(3):
+        evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], q, p, dp, ddp)
+        along = size = 0.0
+        for i in range(6):
+            along += (b[i] - p[i]) * dp[i]
+            size += dp[i] * dp[i]
+        q = min(max(q + along / size, 0.0), f[LENGTH]) if size > 0.0 else q
+    evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], q, p, dp, ddp)
+    return gap(b, p)
+
+
+@kernel
 def _blend_half(f, u, g, w, tolerance, work):
-    """Half the length in q of the blend from piece f to piece g (untrimmed), left in work[0]; 0 where none fits."""
+    """Half the length in q of the blend from piece f to piece g (untrimmed); 0 where none fits.
+
+    Between two lines it is left in work[0] and work[11], else in work[0] alone.
+    """
     p0, d0, dd0, p1, d1, dd1 = work[1, :6], work[2, :6], work[3, :6], work[4, :6], work[5, :6], work[6, :6]
     p, dp, ddp, b = work[7, :6], work[8, :6], work[9, :6], work[10, :6]
     evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], f[LENGTH], p0, d0, dd0)
     evaluate(g, w[KIND], w[AXIS_1], w[AXIS_2], 0.0, p1, d1, dd1)
-    turn = bend = 0.0
+    turn = bend = product = 0.0
     for i in range(6):
         turn += (d1[i] - d0[i]) ** 2
         bend += (dd1[i] - dd0[i]) ** 2
+        product += d0[i] * d1[i]
     turn, bend = sqrt(turn), sqrt(bend)
     half = 0.5 * min(f[LENGTH], g[LENGTH])
     if turn < 1e-12 and bend < 1e-12:
         return 0.0
-    if turn > 0.0:
-        half = min(half, 16.0 / 3.0 * 0.999 * tolerance / turn)
+    sine = sqrt(max(1.0 - product * product, 0.0))
+    if sine > 0.0:
+        half = min(half, 6.0 * 0.999 * tolerance / sine)
+    if u[KIND] == STRAIGHT and w[KIND] == STRAIGHT:
+        if half < 10.0 * TINY:
+            return 0.0
+        make_turn(work[0], work[11], half, p1, d0, d1)
+        return half
     for _ in range(60):
         if half < 10.0 * TINY:
             return 0.0
         evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], f[LENGTH] - half, p0, d0, dd0)
         evaluate(g, w[KIND], w[AXIS_1], w[AXIS_2], half, p1, d1, dd1)
         make_blend(work[0], half, p0, d0, dd0, p1, d1, dd1)
-        if u[KIND] == STRAIGHT and w[KIND] == STRAIGHT:
-            return half
         worst = 0.0
         for k in range(1, 32):
             q = k * half / 16.0
             evaluate(work[0], BLENDED, 0, 1, q, b, dp, ddp)
-            if k <= 16:
-                evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], f[LENGTH] - half + q, p, dp, ddp)
-            else:
-                evaluate(g, w[KIND], w[AXIS_1], w[AXIS_2], q - half, p, dp, ddp)
-            worst = max(worst, gap(b, p))
+            near = _away(b, f, u, min(f[LENGTH] - half + q, f[LENGTH]), p, dp, ddp)
+            if near > worst:
+                worst = max(worst, min(near, _away(b, g, w, max(q - half, 0.0), p, dp, ddp)))
         if worst <= 0.97 * tolerance:  # between the 31 places it is not 3 % more
             return half
         half *= max(0.3, min(0.8, 0.95 * tolerance / worst))
@@ -136,7 +161,7 @@ def _emit(out, ints, count, f, u, first, last, rest, distance, work):
     out[count, :] = f[:FLOATS]
     ints[count, :] = u[:INTS]
     ints[count, FIRST], ints[count, LAST], ints[count, REST] = first, last, rest
-    out[count, DISTANCE] = distance
+    out[count, DISTANCE], out[count, SHARE] = distance, BENDING
     bound(out[count], u[KIND], u[AXIS_1], u[AXIS_2], p, dp, ddp)
     return count + 1
 
@@ -161,9 +186,9 @@ def build(
     the first segment that is not done with. final: nothing follows.
     """
     n = len(rate)
-    out, ints = np.empty((2 * n + 1, FLOATS)), np.zeros((2 * n + 1, INTS), np.int64)
+    out, ints = np.empty((3 * n + 1, FLOATS)), np.zeros((3 * n + 1, INTS), np.int64)
     rows, kinds = np.zeros((2, FLOATS)), np.zeros((2, INTS), np.int64)
-    work = np.zeros((11, FLOATS))
+    work = np.zeros((12, FLOATS))
     blend = np.zeros(INTS, np.int64)
     blend[KIND] = BLENDED
     zero: Any = np.int64(0)  # not the literal, for each of which numba would compile what is called with it
@@ -248,10 +273,17 @@ def build(
                 trim(g, w[KIND], w[AXIS_1], w[AXIS_2], front, half, work[6, :6], work[7, :6], work[8, :6])
                 count = _emit(out, ints, count, g, w, held_first, held_last, np.int64(stops), taken, work)
             if half > 0.0:
-                b = work[0]
-                b[RATIO], b[FEED] = 0.5 * (ratio + f[RATIO]), min(feed, f[FEED]) / quickening(b)
-                taken = distance + (size - half) * ratio
-                count = _emit(out, ints, count, b, blend, held_first, last, zero, taken, work)
+                b, taken = work[0], distance + (size - half) * ratio
+                if u[KIND] == STRAIGHT and w[KIND] == STRAIGHT:  # in two halves
+                    after = work[11]
+                    b[RATIO], b[FEED] = ratio, min(feed, f[FEED])
+                    after[RATIO], after[FEED] = f[RATIO], b[FEED]
+                    count = _emit(out, ints, count, b, blend, held_first, last, zero, taken, work)
+                    taken = distance + size * ratio
+                    count = _emit(out, ints, count, after, blend, held_first, last, zero, taken, work)
+                else:
+                    b[RATIO], b[FEED] = 0.5 * (ratio + f[RATIO]), min(feed, f[FEED]) / quickening(b)
+                    count = _emit(out, ints, count, b, blend, held_first, last, zero, taken, work)
             front = half
             distance += size * ratio
         done, held, held_first, held_last, held_room, old = first, True, first, last, room, new

@@ -23,12 +23,14 @@ SLOPE_0, BEND_0, SLOPE_1, BEND_1 = 57, 63, 69, 75  # dp/dq and d²p/dq² at its 
 END = 81  # position at its end
 DISTANCE = 87  # programmed length from the start of the program to its start
 CAP, PUSH = 88, 89  # highest dq/dt and d²q/dt²
-FLOATS = 90
+SHARE = 90  # of acceleration and jerk, that the path's bends may take; the rest is left for the speed's change
+FLOATS = 91
 # Columns of the whole numbers: kind; first and last segment that it stands for; whether it ends at rest; the axes of an
 # arc's plane.
 KIND, FIRST, LAST, REST, AXIS_1, AXIS_2 = range(6)
 INTS = 6
 STRAIGHT, CIRCULAR, BLENDED = 0, 1, 2
+BENDING = 0.7  # what SHARE is to begin with
 
 
 @kernel
@@ -139,6 +141,25 @@ def make_blend(f, half, p0, d0, dd0, p1, d1, dd1):
         f[c + 24] = (-15.0 * way + 7.0 * tilt - curl) / h**4
         f[c + 30] = (6.0 * way - 3.0 * tilt + 0.5 * curl) / h**5
         f[END + i] = p1[i]
+
+
+@kernel
+def make_turn(first, second, half, corner, d0, d1):
+    """From the direction d0 to d1 (unit vectors) about a corner of two lines, into two rows, each `half` long.
+
+    The direction goes over from one to the other with a second derivative that is constant in each half, and of one
+    size: of all ways within the same distance of the corner the one that is passed fastest within a jerk.
+    """
+    first[LENGTH] = second[LENGTH] = half
+    for i in range(6):
+        turn = d1[i] - d0[i]
+        c = SHAPE + i
+        for k in range(0, 36, 6):
+            first[c + k] = second[c + k] = 0.0
+        first[c], first[c + 6], first[c + 18] = corner[i] - half * d0[i], d0[i], turn / (6.0 * half * half)
+        second[c], second[c + 6] = corner[i] + half / 6.0 * turn, 0.5 * (d0[i] + d1[i])
+        second[c + 12], second[c + 18] = turn / (2.0 * half), -turn / (6.0 * half * half)
+        first[END + i], second[END + i] = second[c], corner[i] + half * d1[i]
 
 
 @kernel

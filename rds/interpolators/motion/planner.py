@@ -136,7 +136,6 @@ class _Planner:
 
     def _build(self, final: bool) -> None:
         from rds.interpolators.motion.path import build
-        from rds.interpolators.motion.speed import piece_limits
 
         new, n = self.new, len(self.new)
         if not n:
@@ -153,7 +152,6 @@ class _Planner:
             **path, rest=rest, point=self.point, final=final, state=self.state, jerk=self.within.jerk, T=self.T
         )
         u[:, 1:3] += first
-        piece_limits(f, self.within.velocity, self.within.acceleration, self.within.jerk, self.tau)
         self.stretch.extend(f, u)
         self.new = new[done:]
 

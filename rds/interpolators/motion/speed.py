@@ -26,14 +26,13 @@ from rds.interpolators.motion.pieces import (
     FEED,
     LENGTH,
     PUSH,
+    SHARE,
     SLOPE,
     SLOPE_0,
     SLOPE_1,
     TWIST,
 )
 
-CURVE_SHARE = 0.7  # of the acceleration, for the direction's change along a curve: the rest is left for the speed's
-TWIST_SHARE = 0.7  # of the jerk, likewise for the curvature's change
 BEND_SHARE = 0.3  # of the jerk, for jumps of the curvature at joints
 
 
@@ -50,9 +49,9 @@ def piece_limits(f, velocity, acceleration, jerk, tau):
             if f[k, SLOPE + i] > 0.0:
                 c = min(c, velocity[i] / f[k, SLOPE + i])
             if f[k, BEND + i] > 0.0:
-                c = min(c, sqrt(CURVE_SHARE * acceleration[i] / f[k, BEND + i]))
+                c = min(c, sqrt(f[k, SHARE] * acceleration[i] / f[k, BEND + i]))
             if f[k, TWIST + i] > 0.0:
-                c = min(c, (TWIST_SHARE * jerk[i] / f[k, TWIST + i]) ** (1.0 / 3.0))
+                c = min(c, (f[k, SHARE] * jerk[i] / f[k, TWIST + i]) ** (1.0 / 3.0))
         a = inf
         for i in range(6):
             slope, bend, twist = f[k, SLOPE + i], f[k, BEND + i], f[k, TWIST + i]

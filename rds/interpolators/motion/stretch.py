@@ -2,6 +2,10 @@
 
 It plans as if the motion ended with the window, and takes over the part of the profile that this end does not touch. So
 memory is bounded. What is in a window does not depend on how many pieces come at a time.
+
+Two choices are made by trying, and counting the time: how long a stretch is averaged over (τ: on short ways less than
+the whole ramp of the acceleration, which is not reached there), and how much of acceleration and jerk the bends of the
+path may take where the motion goes through them at an even speed, and needs nothing to change it.
 """
 
 from __future__ import annotations
@@ -12,28 +16,34 @@ from math import ceil, sqrt
 import numpy as np
 
 from rds.interpolators.motion.limits import Limits
-from rds.interpolators.motion.pieces import END, FIRST, LAST, LENGTH, REST, no_pieces
+from rds.interpolators.motion.pieces import CAP, END, FIRST, LAST, LENGTH, REST, SHARE, no_pieces
 from rds.interpolators.motion.profile import cut, hold_tops, phases_of, settled, speeds
 from rds.interpolators.motion.sampling import LASTS, PLACE, SINCE, sample, timed
-from rds.interpolators.motion.speed import envelope, joint_limits
+from rds.interpolators.motion.speed import envelope, joint_limits, piece_limits
 
 WINDOW = 1024  # pieces that are looked ahead over, at least
 LONGEST_WINDOW = 65536  # pieces: if these are too short a way to stop in, the motion stops after them
 PROGRESS = 0.2  # of a window, that must be settled; else a longer one is taken
 MOST_ROWS = 16384  # samples at a time
+SHARES = (0.85, 0.98)  # of acceleration and jerk for bends that are passed at an even speed
+AVERAGES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.13)  # of the longest ramp, to average over
+SHORTEST_AVERAGE = 4  # samples
+FINE = 1.06  # the best average of a stretch of few pieces is found to so much
+FEW = 3  # pieces
 
 # position, velocity, acceleration (m, 6), programmed distance (m), first and last segment of each sample's piece (m)
+_Profile = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 Samples = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class Stretch:
     """Takes pieces in (`extend`) and gives samples out (`run`); at the end of each stretch it stops giving.
 
-    limits: what is planned with; tau: s, what the profile is averaged over; T: s between samples.
+    limits: what is planned with; tau: s, what the profile is averaged over at most; T: s between samples.
     """
 
     def __init__(self, limits: Limits, tau: float, T: float):
-        self._limits, self._tau, self._T = limits, tau, T
+        self._limits, self._longest, self._T = limits, tau, T
         highest = float(limits.velocity.max()) * sqrt(float(limits.present.sum()))
         # As far as the limits of a place reach, of a joint also through its neighbours within 3 T.
         self._reach = highest * (0.5 * tau + 4.5 * T)
@@ -42,6 +52,7 @@ class Stretch:
 
     def _begin(self) -> None:
         self._place, self._speed, self._time = 0.0, 0.0, 0.0  # where the profile is known to
+        self._tau = 0.0  # not chosen yet
         self._passed = 0  # pieces before this place
         self._next = 1  # sample of the stretch
         self._window = WINDOW
@@ -87,14 +98,25 @@ class Stretch:
 
     def _look_ahead(self, at: np.ndarray, count: int, ends: bool) -> bool:
         """Extend the profile; whether that was possible in this window."""
-        f, limits = self._f[:count], self._limits
+        f = self._f[:count]
         end = at[count] if ends else at[count] - self._reach
         if end <= self._place:
             return False
-        joints = joint_limits(f, at, limits.acceleration, limits.jerk, self._tau, self._T)
-        edges, cap, push = envelope(f, at, joints, self._tau, self._place, end)
-        v = speeds(edges, cap, push, self._speed, 0.0)
-        phases = hold_tops(phases_of(edges, cap, push, v), self._tau)
+        if not self._tau:
+            self._tau = self._best_average(f, at, end)
+        edges, cap, push, v, phases = self._profile(f, at, end, self._tau)
+        for share in SHARES:
+            bent = self._evenly_passed(f, at, edges, v, share)
+            if not bent.any():
+                break
+            before = f[bent, SHARE].copy()
+            f[bent, SHARE] = share
+            found = self._profile(f, at, end, self._tau)
+            if _lasting(found[4]) >= _lasting(phases):
+                f[bent, SHARE] = before
+                self._limit(f, self._tau)
+                break
+            edges, cap, push, v, phases = found
         if not ends:
             done = settled(edges, cap, push, self._speed, v) - self._place
             if done < PROGRESS * (end - self._place):
@@ -106,6 +128,57 @@ class Stretch:
         self._speed = float(phases[-1, 2])
         self._time = float(rows[-1, SINCE] + rows[-1, LASTS])
         return True
+
+    def _limit(self, f: np.ndarray, tau: float) -> None:
+        piece_limits(f, self._limits.velocity, self._limits.acceleration, self._limits.jerk, tau)
+
+    def _profile(self, f: np.ndarray, at: np.ndarray, end: float, tau: float) -> _Profile:
+        """The fastest from where it is known to, that rests at `end`: edges, limits between them, speeds, phases."""
+        limits = self._limits
+        self._limit(f, tau)
+        joints = joint_limits(f, at, limits.acceleration, limits.jerk, tau, self._T)
+        edges, cap, push = envelope(f, at, joints, tau, self._place, end)
+        v = speeds(edges, cap, push, self._speed, 0.0)
+        return edges, cap, push, v, hold_tops(phases_of(edges, cap, push, v), tau)
+
+    def _best_average(self, f: np.ndarray, at: np.ndarray, end: float) -> float:
+        """τ with which the stretch, or its first window, takes the least time."""
+        least = min(SHORTEST_AVERAGE * self._T, self._longest)
+
+        def time(tau: float) -> float:
+            return _lasting(self._profile(f, at, end, tau)[4]) + tau
+
+        tried = {tau: time(tau) for share in AVERAGES if (tau := max(share * self._longest, least))}
+        best = min(tried, key=lambda tau: (tried[tau], -tau))
+        if len(f) > FEW:
+            return best
+        step = sqrt(AVERAGES[0] / AVERAGES[1])
+        while step > FINE:
+            for tau in (best / step, best * step):
+                if least <= tau <= self._longest and (lasts := time(tau)) < tried[best]:
+                    tried[tau], best = lasts, tau
+            step = sqrt(step)
+        return best
+
+    def _evenly_passed(
+        self, f: np.ndarray, at: np.ndarray, edges: np.ndarray, v: np.ndarray, share: float
+    ) -> np.ndarray:
+        """Which pieces are passed as fast as their bends allow from end to end, and may get a larger share.
+
+        Not those whose limits would reach back to where the profile is settled.
+        """
+        first = np.searchsorted(edges, at[:-1], side="right") - 1
+        last = np.searchsorted(edges, at[1:], side="left")
+        inside = (at[:-1] - self._longest * f[:, CAP] > self._place) & (last < len(edges)) & (first >= 0)
+        bent = np.zeros(len(f), bool)
+        which = np.flatnonzero(inside & (f[:, SHARE] < share))
+        if not len(which):
+            return bent
+        lowest = np.minimum.reduceat(np.append(v, np.inf), np.column_stack((first[which], last[which] + 1)).ravel())[
+            ::2
+        ]
+        bent[which] = lowest >= f[which, CAP] * (1.0 - 1e-9)
+        return bent
 
     def _samples(self, at: np.ndarray, count: int, finish: int | None) -> Iterator[tuple[Samples, int | None]]:
         if finish is None:
@@ -144,3 +217,9 @@ class Stretch:
             self._f, self._u = self._f[gone:], self._u[gone:]
             self._rows[:, PLACE] -= at[gone]
             self._place -= at[gone]
+
+
+def _lasting(phases: np.ndarray) -> float:
+    """s."""
+    sums = phases[:, 1] + phases[:, 2]
+    return float((2.0 * phases[:, 0] / np.where(sums > 0.0, sums, np.inf)).sum())

@@ -10,6 +10,7 @@ from pathlib import Path
 from rds.core.limits import read_limited
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
+from rds.nc.language.tool_library import ShapedTool, read_library
 
 _WORD = re.compile(r"([A-Za-z])([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 _WHOLE = "TPQ"
@@ -77,9 +78,13 @@ class ToolTable:
 def read_tools(path: Path) -> list[Tool]:
     """A tool table as LinuxCNC keeps it: `T1 P1 Z0.511 D0.125 ;comment` on each line, in the machine's units.
 
+    Of a tool library (.toml, docs/paths.md) the lengths and diameters, in mm.
+
     Raises ProgramError with line and column for a word that is none of the table's, a line without T or P (LinuxCNC
     passes over the first and misreads the second), or a tool that comes twice.
     """
+    if path.suffix.lower() == ".toml":
+        return [_of_library(tool) for tool in read_library(path)]
     try:
         text = read_limited(path, _LARGEST, "a tool table", "check its path").decode("utf-8-sig", "replace")
     except OSError as error:
@@ -87,6 +92,15 @@ def read_tools(path: Path) -> list[Tool]:
             f"the tool table cannot be read ({error.strerror}); check its path", file=str(path)
         ) from None
     return tools_of(text, str(path))
+
+
+def _of_library(tool: ShapedTool) -> Tool:
+    most = [("S", tool.most_spindle), ("F", tool.most_feed)]
+    words = " ".join(f"{letter}{value:g}" for letter, value in most if value is not None)
+    offset = (0.0, 0.0, tool.length, 0.0, 0.0, 0.0)
+    return Tool(
+        *(tool.number, tool.number, tool.diameter, offset), comment=tool.said + (f", max {words}" if words else "")
+    )
 
 
 def tools_of(table: str, file: str) -> list[Tool]:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rds.core.errors import InputError
+from rds.core.extras import needed_for
 from rds.core.quantities import Quantity
 from rds.core.types import LineSegment, Segment
 from rds.nc.paths.arc_fit import fit
@@ -18,7 +19,7 @@ from rds.nc.paths.deviation import hausdorff
 from rds.nc.paths.measure import signed_area, trace
 from rds.nc.paths.needs import needed
 from rds.nc.paths.numbers import COORDINATE, FEED_RATE, NOT_NEGATIVE, POSITIVE, number, point
-from rds.nc.paths.region import Holes, single_region, without_specks
+from rds.nc.paths.region import Holes, mended, single_region, without_specks
 from rds.nc.paths.smoothing import are_simple, smoothed, without_idle_points
 
 Trace = Literal["contour", "blob"]
@@ -59,9 +60,11 @@ def outline(
     *,
     method: Trace = "contour",
     holes: Holes = "refuse",
-    level: float = 0.5,
+    level: float | None = 0.5,
     invert: bool = False,
     specks: int = 0,
+    blur: float = 0.0,
+    photo: bool = False,
     tolerance: float = 0.0,
     arcs: bool = False,
     at: Sequence[float] = (0.0, 0.0),
@@ -82,6 +85,10 @@ def outline(
     before the outer one; not for a blob). Islands and holes of at most `specks` cells are left out first.
     The depth is reached in `passes` equal steps, each closed before the next.
 
+    `blur` (cells) is the width (standard deviation) of a Gaussian that the darkness is smoothed by; `level` None is
+    Otsu's, which parts light from dark best. `photo` cleans what a camera saw: parts one cell wide are left out, and
+    parts that hang together at a corner joined, so that neither is refused.
+
     InputError names the place of what cannot be followed: see `region.single_region`.
     """
     size = number(pixel, "pixel", name, POSITIVE)
@@ -99,8 +106,8 @@ def outline(
         raise InputError(f"{name}: {passes} passes need a depth to divide; give a depth of more than 0 mm")
     if arcs and allowed == 0:
         raise InputError(f"{name}: arcs need a tolerance to fit them with; give one (half a pixel is {size / 2:g} mm)")
-    darkness = _darkness(drawing, invert, name)
-    threshold = LEVEL.check(level, "level", name)
+    darkness = _blurred(_darkness(drawing, invert, name), number(blur, "blur", name, NOT_NEGATIVE))
+    threshold = _otsu(darkness) if level is None else LEVEL.check(level, "level", name)
     cells = darkness >= threshold
     if not cells.any() or cells.all():
         found = "nowhere as dark as" if not cells.any() else "nowhere lighter than"
@@ -109,7 +116,7 @@ def outline(
             "there is no outline to trace; choose another level, or invert",
             name,
         )
-    clean, left_out = without_specks(cells, specks, name)
+    clean, left_out = without_specks(mended(cells) if photo else cells, specks, name)
     region = single_region(clean, holes, name)
 
     pixels = [boundary_cells(region)] if method == "blob" else _contours(darkness, region, threshold, name)
@@ -134,6 +141,22 @@ def _darkness(drawing: np.ndarray, invert: bool, name: str) -> np.ndarray:
     if not np.all((darkness >= 0) & (darkness <= 1)):
         raise InputError(f"{name}: darkness must be from 0 (white) to 1 (black); divide the drawing by its black")
     return 1.0 - darkness if invert else darkness
+
+
+def _blurred(darkness: np.ndarray, width: float) -> np.ndarray:
+    if width == 0.0:
+        return darkness
+    with needed_for("blurring a drawing"):
+        from scipy.ndimage import gaussian_filter
+
+    return np.clip(gaussian_filter(darkness, width, mode="nearest"), 0.0, 1.0)
+
+
+def _otsu(darkness: np.ndarray) -> float:
+    """N. Otsu (1979): the level that makes the classes on its two sides as different as can be."""
+    if darkness.min() == darkness.max():
+        return 0.5
+    return float(needed("skimage.filters").threshold_otsu(darkness))
 
 
 def _contours(darkness: np.ndarray, region: np.ndarray, level: float, name: str) -> list[np.ndarray]:

@@ -91,7 +91,7 @@ def _lines(
         yield f"G64 P{_number(blend, max(decimals, DECIMALS))}"
     if spindle is not None:
         yield f"S{_number(spindle, 3)} M3"
-    writer = _Writer(decimals)
+    writer = MoveWriter(decimals)
     if safe_height is not None:
         yield f"G0 Z{_number(safe_height, decimals)}"
     for piece in found:
@@ -105,7 +105,7 @@ def _lines(
     yield "M2"
 
 
-class _Writer:
+class MoveWriter:
     """Writes moves with those words only that change; what counts is the position as it was printed."""
 
     def __init__(self, decimals: int):
@@ -121,6 +121,16 @@ class _Writer:
         else:
             yield f"G0 X{self._word(x)} Y{self._word(y)}"
             yield f"G1 Z{self._word(z)}{self._feed(first)}"
+
+    def descend(self, piece: Sequence[Segment], height: float, plunge: float) -> Iterator[str]:
+        """A piece from above: over its start and down to `height` (mm) in rapid moves, then at `plunge` (mm/s)."""
+        x, y, z = self.at = self._rounded(piece[0].start)
+        yield f"G0 X{self._word(x)} Y{self._word(y)}"
+        if height > z:
+            yield f"G0 Z{self._word(height)}"
+        yield f"G1 Z{self._word(z)}{self._feed(LineSegment(self.at, self.at, plunge))}"
+        for segment in piece:
+            yield from self.cut(segment)
 
     def cut(self, segment: Segment) -> Iterator[str]:
         """The segment as one line; none where it is shorter than the last decimal."""

@@ -1,0 +1,24 @@
+"""Vector drawings by the ending of their name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rds.core.errors import InputError
+from rds.nc.shapes.curves import Drawing, checked
+from rds.nc.shapes.dxf import read_dxf
+from rds.nc.shapes.svg import read_svg
+
+
+def read_vector_drawing(file: str, unit: str | None = None) -> Drawing:
+    """The drawing in an SVG or DXF file, by the ending of its name. `unit`: mm, cm, m or in, where the file says none.
+
+    InputError for a file that is neither, damaged, or has nothing to machine.
+    """
+    path = Path(file)
+    ending = path.suffix.lower()
+    if ending == ".svg":
+        return checked(read_svg(path))
+    if ending == ".dxf":
+        return checked(read_dxf(path, unit))
+    raise InputError(f"{ending or 'a name without an ending'} is no vector drawing; known: .svg, .dxf", str(path))
