@@ -269,6 +269,12 @@ def _filter(words: TomlTable) -> Acceleration | None:
 
 
 def _inline(words: TomlTable) -> list[Segment]:
+    given = words.any("segment")
+    if isinstance(given, Sequence) and given and all(isinstance(each, LineSegment | ArcSegment) for each in given):
+        for key in ("start", "feed", "feed_unit"):
+            if key in words:
+                raise words.fault(key, "goes with rows; segments that are objects have their own: remove it")
+        return list(given)
     for key in ("start", "feed", "segment"):
         if key not in words:
             raise InputError(f"{key} of the path is missing; it needs start, feed and segment", words.place())
