@@ -68,12 +68,13 @@ class Interpolator:
             said = f"a segment of {length(segment):g} mm at {segment.feed_rate:g} mm/s makes {expected:.3g} samples"
             raise InputError(f"{said} of {T:g} s, more than {_MOST}; give a longer sample period or a shorter path")
         most = _ROWS_PER_ROW * int(expected) + _SPARE_ROWS
-        whole, way, here = length(segment), 0.0, segment.start
+        whole, way, here = length(segment), 0.0, list(segment.start)
         with_errors = self._errors(segment)
         for k, row in enumerate(with_errors(self.theoretical(segment, T))):
             values = self._row(row, len(segment.start), k)
-            way += dist(here, values[0])
-            here = values[0]
+            there = values[0].tolist()
+            way += dist(here, there)
+            here = there
             yield values
             if k >= most:
                 raise self._broken(f"has yielded {most} rows of a segment of {whole:g} mm, and no end")
