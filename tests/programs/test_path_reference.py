@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -332,55 +330,6 @@ def test_the_command_runs_a_student_s_interpolator(here: Path) -> None:
     assert ran.exit_code == 0, ran.output
     assert '"interpolator": "mine.py"' in ran.stdout and '"path_error"' in ran.stdout
     assert (here / "out" / "program.html").is_file()
-
-
-@pytest.mark.realtime
-@pytest.mark.parametrize("mode", ["emulation", "implementation"])
-def test_it_runs_in_real_time_held_and_slowed(here: Path, mode: str) -> None:
-    experiment = rds.Experiment(
-        axis=["X", "Y"],
-        controller="tracking",
-        sample_period=0.005,
-        reference={"kind": "path", "file": "lines.toml", "interpolator": "mine.py", "acceleration": "linear"},
-    )
-    run = experiment.start(mode)
-    assert run.ready(60.0)
-    run.desk.set("override", 0.5)
-    run.desk.set("hold", 1.0)
-    held: Callable[[], bool] = lambda: run.rows is not None and run.rows["program_state"][-1] == State.HELD  # noqa: E731
-    for _ in range(600):
-        if held() or run.done:
-            break
-        run.ready(0.05)
-        time.sleep(0.05)
-    assert held()
-    run.desk.set("hold", 0.0)
-    result = run.wait()
-    assert result.meta["ending"] == "done" and positions(result)[-1].tolist() == [6.0, 4.0]
-    assert result["interpolate"].max() > 0.0 and "interpolate" in result.meta["timing"]
-    again = experiment.run("simulation", changes=[change[:2] + change[3:] for change in result.meta["changes"]])
-    if mode == "emulation":
-        for column in again.columns:
-            assert np.array_equal(again[column], result[column]), column
-    else:
-        assert result["contour_error"].max() < 0.5
-
-
-@pytest.mark.realtime
-def test_a_slow_interpolator_has_missed_and_is_named(here: Path) -> None:
-    slow = MINE.replace(
-        "        at = [",
-        "        until = time.perf_counter() + 0.012\n        while time.perf_counter() < until: pass\n        at = [",
-    )
-    (here / "slow.py").write_text("import time\n" + slow)
-    experiment = rds.Experiment(
-        axis=["X", "Y"],
-        controller="tracking",
-        sample_period=0.01,
-        reference={"kind": "path", "file": "lines.toml", "interpolator": "slow.py"},
-    )
-    result = experiment.run("emulation")
-    assert result.verdict == "missed" and "the interpolator (" in result.meta["verdict_reason"]
 
 
 def test_the_report_of_a_path_has_its_picture_and_speaks_of_segments(here: Path) -> None:
