@@ -339,7 +339,11 @@ def _show(result: Result, files: dict[str, Path]) -> None:
             f"{worst['time_s']:.3f}",
             f"{worst['rms']:.4f}",
         ]
-        for name, worst in [("contour", about["contour_error"]), *about["following_error"].items()]
+        for name, worst in [
+            ("contour", about["contour_error"]),
+            ("commanded path", about.get("path_error")),
+            *about["following_error"].items(),
+        ]
         if worst
     ]
     title = f"{about['file']} on {result.meta['machine']}, {result.mode}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from math import dist
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from rds.interpolators.reference_word import Steps, steps
 Rows = Iterator[tuple[np.ndarray, ...]]
 _MOST = 2_000_000  # rows of a segment, which are held in memory
 _ROWS_PER_ROW, _SPARE_ROWS = 10, 5000  # a slow start and stop are still allowed
+_LEAST_SHARE = 0.5  # of a segment's length that its rows must go: less has left out a part of it
+_POINT = 0.1  # mm: what is shorter may be less than the steps of an interpolator
 
 
 @dataclass(frozen=True)
@@ -65,12 +68,22 @@ class Interpolator:
             said = f"a segment of {length(segment):g} mm at {segment.feed_rate:g} mm/s makes {expected:.3g} samples"
             raise InputError(f"{said} of {T:g} s, more than {_MOST}; give a longer sample period or a shorter path")
         most = _ROWS_PER_ROW * int(expected) + _SPARE_ROWS
-        axes = len(segment.start)
+        whole, way, here = length(segment), 0.0, list(segment.start)
         with_errors = self._errors(segment)
         for k, row in enumerate(with_errors(self.theoretical(segment, T))):
-            yield self._row(row, axes, k)
+            values = self._row(row, len(segment.start), k)
+            there = values[0].tolist()
+            way += dist(here, there)
+            here = there
+            yield values
             if k >= most:
-                raise self._broken(f"has yielded {most} rows of a segment of {length(segment):g} mm, and no end")
+                raise self._broken(f"has yielded {most} rows of a segment of {whole:g} mm, and no end")
+        if way < _LEAST_SHARE * whole and whole > _POINT:  # a full circle that is taken for a line is over at once
+            kind = "an arc" if isinstance(segment, ArcSegment) else "a line"
+            raise self._broken(
+                f"has gone {way:g} mm of {kind} of {whole:g} mm: go all of it, or raise a ValueError for what it does "
+                "not handle"
+            )
 
     def steps(self, segment: Segment, T: float) -> Steps | None:
         """How a reference word method takes an arc; None for other methods and for lines."""

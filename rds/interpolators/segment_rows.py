@@ -19,8 +19,12 @@ from rds.core.toml_table import TomlTable
 from rds.core.types import ArcSegment, LineSegment, Segment
 
 FEED_UNITS = {"mm/min": 1 / 60, "mm/s": 1.0, "m/min": 1000 / 60, "in/min": 25.4 / 60, "in/s": 25.4}  # mm/s
+_MOST_AXES = 6
 _POINT = Items(
-    "one position for each axis, mm", Quantity("position", "mm"), "one to three positions in mm: X, Y, Z", least=1
+    "one position for each axis, mm, of rotary axes degrees",
+    Quantity("position", "mm"),
+    "one to six positions: mm of X, Y, Z, degrees of A, B, C",
+    least=1,
 )
 _FEED = Quantity("feed along the path, in the unit of the path", above=0.0)
 _LINE: Mapping[str, Declaration] = {"end": _POINT, "feed": _FEED}
@@ -78,8 +82,8 @@ def point(value: Any, what: str, axes: int | None) -> tuple[float, ...]:
     numbers = isinstance(value, list | tuple) and all(
         isinstance(each, int | float) and not isinstance(each, bool) and isfinite(each) for each in value
     )
-    if not numbers or not 1 <= len(value) <= 3:
-        raise InputError(f"{said} must be one to three positions in mm: X, Y, Z")
+    if not numbers or not 1 <= len(value) <= _MOST_AXES:
+        raise InputError(f"{said} must be one to six positions: mm of X, Y, Z, degrees of A, B, C")
     if axes is not None and len(value) != axes:
         raise InputError(f"{said} must have {axes} position{'s' if axes > 1 else ''}, as the start has")
     return tuple(float(each) for each in value)

@@ -1,15 +1,20 @@
-"""A part program as segments for interpolators: the linear axes in machine coordinates, and where the axes rest."""
+"""A part program as segments for interpolators: axes in machine coordinates, and where they rest.
+
+A segment's feed rate is that of all its axes together, degrees counted as mm: where rotary axes move along with X, Y
+and Z, it is so much higher than the programmed one that X, Y and Z keep to that.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import ceil, pi
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.geometry import PLANES
+from rds.core.geometry import PLANES, length, sweep
 from rds.core.types import ArcSegment, LineSegment, Segment
 
 if TYPE_CHECKING:
@@ -39,16 +44,18 @@ def program(
 ) -> Programmed:
     """The moves of a checked program in machine coordinates, rapids at the speed of the slowest axis.
 
-    Points have a position for each of `axes`, which are X, Y and Z, or those of them that the machine has.
+    Points have a position for each of `axes`, in the order of AXES.
 
-    Raises InputError for a program that moves rotary axes, moves nothing, or takes more than `most` samples of `T` s.
+    Raises InputError for a program that moves another axis or the tool's tip, moves nothing, or takes more than `most`
+    samples of `T` s.
     """
     from rds.interpolators.motion.limits import Limits
     from rds.interpolators.motion.planner import PASSING
-    from rds.interpolators.motion.segments import AXES
+    from rds.interpolators.motion.segments import AXES, JOINTS
 
-    fastest = Limits.of(machine).velocity
     columns = [AXES.index(name) for name in axes]
+    others = [k for k in range(len(AXES)) if k not in columns]
+    fastest = Limits.of(machine).velocity[columns]
     segments: list[Segment] = []
     lines: list[int] = []
     events: list[tuple[int, Event]] = []
@@ -61,12 +68,18 @@ def program(
             if row["length"] <= 0.0:
                 made.append(len(segments) - 1)
                 continue
-            if np.any(row["start"][3:] != row["end"][3:]):
+            if row["tip"] != JOINTS:
                 raise InputError(
-                    "it moves a rotary axis; interpolators take X, Y and Z: planned motion moves all axes",
+                    "G43.4 moves the tool's tip, and an interpolator moves axes; use planned motion",
                     f"line {row['line']}",
                 )
-            rate = _rapid(row, fastest) if row["rapid"] else float(row["rate"])
+            if np.any(row["start"][others] != row["end"][others]):
+                moved, taken = next(AXES[k] for k in others if row["start"][k] != row["end"][k]), ", ".join(axes)
+                raise InputError(
+                    f"it moves {moved}, and here an interpolator takes {taken}; planned motion moves all axes",
+                    f"line {row['line']}",
+                )
+            rate = _rapid(row, columns, fastest) if row["rapid"] else float(row["rate"])
             samples = _counted(samples + row["length"] / rate / T + 1.0, most, T)
             segments += _segments(row, rate, columns)
             lines += [int(row["line"])] * (len(segments) - len(lines))
@@ -100,28 +113,39 @@ def _counted(samples: float, most: int, T: float) -> float:
 
 
 def _segments(row: np.ndarray, rate: float, columns: list[int]) -> list[Segment]:
-    start, end, middle = (row[name][columns] for name in ("start", "end", "centre"))
+    """The segments of a move at `rate` along its length: of X, Y, Z where they move, else of the rotary axes."""
+    start, end = (tuple(row[name][columns].tolist()) for name in ("start", "end"))
+    way = row["end"] - row["start"]
+    both = bool(way[:3].any() or row["plane"] >= 0) and bool(way[3:].any())
     if row["plane"] < 0:
-        return [LineSegment(tuple(start.tolist()), tuple(end.tolist()), rate)]
+        straight = LineSegment(start, end, rate)
+        return [_lasting(straight, float(row["length"] / rate)) if both else straight]
     first, second = tuple(PLANES.values())[int(row["plane"])]  # both there, or the check has refused the arc
     plane = columns.index(first), columns.index(second)
+    middle = tuple(float(row["centre"][k]) if k < len(row["centre"]) else 0.0 for k in columns)
     count = max(1, ceil(abs(row["sweep"]) / _TURN))
     turns = count - 1  # whole turns first, each of them a segment of its own
     pieces: list[Segment] = []
     here = start
     for k in range(count):
-        there = end.copy()
+        part = 2 * pi * (k + 1) / abs(row["sweep"])
+        there = end if k == turns else tuple(a + (b - a) * part for a, b in zip(start, end, strict=True))
         if k < turns:
-            there[:] = start + (end - start) * (2 * pi * (k + 1) / abs(row["sweep"]))
-            there[list(plane)] = start[list(plane)]
-        a, b, centre = (tuple(point.tolist()) for point in (here, there, middle))
-        pieces.append(ArcSegment(a, b, centre, rate, bool(row["sweep"] < 0), plane))
+            there = tuple(start[i] if i in plane else value for i, value in enumerate(there))
+        piece = ArcSegment(here, there, middle, rate, bool(row["sweep"] < 0), plane)
+        share = abs(sweep(piece) / row["sweep"])
+        pieces.append(_lasting(piece, float(share * row["length"] / rate)) if both else piece)
         here = there
     return pieces
 
 
-def _rapid(row: np.ndarray, fastest: np.ndarray) -> float:
-    """mm/s: no axis faster than it can."""
-    share = np.abs(row["end"] - row["start"])[:3] / row["length"]
+def _lasting(segment: Segment, seconds: float) -> Segment:
+    """The segment at the feed rate at which it takes so long."""
+    return replace(segment, feed_rate=length(segment) / seconds)
+
+
+def _rapid(row: np.ndarray, columns: list[int], fastest: np.ndarray) -> float:
+    """The rate along the move's length at which no axis is faster than it can."""
+    share = np.abs(row["end"] - row["start"])[columns] / row["length"]
     moving = share > 0.0
-    return float((fastest[:3][moving] / share[moving]).min())
+    return float((fastest[moving] / share[moving]).min())

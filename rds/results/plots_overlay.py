@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from rds.results.result import Result
 
 _ROW_HEIGHT = 2.7  # inches
+_PAIR: tuple[dict[str, Any], ...] = (
+    {"color": ORANGE, "linewidth": 2.4, "alpha": 0.9},
+    {"color": BLUE, "linewidth": 1.2},
+)  # two results over each other
 _NARROWEST = 7.4  # inches that a legend has, also where the picture is made narrower to fit beside settings
 
 
@@ -56,18 +60,27 @@ def modes(results: Sequence[Result], labels: Sequence[str] | None = None) -> Pic
 
 
 def comparison(compared: Comparison) -> Picture:
-    """Two results: per axis both measured responses to the left and their difference, b - a, to the right."""
+    """Two results: per axis both measured responses to the left and their difference, b - a, to the right.
+
+    Runs along a path have a last row: how far the measured and the commanded positions are off the programmed path.
+    """
     from rds.results.comparison_text import labels
 
     names = labels(compared)
-    picture = Picture(_ROW_HEIGHT * len(compared.axes) + 0.4)
-    grid = picture.subplots(len(compared.axes), 2, squeeze=False, sharex=True)
+    off = [
+        (column, label)
+        for column, label in (("contour_error", "measured"), ("path_error", "commanded"))
+        if column in compared.a and column in compared.b
+    ]
+    count = len(compared.axes) + bool(off)
+    picture = Picture(_ROW_HEIGHT * count + 0.4)
+    grid = picture.subplots(count, 2, squeeze=False, sharex=True)
     for row, (axis, about) in enumerate(compared.axes.items()):
         left, right = grid[row]
         column = f"{axis}_measured"
         _reference(left, [compared.a, compared.b], axis)
-        left.plot(compared.a["time"], compared.a[column], label=names[0], color=ORANGE, linewidth=2.4, alpha=0.9)
-        left.plot(compared.b["time"], compared.b[column], label=names[1], color=BLUE, linewidth=1.2)
+        for result, name, style in zip((compared.a, compared.b), names, _PAIR, strict=True):
+            left.plot(result["time"], result[column], label=name, **style)
         time, difference = compared.difference(axis)
         right.plot(
             time, difference, color=VERMILLION, linewidth=0.9, label=f"RMS {about.rms_difference:.4g} {about.unit}"
@@ -78,6 +91,13 @@ def comparison(compared: Comparison) -> Picture:
         dress(right, f"{axis} difference, b − a [{about.unit}]", x)
         legend(left)
         legend(right)
+    for axes, (column, label) in zip(grid[-1], off, strict=False):
+        for result, name, style in zip((compared.a, compared.b), names, _PAIR, strict=True):
+            axes.plot(result["time"], result[column] * 1e3, label=name, **style)
+        dress(axes, f"{label}, off the path [µm]")
+        legend(axes)
+    for axes in grid[-1][len(off) :] if off else ():
+        axes.set_axis_off()
     picture.align_ylabels()
     return picture
 

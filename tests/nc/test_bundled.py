@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import dist, pi
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,15 @@ import pytest
 from documents import ROOT
 from typer.testing import CliRunner
 
+import rds
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
-from rds.nc.bundled import Bundled, bundled, find_bundled
+from rds.nc.bundled import Bundled, bundled, bundled_paths, find_bundled
 from rds.nc.check import Setup, motion
 from rds.nc.run.run import PartProgram
 
-PROGRAMS = bundled()
+PROGRAMS, PATHS = bundled(), bundled_paths()
 
 
 def copied(program: Bundled, folder: Path) -> Path:
@@ -75,25 +77,55 @@ def test_the_shapes_are_what_their_titles_say() -> None:
     assert np.ptp(cut["end"][:, 0]) == 40.0 and np.ptp(cut["end"][:, 1]) == 30.0 and cut["end"][-1, 2] == -1.0
 
 
-def test_the_examples_are_the_same() -> None:
-    folder = ROOT / "examples" / "programs"
+@pytest.mark.parametrize("kind, of", [("programs", PROGRAMS), ("paths", PATHS)])
+def test_the_examples_are_the_same(kind: str, of: dict[str, Bundled]) -> None:
+    folder = ROOT / "examples" / kind
     assert {file.name: file.read_text() for file in folder.iterdir()} == {
-        name: program.text() for name, program in PROGRAMS.items()
+        name: each.text() for name, each in of.items()
     }
+
+
+@pytest.mark.parametrize(
+    ("name", "length"),
+    [
+        ("square", 80.0),
+        ("circle", 20.0 * pi),
+        ("quadrants", 40.0 * pi),
+        ("pocket", 8.0 + (44.0 - 16.0 + 4.0 * pi) + 4.0 + (76.0 - 16.0 + 4.0 * pi) + 12.0),
+        ("dcs-table-5-2", 2 * dist((70.0, 20.0), (0.0, 0.0))),
+        ("oacs-p001", dist((100.0, 25.0), (0.0, 0.0))),
+    ],
+)
+def test_a_path_is_followed_by_the_example_of_an_interpolator(name: str, length: float) -> None:
+    bundle = PATHS[f"{name}.toml"]
+    reference = {"kind": "path", "file": str(bundle.path), "interpolator": str(ROOT / "examples/my_interpolator.py")}
+    axes = ["X", "A"] if bundle.machine == "mrmt-oacs" else ["X", "Y"]
+    experiment = rds.Experiment(
+        machine=bundle.machine, axis=axes, controller="tracking", sample_period=0.01, reference=reference
+    )
+    result = experiment.run()
+    way = np.column_stack([result[f"{axis}_reference"] for axis in axes])
+    assert np.linalg.norm(np.diff(way, axis=0), axis=1).sum() == pytest.approx(length, rel=2e-3)
+    about = result.meta["program"]
+    assert about["path_error"]["max"] < 1e-9 and about["contour_error"]["max"] < 0.2
+    assert all(share["acceleration"] < 1.0 for share in about["limit_shares"].values())
 
 
 def test_the_command_lists_and_copies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    listed = json.loads(CliRunner().invoke(app, ["nc", "bundled", "--json"]).stdout)["programs"]
-    assert {each["name"] + ".ngc": each["machine"] for each in listed} == {
-        name: program.machine for name, program in PROGRAMS.items()
-    }
+    listed = json.loads(CliRunner().invoke(app, ["nc", "bundled", "--json"]).stdout)
+    for kind, ending, of in (("programs", ".ngc", PROGRAMS), ("paths", "", PATHS)):
+        found = {each["name"] + ending: each["machine"] for each in listed[kind]}
+        assert found == {name: each.machine for name, each in of.items()}
     assert "pocket" in CliRunner().invoke(app, ["nc", "bundled"]).stdout
     done = CliRunner().invoke(app, ["nc", "bundled", "circle"])
     assert done.exit_code == 0 and Path("circle.ngc").read_text() == PROGRAMS["circle.ngc"].text()
+    done = CliRunner().invoke(app, ["nc", "bundled", "circle.toml"])
+    assert "path: circle.toml (for mini-cnc)" in done.stdout
+    assert Path("circle.toml").read_text() == PATHS["circle.toml"].text()
     for words, said in (
         (["circle"], "is there already"),
-        (["star"], "no part program 'star'"),
+        (["star"], "no part program or path 'star'"),
         (["-o", "x.ngc"], "none is named"),
     ):
         refused = CliRunner().invoke(app, ["nc", "bundled", *words])

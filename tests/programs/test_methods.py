@@ -43,6 +43,15 @@ def test_the_library_along_a_circle(tmp_path: Path) -> None:
     assert 1.0 < circular["contour error, RMS [µm]"] < circular["contour error, max [µm]"] < 100.0
 
 
+def test_a_method_of_one_kind_is_refused_where_the_other_comes(tmp_path: Path) -> None:
+    """In the middle of the path, by the loop; the others are compared all the same."""
+    path = tmp_path / "both.toml"
+    path.write_text(CIRCLE + '[[segment]]\nkind = "line"\nend = [0.5, 0.0]\n')
+    refused = {each.name: each.refused for each in compare_methods(path, sample_period=0.01) if each.refused}
+    assert set(refused) == {"linear", "circular"}
+    assert "straight moves only" in refused["linear"] and "arcs only" in refused["circular"]
+
+
 def test_an_own_file_stands_beside_them_and_the_page_is_written(tmp_path: Path) -> None:
     (tmp_path / "line.toml").write_text('start = [0.0]\nfeed = 600\n[[segment]]\nkind = "line"\nend = [2.0]\n')
     (tmp_path / "halves.py").write_text(HALVES)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +21,12 @@ from rds.interpolators.path import interpolate
 from rds.machines import load_machine
 from rds.modes.loop.execution import State
 from rds.modes.loop.interpolated import Interpolated
-from rds.nc.run.path import Method, program_of
+from rds.modes.loop.program import InterpolatedProgram
+from rds.nc.run.judge import located
+from rds.nc.run.methods import compare_methods
+from rds.nc.run.path import Method, as_prepared, program_of
+from rds.nc.run.pictures import along, path
+from rds.nc.run.report import findings
 from rds.nc.run.run import PartProgram
 
 T = 0.001
@@ -112,7 +115,50 @@ def test_segments_may_stand_in_the_experiment(here: Path) -> None:
             "segment": [{"kind": "arc", "end": [0.0, 0.0], "centre": [5.0, 0.0]}],
         },
     )
-    assert np.array_equal(positions(inline.run()), positions(follow().run()))
+    of_rows = inline.run()
+    assert np.array_equal(positions(of_rows), positions(follow().run()))
+    objects = [ArcSegment((0.0, 0.0), (0.0, 0.0), (5.0, 0.0), 10.0)]
+    of_objects = rds.Experiment(axis=["X", "Y"], controller="tracking", reference={"kind": "path", "segment": objects})
+    result = of_objects.run(out=here / "saved")
+    assert np.array_equal(positions(result), positions(of_rows))
+    assert np.array_equal(positions(rds.open_result(here / "saved")), positions(of_rows))
+    with pytest.raises(InputError, match=r"feed = 600 goes with rows; segments that are objects have their own"):
+        rds.Experiment(axis=["X", "Y"], reference={"kind": "path", "segment": objects, "feed": 600})
+
+
+def test_programmed_commanded_and_measured_are_told_and_drawn_together(here: Path) -> None:
+    """The filter makes the circle smaller, which is the commanded path's error; the axes add theirs."""
+    experiment = follow(interpolator="constant-velocity", acceleration={"name": "s-shape", "time": 0.2})
+    result = experiment.run()
+    said = " ".join(findings(result.meta["program"]))
+    assert "The measured position is at most 0.0" in said and "What was commanded is at most 0.0" in said
+    program = experiment.plan().program
+    assert isinstance(program, InterpolatedProgram)
+    prepared = as_prepared(program, Path("path"), T)
+    prepared = located(result, prepared)
+    (place, _) = path(result, prepared).axes  # the other is the scale of colours
+    lines = {line.get_label(): np.nan_to_num(line.get_xydata(), nan=5.0) for line in place.lines}
+    radius = {label: np.hypot(*(lines[label] - [5.0, 0.0]).T) for label in ("programmed", "commanded")}
+    assert radius["programmed"] == pytest.approx(5.0) and np.median(radius["commanded"]) < 5.0 - 1e-3
+    off = {line.get_label(): line.get_ydata().max() for line in along(result, prepared).axes[0].lines}
+    assert off["commanded"] == pytest.approx(1e3 * result["path_error"].max())
+    assert off["measured"] == pytest.approx(1e3 * result["contour_error"].max())
+    compared = rds.compare(result, follow(interpolator="constant-velocity").run())
+    last = {axes.get_ylabel(): len(axes.lines) for axes in compared.plot().axes[-2:]}
+    assert last == {"measured, off the path [µm]": 2, "commanded, off the path [µm]": 2}
+
+
+@pytest.mark.parametrize("run", ["experiment", "methods"])
+def test_a_circle_taken_for_a_line_is_no_contour_without_error(here: Path, run: str) -> None:
+    """The example of the document is for lines: on a full circle, whose end is its start, it would never move."""
+    (here / "lines_only.py").write_text(
+        "def interpolate(segment, T, params):\n    yield segment.end, [0.0] * 2, [0.0] * 2\n"
+    )
+    with pytest.raises(ContractError, match=r"has gone 0 mm of an arc of 31\.4159 mm: go all of it"):
+        if run == "experiment":
+            follow(interpolator="lines_only.py").run()
+        else:
+            compare_methods(here / "circle.toml", [here / "lines_only.py"])
 
 
 def test_one_axis_and_two_that_are_no_neighbours(here: Path) -> None:
@@ -284,55 +330,6 @@ def test_the_command_runs_a_student_s_interpolator(here: Path) -> None:
     assert ran.exit_code == 0, ran.output
     assert '"interpolator": "mine.py"' in ran.stdout and '"path_error"' in ran.stdout
     assert (here / "out" / "program.html").is_file()
-
-
-@pytest.mark.realtime
-@pytest.mark.parametrize("mode", ["emulation", "implementation"])
-def test_it_runs_in_real_time_held_and_slowed(here: Path, mode: str) -> None:
-    experiment = rds.Experiment(
-        axis=["X", "Y"],
-        controller="tracking",
-        sample_period=0.005,
-        reference={"kind": "path", "file": "lines.toml", "interpolator": "mine.py", "acceleration": "linear"},
-    )
-    run = experiment.start(mode)
-    assert run.ready(60.0)
-    run.desk.set("override", 0.5)
-    run.desk.set("hold", 1.0)
-    held: Callable[[], bool] = lambda: run.rows is not None and run.rows["program_state"][-1] == State.HELD  # noqa: E731
-    for _ in range(600):
-        if held() or run.done:
-            break
-        run.ready(0.05)
-        time.sleep(0.05)
-    assert held()
-    run.desk.set("hold", 0.0)
-    result = run.wait()
-    assert result.meta["ending"] == "done" and positions(result)[-1].tolist() == [6.0, 4.0]
-    assert result["interpolate"].max() > 0.0 and "interpolate" in result.meta["timing"]
-    again = experiment.run("simulation", changes=[change[:2] + change[3:] for change in result.meta["changes"]])
-    if mode == "emulation":
-        for column in again.columns:
-            assert np.array_equal(again[column], result[column]), column
-    else:
-        assert result["contour_error"].max() < 0.5
-
-
-@pytest.mark.realtime
-def test_a_slow_interpolator_has_missed_and_is_named(here: Path) -> None:
-    slow = MINE.replace(
-        "        at = [",
-        "        until = time.perf_counter() + 0.012\n        while time.perf_counter() < until: pass\n        at = [",
-    )
-    (here / "slow.py").write_text("import time\n" + slow)
-    experiment = rds.Experiment(
-        axis=["X", "Y"],
-        controller="tracking",
-        sample_period=0.01,
-        reference={"kind": "path", "file": "lines.toml", "interpolator": "slow.py"},
-    )
-    result = experiment.run("emulation")
-    assert result.verdict == "missed" and "the interpolator (" in result.meta["verdict_reason"]
 
 
 def test_the_report_of_a_path_has_its_picture_and_speaks_of_segments(here: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from rds import Experiment
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.machines import load_machine
@@ -122,11 +123,42 @@ def test_an_interpolator_s_arc_lies_in_the_plane_of_the_axes_that_there_are(tmp_
     assert planned["X_reference"].min() == pytest.approx(result["X_reference"].min(), abs=0.01)
 
 
-def test_an_interpolator_refuses_rotary_moves(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"line 3: it moves a rotary axis; .*planned motion moves all axes"):
-        PartProgram(written(tmp_path, PROGRAMS["XC"]), str(machine(tmp_path, "XC")), interpolator="tustin")
-    with pytest.raises(InputError, match="has none of X, Y and Z"):
-        PartProgram(written(tmp_path, PROGRAMS["C"]), str(machine(tmp_path, "C")), interpolator="tustin")
+@pytest.mark.parametrize("axes", ["XC", "C"])
+def test_an_interpolator_moves_rotary_axes_at_the_planned_feed(axes: str, tmp_path: Path) -> None:
+    """X keeps to F while C comes along; alone C has F in degrees/min. Planned motion is slower by its ramps alone."""
+    part = PartProgram(written(tmp_path, PROGRAMS[axes]), str(machine(tmp_path, axes)), interpolator="tustin")
+    result = part.run()
+    assert result.meta["program"]["completed"] and result.axes == list(axes) and result["C_reference"][-1] == 0.0
+    assert ("path_error" in result.meta["program"]) == (axes == "XC")
+    line = result["program_line"].astype(int)
+    fed = {"XC": (3, "X", 600.0 / 60), "C": (3, "C", 1200.0 / 60)}[axes]
+    speed = np.abs(np.diff(result[f"{fed[1]}_reference"]))[line[1:] == fed[0]] / 0.001
+    assert np.median(speed) == pytest.approx(fed[2])
+    planned = PartProgram(part.prepared.file, str(tmp_path / f"{axes}.toml")).run()
+    assert 0.0 < planned["time"][-1] - result["time"][-1] < 0.6
+    assert path(result, part.prepared).axes and along(result, part.prepared).axes
+
+
+def test_a_path_may_turn_an_axis_but_no_arc_is_of_one(tmp_path: Path) -> None:
+    rows = [{"kind": "line", "end": [3.0, 9.0]}]
+    words = {"kind": "path", "start": [0.0, 0.0], "feed": 300, "segment": rows}
+    on = {"machine": str(machine(tmp_path, "XC")), "axis": ["X", "C"], "controller": "tracking"}
+    led = Experiment(**on, reference=words).run()
+    planned = Experiment(**on, reference=words | {"profile": "planned"}).run()
+    for result in (led, planned):
+        assert (result["X_reference"][-1], result["C_reference"][-1]) == (3.0, 9.0)
+        # the feed is that of both axes together, degrees counted as mm
+        assert result["X_reference_velocity"].max() == pytest.approx(5.0 * 3.0 / 90.0**0.5, rel=1e-3)
+    arc = [{"kind": "arc", "end": [0.0, 0.0], "centre": [3.0, 0.0]}]
+    with pytest.raises(InputError, match=r"segment 1 is an arc in which C takes part; arcs are of X, Y and Z"):
+        Experiment(**on, reference=words | {"segment": arc})
+
+
+def test_an_interpolator_does_not_move_the_tip(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"line 2: G43\.4 moves the tool's tip, and an interpolator moves axes"):
+        PartProgram(
+            written(tmp_path, "G21 G90 G43.4 G64 P0.1 F300\nG1 X2 Y0 Z0 A5\nM2\n"), "xyzac", interpolator="tustin"
+        )
 
 
 def test_p001_of_the_thesis_runs_and_says_what_is_assumed(tmp_path: Path) -> None:

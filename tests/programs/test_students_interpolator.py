@@ -112,6 +112,10 @@ def test_it_runs_in_every_mode_held_and_slowed_down(here: Path, of: str, mode: s
     # the filter cuts corners; what it is off the path, and the loop, is told
     assert about["path_error"]["max"] < 0.15 and about["contour_error"]["max"] < 0.3
     assert all(about["limit_shares"][axis]["acceleration"] < 1.0 for axis in about["limit_shares"])
+    end = [0.0, 0.0] if of == "circle" else [0.0, 2.0, -0.5]
+    assert [result[f"{axis}_reference"][-1] for axis in "XYZ"[: len(end)]] == pytest.approx(end, abs=1e-12)
+    if mode != "simulation":
+        assert result["interpolate"].max() > 0.0 and "interpolate" in result.meta["timing"]
     if mode == "emulation":
         again = made.run("simulation", changes=[(at, name, new) for at, name, _, new in result.meta["changes"]])
         for column in again.columns:

@@ -207,6 +207,13 @@ def test_each_kind_has_a_default_program(kind: str, name: str, tmp_path: Path) -
     assert said["samples"] == done.samples and said["path_error_mm"] == pytest.approx(done.path_error.max())
 
 
+def test_a_path_of_rds_is_in_the_list(tmp_path: Path) -> None:
+    panel = make(tmp_path, kind="both", given="bundled", bundled="pocket.toml", period=0.01)
+    done = run(panel)
+    said = command(str(find_bundled("pocket.toml").path), "--period", "0.01")
+    assert said["samples"] == done.samples and len(done.segments) == 21
+
+
 def test_a_program_of_lines_is_refused_where_arcs_are_interpolated(tmp_path: Path) -> None:
     panel = make(tmp_path, kind="circular", given="bundled", bundled="square.ngc")
     with pytest.raises(InputError, match="segment 1 is a line, and interpolation is circular"):

@@ -34,8 +34,9 @@ LEAST_AHEAD = 3  # rows: a ramp that ends at a row may pass more than one of the
 _SHARE = 0.5  # of an axis's acceleration and jerk for a change of the rate; the path's own motion has the rest
 _LANDS_WITH = 0.25  # of them for ending at a row
 _FASTEST = 1.5  # times an axis's velocity that a row may ask for: the drive would follow, and nobody meant it
-_ROUNDED = 0.02  # mm that rounding to BLU may add to a row
+_ROUNDED = 0.02  # mm or degrees that rounding to BLU may add to a row
 _BEYOND = 1e-6  # mm that the last digits of a path may lie beyond the travel
+_ROTARY = "ABC"
 _UNKNOWN = 1 << 50  # samples: the end is not in sight
 
 
@@ -156,14 +157,15 @@ class Interpolated(Paced):
             if low <= value <= high and abs(value - last) <= self._longest[axis]:
                 continue
             name, number = self._program.axes[axis], self._first + len(self._rows)
-            where = f"row {number} of the interpolator sends {name} from {last:g} to {value:g} mm"
+            unit = "degrees" if name in _ROTARY else "mm"
+            where = f"row {number} of the interpolator sends {name} from {last:g} to {value:g} {unit}"
             if not low <= value <= high:
                 raise ContractError(
-                    f"{where}; it travels from {low:g} to {high:g} mm", self._program.about["interpolator"]
+                    f"{where}; it travels from {low:g} to {high:g} {unit}", self._program.about["interpolator"]
                 )
             speed = abs(value - last) / self._T
             raise ContractError(
-                f"{where} in one sample, {speed:g} mm/s; it moves at {self._velocity[axis]:g} mm/s "
+                f"{where} in one sample, {speed:g} {unit}/s; it moves at {self._velocity[axis]:g} {unit}/s "
                 "at most: let each row follow the one before at the segment's feed rate",
                 self._program.about["interpolator"],
             )

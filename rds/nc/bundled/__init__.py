@@ -1,7 +1,7 @@
-"""Part programs that come with the package: to begin with, and to test interpolators by, as the paper's panel has them.
+"""Part programs and paths that come with the package: to begin with, and to test interpolators by, as in the paper.
 
-Each is a file `NAME.ngc` here. Its first comment says what it is; a comment `(machine: NAME)` names the machine it is
-for, mini-cnc otherwise.
+Each is a file `NAME.ngc` or `NAME.toml` here. Its first comment says what it is; a comment `(machine: NAME)`, or
+`# machine: NAME`, names the machine it is for, mini-cnc otherwise.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from pathlib import Path
 
 from rds.core.errors import InputError
 
-_ENDING = ".ngc"
-_COMMENT = re.compile(r"\(([^()]*)\)")
-_MACHINE = re.compile(r"\(machine: ([^()\s]+)\)")
+PROGRAM, PATH = ".ngc", ".toml"
+_COMMENT = {PROGRAM: re.compile(r"\(([^()]*)\)"), PATH: re.compile(r"# (.*)")}
+_MACHINE = {PROGRAM: re.compile(r"\(machine: ([^()\s]+)\)"), PATH: re.compile(r"# machine: (\S+)")}
 
 
 @dataclass(frozen=True)
 class Bundled:
-    """One of them: `file` is its name with .ngc."""
+    """One of them: `file` is its name with its ending."""
 
     file: str
     title: str
@@ -29,27 +29,36 @@ class Bundled:
     path: Path
 
     def text(self) -> str:
-        """The program."""
+        """Its text."""
         return self.path.read_text(encoding="utf-8")
 
 
-@cache
 def bundled() -> dict[str, Bundled]:
-    """All of them by file name."""
-    folder = Path(str(files("rds.nc.bundled")))
-    found = {}
-    for path in sorted(folder.glob(f"*{_ENDING}")):
-        text = path.read_text(encoding="utf-8")
-        title, machine = _COMMENT.search(text), _MACHINE.search(text)
-        assert title is not None
-        found[path.name] = Bundled(path.name, title[1], machine[1] if machine else "mini-cnc", path)
-    return found
+    """All part programs by file name."""
+    return _of(PROGRAM)
+
+
+def bundled_paths() -> dict[str, Bundled]:
+    """All paths by file name: files that `[reference] file`, `rds interpolate` and `rds nc methods` take."""
+    return _of(PATH)
 
 
 def find_bundled(name: str) -> Bundled:
-    """The one called `name`, with or without .ngc. InputError names the ones there are."""
-    wanted = name if name.endswith(_ENDING) else name + _ENDING
-    if wanted not in bundled():
-        known = ", ".join(each.removesuffix(_ENDING) for each in bundled())
-        raise InputError(f"no part program {name!r} comes with the package; there are {known}")
-    return bundled()[wanted]
+    """The program called `name`, with or without .ngc, or the path `name`, with .toml; InputError names them all."""
+    every = bundled() | bundled_paths()
+    wanted = name if name.endswith((PROGRAM, PATH)) else name + PROGRAM
+    if wanted not in every:
+        known = ", ".join(each.removesuffix(PROGRAM) for each in every)
+        raise InputError(f"no part program or path {name!r} comes with the package; there are {known}")
+    return every[wanted]
+
+
+@cache
+def _of(ending: str) -> dict[str, Bundled]:
+    found = {}
+    for path in sorted(Path(str(files("rds.nc.bundled"))).glob(f"*{ending}")):
+        text = path.read_text(encoding="utf-8")
+        title, machine = _COMMENT[ending].search(text), _MACHINE[ending].search(text)
+        assert title is not None
+        found[path.name] = Bundled(path.name, title[1], machine[1] if machine else "mini-cnc", path)
+    return found

@@ -52,7 +52,7 @@ def judged(result: Result, prepared: Prepared) -> Result:
         "waiting_samples": len(result) - int(moves.sum()),
         "limit_shares": _limit_shares(result, prepared),
         "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) and linear else None,
-        **({"path_error": worst(columns["path_error"], line, on_path, "mm")} if is_reference else {}),
+        **({"path_error": worst(columns["path_error"], line, on_path, "mm")} if is_reference and linear else {}),
         **prepared.about,
         **_force(result, worst, moves),
         "following_error": {

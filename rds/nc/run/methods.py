@@ -72,8 +72,8 @@ def compare_methods(
 ) -> list[Compared]:
     """Every method of the library, and the users' files `own`, along the path (or part program) in `file`, simulated.
 
-    A method that refuses the path (`circular` a line) says so in `refused`. InputError for what is wrong with the path,
-    the machine or the words; ContractError for an own interpolator that breaks its interface.
+    A method that refuses a segment of the path (`circular` a line) says so in `refused`. InputError for what is wrong
+    with the path, the machine or the words; ContractError for an own interpolator that breaks its interface.
     """
     path = Path(file)
     if not path.is_file():
@@ -92,9 +92,7 @@ def compare_methods(
         try:
             experiment = Experiment.from_table(table)
             result = experiment.run(SIMULATION)
-        except ContractError:
-            raise
-        except InputError as error:
+        except (ContractError, InputError) as error:  # before the run, or at the segment that it does not take
             if name not in LIBRARY.modules or name == LIBRARY.names()[0]:  # which takes every path
                 raise
             found.append(Compared(name, refused=str(error)))

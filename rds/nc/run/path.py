@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.geometry import PLANES, length
+from rds.core.geometry import length
 from rds.core.last_made import LastMade
 from rds.core.load import StudentFile, from_function
 from rds.core.quantities import Anything, Choice, Flag, Items, Quantity, Table, Text
@@ -26,9 +26,8 @@ from rds.interpolators.acceleration import Acceleration, make_acceleration, smoo
 from rds.interpolators.interpolator import Interpolator, find_interpolator, from_student
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.profiles import BLENDED, PROFILES
-from rds.interpolators.motion.segments import AXES, BLEND, EXACT_STOP, arc, line
+from rds.interpolators.motion.segments import AXES, BLEND, EXACT_STOP
 from rds.interpolators.path import check_chain
-from rds.interpolators.segment import Arc
 from rds.interpolators.segment_rows import SEGMENTS, read_segments, segments_of
 from rds.machines import Machine
 from rds.modes.loop.interpolated import LEAST_AHEAD
@@ -37,14 +36,13 @@ from rds.nc.check import Setup, motion
 from rds.nc.interpolator_segments import program as moves_of
 from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import judged
+from rds.nc.run.path_segments import check_room, in_machine_axes, without_idle
 from rds.nc.run.prepare import Prepared, planned, prepare
 from rds.results import Result
 
 SUFFIX = ".toml"  # of a path file; any other is a part program
 MOST_SAMPLES = 20_000_000
 _MOST_AHEAD = 100_000
-_ARC_POINTS = 65  # of an arc, looked at for the travel of the axes
-_LINEAR = AXES[:3]
 _OF_AN_INTERPOLATOR = ("interpolator", "params", "acceleration", "exact_stop", "look_ahead")
 
 WORDS = Table(
@@ -179,8 +177,8 @@ def _planned(
     At rest at the end of the segments in `rests`.
     """
     check_chain(segments, T)
-    _check_room(segments, lines, machine, axes)
-    path = _path(segments, lines, [AXES.index(each) for each in axes])
+    check_room(segments, lines, machine, axes)
+    path = in_machine_axes(segments, lines, [AXES.index(each) for each in axes])
     if profile == BLENDED:
         path["mode"] = BLEND
     path["mode"][list(rests)] = EXACT_STOP
@@ -213,22 +211,20 @@ def of_part_program(
 ) -> InterpolatedProgram:
     """A part program whose moves `method` interpolates, rapids at the speed of the slowest axis.
 
-    InputError or ProgramError for a program that the machine cannot run, and for one that moves rotary axes.
+    Of the rotary axes it has those that the program moves. InputError or ProgramError for a program that the machine
+    cannot run, and for one that moves the tool's tip.
     """
     if not file.is_file():
         raise InputError("there is no such part program; check the name and the folder", str(file))
-    axes = [name for name in _LINEAR if name in machine.axes]
-    if not axes:
-        raise InputError(f"{machine.name} has none of X, Y and Z, which an interpolator moves", str(file))
+    every = [name for name in AXES if name in machine.axes]
     notes: list[str] = []
-    programmed = moves_of(motion(file, machine, setup or Setup(), progress, notes), machine, T, MOST_SAMPLES, axes)
+    programmed = moves_of(motion(file, machine, setup or Setup(), progress, notes), machine, T, MOST_SAMPLES, every)
+    axes, segments = without_idle(every, programmed.segments)
     due: dict[int, tuple[Happening, ...]] = {}
     for after, event in programmed.events:
         due[after] = (*due.get(after, ()), Happening(0, event.kind, float(event.value), event.line))
     first = due.pop(-1, ())
-    made = program_of(
-        file.name, programmed.segments, programmed.lines, due, first, method, machine, axes, T, spindle=True
-    )
+    made = program_of(file.name, segments, programmed.lines, due, first, method, machine, axes, T, spindle=True)
     return replace(made, notes=(*notes, *made.notes))
 
 
@@ -269,6 +265,12 @@ def _filter(words: TomlTable) -> Acceleration | None:
 
 
 def _inline(words: TomlTable) -> list[Segment]:
+    given = words.any("segment")
+    if isinstance(given, Sequence) and given and all(isinstance(each, LineSegment | ArcSegment) for each in given):
+        for key in ("start", "feed", "feed_unit"):
+            if key in words:
+                raise words.fault(key, "goes with rows; segments that are objects have their own: remove it")
+        return list(given)
     for key in ("start", "feed", "segment"):
         if key not in words:
             raise InputError(f"{key} of the path is missing; it needs start, feed and segment", words.place())
@@ -290,7 +292,7 @@ def program_of(
 ) -> InterpolatedProgram:
     """The program of these segments; `due` says after which of them the axes rest, and what happens there."""
     check_chain(segments, T)
-    _check_room(segments, lines, machine, axes)
+    check_room(segments, lines, machine, axes)
     weights = method.acceleration.weights(T) if method.acceleration else np.ones(1)
     ends = set(due) | (set(range(len(segments))) if method.exact_stop else set()) | {len(segments) - 1}
     stretches, begin, samples = [], 0, 1
@@ -320,7 +322,7 @@ def program_of(
         home=(0.0,) * len(axes),
         limits=np.array([limits.velocity, limits.acceleration, limits.jerk])[:, order],
         travel=np.array([machine.axes[each].travel for each in axes], dtype=float),
-        path=_path(segments, lines, order),
+        path=in_machine_axes(segments, lines, order),
         about={
             "interpolator": method.interpolator.name,
             "interpolator_params": dict(method.interpolator.params),
@@ -358,56 +360,6 @@ class _Rows:
         for position, velocity, acceleration in rows:
             at = position if blu is None else np.rint(position / blu) * blu
             yield at.tolist(), velocity.tolist(), acceleration.tolist(), number
-
-
-def _check_room(segments: Sequence[Segment], lines: Sequence[int], machine: Machine, axes: Sequence[str]) -> None:
-    """InputError for a path that leaves the travel of an axis, or axes that a path does not move."""
-    wrong = [name for name in axes if name not in _LINEAR]
-    if wrong or list(axes) != [name for name in _LINEAR if name in axes]:
-        raise InputError(f"a path moves X, Y and Z, in that order, and the run has {', '.join(axes)}; change axes")
-    for segment, number in zip(segments, lines, strict=True):
-        points = np.array([segment.start, segment.end])
-        if isinstance(segment, ArcSegment):
-            points = Arc.of(segment).points(np.linspace(0.0, 1.0, _ARC_POINTS))
-        for i, name in enumerate(axes):
-            low, high = machine.axes[name].travel
-            if points[:, i].min() < low - 1e-9 or points[:, i].max() > high + 1e-9:
-                raise InputError(
-                    f"segment {number} takes {name} from {points[:, i].min():g} to {points[:, i].max():g} mm; "
-                    f"it travels from {low:g} to {high:g} mm; move the path into that range"
-                )
-
-
-def _path(segments: Sequence[Segment], lines: Sequence[int], order: Sequence[int]) -> np.ndarray:
-    """The segments as rows of SEGMENT, in machine axes."""
-    planes = list(PLANES.values())
-    rows = []
-    for segment, number in zip(segments, lines, strict=True):
-        start, end = _in_space(segment.start, order), _in_space(segment.end, order)
-        if isinstance(segment, ArcSegment):
-            plane = order[segment.plane[0]], order[segment.plane[1]]
-            is_seen_from_behind = plane not in planes
-            rows.append(
-                arc(
-                    start,
-                    end,
-                    _in_space(segment.centre, order),
-                    segment.feed_rate,
-                    clockwise=segment.clockwise != is_seen_from_behind,
-                    plane=planes.index(plane[::-1] if is_seen_from_behind else plane),
-                    program_line=number,
-                )
-            )
-        else:
-            rows.append(line(start, end, segment.feed_rate, program_line=number))
-    return np.concatenate(rows)
-
-
-def _in_space(point: Sequence[float], order: Sequence[int]) -> list[float]:
-    whole = [0.0, 0.0, 0.0]
-    for i, value in zip(order, point, strict=True):
-        whole[i] = float(value)
-    return whole
 
 
 def judged_path(result: Result, made: InterpolatedProgram | Program, T: float) -> Result:

@@ -9,8 +9,10 @@ import numpy as np
 from rds.core.figure import BLACK, CYCLE, GREY, ORANGE, SKY, VERMILLION, Picture, dress, legend
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import InterpolatedProgram
+from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import worst_lines
 from rds.nc.run.prepare import Prepared
+from rds.nc.trace import Trace
 from rds.results import Result
 
 if TYPE_CHECKING:
@@ -23,6 +25,8 @@ _NAMED = 3  # of the worst lines
 _MARKERS = ("o", "s", "D")
 _WORST: dict[str, Any] = {"markersize": 9, "markerfacecolor": "none", "color": VERMILLION, "zorder": 3}
 _CUT: dict[str, Any] = {"color": GREY, "linewidth": 0.8, "zorder": 1, "label": "cut, as planned"}
+_COMMANDED: dict[str, Any] = {"color": ORANGE, "linewidth": 1.0, "linestyle": (0, (5, 2)), "zorder": 2.2}
+_PROGRAMMED: dict[str, Any] = {"color": BLACK, "linewidth": 0.8, "linestyle": (0, (1, 1.5)), "zorder": 2.1}
 _COLOURS: dict[str, Any] = {"cmap": "viridis", "linewidths": 0, "zorder": 2}
 _LEAST_ERROR = 0.01  # µm, at the end of the scale: less is rounding
 _RAPID: dict[str, Any] = {
@@ -38,7 +42,7 @@ def path(result: Result, prepared: Prepared) -> Picture:
     """The path from up to three sides, and over time of each axis that no side shows: a rotary one, or the only one.
 
     Rapids are dashed as planned, cuts as measured in the colour of their contour error. The worst lines are marked, and
-    named in the legend.
+    named in the legend. Of a run that a path leads, the path as programmed is drawn, too, and what was commanded.
     """
     axes = prepared.program.axes
     views = [view for view in _VIEWS if view[1] in axes and view[2] in axes]
@@ -67,10 +71,13 @@ def path(result: Result, prepared: Prepared) -> Picture:
         for line, value, when in (worst_lines(result, error, _NAMED) if contour else ())
     ]
     drawn: Any = None
+    interpolated = isinstance(prepared.program, InterpolatedProgram)
+    styles = [(False, _COMMANDED | {"label": "commanded"})] if interpolated else [(False, _CUT), (True, _RAPID)]
+    programmed = _programmed(prepared) if "path_error" in result else None
     most = max(float(error[at].max(initial=0.0)), _LEAST_ERROR)
 
     def draw(place: Axes, wanted: tuple[np.ndarray, np.ndarray], measured: tuple[np.ndarray, np.ndarray]) -> Any:
-        for kind, style in ((False, _CUT), (True, _RAPID)):
+        for kind, style in styles:
             shown = rapid[edges] == kind
             place.plot(np.where(shown, wanted[0], np.nan), np.where(shown, wanted[1], np.nan), **style)
         x, y = measured
@@ -86,6 +93,8 @@ def path(result: Result, prepared: Prepared) -> Picture:
         u, v = (planned[edges, axes.index(name)] for name in names)
         x, y = (measured_at[name] for name in names)
         drawn = draw(place, (u, v), (x, y))
+        if programmed is not None:
+            place.plot(*(programmed[:, LINEAR.index(name)] for name in names), label="programmed", **_PROGRAMMED)
         dress(place, f"{up} [mm]", f"{across_name} [mm]")
         place.set_aspect("equal", adjustable="datalim")
         place.set_title(title + ", tool's tip on the work" * (prepared.tip is not None), loc="left", fontsize="medium")
@@ -102,6 +111,12 @@ def path(result: Result, prepared: Prepared) -> Picture:
     handles, texts = places[0].get_legend_handles_labels()
     picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
     return picture
+
+
+def _programmed(prepared: Prepared) -> np.ndarray:
+    """Points of the programmed path, n × 3 in mm, with nan between its parts; of a tip that moves, the tip's."""
+    path = prepared.path if prepared.tip is None else prepared.tip.path
+    return np.concatenate(list(Trace.of([PathBlock(path)]).points.values()))
 
 
 def _planned(result: Result, prepared: Prepared) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -131,8 +146,12 @@ def along(result: Result, prepared: Prepared) -> Picture:
     picture = Picture(8.4)
     top, middle, bottom = picture.subplots(3, 1, sharex=True)
     edges = _edges(len(time))
-    top.plot(time[edges], _largest(result["contour_error"] * 1e3, edges), color=BLACK, linewidth=1.1)
-    dress(top, "contour error [µm]", None)
+    top.plot(time[edges], _largest(result["contour_error"] * 1e3, edges), color=BLACK, linewidth=1.1, label="measured")
+    if "path_error" in result:
+        commanded = _largest(result["path_error"] * 1e3, edges)
+        top.plot(time[edges], commanded, color=ORANGE, linewidth=1.1, linestyle=(0, (5, 2)), label="commanded")
+        top.legend(loc="upper right", frameon=False, fontsize="small")
+    dress(top, "off the programmed path [µm]" if "path_error" in result else "contour error [µm]", None)
     for i, name in enumerate(prepared.program.axes):
         unit = result.units[f"{name}_measured"]
         scale, unit = (1e3, "µm") if unit == "mm" else (1.0, unit)

@@ -78,6 +78,11 @@ def findings(about: dict[str, Any]) -> list[str]:
             f"The measured position is at most {worst['max']:.4f} mm off the programmed path, in {of} {worst['line']} "
             f"(t = {worst['time_s']:.3f} s); RMS {worst['rms']:.4f} mm."
         )
+    if worst := about.get("path_error"):
+        said.append(
+            f"What was commanded is at most {worst['max']:.4f} mm off it, in {of} {worst['line']} (t = "
+            f"{worst['time_s']:.3f} s); RMS {worst['rms']:.4f} mm."
+        )
     following = about["following_error"]
     for unit in dict.fromkeys(worst["unit"] for worst in following.values()):
         axis, worst = max(

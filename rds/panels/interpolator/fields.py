@@ -13,7 +13,7 @@ from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.interpolators import DEFAULT, interpolator_module, interpolator_names
 from rds.interpolators.acceleration import LIBRARY as FILTERS
 from rds.interpolators.segment_rows import FEED_UNITS, segments_of
-from rds.nc.bundled import bundled
+from rds.nc.bundled import bundled, bundled_paths
 from rds.panels.session.fields import Choice, Field, Flag, Number, Text, labels
 
 USER = "user"
@@ -60,8 +60,9 @@ def fields() -> Iterable[Field]:
     yield Choice("direction", "Direction", "of the arc, seen from the positive end of the third axis", "ccw", ways)
     yield Choice("plane", "Plane", "in which the arc lies", "XY", {name: name for name in PLANES})
     yield Rows("rows", "Segments", "each begins where the one before ends", [dict(row) for row in ROWS["circular"]])
-    programs = {name: name for name, each in bundled().items() if each.machine == "mini-cnc"}
-    yield Choice("bundled", "Program", "a part program that comes with rds", DEFAULT_PROGRAMS["circular"], programs)
+    given_by_rds = {name: name for name, each in (bundled() | bundled_paths()).items() if each.machine == "mini-cnc"}
+    tip = "a part program or a path that comes with rds"
+    yield Choice("bundled", "Program", tip, DEFAULT_PROGRAMS["circular"], given_by_rds)
     yield Text("program", "Part program", "a file in your folder", "", "e.g. part.ngc")
     yield Choice("feed_unit", "Unit of the feed rate", "", "mm/min", {unit: unit for unit in FEED_UNITS})
     yield feed("mm/min", 600.0)

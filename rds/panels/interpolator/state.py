@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
 from rds.core.types import ArcSegment, Segment
-from rds.interpolators.segment_rows import FEED_UNITS, segments_of
+from rds.interpolators.segment_rows import FEED_UNITS, read_segments, segments_of
 from rds.machines import load_machine
-from rds.nc.bundled import find_bundled
+from rds.nc.bundled import PATH, find_bundled
 from rds.panels.code.versions import keep_file
 from rds.panels.equipment.build import Builds, Checked
 from rds.panels.interpolator.fields import (
@@ -134,7 +134,10 @@ class Interpolating:
             if files:
                 task.note = "checking your file"
                 self.builds.require([("interpolator", file) for file in files], T, task.pulse)
-            if program is not None:
+            if program is not None and program.suffix == PATH:
+                path = read_segments(program)
+                self._check_kinds(path)
+            elif program is not None:
                 task.note = "reading the program"
                 path, rests, self.notes = read_program(program, self.session.machine, T)
                 self._check_kinds(path)
