@@ -44,7 +44,8 @@ class ScriptLink:
     variable: str = ""  # which of ENTRIES is the joint's
     limits: tuple[float, float] | None = None  # lower, upper
     errors: tuple[float, ...] = (0.0,) * 6
-    line: int = 0
+    line: int = 0  # of its RF01
+    error_line: int = 0  # of its RF03
 
 
 @dataclass
@@ -135,7 +136,7 @@ class Script:
 
     def _correct(self, number: int, words: dict[str, str]) -> None:
         errors = tuple(self._plain(word, words) for word in ENTRIES)
-        self.links[number - 1] = replace(self.links[number - 1], errors=errors)
+        self.links[number - 1] = replace(self.links[number - 1], errors=errors, error_line=self.line)
         self.built = 0
 
     def _plain(self, word: str, words: dict[str, str]) -> float:
