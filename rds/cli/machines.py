@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.buses import Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import Channel, ChosenBus, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, writes_files
 
 if TYPE_CHECKING:
+    from rds.machines import Machine
     from rds.machines.configuration import Verdict
 
 Name = Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.", metavar="MACHINE")]
@@ -29,8 +30,8 @@ def new(
     order: Annotated[
         str | None,
         typer.Option(
-            help="With --scan: modules from the tool to the work, by number; accessories by their name in the library, "
-            "as in 5,oacs-range-arm,2,4,3. By default as they fit."
+            help="With --scan: modules from the tool to the work, by number; what has no board by its name in the "
+            "library, as in 5,oacs-range-arm,2,4,3. By default that of --like, or as they fit."
         ),
     ] = None,
     modules: Annotated[
@@ -38,6 +39,14 @@ def new(
         typer.Option(
             help="Put it together of modules of the library (`rds machine modules`), from the tool to the work: "
             "oacs-drill,oacs-range-arm,oacs-z,oacs-x."
+        ),
+    ] = None,
+    like: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MACHINE",
+            help="With a script or --scan, the machine that is reconfigured: what nobody says (models, limits, "
+            "converter, spindle) is its. By default of a machine of the package with such modules, or chosen.",
         ),
     ] = None,
     interface: Interface = None,
@@ -59,17 +68,22 @@ def new(
             raise InputError(f"{given}: name a script, or ask the bus with --scan, or name --modules of the library")
         if not scan and (order or interface or channel or experiment):
             raise InputError("--order, --interface, --channel and --experiment belong to --scan, which is not given")
+        if like is not None and modules is not None:
+            raise InputError("--like belongs to a script or --scan; modules of the library are chosen whole")
         _check_out(out, ".toml", force)
+        before = load_machine(like) if like is not None else None
         if modules is not None:
             text = text_of_modules([each.strip() for each in modules.split(",")], out.stem)
+        elif scan:
+            text = _scanned(out.stem, order, before, chosen_bus(interface, channel, experiment))
         else:
-            text = _scanned(out.stem, order, interface, channel, experiment) if scan else _from_file(script, out.stem)
+            text = _from_file(script, out.stem, before)
         _write(out, text)
         judged = verdict(load_machine(str(out)))
     _show_verdict(judged, json, f"wrote {out}")
 
 
-def _from_file(path: Path | None, name: str) -> str:
+def _from_file(path: Path | None, name: str, before: Machine | None) -> str:
     from rds.core.errors import InputError
     from rds.machines.ncc import machine_text_of_script, read_script
     from rds.machines.urdf import machine_text_of_urdf
@@ -82,17 +96,18 @@ def _from_file(path: Path | None, name: str) -> str:
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror}); check the path", str(path)) from error
     if path.suffix.lower() == ".urdf":
+        if before is not None:
+            raise InputError("--like belongs to a script or --scan; a .urdf file says all of its joints", str(path))
         return machine_text_of_urdf(text, name, str(path))
-    return machine_text_of_script(read_script(text, str(path)), name)
+    return machine_text_of_script(read_script(text, str(path)), name, before)
 
 
-def _scanned(name: str, order: str | None, interface: str | None, channel: str | None, experiment: Path | None) -> str:
+def _scanned(name: str, order: str | None, before: Machine | None, place: ChosenBus) -> str:
     from rds.bus.modules.oacs.remote import Module
     from rds.bus.tools.scan import scan_all
     from rds.core.errors import MachineError
-    from rds.machines.assembly import first_order, machine_text
+    from rds.machines.assembly import first_order, machine_text, order_of
 
-    place = chosen_bus(interface, channel, experiment)
     rows = scan_all(place.interface, place.channel, **place.options)
     numbers = [row["id"] for row in rows if row["dialect"] == "oacs"]
     if not numbers:
@@ -102,8 +117,10 @@ def _scanned(name: str, order: str | None, interface: str | None, channel: str |
         for number in numbers:
             data[number] = Module(bus, number).info().as_dict()
     words = [word.strip() for word in order.split(",")] if order else []
-    chosen = [int(word) if word.isdigit() else word for word in words] or [*first_order(data)]
-    return machine_text(name, chosen, data)
+    chosen = [int(word) if word.isdigit() else word for word in words]
+    if not chosen:
+        chosen = (order_of(before, data) if before is not None else None) or first_order(data)
+    return machine_text(name, chosen, data, before)
 
 
 @writes_files

@@ -51,7 +51,7 @@ def check(
         from rds.nc.check import check_program
 
         of = load_machine(machine)
-        what = setup(tools, parameters, with_, max_jumps).on(of)
+        what = setup(tools, parameters, with_, max_jumps).on(of, file)
         with progress_bars() as bar:
             result, compiled = check_program(file, of, what, bar("check"))
         proved, pictures = _prove(file, what) if proof else (None, [])
@@ -172,16 +172,16 @@ def plot(
     with refusals():
         from rds.machines import load_machine
         from rds.nc.axis_plot import has_no_side, plot_axes
-        from rds.nc.check import followed, watched
+        from rds.nc.check import followed, validator_of, watched
         from rds.nc.plots import plot as draw
         from rds.nc.tool_centre import shown
         from rds.nc.trace import Trace
-        from rds.nc.validate import Validator
 
         path = out or file.with_name(f"{file.stem}-path.png")
         of = load_machine(machine)
-        what = setup(tools, parameters, with_, max_jumps).on(of)
-        validator = Validator(of, what.tool_list(), str(file))
+        what = setup(tools, parameters, with_, max_jumps).on(of, file)
+        validator = validator_of(file, of, what)
+        of = validator.machine
         trace, flat = Trace(), has_no_side(of)
         segments = []
         with progress_bars() as bar:

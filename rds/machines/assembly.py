@@ -1,7 +1,7 @@
 """A machine assembled of modules that say what they are: its file, and the verdict on it before there is one.
 
-OACS thesis, 8.4: after a scan of the bus the user numbers the modules from the tool head to the workspace. Accessories
-have no board, and so no number: they stand in the order by their name in the library.
+OACS thesis, 8.4: after a scan of the bus the user numbers the modules from the tool head to the workspace. Accessories,
+beds, columns and tables have no board, and so no number: they stand in the order by their name in the library.
 """
 
 from __future__ import annotations
@@ -16,8 +16,11 @@ from rds.core.toml_table import TomlTable
 from rds.core.toml_text import toml_text
 from rds.machines.configuration import Check, Verdict, verdict
 from rds.machines.library import LibraryModule, by_type_text, library_module, told_module
+from rds.machines.link_modules import said_by_link
+from rds.machines.link_table import BED, path_to
 from rds.machines.machine import MACHINE, Machine, load_machine, machine_from, machine_names
 from rds.machines.module_table import CARRIES_ON, MOUNTED_BY
+from rds.machines.mounting import SPEED, chosen_motion, chosen_spindle, mounted, with_zero
 
 Data = Mapping[str, Any]  # of one module, as `Information.as_dict`
 Order = Sequence[int | str]  # from the tool to the work: numbers of modules, names of accessories in the library
@@ -28,7 +31,7 @@ _MODULE = (  # what a module tells, under the names of `[axis.NAME.module]`
 _JOINTS = {"x": "X", "y": "Y", "z": "Z", "a": "XA", "b": "YA", "c": "ZA"}
 _ABOUT = (
     "A machine configured from what its modules say, from the tool to the work: {order}.\n"
-    "Yours to add, because no module knows it: [axis.NAME.model] (rds fit) and [axis.NAME.limits]."
+    "No module knows its axis's model and limits of planned motion: {known}."
 )
 
 
@@ -49,6 +52,23 @@ def first_order(data: Mapping[int, Data]) -> list[int | str]:
         left.remove(number)
         above = _module(data[number])
     return order
+
+
+def order_of(machine: Machine, data: Mapping[int, Data]) -> list[int | str] | None:
+    """The order that a machine's links say, of these modules; None if one of them is none of the machine's."""
+    links = {link.name: link for link in machine.links}
+    ends = [end.link if end else usual for end, usual in ((machine.tool, [*links, ""][-1]), (machine.work, BED))]
+    to_tool, to_work = ([*path_to(links, end)] for end in ends)
+    carrying = [name for name in to_tool if name in to_work]
+    names = [name for name in reversed(to_tool) if name not in carrying[:-1]]
+    order: list[int | str] = []
+    for name in [*names, *(name for name in to_work if name not in carrying)]:
+        axis = machine.axes.get(links[name].axis or name)
+        if axis is not None:
+            order += [axis.node] if axis.node in data else []
+        elif links[name].module:
+            order.append(links[name].module)
+    return order if set(data) <= set(order) else None
 
 
 def _module(data: Data) -> LibraryModule | None:
@@ -83,7 +103,7 @@ def machine_text(name: str, order: Order, data: Mapping[int, Data], before: Mach
 
     What no module knows is taken from `before`, the machine that was reconfigured: its converter, and model, limits,
     power and physics of the axes whose module is of the same number and type; else from a machine of the
-    package that has a module of this type.
+    package that has a module of this type; else it is chosen, within the speeds that the module says.
     """
     found = judged(order, data, name)
     if not found.ok:
@@ -93,22 +113,36 @@ def machine_text(name: str, order: Order, data: Mapping[int, Data], before: Mach
     if before is not None:
         table["sample_period"] = before.sample_period
         table["converter"] = asdict(before.converter)
-        for axis in table["axis"].values():
-            axis.update(_kept(axis, before))
-    return toml_text(table, _ABOUT.format(order=told))
+    known = []
+    for letter, axis in table["axis"].items():
+        kept, source = _kept(axis, before)
+        axis.update(kept or _chosen(axis, table["converter"]["range"]))
+        known.append(f"those of {letter} are {f'from {source}' if kept else 'chosen'}")
+    return toml_text(table, _ABOUT.format(order=told, known=", ".join(known)))
 
 
-def _kept(axis: Mapping[str, Any], before: Machine) -> dict[str, Any]:
+def _kept(axis: Mapping[str, Any], before: Machine | None) -> tuple[dict[str, Any], str]:
+    """Model, limits, power and physics of an axis with such a module, and the machine that it is of."""
     said = axis["module"]["type_text"]
-    same = [known for known in before.axes.values() if known.node == axis["node"]]
-    packaged = (known for name in machine_names() for known in load_machine(name).axes.values())
-    for known in chain(same, packaged):
-        if known.module.get("type_text") == said:
-            tables = {"model": known.model, "machine": known.machine}
-            limits = {"limits": asdict(known.limits)} if known.limits is not None else {}
-            power = {"power": known.power} if known.power is not None else {}
-            return {key: dict(value) for key, value in tables.items() if value} | limits | power
-    return {}
+    packaged = (load_machine(name) for name in machine_names())
+    for machine in chain([] if before is None else [before], packaged):
+        for known in machine.axes.values():
+            same = machine is not before or known.node == axis["node"]
+            own = known.module.get("type_text") or said_by_link(machine, known).get("type_text")
+            if same and own == said:
+                tables = {"model": known.model, "machine": known.machine}
+                limits = {"limits": asdict(known.limits)} if known.limits is not None else {}
+                power = {"power": known.power} if known.power is not None else {}
+                made = {key: dict(value) for key, value in tables.items() if value} | limits | power
+                if made:
+                    return made, machine.name
+    return {}, ""
+
+
+def _chosen(axis: Mapping[str, Any], full: float) -> dict[str, Any]:
+    told = axis["module"]
+    speed = min(told["clockwise_speed"], told["counterclockwise_speed"]) or SPEED
+    return chosen_spindle(speed, full) if told["kind"] == "tool" else chosen_motion(speed, full)
 
 
 def _before(order: Order, data: Mapping[int, Data]) -> list[str]:
@@ -146,7 +180,12 @@ def _before(order: Order, data: Mapping[int, Data]) -> list[str]:
 def _table(name: str, order: Order, data: Mapping[int, Data]) -> dict[str, Any]:
     axes = {_letter(data[number]): _axis(number, data[number]) for number in order if isinstance(number, int)}
     table = {"name": name, "title": f"Configured from {len(order)} modules", "sample_period": 0.001}
-    return table | {"axis": axes, "link": [_link(each, data) for each in reversed(order)]}
+    table |= {"converter": {"range": max(axis["module"]["supply"] for axis in axes.values())}, "axis": axes}
+    return with_zero(table | mounted(order, lambda each: _known(each, data), lambda each: _link(each, data)))
+
+
+def _known(each: int | str, data: Mapping[int, Data]) -> LibraryModule | None:
+    return library_module(each) if isinstance(each, str) else _module(data[each])
 
 
 def _link(each: int | str, data: Mapping[int, Data]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from rds.machines.kinematics.build import kinematics_of, resolved
 from rds.machines.kinematics.kinematics import Kinematics
 from rds.machines.kinematics.workspace import workspace
 from rds.machines.library import LibraryModule, library_module, told_module
-from rds.machines.link_table import BED, Link
+from rds.machines.link_table import BED, Link, path_to
 from rds.machines.machine import Machine
 
 _POSES, _POSES_NUMERIC = 200, 30
@@ -123,19 +123,11 @@ def _ends(machine: Machine) -> tuple[str, str]:
     return tool, machine.work.link if machine.work else BED
 
 
-def _path(links: dict[str, Link], end: str) -> list[str]:
-    made = []
-    while end != BED:
-        made.append(end)
-        end = links[end].parent
-    return made
-
-
 def _chain(machine: Machine, links: dict[str, Link]) -> Iterator[Finding]:
     tool, work = _ends(machine)
     if tool == work:
         yield tool, f"tool and work are both on {tool}: nothing can move between them"
-    used = {*_path(links, tool), *_path(links, work)}
+    used = {*path_to(links, tool), *path_to(links, work)}
     for name in links:
         if name not in used:
             yield (

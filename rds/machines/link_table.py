@@ -195,6 +195,15 @@ def check_unit(link: Link, axis: Axis, place: str) -> None:
         raise InputError(f"joint = {link.joint!r} {kind}, and {axis.name} has {axis.unit!r}", place)
 
 
+def path_to(links: Mapping[str, Link], end: str) -> list[str]:
+    """The names of the links from the bed to one of them; none to the bed itself."""
+    found = []
+    while end in links:
+        found.append(end)
+        end = links[end].parent
+    return found[::-1]
+
+
 def links_as_tables(links: tuple[Link, ...]) -> list[dict[str, Any]]:
     """The links as `[[link]]` tables, for toml_text; what is as by default is left out."""
     made = []

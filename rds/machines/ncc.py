@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,8 @@ from rds.core.toml_text import toml_text
 from rds.machines.kinematics.kinematics import Kinematics
 from rds.machines.kinematics.transform import numbers_of, transformation
 from rds.machines.link_table import ENTRIES, ROTARY
-from rds.machines.machine import MACHINE, Machine, machine_from
+from rds.machines.machine import MACHINE, VOLTAGE_RANGE, Machine, machine_from
+from rds.machines.mounting import SPEED, axis_table, chosen_motion
 
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
 _WORD = re.compile(rf"\s*(XA|YA|ZA|X|Y|Z|UP|LW|LN)\s*(#|{_NUMBER})")
@@ -44,7 +46,8 @@ class ScriptLink:
     variable: str = ""  # which of ENTRIES is the joint's
     limits: tuple[float, float] | None = None  # lower, upper
     errors: tuple[float, ...] = (0.0,) * 6
-    line: int = 0
+    line: int = 0  # of its RF01
+    error_line: int = 0  # of its RF03
 
 
 @dataclass
@@ -135,7 +138,7 @@ class Script:
 
     def _correct(self, number: int, words: dict[str, str]) -> None:
         errors = tuple(self._plain(word, words) for word in ENTRIES)
-        self.links[number - 1] = replace(self.links[number - 1], errors=errors)
+        self.links[number - 1] = replace(self.links[number - 1], errors=errors, error_line=self.line)
         self.built = 0
 
     def _plain(self, word: str, words: dict[str, str]) -> float:
@@ -174,13 +177,40 @@ def machine_of_script(script: Script, name: str = "script") -> Machine:
     return machine_from(TomlTable(_table(script, name), MACHINE))
 
 
-def machine_text_of_script(script: Script, name: str) -> str:
-    """The machine's file, as TOML."""
+def machine_text_of_script(script: Script, name: str, before: Machine | None = None) -> str:
+    """The machine's file, as TOML.
+
+    What the script does not say (encoders, models, limits of planned motion, spindles, converter) is that of the axes
+    of the same name of `before`, the machine that is reconfigured, else chosen.
+    """
+    table = _table(script, name)
+    axes, known = table["axis"], {} if before is None else before.axes
+    if before is not None:
+        table |= {"sample_period": before.sample_period, "converter": asdict(before.converter)}
+        axes |= {axis.name: axis_table(axis) for axis in known.values() if axis.is_spindle and axis.name not in axes}
+    taken = {axis.node for axis in known.values()}
+    moving = {link["axis"]: link for link in table["link"] if "axis" in link}
+    full = table.get("converter", {}).get("range", VOLTAGE_RANGE.default)
+    for axis, link in moving.items():
+        own = known.get(axis)
+        if own is None or own.unit != axes[axis]["unit"]:
+            free = next(node for node in count(2) if node not in taken)
+            taken.add(free)
+            axes[axis] |= {"node": free} | chosen_motion(SPEED, full)
+            continue
+        (least, most), (lower, upper) = own.travel, axes[axis]["travel"]
+        low, high = max(least, lower), min(most, upper)
+        if not low < high:
+            said = f"the limits of {link['name']} are outside the travel of {axis}, {least:g} to {most:g}"
+            raise script._error(f"{said}; mend RF02")
+        link["limits"] = [low, high]
+        axes[axis] = chosen_motion(SPEED, full) | axis_table(own)
+    of = "" if before is None else f", but for what {before.name} has of axes with the same name"
     about = (
         f"A machine configured by the script {script.name or name}. Links are listed from the work on; LN1 holds "
-        "the tool.\nNodes, encoders and sample period are chosen; yours to add: axis.NAME.model and axis.NAME.limits."
+        f"the tool.\nNodes, encoders, models and limits of planned motion are chosen{of}."
     )
-    return toml_text(_table(script, name), about)
+    return toml_text(table, about)
 
 
 def _table(script: Script, name: str) -> dict[str, Any]:
@@ -207,7 +237,7 @@ def _table(script: Script, name: str) -> dict[str, Any]:
 
 def axis_name(variable: str, taken: Iterable[str]) -> str:
     """The name of an axis by what it does (X, XA...): the first letter that is not taken."""
-    names = [*_LETTERS[variable], *(f"{_LETTERS[variable][0]}{count}" for count in range(2, 100))]
+    names = [*_LETTERS[variable], *(f"{_LETTERS[variable][0]}{number}" for number in range(2, 100))]
     return next(name for name in names if name not in taken)
 
 

@@ -14,7 +14,7 @@ from rds.core.errors import InputError
 from rds.core.installed import version
 from rds.machines import Machine
 from rds.nc.compiled_file import Compiled, beside, file_sha256, is_ours, open_compiled, write_compiled
-from rds.nc.configuration import configured
+from rds.nc.configuration import configured, corrects
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
@@ -44,11 +44,12 @@ class Setup:
     options: Dialect = field(default_factory=Dialect)
     correct: bool = False  # for the assembly errors in the machine's links
 
-    def on(self, machine: Machine) -> Setup:
-        """The same on a machine: one whose links have rotary axes reads G43.4."""
-        if self.options.tcp or not has_tool_centre(machine):
-            return self
-        return replace(self, options=replace(self.options, tcp=True))
+    def on(self, machine: Machine, program: Path) -> Setup:
+        """The same for a program on a machine: links with rotary axes read G43.4, and RF03 at its head corrects."""
+        tcp = self.options.tcp or has_tool_centre(machine)
+        return replace(
+            self, options=replace(self.options, tcp=tcp), correct=self.correct or corrects(program, self.options)
+        )
 
     def tool_list(self) -> list[Tool]:
         """The tools of the table; none without one. Raises ProgramError for a table that is wrong."""
@@ -72,7 +73,7 @@ def motion(
 
     `notes`, when given, gets at the end what is no fault and worth a look, by line.
     """
-    setup = setup.on(machine)
+    setup = setup.on(machine, program)
     validator = validator_of(program, machine, setup)
     for block in watched(
         followed(setup.interpret(program, validator.warn), program, progress), validator, setup, raise_it
@@ -122,7 +123,7 @@ def check_program(
     A program with faults leaves none, and one of before is removed. Raises InputError for files that cannot be read or
     written, and where the place of the compiled form is taken by a file that is none.
     """
-    setup = setup.on(machine)
+    setup = setup.on(machine, program)
     header = describe(program, machine, setup)
     place = beside(program)
     if place.exists() and not is_ours(place):
@@ -154,9 +155,9 @@ def in_dead_code(fault: ProgramError) -> ProgramError:
 
 
 def validator_of(program: Path, machine: Machine, setup: Setup) -> Validator:
-    """What looks at the program: with the travel that a script at its head leaves. ProgramError for another chain."""
-    narrowed, remarks = configured(program, machine, setup.options)
-    validator = Validator(narrowed, setup.tool_list(), str(program))
+    """What looks at the program, for the machine as limits and script leave it. ProgramError for another chain."""
+    own, remarks = configured(program, machine, setup.options)
+    validator = Validator(own, setup.tool_list(), str(program))
     for remark in remarks:
         validator.warn(remark)
     return validator
@@ -196,6 +197,7 @@ def compiled_if_current(program: Path, machine: Machine, setup: Setup) -> Compil
 
 def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:
     """Everything that the motion depends on, with its SHA-256: the header of the compiled form."""
+    setup = setup.on(machine, program)
     return {
         "rds": version(),
         "program": program.name,
@@ -204,7 +206,7 @@ def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:
         "machine_sha256": file_sha256(Path(machine.path)),
         "tools_sha256": file_sha256(setup.tools) if setup.tools else None,
         "parameters_sha256": file_sha256(setup.parameters) if setup.parameters else None,
-        "options": asdict(setup.on(machine).options),
+        "options": asdict(setup.options),
         "correct": setup.correct,
     }
 

@@ -1,7 +1,7 @@
-"""A configuration script at a part program's head (option ncc) applied to the machine that runs the program.
+"""What a machine's virtual limits and a configuration script at a program's head (option ncc) change for the program.
 
-mrm-control, section 5: RF02 narrows the travel of the joints, RF01 says a chain, which has to be the machine's, and
-RF03 notes assembly errors.
+mrm-control, sections 5 and 6: limits of links, and RF02 of the script, narrow the travel of the joints; RF01 says a
+chain, which has to be the machine's; RF03 says its assembly errors, for which the motion is corrected.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.machines import Machine
 from rds.machines.kinematics.kinematics import Kinematics
-from rds.machines.link_table import ENTRIES
+from rds.machines.kinematics.tip import Tip
+from rds.machines.link_table import ENTRIES, Link
 from rds.machines.ncc import Script, ScriptLink, machine_of_script
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
@@ -25,11 +26,13 @@ _POSES = 16
 
 
 def configured(program: Path, machine: Machine, options: Dialect) -> tuple[Machine, list[ProgramError]]:
-    """The machine with its travel narrowed by the script at the program's head, and what is to be noted, by line.
+    """The machine that the program is checked for and run on, and what is to be noted, by line.
 
-    The machine as it is where there is no script, or one that is wrong: that is said, by its line, where the program
-    is read. Raises ProgramError with what differs where the script's chain is not the machine's.
+    Its travel is narrowed to the limits of its links and by the script at the program's head, whose assembly errors
+    (RF03) it has. A script that is wrong changes nothing: that is said, by its line, where the program is read. Raises
+    ProgramError with what differs where the script's chain is not the machine's, and where it cannot be corrected for.
     """
+    machine = _within_limits(machine)
     script = _script(program) if options.ncc else None
     if script is None:
         return machine, []
@@ -63,12 +66,44 @@ def configured(program: Path, machine: Machine, options: Dialect) -> tuple[Machi
             axes[axis] = replace(axes[axis], travel=(low, high))
             said = f"RF02 narrows the travel of {axis} (LN{number}) to {low:g} to {high:g} {axes[axis].unit}"
             notes.append(_error(program, link.line, said))
-    for number, link in enumerate(script.links, 1):
-        if any(link.errors):
-            words = " ".join(f"{word}{value:g}" for word, value in zip(ENTRIES, link.errors, strict=True) if value)
-            said = f"RF03 notes an assembly error of LN{number}, {words}; the motion is not corrected by it"
-            notes.append(_error(program, link.line, said))
-    return replace(machine, axes=axes), notes
+    wrong = [(number, link) for number, link in enumerate(script.links, 1) if any(link.errors)]
+    for number, link in wrong:
+        words = " ".join(f"{word}{value:g}" for word, value in zip(ENTRIES, link.errors, strict=True) if value)
+        said = f"the motion is corrected for the assembly error that RF03 says of LN{number}, {words}"
+        notes.append(_error(program, link.error_line, said))
+    made = replace(machine, axes=axes)
+    if not wrong:
+        return made, notes
+    made = replace(made, links=_links(script, names), tool=None, work=None)
+    try:
+        Tip(made.kinematics)
+    except InputError as error:
+        said = f"the motion cannot be corrected for RF03: {error.args[0]}; remove it"
+        raise _error(program, wrong[0][1].error_line, said) from None
+    return made, notes
+
+
+def corrects(program: Path, options: Dialect) -> bool:
+    """Whether a script at the program's head says assembly errors."""
+    script = _script(program) if options.ncc else None
+    return script is not None and any(any(link.errors) for link in script.links)
+
+
+def _within_limits(machine: Machine) -> Machine:
+    """The machine with the travel of its axes narrowed to the limits of their links, the operational workspace."""
+    limits = {link.axis: link.limits for link in machine.links if link.axis and link.limits}
+    if not limits:
+        return machine
+    axes = {name: replace(axis, travel=limits.get(name, axis.travel)) for name, axis in machine.axes.items()}
+    return replace(machine, axes=axes)
+
+
+def _links(script: Script, names: list[str]) -> tuple[Link, ...]:
+    """The script's links with the machine's names of axes, given in the order from the work."""
+    told = machine_of_script(_bounded(script.links))
+    kinematics = told.kinematics
+    own = dict(zip([kinematics.joints[joint.number] for joint in kinematics.chain.joints], names, strict=True))
+    return tuple(replace(link, axis=own[link.axis]) if link.axis else link for link in told.links)
 
 
 def _script(program: Path) -> Script | None:
@@ -96,8 +131,7 @@ def _differs(script: Script, own: Kinematics) -> str:
 
 def _away(links: list[ScriptLink], own: Kinematics) -> tuple[float, float, float]:
     """mm between the tips with all joints at zero, the most of them at random poses, and of entries of the turn."""
-    bounded = [replace(link, limits=(-1.0, 1.0)) if link.variable else link for link in links]
-    told = machine_of_script(Script("", bounded, 1)).kinematics
+    told = machine_of_script(_bounded(links)).kinematics
     q = np.concatenate([np.zeros((1, len(own.joints))), own.random(_POSES, seed=5)])
     theirs = np.empty_like(q)
     for joint, mine in zip(told.chain.joints, own.chain.joints, strict=True):
@@ -105,6 +139,11 @@ def _away(links: list[ScriptLink], own: Kinematics) -> tuple[float, float, float
     apart = told.forward(theirs) - own.forward(q)
     far = np.linalg.norm(apart[:, :3, 3], axis=1)
     return float(far[0]), float(far.max()), float(np.abs(apart[:, :3, :3]).max())
+
+
+def _bounded(links: list[ScriptLink]) -> Script:
+    """The links as a script whose joints all have limits, without which no machine is made of it."""
+    return Script("", [replace(link, limits=(-1.0, 1.0)) if link.variable else link for link in links], 1)
 
 
 def _remedy(program: Path) -> str:

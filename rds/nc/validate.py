@@ -251,10 +251,12 @@ class Validator:
     def _travel_message(self, axis: int, value: float, arc: bool) -> str:
         name, unit = AXES[axis], _UNITS[axis]
         least, most = self._machine.axes[name].travel
+        virtual = any(link.axis == name and link.limits == (least, most) for link in self._machine.links)
         beyond = max(least - value, value - most)
         return (
             f"{'on this arc ' if arc else ''}{name} would reach {plain(value)} {unit} (machine coordinates), "
-            f"{plain(beyond)} {unit} beyond its travel of {least:g} to {most:g}; shorten the path, or move its origin"
+            f"{plain(beyond)} {unit} beyond its {'limits' if virtual else 'travel'} of {least:g} to {most:g}; "
+            "shorten the path, or move its origin"
         )
 
     def _look_at_feed(self, block: PathBlock, linear: np.ndarray, moves: np.ndarray, limits: ToolLimits) -> None:

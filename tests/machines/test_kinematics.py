@@ -171,5 +171,5 @@ def test_what_is_no_joint_or_pose_is_said() -> None:
         mill.forward(np.zeros((2, 4)))
     with pytest.raises(InputError, match=r"must be \(n, 4, 4\)"):
         mill.inverse(np.zeros((2, 3)))
-    with pytest.raises(InputError, match="there is no frame 'spindle'"):
-        mill.frames(np.zeros((1, 3)), relative_to="spindle")
+    with pytest.raises(InputError, match="there is no frame 'sledge'"):
+        mill.frames(np.zeros((1, 3)), relative_to="sledge")

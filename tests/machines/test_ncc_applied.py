@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rds.core.errors import RdsError
 from rds.machines import load_machine
-from rds.machines.ncc import script_of
+from rds.machines.ncc import machine_of_script, read_script, script_of
+from rds.modes.loop.program import Program
 from rds.nc.check import Setup, check_program, motion
 from rds.nc.language.dialect import Dialect
 from rds.nc.run.prepare import prepare
@@ -52,10 +55,25 @@ def test_limits_beyond_the_travel_leave_it(tmp_path: Path) -> None:
     assert not found.ok
 
 
-def test_assembly_errors_are_noted(tmp_path: Path) -> None:
-    text = SCRIPT.replace("BUILD", "RF03 LN1 XA0 YA0 ZA0 X0 Y0 Z-5\nBUILD")
-    notes = prepare(program(tmp_path, text), MILL, NCC).notes
-    assert any("RF03 notes an assembly error of LN1, Z-5; the motion is not corrected" in note for note in notes)
+def test_the_motion_is_corrected_for_its_assembly_errors(tmp_path: Path) -> None:
+    """mrm-control, section 5: RF03 alters programs so that the tool goes where they say on the misaligned machine."""
+    wrong = SCRIPT.replace("BUILD", "RF03 LN1 XA0 YA0 ZA0 X0.2 Y0 Z-5\nRF03 LN4 XA0 YA0 ZA0.5 X0 Y0 Z0\nBUILD")
+    prepared = prepare(program(tmp_path, wrong, 50.0), MILL, NCC)
+    assert any("corrected for the assembly error that RF03 says of LN1, X0.2 Z-5" in note for note in prepared.notes)
+    assert isinstance(prepared.program, Program) and prepared.tip is not None
+    end = dict(zip(prepared.program.axes, prepared.program.position[-1], strict=True))
+    meant = MILL.kinematics.forward({"X": 50.0})
+    crooked = machine_of_script(read_script(wrong)).kinematics
+    np.testing.assert_allclose(crooked.forward(end)[:3, 3], meant[:3, 3], atol=1e-6)
+    assert abs(end["Z"]) > 4.0 and abs(end["X"] - 50.0) > 0.1, "without the correction 0 and 50"
+
+
+def test_limits_of_links_are_those_of_programs(tmp_path: Path) -> None:
+    links = tuple(replace(link, limits=(-5.0, 5.0)) if link.axis == "X" else link for link in MILL.links)
+    narrow = replace(MILL, links=links)
+    assert check_program(program(tmp_path, "", 4.9), narrow, Setup())[0].ok
+    found, _ = check_program(program(tmp_path, "", 5.1), narrow, Setup())
+    assert "0.1 mm beyond its limits of -5 to 5" in str(found.faults[0])
 
 
 @pytest.mark.parametrize(

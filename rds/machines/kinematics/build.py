@@ -12,7 +12,7 @@ from rds.machines.kinematics.chain import Joint, joined
 from rds.machines.kinematics.kinematics import TIP, ZERO, Kinematics
 from rds.machines.kinematics.transform import inverted, numbers_of, transformation
 from rds.machines.library import library_module
-from rds.machines.link_table import BED, ENTRIES, ChainEnd, Link, check_unit
+from rds.machines.link_table import ENTRIES, ChainEnd, Link, check_unit, path_to
 
 if TYPE_CHECKING:
     from rds.machines.machine import Machine
@@ -122,11 +122,7 @@ def steps_of(link: Link, numbers: dict[str, int]) -> list[Step]:
 
 def _path(links: dict[str, Link], end: str) -> list[Link]:
     """The links from the bed to one of them."""
-    found = []
-    while end != BED:
-        found.append(links[end])
-        end = links[end].parent
-    return found[::-1]
+    return [links[name] for name in path_to(links, end)]
 
 
 def _end(end: ChainEnd) -> np.ndarray:

@@ -23,6 +23,7 @@ from rds.machines.kinematics.tip import Tip
 from rds.modes.loop.program import Happening, InterpolatedProgram, Program
 from rds.nc.check import Setup, check_program, compiled_if_current
 from rds.nc.compiled_file import Compiled, open_compiled
+from rds.nc.configuration import configured
 from rds.nc.path_block import PathBlock
 from rds.nc.tool_centre import ToolCentre, path_of_tip
 
@@ -106,7 +107,8 @@ def _of_compiled(compiled: Compiled, file: Path, machine: Machine, setup: Setup,
     require_room(least_seconds(compiled.blocks()), machine, T, file)
     found = planned(compiled.blocks(), machine, T, file, profile)
     if (found.path["tip"] != JOINTS).any():
-        found = replace(found, tip=tip_path(found.path, machine, setup.correct))
+        own, _ = configured(file, machine, setup.options)
+        found = replace(found, tip=tip_path(found.path, own, setup.on(machine, file).correct))
     return replace(found, notes=(*compiled.trailer.get("notes", ()), *found.notes))
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from html import escape
 from typing import Any
 
 import ipywidgets as widgets
 
-from rds.machines.assembly import assembled, first_order, judged
+from rds.core.errors import InputError
+from rds.machines.assembly import assembled, first_order, judged, order_of
 from rds.machines.library import library
 from rds.machines.machine import Machine
 from rds.panels.kit.button import button
@@ -18,9 +18,15 @@ from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.machine.configuration import directions, moved, write_machine
 from rds.panels.machine.state import MachineDesk
-from rds.panels.session.fields import Text
+from rds.panels.session.fields import Choice, Text
 from rds.results import html
 
+_BOARDLESS = {
+    name: f"{module.kind}: {name}, {module.title}"
+    for name, module in library().items()
+    if module.kind in ("accessory", "frame", "table")
+}
+_PART = Choice("part", "Without a board", "What the bus cannot tell of", next(iter(_BOARDLESS)), _BOARDLESS)
 _FILE = Text("file", "Machine file", "A file of your folder, which every mode takes as its machine", "my-machine.toml")
 
 
@@ -31,40 +37,37 @@ class ConfigurationView:
         self.session, self.desk = shell.session, desk
         self._ticker, self._figure = shell.ticker, FigureView()
         self.notice = Notice()
-        self.choices = shell.session.choices("configuration", [_FILE])
+        self.choices = shell.session.choices("configuration", [_PART, _FILE])
         self.order: list[int | str] = []
         self._place, self._found = widgets.VBox([]), widgets.HTML()
         self._write = button("Write machine", "Write the machine's file", self.write, self.notice, primary=True)
         side = [group("The machine", FieldView(self.choices, "file"), row(self._write))]
         head = widgets.HTML("<p>Number the modules as they are mounted: 1 holds the tool, the last one the work.</p>")
-        self._accessories = row(
-            *(
-                button(f"Add {name}", module.title, partial(self._toggle, name), self.notice)
-                for name, module in library().items()
-                if module.kind == "accessory" and module.source.startswith("OACS")
-            )
+        self._parts = row(
+            FieldView(self.choices, "part"),
+            button("Add", "Put it into the order", self.add, self.notice),
         )
-        self.widget = columns(side, [self.notice, head, self._place, self._accessories, self._found, self._figure])
+        self.widget = columns(side, [self.notice, head, self._place, self._parts, self._found, self._figure])
         self.refresh()
 
     def refresh(self) -> None:
         """Other modules are known."""
         if {each for each in self.order if isinstance(each, int)} != set(self.desk.data):
-            self.order = [*first_order(self.desk.data)]
+            self.order = order_of(self.desk.machine, self.desk.data) or first_order(self.desk.data)
         self._show()
 
     def write(self) -> None:
         """Write the file."""
         path = write_machine(self.session.folder, self.choices["file"], self.order, self.desk.data)
         self.notice.say(
-            f"wrote {path.name}; add to it what no module knows, its axes' models and limits, then use it: "
-            f"rds app --machine {path.name}",
+            f"wrote {path.name}: every mode takes it as its machine; its head says where models and limits are from, "
+            f"which no module knows. Use it: rds app --machine {path.name}",
             "good",
         )
 
     def _show(self) -> None:
         self._place.children = [self._row(place, number) for place, number in enumerate(self.order, start=1)]
-        self._accessories.layout.display = None if self.order else "none"
+        self._parts.layout.display = None if self.order else "none"
         verdict = judged(self.order, self.desk.data)
         self._write.disabled = not verdict.ok
         if not verdict.ok:
@@ -93,21 +96,25 @@ class ConfigurationView:
         if isinstance(number, int):
             return row(up, down, text)
         return row(
-            up, down, text, button("Remove", "Take the accessory out", lambda: self._toggle(number), self.notice)
+            up, down, text, button("Remove", "Take it out of the order", lambda: self._remove(number), self.notice)
         )
 
     def _name(self, number: int | str) -> str:
         if isinstance(number, str):
-            return f"accessory {library()[number].title} ({number})"
+            return f"{library()[number].kind} {library()[number].title} ({number})"
         data = self.desk.data[number]
         return f"{data['axis']}: {data['kind']} {data['type_text']} (module {number})"
 
-    def _toggle(self, accessory: str) -> None:
-        """Put an accessory behind the tool, or take it out."""
-        if accessory in self.order:
-            self.order.remove(accessory)
-        else:
-            self.order.insert(1, accessory)
+    def add(self) -> None:
+        """Put what has no board into the order: an accessory behind the tool, anything else at the work's end."""
+        part = self.choices["part"]
+        if part in self.order:
+            raise InputError(f"{part} stands in the order already; move it with ▲ and ▼")
+        self.order.insert(1 if library()[part].kind == "accessory" else len(self.order), part)
+        self._show()
+
+    def _remove(self, part: str) -> None:
+        self.order.remove(part)
         self._show()
 
     def _move(self, number: int | str, by: int) -> None:

@@ -88,7 +88,7 @@ def look(
         parameters = read_parameters(setup.parameters) if setup.parameters else None
     except RdsError as error:
         return Look((Mark(0, 0, 0, str(error)),))
-    setup = setup.on(machine)
+    setup = setup.on(machine, source)
     label = str(source)
     try:
         validator, trace = validator_of(source, machine, setup), Trace()
@@ -109,7 +109,7 @@ def look(
     kept: list[PathBlock] = []
     try:
         for block in validator.watch(watched(follower.run(), validator, setup, validator.report)):
-            trace.add(shown(block.segments, machine))
+            trace.add(shown(block.segments, validator.machine))
             kept.append(block)
     finally:
         follower.close()

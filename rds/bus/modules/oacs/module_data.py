@@ -1,11 +1,13 @@
 """What a distributed module knows of itself and what its board does: `[axis.NAME.module]` of a machine's file.
 
-The other tables of the file (rds/machines) have an axis's number, travel, resolution and physics; what this one does
-not say follows from them, with a quick board. So every machine can be served, if its nodes are from 2 to 14.
+The other tables of the file (rds/machines) have an axis's number, travel, resolution and physics, and its link says
+which module of the library it is; what this one does not say follows from them, with a quick board. So every machine
+can be served, if its nodes are from 2 to 14.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +16,7 @@ from rds.bus.modules.oacs.transfer import JOINTS, UNITS, Matrix, ModuleDescripti
 from rds.bus.modules.rds.module import machine_parameters
 from rds.core.errors import InputError
 from rds.machines.library import Interface
+from rds.machines.link_modules import said_by_link
 from rds.machines.machine import Axis, Machine
 from rds.machines.module_table import CARRIES_ON, MOUNTED_BY
 from rds.models.machine_axis import MachineParameters
@@ -99,17 +102,21 @@ class ModuleData:
 
 def read_modules(machine: Machine) -> dict[str, ModuleData]:
     """The data of each axis of `machine` by its name. InputError for a table that is wrong, or a number over 15."""
-    return {axis.name: module_data(axis, machine.converter.range, machine.path) for axis in machine.axes.values()}
+    return {
+        axis.name: module_data(axis, machine.converter.range, machine.path, said_by_link(machine, axis))
+        for axis in machine.axes.values()
+    }
 
 
-def module_data(axis: Axis, supply: float, path: str = "") -> ModuleData:
+def module_data(axis: Axis, supply: float, path: str = "", mounted: Mapping[str, Any] | None = None) -> ModuleData:
     """The data of one axis: its `module` table, completed by what else is known of it.
 
-    `supply` is the motor's, V, where the table names none; `path` is the machine's file, for errors. Raises InputError
-    for a number that no module can have, and for data that a download can't carry.
+    `mounted` is what its link says of the module (`said_by_link`), `supply` is the motor's, V, where the table names
+    none; `path` is the machine's file, for errors. Raises InputError for a number that no module can have, and for
+    data that a download can't carry.
     """
     where = f"{path}, [axis.{axis.name}.module]" if path else f"[axis.{axis.name}.module]"
-    values = dict(axis.module)
+    values = {**(mounted or {}), **axis.module}
     kind = values.pop("kind", _kind_by_unit(axis.unit))
     letter = values.pop("letter", "T" if kind == "tool" else _first_letter(axis.name))
     supply = values.setdefault("supply", supply)

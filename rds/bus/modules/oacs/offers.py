@@ -18,7 +18,7 @@ from rds.bus.modules.oacs.remote import Module
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError, MachineError
 from rds.machines import Machine, load_machine
-from rds.machines.assembly import Order, first_order, judged, machine_text
+from rds.machines.assembly import Order, first_order, judged, machine_text, order_of
 from rds.machines.configuration import Verdict
 
 _SLACK = 10.0  # s for a motion beyond twice its time at full speed
@@ -63,7 +63,7 @@ class Offers:
             data = {number: Module(self._bus, number).info().as_dict() for number in self._watching.numbers}
         except MachineError:
             return None  # gone meanwhile, or busy: asked again at the next look
-        order = first_order(data)
+        order = order_of(self._before, data) or first_order(data)
         return Offer(order, data, judged(order, data, self._before.name))
 
     def go_on(self, bus: can.BusABC) -> None:
