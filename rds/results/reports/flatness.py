@@ -121,7 +121,7 @@ def _cut_faces(files: Sequence[Path], settings: Mapping[str, Any]) -> list[Face]
 
 
 def _extent(segment: Segment) -> np.ndarray:
-    """Places (n × 2) between which a level move is: its ends, or the square about its circle; none of a vertical one."""
+    """Places (n × 2) between which a level move is: its ends, or the square about its circle; none if vertical."""
     if segment.plane == STRAIGHT:
         return (
             np.array([segment.start, segment.end])[:, :2] if np.any(segment.start != segment.end) else np.empty((0, 2))
