@@ -31,9 +31,11 @@ def analyse(
     baud: Annotated[
         int | None, typer.Option(help="Baud rate of a serial line (default: a table of several).", min=1)
     ] = None,
-    units: Annotated[int | None, typer.Option(help="Units on a serial line (default: one for each axis).")] = None,
+    units: Annotated[
+        int | None, typer.Option(help="Units of the methods, in what fits (default: one for each axis).")
+    ] = None,
     fits: Annotated[
-        bool, typer.Option("--fits", help="On CAN: what fits, by bit rate, with margin; with --plot curves.")
+        bool, typer.Option("--fits", help="On CAN: what fits, as with --period; with --plot curves.")
     ] = False,
     plot: Annotated[
         Path | None, typer.Option(help="Write the timeline and response times, or curves, as a PNG.")
@@ -42,12 +44,13 @@ def analyse(
 ) -> None:
     """Bus load, and every message's worst-case response time (Davis, Burns, Bril and Lukkien, 2007).
 
-    On a serial line (--dialect dcs): what each method takes of a period, by baud rate, and what fits.
+    With --period: what fits, by method, units and bit rate, with margin. On a serial line (--dialect dcs) the same, by
+    baud rate.
     """
     with refusals():
         from rds.core.errors import InputError
 
-        serial = {"--baud": baud, "--units": units}
+        serial = {"--baud": baud}
         can = {"--bitrate": bitrate, "--response-time": response_time, "--host-jitter": host_jitter, "--errors": errors}
         can |= {"--error-interval": error_interval, "--fits": fits}
         wrong = [name for name, value in (can if dialect == "dcs" else serial).items() if value]
@@ -60,6 +63,9 @@ def analyse(
 
             met = show_serial(load_machine(machine), baud, units, sample_period, plot, json)
             raise typer.Exit(0 if met else 1)
+        asked = fits or sample_period is not None
+        if units is not None and not (asked and dialect == "rds"):
+            raise InputError("--units is of what fits a serial line or modules of dialect rds: add --fits or --period")
         from math import inf
 
         from rds.bus.analysis.analysis_report import analyse as analyse_bus
@@ -80,9 +86,9 @@ def analyse(
             from rds.cli.analyse_fits import draw_can
 
             draw_can(plot, analysis, load_machine(machine), sample_period, dialect, fits)
-        rows = []
-        if fits:
-            from rds.cli.analyse_fits import can_rows
+        rows, methods = [], []
+        if asked:
+            from rds.cli.analyse_fits import can_methods, can_rows
 
             rows = can_rows(
                 load_machine(machine),
@@ -92,14 +98,16 @@ def analyse(
                 host_jitter=host_jitter,
                 errors=analysis.errors,
             )
+            if dialect == "rds":
+                methods = can_methods(load_machine(machine), sample_period, bitrate, units)
     if json:
-        print_json(analysis.to_json() | ({"fits": rows} if fits else {}))
+        print_json(analysis.to_json() | ({"fits": rows, "methods": methods} if asked else {}))
     else:
         typer.echo(str(analysis))
-        if fits:
+        if asked:
             from rds.cli.analyse_fits import show_can
 
-            show_can(rows)
+            show_can(rows, methods)
         if plot is not None:
             typer.echo(f"plot: {plot}")
     raise typer.Exit(0 if analysis.met else 1)

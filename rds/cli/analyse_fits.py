@@ -1,4 +1,4 @@
-"""`rds bus analyse` where it says what fits: methods on a serial line by baud rate, a CAN bus by bit rate."""
+"""`rds bus analyse` where it says what fits: methods on a serial line or CAN by its rate, experiments on CAN."""
 
 from __future__ import annotations
 
@@ -79,11 +79,23 @@ def can_rows(machine: Machine, period: float | None, **words: Any) -> list[list[
     return rows
 
 
-def show_can(rows: list[list[Any]]) -> None:
-    """The table of `can_rows`."""
+def can_methods(machine: Machine, period: float | None, bitrate: int | None, units: int | None) -> list[list[Any]]:
+    """What methods A, B and C of the modules of dialect rds take of a CAN bus, by bit rate, or at one."""
+    from rds.bus.analysis import can_curves
+
+    T = machine.sample_period if period is None else period
+    count = sum(not axis.is_spindle for axis in machine.axes.values()) if units is None else units
+    return can_curves.table(count, T, _BITRATES if bitrate is None else [bitrate])
+
+
+def show_can(rows: list[list[Any]], methods: list[list[Any]]) -> None:
+    """The tables of `can_rows` and, of dialect rds, `can_methods`."""
+    from rds.bus.analysis.can_curves import COLUMNS
     from rds.cli.console import cell, show_table
 
     show_table("What fits", _CAN_COLUMNS, [[cell(value) for value in row] for row in rows])
+    if methods:
+        show_table("A part program by methods", COLUMNS, [[cell(value) for value in row] for row in methods])
 
 
 def draw_can(plot: Path, analysis: Analysis, machine: Machine, period: float | None, dialect: str, fits: bool) -> None:

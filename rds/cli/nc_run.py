@@ -123,7 +123,8 @@ def run(
     In a terminal, while it runs in real time: space holds and goes on, + and - change the feed, h moves home, q stops.
     Elsewhere `rds nc operate` does the same.
     """
-    with refusals(), stdout_kept(json), ends_as_ctrl_c():
+    own_code = method is None  # nodes run none of it, and the JSON object is printed in here
+    with refusals(), stdout_kept(json and own_code), ends_as_ctrl_c():
         if method is not None:
             given = {
                 "--override": override != 100.0,

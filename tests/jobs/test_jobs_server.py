@@ -14,8 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import rds
+from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.jobs.folder import Folder
 from rds.jobs.jobs import Jobs
@@ -132,29 +134,17 @@ def test_strangers_and_too_many_clients_keep_nobody_out(serve: Serve) -> None:
 def test_a_port_needs_the_secret_and_a_socket_may_do_without(serve: Serve, alone: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    refused = subprocess.run(
-        [sys.executable, "-m", "rds", "jobs", "serve", "--port", str(port), "--no-secret", "."],
-        capture_output=True,
-        text=True,
-    )
-    assert refused.returncode == 2 and "it needs the secret" in refused.stderr
+    refused = CliRunner().invoke(app, ["jobs", "serve", "--port", str(port), "--no-secret", "."])
+    assert refused.exit_code == 2 and "it needs the secret" in refused.stderr
     server = serve(port=port)
     assert server.client().ask(do="jobs")["ok"]
     assert not server.client(with_secret=False).ask(do="jobs")["ok"]
     open_one = serve("--no-secret")
     assert open_one.client(with_secret=False).ask(do="jobs")["ok"]
-    again = subprocess.run(
-        [sys.executable, "-m", "rds", "jobs", "serve", "--socket", str(open_one.socket), "."],
-        capture_output=True,
-        text=True,
-    )
-    assert again.returncode == 2 and "another server of jobs listens there" in again.stderr
-    sent = subprocess.run(
-        [sys.executable, "-m", "rds", "jobs", "send", "--socket", str(open_one.socket), '{"do": "jobs"}', '{"do": 1}'],
-        capture_output=True,
-        text=True,
-    )
-    assert sent.returncode == 1 and sent.stdout.startswith('{"ok": true, "jobs": []}\n{"ok": false'), sent
+    again = CliRunner().invoke(app, ["jobs", "serve", "--socket", str(open_one.socket), "."])
+    assert again.exit_code == 2 and "another server of jobs listens there" in again.stderr
+    sent = CliRunner().invoke(app, ["jobs", "send", "--socket", str(open_one.socket), '{"do": "jobs"}', '{"do": 1}'])
+    assert sent.exit_code == 1 and sent.stdout.startswith('{"ok": true, "jobs": []}\n{"ok": false'), sent
 
 
 @pytest.mark.realtime
@@ -229,7 +219,7 @@ def test_the_documents_client(alone: Path) -> None:
     found = blocks("docs/jobs.md")
     save(found, alone)
     (program,) = (block for block in found if block.file == "client.py")
-    assert sum(bool(line) for line in program.text.splitlines()) <= 12
+    assert sum(bool(line) for line in program.text.splitlines()) <= 10
     run = subprocess.Popen(
         [sys.executable, "-m", "rds", "jobs", "serve", "--socket", "jobs.sock", "."],
         stderr=subprocess.PIPE,

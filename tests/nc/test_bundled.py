@@ -31,7 +31,17 @@ def copied(program: Bundled, folder: Path) -> Path:
 def test_there_are_those_of_the_paper_and_of_the_theses() -> None:
     assert set(PROGRAMS) == {
         f"{name}.ngc"
-        for name in ("square", "circle", "quadrants", "pocket", "pyramid", "hemisphere", "dcs-table-5-2", "oacs-p001")
+        for name in (
+            "square",
+            "circle",
+            "quadrants",
+            "pocket",
+            "pyramid",
+            "face",
+            "hemisphere",
+            "dcs-table-5-2",
+            "oacs-p001",
+        )
     }
     assert PROGRAMS["pyramid.ngc"].machine == "starmill"
     assert PROGRAMS["oacs-p001.ngc"].machine == "mrmt-oacs"

@@ -197,7 +197,7 @@ def test_the_command_chooses_by_the_machine(tmp_path: Path) -> None:
     words = ["nc", "run", str(file), "--machine", "mini-cnc"]
     told = CliRunner().invoke(app, [*words, "--method", "all", "--option", "period=0.002", "--json"])
     assert told.exit_code == 0, told.output
-    assert [row[0][:2] for row in json.loads(told.output)["tables"][0]["rows"]] == [
+    assert [row[0][:2] for row in json.loads(told.stdout)["tables"][0]["rows"]] == [
         "A:",
         "B:",
         "C:",

@@ -43,6 +43,32 @@ def test_the_integrator_with_a_constant_delay(gain: float, delay: float) -> None
     assert found.u == pytest.approx(gain**2 * expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("K", [1.2, 1.9, 2.5, 3.0])
+def test_the_published_region_of_delays_of_the_integrator(K: float) -> None:
+    """W. Zhang, M. S. Branicky, S. M. Phillips, Stability of networked control systems, IEEE Control Systems Magazine
+    21 (2001): dx = u dt, u = -K x, delay τ below h: stable for max(h/2 - 1/K, 0) < τ < min(1/K, h)."""
+    h = 0.7
+    K /= h
+    low, high = max(h / 2 - 1 / K, 0.0), min(1 / K, h)
+    for tau, holds in ((0.999 * low, False), (1.001 * low, True), (0.999 * high, True), (1.001 * high, False)):
+        if tau > 0.0:
+            found = cost(INTEGRATOR, Law.gain(-K), h, Delay.named("constant", delay=tau))
+            assert found.stable == holds, tau
+
+
+def test_delay_makes_a_loop_better_as_published() -> None:
+    """H. J. Kushner, L. Tobias, IEEE AC-14 (1969), as the toolbox Jitterbug has it among its examples (kushner.m).
+
+    6/((s + 1)(s + 2)) under u = -y, sampled every 1.42 s, is all but unstable; with delays that change from sample to
+    sample it is not. Told apart, it is the mean delay that helps, and the jitter costs a little.
+    """
+    A, C, R = np.array([[-3.0, -2.0], [1.0, 0.0]]), np.array([[0.0, 6.0]]), np.diag([1.0, 0.0])
+    plant, law = Plant(A, np.array([1.0, 0.0]), C, R), Law.gain(-1.0)
+    none, jittered = (cost(plant, law, 1.42, Delay.named("uniform", high=most), bins=15).cost for most in (0.0, 0.1))
+    mean = cost(plant, law, 1.42, Delay.named("constant", delay=0.05)).cost
+    assert none > 100.0 and mean < jittered < 15.0
+
+
 @pytest.mark.parametrize("tau", [0.0, 0.3, 0.75])
 def test_the_least_cost_of_a_delayed_integrator(tau: float) -> None:
     """(3 + √3)/6 h + τ, derived in docs/network.md; Åström and Bernhardsson (2002) publish (3 + √3)/6 h at τ = 0."""

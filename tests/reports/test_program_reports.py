@@ -96,6 +96,25 @@ def test_runs_leave_what_the_reports_read(tmp_path: Path) -> None:
     assert circle.column("nominal [mm]")[1] == pytest.approx(1.0)
 
 
+def test_a_face_is_the_lowest_that_the_tool_went(tmp_path: Path) -> None:
+    """Two strokes 5 mm apart, the second one 0.04 mm higher; a lift and a rapid leave nothing behind."""
+    strokes = [[-0.5, 0, 0, 20, 0, -0.5], [-0.5, 0, 5, 20, 5, -0.5]]
+    path = [[k, k, 0, -1, x, y, z, x2, y2, z2, 0, 0, 0, 0] for k, (z, x, y, x2, y2, z2) in enumerate(strokes)]
+    path.append([2, 9, 1, -1, 0, 0, -9, 20, 5, -9, 0, 0, 0, 0])
+    rows: list[list[float]] = [[0.0, 0.0, 0.0, 2.0, 0]]
+    rows += [[1 + k, k, 0.0, -0.5, 0] for k in range(21)]
+    rows += [[30 + k, k, 5.0, -0.46, 1] for k in range(21)]
+    rows += [[60, 10.0, 0.0, -9.0, 2]]
+    table = make_report("flatness", files(tmp_path, path, rows), {"tool": 4.0}).table("Flatness")
+    assert table.column("readings") == [10, None]
+    assert table.column("largest relative error [mm]") == pytest.approx([0.04, 0.126])
+    assert table.column("slope in y [mm/m]")[0] == pytest.approx(8.0)
+    with pytest.raises(InputError, match="can be shown; take more"):
+        make_report("flatness", files(tmp_path, path, rows), {"grid": 0.05})
+    with pytest.raises(InputError, match="no level feed moves"):
+        make_report("flatness", files(tmp_path, [[0, 2, 0, -1, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0]], rows[:2]))
+
+
 def test_what_does_not_belong_together_is_refused(tmp_path: Path) -> None:
     path, gauges = files(tmp_path, [CIRCLE], [[0, 1, 1, 0, 0], [1, 1, 1, 0, 3]])
     for given, said in (

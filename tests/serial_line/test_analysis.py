@@ -48,6 +48,21 @@ def test_the_command_says_what_fits(tmp_path: Path) -> None:
     assert [row[-1] for row in json.loads(can.stdout)["fits"]] == ["no", "no", "no", "yes"]
 
 
+def test_the_command_says_what_fits_on_can_by_method() -> None:
+    """Frames of 8 bytes have 135 bits at worst: method C needs a third of one for each module and period."""
+    words = ["bus", "analyse", "mini-cnc", "--period", "0.001", "--bitrate", "500000", "--units", "3"]
+    told = CliRunner().invoke(app, [*words, "--json"])
+    rows = {row[0][0]: row[2:] for row in json.loads(told.stdout)["methods"]}
+    assert rows["A"] == pytest.approx([1.08, 108.0, -0.08, 2])
+    assert rows["B"] == pytest.approx([3.24, 324.0, -2.24, 0])
+    assert rows["C"] == pytest.approx([0.27, 27.0, 0.73, 11])
+    assert "A part program by methods" in CliRunner().invoke(app, words).stdout
+    words[-1] = "16"
+    assert "16 modules; the methods are reckoned for 1 to 15" in CliRunner().invoke(app, words).stderr
+    refused = CliRunner().invoke(app, ["bus", "analyse", "mini-cnc", "--units", "3"])
+    assert refused.exit_code == 2 and "add --fits or --period" in refused.stderr
+
+
 @pytest.mark.parametrize("units", [1, 3])
 def test_can_measured_lies_between_the_formulas(units: int) -> None:
     """The least has no stuff bit, the most all that can be; what the modules' frames take lies between."""

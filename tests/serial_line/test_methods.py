@@ -48,6 +48,15 @@ def test_a_circle_is_kept_to_half_a_step_by_every_method(circle: dict[str, Metho
         assert not any(run.lost.values()), name
 
 
+def test_a_dwell_takes_its_time_by_every_method(tmp_path: Path) -> None:
+    dwells = "G21 G90 G61 F240\nG4 P0.1\nG1 X1\nG4 P0.2\nG4 P0.1\nG1 X2\nG3 X2 I-0.4 F120\nG4 P0.05\nM2\n"
+    for name, run in runs(tmp_path, dwells).items():
+        x = run.position[:, 0]
+        assert 95 < (x < 0.005).sum() < 200, name  # ms, of 100; a planned motion begins slowly
+        assert 295 < (abs(x - 1.0) < 0.005).sum() < 450, name
+        assert run.error.max() < 0.02 and not any(run.lost.values()), name
+
+
 def test_a_full_buffer_is_sent_nothing_that_it_cannot_take(bench: Maker) -> None:
     for method, size in (
         (lambda b: methods.method_c(b.host, steps(2400), UNITS), 1),

@@ -10,17 +10,21 @@ rds/bus/modules/rds/motion_frames.py. With R the bit rate, n modules and the per
 - figure 3.16: the clocks of n modules are asked for by one frame; each answers by one. This happens four times a
   second, and not at each step.
 
+- methods B and C as they run: what the motion itself needs, the four frames of a segment for each module, or a frame
+  of three increments for each module in three periods.
+
 Stuff bits depend on the content, so each formula gives a least and a most; what is measured lies between.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rds.bus.medium.bits import longest, shortest
-from rds.bus.modules.rds.motion_frames import BUFFER, PIECE, SLOTS
+from rds.bus.modules.rds.motion_frames import BUFFER, PIECE, SEGMENT_SIZE, SLOTS
+from rds.core.errors import InputError
 
 if TYPE_CHECKING:
     from rds.core.figure import Picture
@@ -53,6 +57,38 @@ def by_formula(units: int, bitrate: int, most: bool = True) -> CanTimes:
         units * (BUFFER // PIECE) * bits(2 + PIECE) / bitrate,
         (bits(2) + units * bits(4, True)) / bitrate,
     )
+
+
+COLUMNS = ("method", "bit rate [bit/s]", "takes [ms]", "of the period [%]", "left [ms]", "most modules")
+
+
+def table(units: int, period: float, bitrates: Sequence[int] = BITRATES) -> list[list[Any]]:
+    """Rows of method, bit rate, ms taken at worst, load in %, ms left, and the most modules that fit, of fifteen.
+
+    InputError for modules that no program moves.
+    """
+    if units not in _COUNTS:
+        raise InputError(f"{units} modules; the methods are reckoned for {_COUNTS[0]} to {_COUNTS[-1]}")
+    rows: list[list[Any]] = []
+    for method, (most, time) in _METHODS.items():
+        for bitrate in bitrates:
+            takes = time(units, bitrate)
+            fitting = max((n for n in range(1, most + 1) if time(n, bitrate) <= period), default=0)
+            rows.append([method, bitrate, takes * 1e3, 100.0 * takes / period, (period - takes) * 1e3, fitting])
+    return rows
+
+
+def _pieces(units: int, bitrate: int, pieces: float) -> float:
+    """s of the bus for so many frames of data to each module."""
+    return units * pieces * longest(2 + PIECE) / bitrate
+
+
+# by method: the most modules that it can have, and s that it takes at worst; an increment has two bytes
+_METHODS: dict[str, tuple[int, Callable[[int, int], float]]] = {
+    "A, set points and answers": (SLOTS, lambda units, bitrate: by_formula(units, bitrate).cycle),
+    "B, a segment a period": (_COUNTS[-1], lambda units, bitrate: _pieces(units, bitrate, SEGMENT_SIZE / PIECE)),
+    "C, cyclic buffer": (_COUNTS[-1], lambda units, bitrate: _pieces(units, bitrate, 2.0 / PIECE)),
+}
 
 
 def measure(machine: Machine, units: int, bitrate: int) -> CanTimes:

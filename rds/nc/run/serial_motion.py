@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from math import ceil
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from rds.core.errors import InputError
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.segments import AXES, LINE, in_plane
 from rds.machines import Machine
-from rds.modes.loop.program import Program
+from rds.modes.loop.program import Program, dwell_samples
 from rds.nc.check import Setup
 from rds.nc.run.prepare import Prepared, Progress, prepare
 
@@ -81,8 +82,12 @@ def serial_motion(
     blu = np.array([machine.axis(name).resolution for name in axes])
     order = [AXES.index(name) for name in axes]
     nodes, counts = _equations(prepared.path, order, blu, Limits.of(machine), synchronized, period)
+    happenings = getattr(program, "happenings", ())
+    for each in happenings:
+        if each.kind == "dwell":
+            _hold(nodes, counts, int(prepared.segment[each.sample - 1]) if each.sample else None, each.value, period)
     notes = list(prepared.notes)
-    if kinds := sorted({each.kind for each in getattr(program, "happenings", ())} - {"end"}):
+    if kinds := sorted({each.kind for each in happenings} - {"end", "dwell"}):
         notes.append(f"nodes move axes only: {', '.join(kinds)} of the program are not carried out")
     if motion == "plan":
         assert isinstance(program, Program)
@@ -134,6 +139,26 @@ def _equations(
             else:
                 nodes[i].append(line(start, end, steps))
     return nodes, counts
+
+
+def _hold(
+    nodes: list[list[NodeSegment]], counts: list[int], segment: int | None, seconds: float, period: float
+) -> None:
+    """A dwell after a segment of the path, or before the first: all nodes stay where they are, and it takes longer."""
+    steps, after = dwell_samples(seconds, period), segment or 0
+    place = sum(counts[: after + 1]) if segment is not None else 0
+    for found in nodes:
+        ends = [0, *accumulate(each.steps for each in found)]
+        at = ends.index(place)
+        where = found[at].own if at < len(found) else _last(found[-1])
+        found[at:at] = [line(where, where, min(steps - k, _MOST_STEPS)) for k in range(0, steps, _MOST_STEPS)]
+    counts[after] += steps
+
+
+def _last(node: NodeSegment) -> float:
+    """Where a segment ends, BLU."""
+    equations = Equations(node)
+    return [equations.next() for _ in range(node.steps)][-1]
 
 
 def _arc(row: np.ndarray, axis: int, blu: float, steps: int) -> NodeSegment:

@@ -4,6 +4,9 @@ Largest relative error: highest less lowest reading; the standard deviation is t
 is the distance of two parallel planes that hold all readings; here they are parallel to the plane of least squares,
 which bounds the least such distance from above. Source: dcs-thesis, section 5.5, experiment III, figures 5.13 to 5.16:
 largest relative error 0.126 mm, standard deviation 0.0520 mm.
+
+Of a run by methods (path.csv and gauges-*.csv) the face is what the tool has left: at each place of a grid the lowest
+that it went within its radius. The grid lies where the lowest level feeds of the program do.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.results.reports.content import Report, Table
+from rds.results.reports.gauges import PATH, STRAIGHT, Readings, Segment, read_gauges
 from rds.results.reports.reading import columns_in, read_columns
 from rds.results.reports.settings import Setting
 
@@ -25,8 +29,12 @@ if TYPE_CHECKING:
 
 SETTINGS = {
     "tolerance": Setting("flatness that is allowed", "mm", more_than=0),
+    "grid": Setting("of a run by methods: from reading to reading", "mm", 5.0, more_than=0),
+    "tool": Setting("of a run by methods: the tool's diameter (dcs-thesis, table 5.3)", "mm", 6.0, more_than=0),
 }
 _FACE = ("x", "y", "z")
+_MOST = 10_000  # readings of a grid
+_THESIS = ["dcs-thesis, figure 5.13", None, None, 0.126, 0.052, None, None, None]
 _LEAST = 4  # readings: three are always in one plane
 
 
@@ -54,10 +62,11 @@ class Face:
 
 def report(files: Sequence[Path], settings: Mapping[str, Any]) -> Report:
     """Flatness of each file's face. InputError for data or options that will not do."""
-    faces = [_read(path) for path in files]
+    by_methods = any(set(PATH) <= {column.heading for column in read_columns(path)} for path in files)
+    faces = _cut_faces(files, settings) if by_methods else [_read(path) for path in files]
     columns = ["face", "readings", "mean height [mm]", "largest relative error [mm]", "std [mm]", "flatness [mm]"]
     columns += ["slope in x [mm/m]", "slope in y [mm/m]"]
-    rows = [_row(face) for face in faces]
+    rows = [_row(face) for face in faces] + ([_THESIS] if by_methods else [])
     note = (
         "Flatness: between two planes parallel to that of least squares, without the slope of how the part was set up."
     )
@@ -81,11 +90,59 @@ def _read(path: Path) -> Face:
     if missing := [name for name in _FACE if name not in found]:
         raise InputError(f"there is no column {missing[0]}_mm; a face needs x_mm, y_mm and z_mm", str(path))
     points = np.column_stack([found[name].numbers(_LEAST) for name in _FACE])
+    return _face(path.stem, points, path)
+
+
+def _face(name: str, points: np.ndarray, path: Path) -> Face:
     matrix = np.column_stack([np.ones(len(points)), points[:, :2]])
     plane, _, rank, _ = np.linalg.lstsq(matrix, points[:, 2], rcond=None)
     if rank < 3:
         raise InputError("all readings are on one line in x and y; a face needs readings beside it", str(path))
-    return Face(path.stem, points, plane)
+    return Face(name, points, plane)
+
+
+def _cut_faces(files: Sequence[Path], settings: Mapping[str, Any]) -> list[Face]:
+    """The faces that runs by methods have cut."""
+    path, runs = read_gauges(files)
+    level = [each for each in path if not each.rapid and each.start[2] == each.end[2] and len(_extent(each))]
+    if not level:
+        raise InputError(
+            "the path has no level feed moves, and so no face; take a program like face.ngc", str(files[0])
+        )
+    lowest = min(each.start[2] for each in level)
+    corners = np.concatenate([_extent(each) for each in level if each.start[2] == lowest])
+    axes = [
+        np.arange(low, high + 1e-9, settings["grid"]) for low, high in zip(corners.min(0), corners.max(0), strict=True)
+    ]
+    if (count := len(axes[0]) * len(axes[1])) > _MOST:
+        raise InputError(f"grid = {settings['grid']:g} mm makes {count} readings, and {_MOST} can be shown; take more")
+    places = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    return [_face(run.name, _left(run, path, places, 0.5 * settings["tool"]), files[0]) for run in runs]
+
+
+def _extent(segment: Segment) -> np.ndarray:
+    """Places (n × 2) between which a level move is: its ends, or the square about its circle; none if vertical."""
+    if segment.plane == STRAIGHT:
+        return (
+            np.array([segment.start, segment.end])[:, :2] if np.any(segment.start != segment.end) else np.empty((0, 2))
+        )
+    return np.array([segment.centre - segment.radius, segment.centre + segment.radius])[:, :2]
+
+
+def _left(run: Readings, path: Sequence[Segment], places: np.ndarray, radius: float) -> np.ndarray:
+    """At each of the places (n × 2) that a feed came over, the lowest that it went there (m × 3), mm."""
+    feeds = np.array([not each.rapid for each in path])
+    tool = run.position[feeds[run.segment]]
+    found = []
+    for place in places:
+        over = np.hypot(*(tool[:, :2] - place).T) <= radius
+        if over.any():
+            found.append([*place, tool[over, 2].min()])
+    if len(found) < _LEAST:
+        raise InputError(
+            f"{run.name}: {len(found)} places of the grid were cut, and a face needs {_LEAST}; a finer grid"
+        )
+    return np.array(found)
 
 
 def _row(face: Face) -> list[Any]:
