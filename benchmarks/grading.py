@@ -11,8 +11,8 @@ import rds
 from benchmarks.figures import Figure, interleaved
 from benchmarks.grading_peers import autograde_seconds, nbclient_seconds
 from rds.grading.assignment.assignment import read_assignment
-from rds.grading.batch import run_batch
 from rds.grading.batch.grade_one import grade
+from rds.grading.batch.run import run_batch
 from rds.grading.sandbox import Pool, available
 
 STUDENTS = 1000

@@ -52,6 +52,7 @@ def check(
 ) -> None:
     """Check an assignment: its reference solution earns all points for everybody, doing nothing earns none."""
     with refusals(), stdout_kept(json):
+        needs_sandbox()
         from rds.grading.assignment.assignment import read_assignment
         from rds.grading.assignment.check_assignment import check_assignment
         from rds.grading.sandbox import Pool
@@ -97,11 +98,22 @@ def _opener(is_trusted: bool) -> AbstractContextManager[Opener]:
         )
         return nullcontext(TrustedFiles())
     from rds.core.errors import InputError
-    from rds.grading.sandbox import Pool, available
+    from rds.grading.sandbox.requirements import available
 
     if fault := available():
         raise InputError(f"{fault}\nFor a file that you wrote yourself, --trust-my-file goes without the sandbox")
+    from rds.grading.sandbox import Pool
+
     return Pool()
+
+
+def needs_sandbox() -> None:
+    """InputError, with the remedy, where nothing of the sandbox can be imported: on Windows and macOS."""
+    from rds.core.errors import InputError
+    from rds.grading.sandbox.requirements import missing
+
+    if fault := missing():
+        raise InputError(fault)
 
 
 def _show_self(found: SelfCheck) -> None:

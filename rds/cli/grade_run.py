@@ -9,9 +9,10 @@ import typer
 
 from rds.cli import cluster_options
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, stdout_kept, writes_files
+from rds.cli.grade import needs_sandbox
 
 if TYPE_CHECKING:
-    from rds.grading.batch import BatchOutcome
+    from rds.grading.batch.outcome import BatchOutcome
 
 _INTERRUPTED = 130  # by the shell's custom
 
@@ -27,6 +28,12 @@ def run(
     tls_cert: cluster_options.Cert = None,
     tls_key: cluster_options.Key = None,
     insecure_cluster: cluster_options.Insecure = False,
+    class_list: Annotated[
+        Path | None, typer.Option("--class", help="The class list: sections, groups, extensions, late days.")
+    ] = None,
+    against: Annotated[
+        list[Path] | None, typer.Option(help="Earlier batches, or submissions and solutions, to compare with.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the batch in that folder.")] = False,
     json: Json = False,
 ) -> None:
@@ -36,7 +43,8 @@ def run(
     """
     try:
         with refusals(), stdout_kept(json), ends_as_ctrl_c():
-            from rds.grading.batch import run_batch
+            needs_sandbox()
+            from rds.grading.batch.run import run_batch
 
             cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)
             with progress_bars() as bar:
@@ -47,6 +55,8 @@ def run(
                     jobs=jobs,
                     scheduler=cluster,
                     resume=resume,
+                    class_list=class_list,
+                    against=tuple(against or ()),
                     progress=bar("submissions"),
                     announce=lambda text: typer.echo(f"rds: {text}", err=True),
                 )

@@ -26,6 +26,7 @@ from rds.cli import (
     forces,
     grade,
     grade_export,
+    grade_review,
     grade_run,
     interpolate,
     jobs,
@@ -101,6 +102,10 @@ app.add_typer(design.app, name="design")
 app.add_typer(grade.app, name="grade")
 grade.app.command()(grade_run.run)
 grade.app.command()(grade_export.export)
+grade.app.command()(grade_review.review)
+grade.app.command()(grade_review.regrade)
+grade.app.command()(grade_review.best)
+grade.app.command("late-days")(grade_review.late_days)
 machine_app.command("from")(design.machine_from)
 machine_app.command()(forces.power)
 for command in (machines.new, machines.show, machines.pose, machines.joints, machines.urdf, machines.script):

@@ -18,6 +18,7 @@ class Status(StrEnum):
     BROKE_CONTRACT = "broke the contract"  # it answered what no controller may: NaN, text, too late a sample, ...
     TIMED_OUT = "timed out"  # more CPU or wall time than the assignment allows
     KILLED = "killed"  # it ended its process, or went over a limit of memory, processes or output
+    EXCUSED = "excused"  # by a grader's word: it counts neither for nor against the student
     GRADER_ERROR = "grader error"  # our fault: to be graded again, never a zero
 
 

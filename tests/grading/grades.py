@@ -32,6 +32,7 @@ def grade(student: str = "ada", status: Status = Status.OK, *scores: CriterionSc
 def batch_in(
     folder: Path,
     grades: Sequence[Grade],
+    /,
     title: str = "Tracking",
     pages: Mapping[str, str] | None = None,
     **record: Any,

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from rds.grading.batch import BatchOutcome, run_batch
+from rds.grading.batch.outcome import BatchOutcome
+from rds.grading.batch.run import run_batch
 from rds.grading.grade import Status
 from rds.grading.intake.names import shown
 from rds.grading.sandbox import available

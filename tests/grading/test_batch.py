@@ -17,9 +17,10 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.core.parallel import Outcome
-from rds.grading.batch import BatchOutcome, run_batch
 from rds.grading.batch import run as run_module
 from rds.grading.batch.journal import Journal, read_journal
+from rds.grading.batch.outcome import BatchOutcome
+from rds.grading.batch.run import run_batch
 from rds.grading.grade import Grade, Status
 from rds.grading.sandbox import SandboxError, available
 from tests.grading.batches import ASSIGNMENT, law, notebook, put

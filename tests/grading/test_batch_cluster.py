@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
-from rds.grading.batch import run_batch
+from rds.grading.batch.run import run_batch
 from rds.grading.sandbox import available
 from tests.grading.batches import ASSIGNMENT, law, put
 from tests.grading.made import assignment_in

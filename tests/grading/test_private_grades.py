@@ -12,7 +12,7 @@ from other_user import SIGN, hall, open_by_mode, seen_by_another
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.hand_out import hand_out
-from rds.grading.batch import run_batch
+from rds.grading.batch.run import run_batch
 from rds.grading.exports.export import export
 from rds.grading.exports.exported import Wanted
 from rds.grading.sandbox import available

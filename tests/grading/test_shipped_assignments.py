@@ -15,8 +15,9 @@ import pytest
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.hand_out import hand_out
-from rds.grading.batch import BatchOutcome, run_batch
 from rds.grading.batch.grade_one import grade, grade_with_runs
+from rds.grading.batch.outcome import BatchOutcome
+from rds.grading.batch.run import run_batch
 from rds.grading.grade import Status
 from rds.grading.sandbox import Pool, available
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from itertools import combinations
 
@@ -17,9 +18,10 @@ from rds.grading.batch.similarity import (
     WINDOW,
     fingerprints,
     identical_files,
+    same_loops,
     similar_pairs,
 )
-from rds.grading.batch.similarity_table import pairs_html
+from rds.grading.batch.similarity_table import alike_json, found_html
 
 LAW = '''"""PD control with a filtered derivative."""
 
@@ -146,7 +148,8 @@ def test_the_same_file_is_always_told_also_when_most_of_a_class_have_it() -> Non
     assert group.students == tuple(f"s{n:02}" for n in range(7)) and group.source == ""
     (group,) = identical_files(given, {"solution.py": LAW.encode()})
     assert group.source == "solution.py"
-    assert "solution.py" in pairs_html([], [group]) and "s06" in pairs_html([], [group])
+    shown = found_html(json.loads(alike_json([], [group])))
+    assert "solution.py" in shown and "s06" in shown
     assert identical_files([("ada", b"x"), ("ben", b"y")], {"my.py": b"y"})[0].students == ("ben",)
 
 
@@ -160,5 +163,19 @@ def test_a_solution_that_was_handed_out_is_named_as_the_source() -> None:
 
 def test_the_table_escapes_names() -> None:
     pairs = similar_pairs(prints(**{"<b>": LAW, "ben": disguised(LAW)}))
-    assert "<b>" not in pairs_html(pairs) and "&lt;b&gt;" in pairs_html(pairs)
-    assert "No two submissions" in pairs_html([])
+    shown = found_html(json.loads(alike_json(pairs)))
+    assert "<b>" not in shown and "&lt;b&gt;" in shown
+    assert "No two submissions" in found_html(json.loads(alike_json([])))
+
+
+def test_files_of_others_are_compared_with_the_class_alone() -> None:
+    others = {"2024/eve": fingerprints(disguised(LAW).encode()), "2024/zoe": fingerprints(LAW.encode())}
+    pairs = similar_pairs(prints(ada=LAW, cy=OTHER), others=others)
+    assert {(pair.first, pair.second) for pair in pairs} == {("ada", "2024/eve"), ("ada", "2024/zoe")}
+
+
+def test_equal_runs_make_a_group_whatever_the_programs_look_like() -> None:
+    one, other = {"sine": "a", "step": "b"}, {"sine": "a", "step": "c"}
+    groups = same_loops({"ada": one, "ben": dict(one), "cy": other, "di": {}, "ed": {}}, {"2024/eve": other})
+    assert [(group.students, group.others) for group in groups] == [(("ada", "ben"), ()), (("cy",), ("2024/eve",))]
+    assert "to the last bit" in found_html(json.loads(alike_json([], [], groups)))

@@ -120,6 +120,7 @@ LATE = Table(
         "grace_hours": Quantity("delay that costs nothing", "h", 0.0, 1e4, default=0.0),
         "cap_percent": Quantity("most that is lost", "% of the points", 0.0, 100.0, default=100.0),
         "zero_after_days": Quantity("delay after which nothing is left", "days", 0.0, default=inf, infinite=True),
+        "free_days": Quantity("late days that a student may spend here", "days", 0, 366, default=0, whole=True),
     },
 )
 

@@ -17,21 +17,30 @@ class Late:
     """Each day that has begun after `due` and the hours of grace costs `percent_per_day` of the points earned.
 
     The loss is at most `cap_percent`. After `zero_after_days` days nothing is left. Within the grace nothing is lost;
-    after it, days count from `due` itself.
+    after it, days count from `due` itself. `free_days` of them cost nothing: late days that a student may spend here.
     """
 
     percent_per_day: float = 0.0
     grace_hours: float = 0.0
     cap_percent: float = 100.0
     zero_after_days: float = inf
+    free_days: int = 0
 
-    def lost(self, days: float) -> float:
-        """The share of the points that is lost after `days` days, 0 to 1."""
+    def spent(self, days: float, left: int | None = None) -> int:
+        """Late days that are spent after `days` days, of those that the student has `left` (None: nobody counts)."""
+        if days * 24.0 <= self.grace_hours or days > self.zero_after_days:
+            return 0
+        free = self.free_days if left is None else min(self.free_days, left)
+        return min(free, ceil(days))
+
+    def lost(self, days: float, left: int | None = None) -> float:
+        """The share of the points that is lost after `days` days, 0 to 1; `left` as in `spent`."""
         if days * 24.0 <= self.grace_hours:
             return 0.0
         if days > self.zero_after_days:
             return 1.0
-        return min(self.percent_per_day * ceil(days), self.cap_percent) / 100.0
+        charged = ceil(days) - self.spent(days, left)
+        return min(self.percent_per_day * charged, self.cap_percent) / 100.0
 
     def to_table(self) -> Mapping[str, float]:
         """As the words of an assignment."""

@@ -10,20 +10,35 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
+from rds.grading.assignment.late_rules import Late
+from rds.grading.course.class_list import FILE as CLASS
+from rds.grading.course.class_list import ClassList, read_class_list
 from rds.grading.grade import Grade, Status
+from rds.grading.intake.names import safe_id
+from rds.grading.review.entries import Review, read_review
+from rds.grading.review.everyone import everyone
 
 RECORD, STUDENTS, GRADE, FEEDBACK = "batch.json", "students", "grade.json", "feedback.html"
 
 
 @dataclass(frozen=True)
 class Finished:
-    """The grades of a batch in the order of the students' identifiers; `folders` are theirs, by identifier."""
+    """The grades that count, in the order of the students' identifiers; `folders` are theirs, by identifier.
+
+    `measured` are those that the batch has made, by the student or group that handed in; `of` says from whose a
+    student's grade is.
+    """
 
     folder: Path
     title: str
     grades: tuple[Grade, ...]
     folders: Mapping[str, Path]
     record: Mapping[str, Any] = field(default_factory=dict)
+    measured: Mapping[str, Grade] = field(default_factory=dict)
+    of: Mapping[str, str] = field(default_factory=dict)
+    kept: Mapping[str, Path] = field(default_factory=dict)  # folders of what is `measured`
+    listed: ClassList = field(default_factory=ClassList)
+    review: Review = field(default_factory=Review)
 
     @property
     def max_score(self) -> float:
@@ -32,19 +47,24 @@ class Finished:
 
     @property
     def to_hand_on(self) -> tuple[Grade, ...]:
-        """The grades that a gradebook may get: all but those that the grader could not make."""
-        return tuple(grade for grade in self.grades if grade.status is not Status.GRADER_ERROR)
+        """The grades that a gradebook may get: all but those that the grader could not make, and excused ones."""
+        return tuple(grade for grade in self.grades if grade.status not in (Status.GRADER_ERROR, Status.EXCUSED))
+
+    @property
+    def excused(self) -> tuple[Grade, ...]:
+        """Students who need no grade here."""
+        return tuple(grade for grade in self.grades if grade.status is Status.EXCUSED)
 
     @property
     def not_graded(self) -> tuple[str, ...]:
         """Students whose submission is still to be graded, or to be graded again."""
         failed = {grade.student for grade in self.grades if grade.status is Status.GRADER_ERROR}
-        known = {grade.student for grade in self.grades}
+        known = {grade.student for grade in self.grades} | set(self.measured)
         return tuple(sorted(failed | (set(self.record.get("handed_in", ())) - known)))
 
     def time(self, student: str) -> datetime | None:
-        """When the student handed in, where that is known."""
-        return as_time(self.record.get("times", {}).get(student))
+        """When the student, or the student's group, handed in, where that is known."""
+        return as_time(self.record.get("times", {}).get(self.of.get(student, student)))
 
     @property
     def due(self) -> datetime | None:
@@ -79,14 +99,33 @@ def read_finished(folder: str | Path) -> Finished:
         found[grade.student] = grade, path.parent
     if not found:
         raise InputError("holds no grade yet; run `rds grade run` first", str(folder))
-    names = sorted(found)
+    listed = read_class_list(folder / CLASS) if (folder / CLASS).exists() else ClassList()
+    review = read_review(folder)
+    counting = everyone((grade for grade, _ in found.values()), listed, review, late_rules(record))
     return Finished(
         folder,
         str(record.get("title") or folder.name),
-        tuple(found[name][0] for name in names),
-        {name: found[name][1] for name in names},
+        tuple(grade for grade, _ in counting.values()),
+        {
+            # a group's members have folders of their own beside the group's
+            name: folder / STUDENTS / safe_id(name) if grade.student != name else found[name][1]
+            for name, (_, grade) in counting.items()
+        },
         record,
+        {name: grade for name, (grade, _) in sorted(found.items())},
+        {name: grade.student for name, (_, grade) in counting.items()},
+        {name: folder for name, (_, folder) in sorted(found.items())},
+        listed,
+        review,
     )
+
+
+def late_rules(record: Mapping[str, Any]) -> Late:
+    """What the batch's record says of late submissions. InputError for words that this version does not know."""
+    try:
+        return Late(**record.get("late", {}))
+    except TypeError as error:
+        raise InputError(f"its late rules are of another version ({error}); grade into a new folder", RECORD) from error
 
 
 def _json(path: Path) -> Any:

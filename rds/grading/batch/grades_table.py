@@ -41,7 +41,7 @@ def csv_text(rows: Iterable[Sequence[str | float | None]]) -> str:
 
 
 def _row(grade: Grade, criteria: Sequence[CriterionScore]) -> list[str | float | None]:
-    is_graded = grade.status is not Status.GRADER_ERROR
+    is_graded = grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)
     scores = {score.name: score for score in grade.criteria} if is_graded else {}
     points = [grade.score if is_graded else None, grade.max_score, grade.before_penalty if is_graded else None]
     row: list[str | float | None] = [grade.student, str(grade.status), *points, grade.late_days]

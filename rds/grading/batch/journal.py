@@ -41,7 +41,9 @@ class Journal:
             try:
                 fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                raise InputError("another rds grade run is at work here; wait for its end", str(path)) from None
+                raise InputError(
+                    "another rds grade run, or another grader, is at work here; wait for its end", str(path)
+                ) from None
             self.rows, good = _whole_lines(path)
             if good < os.fstat(self._fd).st_size:
                 self.was_torn = True

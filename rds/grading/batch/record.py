@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ class Record:
     times: Mapping[str, str]
     layout: str
     due: str | None
+    late: Mapping[str, float] = field(default_factory=dict)  # the assignment's rules
 
     def write(self, folder: Path) -> None:
         """Into the batch's folder, whole."""
@@ -47,7 +48,9 @@ def record_of(assignment: Assignment, handed_in: Mapping[str, str], times: Mappi
     versions = {"rds": own_version(), "Python": platform.python_version(), "numpy": version("numpy")}
     due = None if assignment.due is None else assignment.due.isoformat()
     folder = str(assignment.folder.resolve())
-    return Record(assignment.title, folder, assignment.sha256, versions, handed_in, times, layout, due)
+    return Record(
+        assignment.title, folder, assignment.sha256, versions, handed_in, times, layout, due, assignment.late.to_table()
+    )
 
 
 def read_record(folder: Path) -> Record:

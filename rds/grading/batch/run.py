@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,53 +15,65 @@ from rds.core.errors import InputError
 from rds.core.parallel import Outcome, Scheduler, processors, spread
 from rds.core.parallel.spread import Progress
 from rds.grading.assignment.assignment import Assignment, read_assignment
+from rds.grading.batch.alike import alike
 from rds.grading.batch.journal import FILE as JOURNAL
 from rds.grading.batch.journal import Journal
 from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.queue import Queued, keep, queued, ungraded
 from rds.grading.batch.record import FILE, check_same, read_record, record_of
-from rds.grading.batch.similarity import Identical, Pair, fingerprints, identical_files, similar_pairs
-from rds.grading.batch.similarity_table import pairs_html, pairs_json
+from rds.grading.batch.similarity_table import alike_json
 from rds.grading.batch.work import CODE, FEEDBACK, Answer, Task, graded, setup_of
-from rds.grading.feedback.class_files import write_class_files
+from rds.grading.course.class_list import FILE as CLASS
+from rds.grading.course.class_list import ClassList, read_class_list
+from rds.grading.course.groups import by_group
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.grade import Grade, Status
-from rds.grading.intake import collect
+from rds.grading.intake import Intake, collect
+from rds.grading.review.publish import SIMILARITY, publish
 from rds.grading.sandbox import available
 
-STUDENTS, SIMILARITY = "students", "similarity.json"
+STUDENTS = "students"
 _PATIENCE = 600.0  # s for one submission beyond all that it may take: then it is the grader that hangs
 Address = str | Scheduler | None
 _LONGEST = 2.0 * (1.0 + 10.0)  # times the limits: where all is visible and where it is hidden, run and counted
 
 
-def run_batch(
-    assignment: str | Path,
-    submissions: str | Path,
-    out: str | Path,
-    *,
-    jobs: int | None = None,
-    scheduler: Address = None,
-    resume: bool = False,
-    progress: Progress | None = None,
-    announce: Callable[[str], None] | None = None,
-) -> BatchOutcome:
+@dataclass(frozen=True)
+class How:
+    """How a batch is graded, whatever it is. `announce` gets sentences for whoever watches."""
+
+    jobs: int | None = None  # local processes; default: one for each processor
+    scheduler: Address = None  # a dask cluster, whose workers grade
+    resume: bool = False
+    class_list: Path | None = None
+    against: tuple[Path, ...] = ()  # what submissions are compared with, besides each other
+    progress: Progress | None = None
+    announce: Callable[[str], None] = lambda text: None
+
+
+def run_batch(assignment: str | Path, submissions: str | Path, out: str | Path, **how: Any) -> BatchOutcome:
     """Grade all `submissions` (a folder or an exported zip) by the assignment in a folder, into the folder `out`.
 
-    Each finished submission is in the journal of `out` before the next is: `resume` goes on after a kill at any point,
-    with the same scores. `jobs` local processes (default: one for each processor), or the workers of a dask
-    `scheduler`. What a submission does is in its row. Raises InputError for what will not do, with nothing graded;
-    also where the sandbox does not hold.
+    `how` are the fields of `How`. Each finished submission is in the journal of `out` before the next is: `resume` goes
+    on after a kill at any point, with the same scores. What a submission does is in its row. Raises InputError for what
+    will not do, with nothing graded; also where the sandbox does not hold.
     """
-    began = time.monotonic()
-    say = announce or (lambda text: None)
-    out = Path(out)
-    _check_free(out, resume)
     read = read_assignment(assignment)
-    _check_sandbox(jobs, scheduler)
     names = (read.title, read.folder.resolve().name)
-    intake = collect(submissions, read.files, names, read.due.tzinfo if read.due else None)
-    rows = queued(read, intake, out / STUDENTS, jobs if scheduler is None else None)
+    zone = read.due.tzinfo if read.due else None
+    return grade_all(read, lambda: collect(submissions, read.files, names, zone), Path(out), How(**how))
+
+
+def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how: How) -> BatchOutcome:
+    """As `run_batch`, whatever was handed in comes from; it is asked for when all else is known to be in order."""
+    began = time.monotonic()
+    _check_free(out, how.resume)
+    kept = out / CLASS
+    place = how.class_list or (kept if kept.exists() else None)
+    listed = ClassList() if place is None else read_class_list(place)
+    _check_sandbox(how.jobs, how.scheduler)
+    intake = by_group(handed_in(), listed)
+    rows = queued(read, intake, out / STUDENTS, how.jobs if how.scheduler is None else None)
     record = record_of(
         read,
         {each.row.student: each.mark for each in rows},
@@ -68,27 +81,38 @@ def run_batch(
         intake.layout,
     )
     notes = [f"not a submission, and left alone: {name}" for name in intake.ignored]
+    notes += _unlisted(listed, intake)
     with Journal(out / JOURNAL) as journal:  # from here on nobody else writes into this folder
         if (out / FILE).exists():
-            _check_free(out, resume)
+            _check_free(out, how.resume)
             check_same(read_record(out), record, out)
         record.write(out)
+        if listed.members and how.class_list is not None:
+            write_whole(kept, listed.to_csv())
         if journal.was_torn:
-            say("the last line of the journal was only half written, and was cut off: that submission is graded again")
+            how.announce(
+                "the last line of the journal was only half written, and was cut off: that submission is graded again"
+            )
         keep(rows)
         batch = _Batch(read, rows, journal)
         todo = batch.todo()
         if len(todo) < len(rows):
-            say(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
-        batch.go(todo, jobs, scheduler, progress)
+            how.announce(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
+        batch.go(todo, how.jobs, how.scheduler, how.progress)
         grades = batch.grades()
-        pairs, identical = _pairs(read, rows, jobs)
-        write_whole(out / SIMILARITY, pairs_json(pairs, identical))
-        everybody, similar = list(grades.values()), pairs_html(pairs, identical)
-        about = f"{len(everybody)} submissions, handed in as {intake.layout}"
-        write_class_files(out, read.title, everybody, seconds=batch.seconds, similar=similar, about=about)
-        outcome = BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
-    return outcome
+        found = alike(read, rows, grades, how.against, how.jobs, how.scheduler)
+        write_whole(out / SIMILARITY, alike_json(found.pairs, found.identical, found.loops))
+        publish(out, read)
+    return BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
+
+
+def _unlisted(listed: ClassList, intake: Intake) -> list[str]:
+    """Who handed in, and is not in the class list."""
+    if not listed.members:
+        return []
+    groups = listed.groups()
+    strangers = [r.student for r in intake.rows if r.student not in groups and listed.find(r.student, r.source) is None]
+    return [f"not in the class list: {student}" for student in strangers]
 
 
 def _check_sandbox(jobs: int | None, scheduler: Address) -> None:
@@ -106,20 +130,6 @@ def _check_sandbox(jobs: int | None, scheduler: Address) -> None:
 def _missing(_: int) -> Answer:
     """On a worker: whether it can grade."""
     return Answer(missing=available() or "")
-
-
-def _pairs(assignment: Assignment, rows: Sequence[Queued], jobs: int | None) -> tuple[list[Pair], list[Identical]]:
-    """Submissions that are alike, and those that are the same. Parsed in other processes, which may crash."""
-    given = [(each.row.student, each.code) for each in rows if each.code]
-    names = (assignment.template, assignment.solution)
-    own = {name: (assignment.folder / name).read_bytes() for name in names if name is not None}
-    parsed = {name: code for name, code in own.items() if name.endswith(".py")}
-    codes = [code for _, code in given] + list(parsed.values())
-    done = [outcome.value or {} for outcome in spread(fingerprints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)]
-    found = {student: prints for (student, _), prints in zip(given, done, strict=False)}
-    sources = dict(zip(parsed, done[len(given) :], strict=True))
-    template = sources.pop(assignment.template or "", {})
-    return similar_pairs(found, [template], sources), identical_files(given, own)
 
 
 def _check_free(out: Path, resume: bool) -> None:

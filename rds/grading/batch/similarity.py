@@ -49,6 +49,26 @@ class Identical:
     source: str = ""
 
 
+@dataclass(frozen=True)
+class SameLoop:
+    """Students, and files of others, whose runs are the same to the last bit in all cases that everybody has alike."""
+
+    students: tuple[str, ...]
+    others: tuple[str, ...] = ()
+
+
+def same_loops(found: Mapping[str, Mapping[str, str]], others: Mapping[str, Mapping[str, str]]) -> list[SameLoop]:
+    """Groups of those who behave the same: by name and case a hash of the run. Nobody without a run is in one."""
+    groups: dict[tuple[tuple[str, str], ...], tuple[list[str], list[str]]] = {}
+    for place, names in enumerate((found, others)):
+        for name, cases in names.items():
+            if cases:
+                groups.setdefault(tuple(sorted(cases.items())), ([], []))[place].append(name)
+    made = [SameLoop(tuple(sorted(own)), tuple(sorted(rest))) for own, rest in groups.values()]
+    alike = [each for each in made if each.students and len(each.students) + len(each.others) > 1]
+    return sorted(alike, key=lambda group: (-len(group.students), group.students))
+
+
 def identical_files(given: Iterable[tuple[str, bytes]], own: Mapping[str, bytes]) -> list[Identical]:
     """Groups of students with the same file, the largest first, however many of a class they are.
 
@@ -93,17 +113,21 @@ def similar_pairs(
     found: Mapping[str, Fingerprints],
     template: Iterable[Fingerprints] = (),
     sources: Mapping[str, Fingerprints] | None = None,
+    others: Mapping[str, Fingerprints] | None = None,
 ) -> list[Pair]:
     """The pairs of students whose programs are alike, the most alike first. `found` is by student.
 
     `sources` are what the instructor has of it, such as a solution: the one that holds most of what a pair has in
-    common, and half of it at least, is named.
+    common, and half of it at least, is named. `others` are programs of no student of this class, by names that no
+    student has: each is compared with the students', and not with other ones.
     """
+    foreign = others or {}
     known = {value for prints in template for value in prints}
     spread = Counter(value for prints in found.values() for value in prints)
     if len(found) >= _CLASS:
         known |= {value for value, count in spread.items() if count > _MANY * len(found) and count > 2}
-    own = {student: {v: lines for v, lines in prints.items() if v not in known} for student, prints in found.items()}
+    everybody = {**foreign, **found}
+    own = {name: {v: lines for v, lines in prints.items() if v not in known} for name, prints in everybody.items()}
     holders: dict[int, list[str]] = {}
     for student in sorted(own):
         for value in own[student]:
@@ -115,8 +139,9 @@ def similar_pairs(
     parts = list(groups.values())
     shared: dict[tuple[str, str], list[int]] = {}  # by pair: numbers of groups
     for number, together in enumerate(groups):
-        for pair in combinations(together, 2):
-            shared.setdefault(pair, []).append(number)
+        for pair in combinations(sorted(together, key=lambda name: (name not in found, name)), 2):
+            if pair[0] in found:  # students come first
+                shared.setdefault(pair, []).append(number)
 
     @cache
     def lines(student: str, numbers: tuple[int, ...]) -> tuple[Lines, ...]:

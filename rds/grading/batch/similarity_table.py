@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from typing import Any
 
-from rds.grading.batch.similarity import LEAST_SCORE, Identical, Lines, Pair
+from rds.grading.batch.similarity import LEAST_SCORE, Identical, Lines, Pair, SameLoop
 from rds.grading.feedback.plain_text import one_line
 from rds.results.html import table
 
@@ -17,45 +18,69 @@ _NOTE = (
     "the template or half of the class have too is left out. Short programs are often alike by themselves: this is "
     "where to look, and no finding. No points depend on it."
 )
+_LOOPS = (
+    "In all cases that are the same for everybody these runs are equal to the last bit, whatever the programs look "
+    "like. Who takes the same simple law with the same gains has them too: it is where to look, and no finding."
+)
 
 
-def pairs_html(pairs: Sequence[Pair], identical: Sequence[Identical] = ()) -> str:
-    """Who handed in the same file, and a table of the most alike; a sentence where there are none."""
-    return _same(identical) + _alike(pairs)
+def found_html(found: Mapping[str, Any]) -> str:
+    """What `alike_json` holds: who handed in the same file, whose loops are the same, and the most alike programs."""
+    return (
+        _same(found.get("identical", ())) + _loops(found.get("loops", ())) + _alike(found.get("pairs", ()))
+        if found
+        else ""
+    )
 
 
-def _same(identical: Sequence[Identical]) -> str:
+def _same(identical: Sequence[Mapping[str, Any]]) -> str:
     if not identical:
         return ""
-    rows = [
-        [len(group.students), ", ".join(one_line(each, _NAME) for each in group.students), group.source or "–"]
-        for group in identical
-    ]
+    rows = [[len(group["students"]), _names(group["students"]), group["source"] or "–"] for group in identical]
     return table(["students", "the same file, to the last byte", "which is also"], rows)
 
 
-def _alike(pairs: Sequence[Pair]) -> str:
+def _loops(loops: Sequence[Mapping[str, Any]]) -> str:
+    if not loops:
+        return ""
+    rows = [[len(group["students"]), _names(group["students"]), _names(group["others"]) or "–"] for group in loops]
+    return table(["students", "the same closed loop, to the last bit", "as have"], rows, "", _LOOPS)
+
+
+def _names(names: Sequence[str]) -> str:
+    return ", ".join(one_line(each, _NAME) for each in names)
+
+
+def _alike(pairs: Sequence[Mapping[str, Any]]) -> str:
     if not pairs:
         return f'<p class="note">No two submissions share {100 * LEAST_SCORE:.0f} % of their structure or more.</p>'
     rows = [
         [
-            one_line(pair.first, _NAME),
-            one_line(pair.second, _NAME),
-            f"{100 * pair.score:.0f} %",
-            _ranges(pair.first_lines),
-            _ranges(pair.second_lines),
-            pair.source or "–",
+            one_line(pair["first"], _NAME),
+            one_line(pair["second"], _NAME),
+            f"{100 * pair['score']:.0f} %",
+            _ranges(pair["first_lines"]),
+            _ranges(pair["second_lines"]),
+            pair["source"] or "–",
         ]
         for pair in pairs[:MOST]
     ]
     note = _NOTE if len(pairs) <= MOST else f"{_NOTE} The first {MOST} of {len(pairs)} pairs; similarity.json has all."
-    heads = ["student", "student", "in common", "lines of the first", "lines of the second", "both from"]
+    heads = [
+        "student",
+        "student, or file of others",
+        "in common",
+        "lines of the first",
+        "lines of the second",
+        "both from",
+    ]
     return table(heads, rows, "", note)
 
 
-def pairs_json(pairs: Sequence[Pair], identical: Sequence[Identical] = ()) -> bytes:
-    """All pairs, with their ranges of lines, and who handed in the same file."""
-    whole = {"identical": [asdict(group) for group in identical], "pairs": [asdict(pair) for pair in pairs]}
+def alike_json(pairs: Sequence[Pair], identical: Sequence[Identical] = (), loops: Sequence[SameLoop] = ()) -> bytes:
+    """All pairs, with their ranges of lines, who handed in the same file, and whose loops are the same."""
+    parts: dict[str, Sequence[Any]] = {"identical": identical, "loops": loops, "pairs": pairs}
+    whole = {name: [asdict(each) for each in found] for name, found in parts.items()}
     return json.dumps(whole, indent=1).encode() + b"\n"
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import lru_cache
@@ -25,6 +26,8 @@ from rds.grading.sandbox import Pool, available
 if TYPE_CHECKING:
     from rds.grading.cases.case import CaseRun
 
+BEHAVIOUR, AS_SOLUTION = "behaviour", "same_loop_as_solution"  # of a grade's details
+_ANSWERS = ("_command", "_voltage", "_modelled")  # columns of what a submission answers
 CODE = "submission.py"  # what a submission is called in messages to its author, wherever it is graded
 COLUMNS, FEEDBACK = "columns.parquet", "feedback.html"
 _SOLUTION = "reference solution"  # the student whose plants it runs on
@@ -87,13 +90,31 @@ def graded(setup: Setup, task: Task) -> Answer:
             write_private(path, task.code, is_own=True)
             found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
     grade, seconds = found.grade, time.monotonic() - began
-    grade = replace(grade, notes=(*task.notes, *grade.notes), details={**grade.details, **task.about})
     expected = _expected(setup) if solution else ()
+    own = behaviour(assignment, found.runs)
+    about = {**grade.details, BEHAVIOUR: own, **task.about}
+    if own and own == behaviour(assignment, expected):
+        about[AS_SOLUTION] = True
+    grade = replace(grade, notes=(*task.notes, *grade.notes), details=about)
     page = feedback_page(assignment, grade, found.runs, expected, same_plants=False)
     files = {FEEDBACK: page.encode("utf-8", "replace")}
     if found.runs:
         files[COLUMNS] = columns_of(found.runs)
     return Answer(grade.to_json(), files, seconds)
+
+
+def behaviour(assignment: Assignment, runs: Sequence[CaseRun]) -> dict[str, str]:
+    """By case a hash of what the submission answered, where the case is the same for everybody and it did something."""
+    same = {case.name for case in assignment.cases if not case.is_drawn}
+    made: dict[str, str] = {}
+    for run in runs:
+        if run.case not in same or run.fault:
+            continue
+        answers = [run.result[name] for name in run.result.columns if name.endswith(_ANSWERS)]
+        answers = answers if run.rows is None else [run.rows]
+        if any(np.any(values != values.flat[0]) for values in answers if values.size):
+            made[run.case] = hashlib.sha256(b"".join(np.ascontiguousarray(v).tobytes() for v in answers)).hexdigest()
+    return made
 
 
 def columns_of(runs: tuple[CaseRun, ...]) -> bytes:

@@ -52,10 +52,15 @@ class LinearLoop:
     @cached_property
     def margins(self) -> tuple[float, float, float]:
         """Gain margin (dB), phase margin (°), least distance of L from -1; inf where nothing crosses."""
-        answer = np.fft.rfft(self.voltage, max(_GRID, 4 * len(self.voltage)))[1:]
-        w = np.linspace(0.0, np.pi / self.T, len(answer) + 1)[1:]
-        gain, phase, modulus = margins_of(w, (-answer / (answer + PULSE))[None])[0]
+        w, locus = self.locus(_GRID)
+        gain, phase, modulus = margins_of(w, locus[None])[0]
         return float(gain), float(phase), float(modulus)
+
+    def locus(self, points: int) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies (rad/s) up to half the sampling rate, half of `points` at least, and L there."""
+        answer = np.fft.rfft(self.voltage, max(points, 4 * len(self.voltage)))[1:]
+        w = np.linspace(0.0, np.pi / self.T, len(answer) + 1)[1:]
+        return w, np.asarray(-answer / (answer + PULSE))
 
     @cached_property
     def poles(self) -> np.ndarray:

@@ -22,7 +22,7 @@ from typing import Any
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError, RdsError
 from rds.core.private_files import keep_process_private, open_private
-from rds.grading.batch import run_batch
+from rds.grading.batch.run import run_batch
 from rds.grading.batch.scratch import scratch
 from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.export import export

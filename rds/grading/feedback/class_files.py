@@ -13,6 +13,7 @@ from rds.grading.batch.grades_table import grades_csv
 from rds.grading.feedback.class_report import class_page
 from rds.grading.grade import Grade
 from rds.grading.intake.names import safe_id
+from rds.grading.review.entries import Review
 
 TABLE, PAGE = "grades.csv", "index.html"
 
@@ -25,10 +26,11 @@ def write_class_files(
     seconds: Mapping[str, float] | None = None,
     similar: str = "",
     about: str = "",
+    review: Review | None = None,
 ) -> list[Path]:
     """Write both into `out`, whole or not at all; see `class_page`. InputError where the system refuses."""
     links = {grade.student: f"{STUDENTS}/{safe_id(grade.student)}/{FEEDBACK}" for grade in grades}
-    page = class_page(title, grades, links, seconds=seconds, similar=similar, about=about)
+    page = class_page(title, grades, links, seconds=seconds, similar=similar, about=about, review=review)
     # spreadsheets know UTF-8 by its mark
     made = {TABLE: grades_csv(grades).encode("utf-8-sig", "replace"), PAGE: page.encode("utf-8", "replace")}
     write_files({out / name: partial(_write, data) for name, data in made.items()})

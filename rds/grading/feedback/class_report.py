@@ -12,6 +12,9 @@ from rds.grading.batch.grades_table import criteria_of
 from rds.grading.feedback import histogram
 from rds.grading.feedback.plain_text import isolated, one_line
 from rds.grading.grade import Band, CriterionScore, Grade, Status
+from rds.grading.review.applied import is_changed, of_review
+from rds.grading.review.entries import Kind, Review
+from rds.grading.review.everyone import SECTION
 from rds.results import html
 from rds.results.report import page
 
@@ -33,19 +36,23 @@ def class_page(
     similar: str = "",
     missing: Sequence[str] = (),
     about: str = "",
+    review: Review | None = None,
 ) -> str:
     """The page as HTML.
 
     `links` are the students' pages by identifier, as paths from this page; `seconds` is how long each submission took;
-    `similar` is HTML that points out submissions that are alike; `missing` are students without a grade.
+    `similar` is HTML that points out submissions that are alike; `missing` are students without a grade; `review` is
+    what graders have said.
     """
-    graded = [grade for grade in grades if grade.status is not Status.GRADER_ERROR]
+    graded = [grade for grade in grades if grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)]
     parts = [
         _STYLE,
         f'<header><h1>{escape(one_line(title))}</h1><p class="about">{escape(about)}</p></header>',
         _first(grades, links, missing),
         _summary(graded),
+        _sections(graded),
         _distributions(graded),
+        _trail(review),
         f"<section><h2>Submissions that are alike</h2>{similar}</section>" if similar else "",
         _slowest(grades, links, seconds or {}),
         _everybody(grades, links),
@@ -74,6 +81,13 @@ def _first(grades: Sequence[Grade], links: Mapping[str, str], missing: Sequence[
         parts.append(
             f'<div class="verdict void"><strong>{len(review)} for a review</strong>: these could not be measured, and '
             f"count in proportion to the rest of the submission until you have looked.<ul>{lines}</ul></div>"
+        )
+    differ = [(grade, name) for grade in grades for name in of_review(grade).get("differ", ())]
+    if differ:
+        names = "".join(f"<li>{_name(grade.student, links)}: {escape(one_line(name))}</li>" for grade, name in differ)
+        parts.append(
+            f'<div class="verdict void"><strong>{len(differ)} on which graders differ</strong>: the mean counts '
+            f"until one of them gives a final word (--final).<ul>{names}</ul></div>"
         )
     counts = Counter(grade.status for grade in grades)
     rows = "".join(
@@ -112,6 +126,41 @@ def _summary(graded: Sequence[Grade]) -> str:
 
 def _statistics(points: Sequence[float]) -> list[float]:
     return [mean(points), median(points), min(points), max(points)]
+
+
+def _sections(graded: Sequence[Grade]) -> str:
+    """The sections beside each other, where there are some."""
+    names = sorted({str(grade.details[SECTION]) for grade in graded if SECTION in grade.details})
+    if not names:
+        return ""
+    rows = []
+    for name in names:
+        points = [grade.score for grade in graded if grade.details.get(SECTION) == name]
+        rows.append([name, len(points), *_statistics(points)])
+    columns = ["section", "students", "mean", "median", "lowest", "highest"]
+    return f"<section><h2>Sections</h2>{html.table(columns, rows)}</section>"
+
+
+def _trail(review: Review | None) -> str:
+    """What graders said, the last first."""
+    if review is None or not review.entries:
+        return ""
+    standing = {entry.number for entry in review.standing}
+    rows = [
+        [
+            entry.number,
+            entry.time,
+            one_line(entry.by, 60),
+            str(entry.kind) + ("" if entry.number in standing or entry.kind is Kind.UNDO else " (undone)"),
+            one_line(entry.about, 80),
+            one_line(entry.criterion, 60) or "–",
+            entry.value,
+            one_line(" ".join(filter(None, (entry.comment, entry.why))), 400),
+        ]
+        for entry in reversed(review.entries)
+    ]
+    columns = ["entry", "time", "by", "what", "about", "criterion", "value", "words"]
+    return f"<section><h2>Review</h2>{html.table(columns, rows)}</section>"
 
 
 def _distributions(graded: Sequence[Grade]) -> str:
@@ -153,7 +202,7 @@ def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> str:
 
 
 def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) -> str:
-    is_graded = grade.status is not Status.GRADER_ERROR
+    is_graded = grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)
     scores = {score.name: score for score in grade.criteria} if is_graded else {}
     cells = [
         _points(grade.score) if is_graded else "–",
@@ -162,7 +211,8 @@ def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) ->
     numbers = "".join(f'<td class="number">{each}</td>' for each in cells)
     numbers += "".join(_cell(scores.get(name)) for name in criteria)
     return (
-        f'<tr><td>{_name(grade.student, links)}</td><td class="status">{escape(str(grade.status))}</td>{numbers}'
+        f'<tr><td>{_name(grade.student, links)}</td><td class="status">{escape(str(grade.status))}'
+        f"{' (reviewed)' if is_changed(grade) else ''}</td>{numbers}"
         f'<td class="reason">{escape(one_line(grade.reason, 300))}</td></tr>'
     )
 

@@ -6,18 +6,22 @@ the text that it printed, which is shown as text.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from html import escape
+from statistics import median
 
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.criterion import Criterion
-from rds.grading.feedback import band_bar
+from rds.grading.feedback import band_bar, histogram
+from rds.grading.feedback.advice import advice
 from rds.grading.feedback.feedback_plots import case_picture
 from rds.grading.feedback.plain_text import isolated, one_line, plain
 from rds.grading.grade import Band, CriterionScore, Grade, Status
 from rds.results.report import page
 
+LEAST_CLASS = 10  # students: of fewer, a distribution would tell whose points they are
 _BANDS = {
     Band.FULL: "full points",
     Band.PARTIAL: "part of the points",
@@ -32,6 +36,7 @@ _WHAT_IT_MEANS = {
     Status.BROKE_CONTRACT: "Your file answered in a way that its interface does not allow.",
     Status.TIMED_OUT: "Your file took longer than the assignment allows.",
     Status.KILLED: "Your file was ended, because it ended itself or went over a limit.",
+    Status.EXCUSED: "You are excused: this counts neither for nor against you.",
     Status.GRADER_ERROR: "The grader failed. This is not your fault, and will be graded again.",
 }
 
@@ -42,11 +47,12 @@ _STYLE = f"""<style>
 .criterion h3 {{ margin: 0; font-size: 1rem; }} .criterion p {{ margin: .15rem 0; }}
 .points {{ font-variant-numeric: tabular-nums; }} .full b {{ color: var(--met); }}
 .none b {{ color: var(--missed); }} .partial b {{ color: var(--void); }}
+.said {{ border-left: 3px solid var(--line); padding-left: .8rem; }}
 .printed {{ white-space: pre-wrap; overflow-wrap: anywhere; background: var(--band); padding: .6rem .8rem;
   border: 1px solid var(--line); border-radius: 4px; max-height: 24rem; overflow-y: auto; }}
 h1, p {{ overflow-wrap: anywhere; }}
 @media (max-width: 760px) {{ .criterion {{ grid-template-columns: 1fr; }} }}
-{band_bar.STYLE}</style>"""
+{band_bar.STYLE}{histogram.STYLE}</style>"""
 
 
 def feedback_page(
@@ -66,13 +72,76 @@ def feedback_page(
     title = f"{assignment.title}: {one_line(grade.student, 80)}"
     parts = [
         _STYLE,
-        f"<header><h1>{escape(assignment.title)}</h1>"
-        f'<p class="about">Feedback for {isolated(grade.student)}</p>{_total(grade)}</header>',
-        _criteria(assignment, grade, shows_all),
+        f"<header><h1>{escape(assignment.title)}</h1>{_marked('total', total_part(grade))}</header>",
+        _advice(assignment, grade, runs),
+        _marked("criteria", criteria_part(assignment, grade)),
+        _marked("class", ""),
         _runs(assignment, runs, solution, shows_all, same_plants),
         _notes(grade),
     ]
     return page(title, "\n".join(filter(None, parts)))
+
+
+def with_parts(page: str, parts: Mapping[str, str]) -> str:
+    """A page that `feedback_page` made with other parts by name: total, criteria, class."""
+    for name, part in parts.items():
+        pattern = re.compile(f"<!--{name}-->.*?<!--/{name}-->", re.DOTALL)
+        page = pattern.sub(lambda _, name=name, part=part: _marked(name, part), page, count=1)  # type: ignore[misc]
+    return page
+
+
+def _marked(name: str, part: str) -> str:
+    """Between marks that nothing else on the page can hold: whatever others wrote is escaped."""
+    return f"<!--{name}-->{part}<!--/{name}-->"
+
+
+def total_part(grade: Grade) -> str:
+    """Whose page it is, the points, and what graders said."""
+    return f'<p class="about">Feedback for {isolated(grade.student)}</p>{_total(grade)}{_said_by_graders(grade)}'
+
+
+def class_part(grade: Grade, everybody: Sequence[Grade]) -> str:
+    """How the class did, with this student's place in it; nothing of a class so small that it would name somebody."""
+    graded = [each for each in everybody if each.status not in (Status.GRADER_ERROR, Status.EXCUSED, Status.MISSING)]
+    if len(graded) < LEAST_CLASS or grade not in graded:
+        return ""
+    points, most = [each.score for each in graded], max(each.max_score for each in graded)
+    drawn = histogram.histogram(points, most, mark=grade.score)
+    said = f"{len(graded)} of the class were graded; the median is {median(points):.4g} points. The mark is you."
+    return f'<section><h2>The class</h2>{drawn}<p class="note">{said}</p></section>'
+
+
+def _said_by_graders(grade: Grade) -> str:
+    """Comments, and what an extension or late days did; who wrote it is the graders' own affair."""
+    review = grade.details.get("review")
+    if not isinstance(review, Mapping):
+        return ""
+    titles = {score.name: score.title for score in grade.criteria}
+    lines = [
+        f"{titles.get(each['criterion'], '')}: {each['text']}".removeprefix(": ") for each in review.get("comments", ())
+    ]
+    if days := review.get("extension_days"):
+        lines.append(f"Your due time was moved by {days:.3g} days.")
+    if spent := review.get("late_days_spent"):
+        lines.append(f"{spent} of your late days are spent here.")
+    if not lines:
+        return ""
+    items = "".join(f"<li>{escape(one_line(line, 4000))}</li>" for line in lines)
+    return f'<div class="said"><strong>From your instructors</strong><ul>{items}</ul></div>'
+
+
+def _advice(assignment: Assignment, grade: Grade, runs: Sequence[CaseRun]) -> str:
+    found = advice(assignment, grade, runs)
+    if found is None:
+        return ""
+    parts = [f"<h2>What to change first</h2><p>{escape(found.sentence)}</p>"]
+    if found.picture is not None:
+        caption = escape(one_line(found.caption))
+        parts.append(
+            f'<figure style="margin:0"><figcaption>{caption}</figcaption>'
+            f'<img alt="{caption}" src="{found.picture.url}"></figure>'
+        )
+    return f"<section>{''.join(parts)}</section>"
 
 
 def _total(grade: Grade) -> str:
@@ -96,9 +165,11 @@ def _total(grade: Grade) -> str:
     return "".join(parts)
 
 
-def _criteria(assignment: Assignment, grade: Grade, shows_all: bool) -> str:
+def criteria_part(assignment: Assignment, grade: Grade) -> str:
+    """Each criterion with its points; the value and its bands of those that the student may see."""
     if not grade.criteria:
         return ""
+    shows_all = assignment.feedback == "all"
     known = {criterion.name: criterion for criterion in assignment.criteria}
     shown = [_criterion(score, known.get(score.name), shows_all or score.visible) for score in grade.criteria]
     note = (

@@ -82,19 +82,20 @@ def _panels(run: CaseRun, solution: CaseRun | None) -> list[Panel]:
 
 
 def _control_panels(run: CaseRun, beside: Result | None, axes: Sequence[str]) -> list[Panel]:
-    result, panels = run.result, []
-    if len(axes) > 1:
-        panels.append(_path(result, beside, axes, "_measured", "_reference"))
-    else:
-        curves = _pair(result, beside, f"{axes[0]}_measured")
-        panels.append(Panel([_reference(result, f"{axes[0]}_reference"), *curves], _label(result, axes[0], "measured")))
-    for axis in axes:
+    result = run.result
+    panels: list[Panel] = []
+    for axis in axes:  # the error first: it is what the points are for
         own, other = _error(result, axis), None if beside is None else _error(beside, axis)
         if own is None:
             continue
         unit = result.units.get(f"{axis}_measured", "")
         most = _most_error(result, f"{axis}_reference")
         panels.append(Panel(_two(result, own, beside, other), heading(f"{axis} error", unit), most=most))
+    if len(axes) > 1:
+        panels.append(_path(result, beside, axes, "_measured", "_reference"))
+    else:
+        curves = _pair(result, beside, f"{axes[0]}_measured")
+        panels.append(Panel([_reference(result, f"{axes[0]}_reference"), *curves], _label(result, axes[0], "measured")))
     limits = run.fact("limits")
     levels = [(float(each), "limit") for each in limits or () if np.isfinite(each)]
     for axis in axes:
@@ -117,12 +118,12 @@ def _model_panels(result: Result, beside: Result | None, axis: str) -> list[Pane
     unit = result.units.get(f"{axis}_measured", "")
     voltage = Curve("", result["time"], result[f"{axis}_voltage"], VERMILLION, expected=True)
     return [
-        Panel([data, *_pair(result, beside, f"{axis}_modelled")], _label(result, axis, "measured")),
         Panel(
             _two(result, own, beside, other),
             heading("measured − modelled", unit),
             most=_most_error(result, f"{axis}_measured"),
         ),
+        Panel([data, *_pair(result, beside, f"{axis}_modelled")], _label(result, axis, "measured")),
         Panel([voltage], heading("voltage", "V")),
     ]
 

@@ -11,13 +11,14 @@ _BINS = 10
 STYLE = """
 .histogram { width: 400px; max-width: 100%; height: auto; font: 11px system-ui, sans-serif; }
 .histogram text { fill: var(--dim); } .histogram rect { fill: #0072B2; } .histogram path { stroke: var(--line); }
+.histogram .mark { fill: var(--ink); stroke: none; }
 """
 
 
-def histogram(values: Sequence[float], most: float, bins: int = _BINS) -> str:
+def histogram(values: Sequence[float], most: float, bins: int = _BINS, mark: float | None = None) -> str:
     """Points from 0 to `most` in `bins` equal parts; full points belong to the last part. SVG for a page with `STYLE`.
 
-    Every bar says how many it stands for.
+    Every bar says how many it stands for. A needle at the bottom shows `mark`, in points.
     """
     most = most if most > 0.0 else 1.0
     counts = [0] * bins
@@ -37,6 +38,9 @@ def histogram(values: Sequence[float], most: float, bins: int = _BINS) -> str:
         at = _LEFT + k * wide
         parts.append(f'<text x="{at:.1f}" y="{_HEIGHT - 16}" text-anchor="middle">{most * k / bins:.4g}</text>')
     parts.append(f'<path d="M{_LEFT} {_TOP + high}H{_WIDTH}"/>')
+    if mark is not None:
+        at = _LEFT + (_WIDTH - _LEFT) * min(max(mark / most, 0.0), 1.0)
+        parts.append(f'<path class="mark" d="M{at:.1f} {_TOP + high}l-5 9h10z"/>')
     parts.append(f'<text x="{(_LEFT + _WIDTH) / 2}" y="{_HEIGHT - 3}" text-anchor="middle">points</text>')
     said = f"{len(values)} students, from 0 to {most:.4g} points: {', '.join(map(str, counts))}"
     return (

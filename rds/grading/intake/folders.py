@@ -12,6 +12,7 @@ from pathlib import Path
 from rds.core.errors import InputError
 from rds.grading.intake.items import CODE, DEEPEST, MOST_FILES, Item, Refusal, faulty, is_clutter
 from rds.grading.intake.names import shown
+from rds.grading.sandbox.submission import UNFOLLOWED
 
 _KINDS = {
     stat.S_IFLNK: "a link",
@@ -42,7 +43,7 @@ def files_below(folder: Path) -> tuple[list[Item], list[str]]:
 def read_regular(path: Path, most: int) -> bytes:
     """At most `most` bytes of a regular file; Refusal for anything else."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(path, UNFOLLOWED)
     except (OSError, ValueError) as error:
         said = error.strerror if isinstance(error, OSError) else str(error)
         raise Refusal(f"it cannot be opened: {said}") from None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from rds.grading.sandbox.run import Run, Sample
+if TYPE_CHECKING:  # a file that its author tries without a sandbox is counted too, on systems that have none
+    from rds.grading.sandbox.run import Run, Sample
 
 
 @dataclass(frozen=True)

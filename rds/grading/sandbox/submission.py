@@ -17,6 +17,13 @@ _SAFE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,60}\.py")
 _IMPORTS = re.compile(rb"^[ \t]*(?:import|from)[ \t]([^\n]*)", re.MULTILINE)
 
 
+# A link is not followed, and a pipe does not hold the reader up. Windows has neither, and needs a flag of its own,
+# without which it changes line ends.
+UNFOLLOWED = os.O_RDONLY
+for _flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):
+    UNFOLLOWED |= getattr(os, _flag, 0)
+
+
 @dataclass(frozen=True)
 class Submission:
     """Its bytes, and a name for messages that can be shown anywhere."""
@@ -36,7 +43,7 @@ class Submission:
 def read_submission(path: Path) -> Submission:
     """The regular file at `path`. SubmissionError for anything else: a link, a device, or one that is too large."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(path, UNFOLLOWED)
     except FileNotFoundError:
         raise SubmissionError(Status.MISSING, "there is no such file") from None
     except (OSError, ValueError) as error:

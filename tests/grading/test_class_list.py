@@ -1,0 +1,91 @@
+"""The class list: read, matched, and submissions of groups folded into one."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.grading.course.class_list import ClassList, Member, read_class_list
+from rds.grading.course.groups import by_group
+from rds.grading.grade import Status
+from rds.grading.intake import HandedIn, Intake
+
+TEXT = """student,name,email,section,group,extension_days,late_days
+ada,Ada Lovelace,ada@example.edu,A,red,0,3
+ben,Ben Ó Sé,ben@example.edu,A,red,1.5,
+cy,Cy Twombly,cy@example.edu,B,,,0
+"""
+
+
+def listed(folder: Path, text: str = TEXT) -> ClassList:
+    (folder / "class.csv").write_text(text, encoding="utf-8")
+    return read_class_list(folder / "class.csv")
+
+
+def test_a_list_is_read_and_written_as_it_is(tmp_path: Path) -> None:
+    found = listed(tmp_path)
+    assert found.members[0] == Member("ada", "Ada Lovelace", "ada@example.edu", "A", "red", 0.0, 3)
+    assert found.members[1].extension_days == 1.5 and found.members[1].late_days is None
+    assert found.sections() == ("A", "B") and list(found.groups()) == ["red"]
+    (tmp_path / "again.csv").write_bytes(found.to_csv())
+    assert read_class_list(tmp_path / "again.csv") == found
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("name\nada\n", "must have student"),
+        ("student,grade\nada,1\n", "must have student"),
+        ("student\nada\nada\n", "line 3"),
+        ("student,late_days\nada,1.5\n", "whole number"),
+        ("student,extension_days\nada,-1\n", "from 0 to 366"),
+        ("student,extension_days\nada,nan\n", "from 0 to 366"),
+        ("student,group\nada,ben\nben,ben\n", "a group and a student"),
+        ("student,name\nada\n", "number of cells"),
+        ("student\n", "no student"),
+    ],
+)
+def test_a_list_that_will_not_do_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        listed(tmp_path, text)
+
+
+def test_students_are_found_by_identifier_address_and_name(tmp_path: Path) -> None:
+    found = listed(tmp_path)
+
+    def name(student: str, **source: str) -> str:
+        member = found.find(student, source)
+        return "" if member is None else member.student
+
+    assert name("Ada Lovelace_501", name="Ada Lovelace", id="501") == "ada"
+    assert name("x", email="BEN@example.edu") == "ben"
+    assert name("Lovelace") == "" and name("ada") == "ada"
+
+
+def row(student: str, hour: int | None = None, **more: object) -> HandedIn:
+    time = None if hour is None else datetime(2026, 1, 10, hour, tzinfo=UTC)
+    return HandedIn(student, f"{student}.py", time=time, **more)  # type: ignore[arg-type]
+
+
+def test_the_last_file_of_a_group_counts_and_nobody_is_forgotten(tmp_path: Path) -> None:
+    found = by_group(Intake("files", (row("ada", 9), row("ben", 11), row("zoe"))), listed(tmp_path))
+    rows = {each.student: each for each in found.rows}
+    assert set(rows) == {"red", "cy", "zoe"}
+    assert rows["red"].name == "ben.py" and "ben" in rows["red"].notes[0]
+    assert rows["cy"].status is Status.MISSING
+    assert set(rows["red"].source["handed_in_by"]) == {"ada", "ben"}
+
+
+def test_nobody_guesses_which_file_of_a_group_was_the_last(tmp_path: Path) -> None:
+    found = by_group(Intake("files", (row("ada"), row("ben", 11))), listed(tmp_path))
+    (red,) = (each for each in found.rows if each.student == "red")
+    assert red.status is Status.REFUSED and "ada, ben" in red.reason
+
+
+def test_late_days_are_taken_off_for_the_next_assignment(tmp_path: Path) -> None:
+    after = listed(tmp_path).with_late_days({"ada": 2, "cy": 1})
+    assert [each.late_days for each in after.members] == [1, None, 0]
+    assert all(each.extension_days == 0.0 for each in after.members)

@@ -1,0 +1,198 @@
+"""What graders say: points, comments, excuses, extensions; two graders; an audit trail; attempts."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rds.cli.main import app
+from rds.core.errors import InputError
+from rds.grading.assignment.assignment import read_assignment
+from rds.grading.assignment.late_rules import Late
+from rds.grading.batch.finished import read_finished
+from rds.grading.course.class_list import ClassList, Member
+from rds.grading.feedback.feedback import feedback_page
+from rds.grading.grade import Band, Grade, Status
+from rds.grading.review.applied import of_review, reviewed
+from rds.grading.review.best import best
+from rds.grading.review.entries import FILE, Entry, Kind, Review, add, read_review
+from rds.grading.review.everyone import everyone
+from rds.grading.review.regrade import changes_of
+from rds.grading.review.say import marks_table, read_marks, say
+from tests.grading.grades import batch_in, grade, score
+from tests.grading.made import RMS, SINE, assignment_in
+
+LATE = Late(percent_per_day=10.0, free_days=2)
+HEAD = 'title = "Tracking"\nkind = "controller"\nsecret = "not told to anybody"\n'
+
+
+def points(value: float, by: str = "ann", criterion: str = "rms", **more: object) -> Entry:
+    return Entry(Kind.POINTS, by, "ada", criterion=criterion, value=value, **more)  # type: ignore[arg-type]
+
+
+def made(folder: Path, *grades: Grade, words: str = "") -> Path:
+    """A batch with pages, and the assignment that it was graded by."""
+    read = read_assignment(assignment_in(folder / "task", HEAD + SINE + RMS))
+    given = grades or (grade("ada"), grade("ben"))
+    pages = {each.student: feedback_page(read, each) for each in given}
+    record = {"folder": str(read.folder), "assignment": read.sha256, "late": {"percent_per_day": 10.0}}
+    out = batch_in(folder / "out", given, pages=pages, **record)
+    if words:
+        (out / "class.csv").write_text(words)
+    return out
+
+
+def test_points_by_hand_replace_those_that_were_measured() -> None:
+    found = reviewed(grade(), LATE, None, [points(9.0, comment="x")])
+    assert found.score == 29.0 and found.criteria[0].score == 9.0 and found.criteria[0].value == 0.23
+    assert "from 6 as measured: ann (9)" in found.criteria[0].sentence
+    assert not reviewed(grade(), LATE, None, [points(0.0)]).criteria[0].score
+
+
+def test_a_grader_settles_what_could_not_be_measured() -> None:
+    unknown = replace(score(), band=Band.REVIEW, value=None)
+    found = reviewed(grade("ada", Status.OK, unknown), LATE, None, [points(10.0)])
+    assert not found.for_review and found.criteria[0].band is Band.FULL
+
+
+def test_two_graders_count_by_their_mean_until_a_final_word() -> None:
+    two = [points(8.0), points(3.0), points(6.0, "bob")]
+    found = reviewed(grade(), LATE, None, two)
+    assert found.criteria[0].score == 4.5 and of_review(found)["differ"] == ["rms"]
+    found = reviewed(grade(), LATE, None, [*two, points(7.0, "cy", is_final=True)])
+    assert found.criteria[0].score == 7.0 and of_review(found)["differ"] == []
+
+
+@pytest.mark.parametrize(
+    ("extension", "left", "lost"), [(0.0, None, 1), (0.0, 0, 3), (0.0, 1, 2), (1.0, 0, 2), (1.0, 5, 0), (9.0, 0, 0)]
+)
+def test_extensions_and_late_days_move_what_is_lost(extension: float, left: int | None, lost: int) -> None:
+    late = replace(grade(), late_days=2.5, score=23.4, details={"late_share": 0.1})
+    member = Member("ada", extension_days=extension, late_days=left)
+    found = reviewed(late, LATE, member, [])
+    assert found.score == pytest.approx(26.0 * (1.0 - 0.1 * lost))
+
+
+def test_an_excused_student_has_no_score_and_is_in_no_gradebook(tmp_path: Path) -> None:
+    say(made(tmp_path), [Entry(Kind.EXCUSE, "ann", "ada", why="ill")])
+    finished = read_finished(tmp_path / "out")
+    assert [each.student for each in finished.to_hand_on] == ["ben"]
+    assert [each.student for each in finished.excused] == ["ada"]
+
+
+def test_the_trail_only_grows_and_notices_what_was_taken_out(tmp_path: Path) -> None:
+    add(tmp_path, [points(1.0), points(2.0), Entry(Kind.UNDO, "ann", value=1.0)])
+    review = read_review(tmp_path)
+    assert [each.number for each in review.standing] == [2] and len(review.entries) == 3
+    with pytest.raises(InputError, match="undone already"):
+        add(tmp_path, [Entry(Kind.UNDO, "ann", value=1.0)])
+    lines = (tmp_path / FILE).read_bytes().splitlines(keepends=True)
+    (tmp_path / FILE).write_bytes(b"".join(lines[1:]))
+    with pytest.raises(InputError, match="taken out"):
+        read_review(tmp_path)
+
+
+def test_a_word_about_nobody_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    out = made(tmp_path)
+    for entry, said in (
+        (points(11.0), "from 0 to 10"),
+        (points(1.0, criterion="rsm"), "no criterion 'rsm'"),
+        (replace(points(1.0), student="eve"), "no student or group"),
+        (Entry(Kind.EXTEND, "ann", section="Q", value=1.0), "no section"),
+    ):
+        with pytest.raises(InputError, match=said):
+            say(out, [entry])
+    assert not (out / FILE).exists()
+
+
+def test_pages_and_tables_follow_and_name_no_grader(tmp_path: Path) -> None:
+    out = made(tmp_path)
+    say(out, [points(10.0, comment="Well <b>argued</b>.", why="secret reason")])
+    page = (out / "students/ada/feedback.html").read_text()
+    assert "30 of 30 points" in page and "Well &lt;b&gt;argued" in page and "secret reason" not in page
+    assert "secret reason" in (out / "index.html").read_text()
+    rows = list(csv.DictReader((out / "grades.csv").open(encoding="utf-8-sig")))
+    assert [row["score"] for row in rows] == ["30", "26"]
+    assert json.loads((out / "students/ada/grade.json").read_text())["score"] == 26.0  # as it was measured
+
+
+def test_a_changed_assignment_stops_a_review(tmp_path: Path) -> None:
+    out = made(tmp_path)
+    with (tmp_path / "task/assignment.toml").open("a") as file:
+        file.write("# mended\n")
+    with pytest.raises(InputError, match="regrade"):
+        say(out, [points(1.0)])
+    assert not (out / FILE).exists()
+
+
+def test_the_members_of_a_group_get_its_grade_and_words_of_their_own(tmp_path: Path) -> None:
+    words = "student,section,group\nada,A,red\nben,B,red\n"
+    out = made(tmp_path, grade("red"), words=words)
+    say(out, [points(10.0), Entry(Kind.COMMENT, "ann", section="B", comment="for section B")])
+    finished = read_finished(out)
+    assert {each.student: each.score for each in finished.grades} == {"ada": 30.0, "ben": 26.0}
+    assert "for section B" in (out / "students/ben/feedback.html").read_text()
+    assert "for section B" not in (out / "students/ada/feedback.html").read_text()
+    assert "<h2>Sections</h2>" in (out / "index.html").read_text()
+
+
+def test_marks_come_and_go_as_a_table(tmp_path: Path) -> None:
+    out = made(tmp_path)
+    lines = marks_table(read_finished(out)).decode("utf-8-sig").splitlines()
+    assert lines[0].startswith("student,criterion,points,comment,why") and len(lines) == 5
+    lines[1] = lines[1].replace("ada,rms,,", "ada,rms,7.5,fine", 1)
+    (tmp_path / "marks.csv").write_text("\n".join(lines))
+    (entry,) = read_marks(tmp_path / "marks.csv", "bob")
+    assert (entry.student, entry.criterion, entry.value, entry.comment) == ("ada", "rms", 7.5, "fine")
+
+
+def test_the_best_attempt_counts_with_what_was_said_of_it(tmp_path: Path) -> None:
+    first = made(tmp_path / "1", grade("ada", score=1.0, before_penalty=1.0), grade("ben"))
+    second = made(tmp_path / "2", grade("ada"))
+    record = json.loads((first / "batch.json").read_text())
+    for out in (first, second):  # one assignment in both
+        (out / "batch.json").write_text(json.dumps(record | {"title": "Tracking"}))
+    say(second, [points(10.0, comment="good")])
+    finished = best([first, second], tmp_path / "best")
+    assert {each.student: each.score for each in finished.grades} == {"ada": 30.0, "ben": 26.0}
+    page = (tmp_path / "best/students/ada/feedback.html").read_text()
+    assert "30 of 30 points" in page and "good" in page
+    assert "2: 30 (counts)" in finished.grades[0].notes[-1]
+
+
+def test_who_changes_is_told_with_the_reason(tmp_path: Path) -> None:
+    before = read_finished(made(tmp_path / "1", grade("ada", Status.OK, score(), score("old", 1.0))))
+    new = (replace(score(points=8.0), value=0.23), score("new", 2.0))
+    now = read_finished(made(tmp_path / "2", grade("ada", Status.OK, *new)))
+    (change,) = changes_of(before, now)
+    assert (change.before, change.now) == (7.0, 10.0)
+    assert change.why[0] == "rms: 6 → 8 points, because its bands are others (the same value, 0.23 mm)"
+    assert "a new criterion" in change.why[1] or "no longer" in change.why[1]
+
+
+def test_everyone_is_found_by_what_the_export_says() -> None:
+    own = grade("Ada Lovelace_501", details={"source": {"name": "Ada Lovelace", "id": "501"}}, late_days=1.5)
+    own = replace(own, details={**own.details, "late_share": 0.2}, score=20.8)
+    found = everyone(
+        [own], ClassList((Member("ada", "Ada Lovelace", section="A", extension_days=1.0),)), Review(), LATE
+    )
+    (counting, measured) = found["Ada Lovelace_501"]
+    assert counting.details["section"] == "A" and counting.score > measured.score
+
+
+def test_the_command_says_what_waits_and_refuses_half_a_sentence(tmp_path: Path) -> None:
+    unknown = replace(score(), band=Band.REVIEW, value=None)
+    out = made(tmp_path, grade("ada", Status.OK, unknown))
+    run = CliRunner().invoke
+    assert "could not be" in run(app, ["grade", "review", str(out)]).output
+    assert run(app, ["grade", "review", str(out), "--points", "3"]).exit_code == 2
+    assert run(app, ["grade", "review", str(out), "--student", "ada"]).exit_code == 2
+    words = ["--student", "ada", "--criterion", "rms", "--points", "3", "--by", "ann"]
+    assert run(app, ["grade", "review", str(out), *words]).exit_code == 0
+    assert "nothing waits" in run(app, ["grade", "review", str(out)]).output
+    assert "ann" in run(app, ["grade", "review", str(out), "--log"]).output
