@@ -30,6 +30,7 @@ Frame = tuple[int, bytes]
 NODES = range(1, 128)
 NMT, HEARTBEAT = 0x000, 0x700
 _CLOSE = 0.75  # periods: of any two hosts with one period, one comes closer than that after the other
+_NONE_LOST = 1.5  # periods between two SYNCs: in less, none can have been lost
 _MOVING = 2e-3  # s between two looks at an axis under power if no frame comes
 
 
@@ -50,6 +51,7 @@ class Drive:
         self.errors = Errors(self.objects, self._send)
         self.operation = Operation(self.objects, self.servo, self.errors.report, self.errors.clear)
         self.heartbeats = Heartbeats(self.objects, lambda: self.operation.now)
+        self.operation.is_host_missing = lambda: self.heartbeats.is_one_missing
         self.receive_pdos = [Rpdo(number, self.objects) for number in range(COUNT)]
         self.transmit_pdos = [Tpdo(number, self.objects) for number in range(COUNT)]
         self._server = Server(self.node, self.objects, self._send)
@@ -58,6 +60,8 @@ class Drive:
         self.objects.writers[0x1019, 0] = self._check_sync_counter
         self.objects.readers[0x1018, 4] = lambda: self.serial
         self._bad_length = False
+        self._synced_at = -inf  # s: the last SYNC
+        self._contradicted = False  # two commands have come since then
         # what the objects say, looked up once for a thousand frames a second
         self._sync_identifier = 0x80
         self._taken: dict[int, list[Rpdo]] = {}
@@ -241,6 +245,11 @@ class Drive:
             self._complain(0x8240)
             return
         self.syncs += 1
+        was_lost = self.operation.now - self._synced_at > _NONE_LOST * self.operation.period
+        self._synced_at = self.operation.now
+        contradicted, self._contradicted = self._contradicted, False
+        if contradicted and not was_lost and self.state is State.OPERATION_ENABLED:
+            self.operation.fault(codes.IDENTIFIER_COLLISION)
         for received in self.receive_pdos:
             if received.waiting is not None:
                 waiting, received.waiting = received.waiting, None
@@ -270,13 +279,15 @@ class Drive:
     def _contradicts(self, pdo: Rpdo, data: bytes) -> bool:
         """Whether two hosts command: two commands for one SYNC, too close for one whose SYNC was lost.
 
-        A host that takes the power away may always change its mind.
+        The next SYNC decides about those that are further apart: if it comes in time, none was lost between them. A
+        host that takes the power away may always change its mind.
         """
         if pdo.waiting is None or pdo.waiting == data or self.state is not State.OPERATION_ENABLED:
             return False
         word = int.from_bytes(data[:2], "little") if pdo.mapped[0] == (0x6040, 0) else codes.ENABLE_OPERATION
         if command(word) is not Command.ENABLE_OPERATION:
             return False
+        self._contradicted = True
         return self.operation.now - pdo.came_at < _CLOSE * self.operation.period
 
     def _complain(self, code: int) -> None:

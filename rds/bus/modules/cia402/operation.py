@@ -42,6 +42,7 @@ class Operation:
         self.objects, self.servo = objects, servo
         self.now = servo.axis.now
         self.remote = False  # whether NMT is OPERATIONAL
+        self.is_host_missing: Callable[[], bool] = lambda: False  # whether heartbeats that it waits for have stopped
         self.interlock = False  # whether the emergency stop button is pressed: no fault can be reset meanwhile
         self._report, self._cleared = report, cleared
         self._mode: OperationMode | None = None  # while OPERATION ENABLED
@@ -115,6 +116,8 @@ class Operation:
     def control(self, word: int) -> None:
         """Obey a controlword, 0x6040."""
         if self.interlock and word & codes.FAULT_RESET:
+            return
+        if command(word) is Command.ENABLE_OPERATION and not self._is_powered() and self.is_host_missing():
             return
         option = {Command.SWITCH_ON: 0x605C, Command.SHUTDOWN: 0x605B}.get(command(word))
         if self.machine.state is State.OPERATION_ENABLED and option and self.objects[option] and self._is_powered():
