@@ -11,13 +11,12 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.buses import BUILTIN, Channel, ChosenBus, Experiment, Interface, chosen_bus
+from rds.cli.buses import BUILTIN, Bitrate, Channel, ChosenBus, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, stdout_kept, until_ctrl_c, writes_files
 
 app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
 
 Seconds = Annotated[float | None, typer.Option(help="End after so many seconds instead of at Ctrl-C.", min=0.0)]
-Bitrate = Annotated[int | None, typer.Option(help="Bit rate, bit/s, for interfaces that have to be told.", min=1)]
 Identifiers = Annotated[
     list[str] | None,
     typer.Option("--id", help="Only this identifier or range, as in 0x020-0x07F; may be given more than once."),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.buses import Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import Bitrate, Channel, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, writes_files
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def new(
     ] = None,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     force: Force = False,
     json: Json = False,
@@ -57,13 +58,19 @@ def new(
         if ways != 1:
             given = "none is given" if not ways else f"{ways} are given"
             raise InputError(f"{given}: name a script, or ask the bus with --scan, or name --modules of the library")
-        if not scan and (order or interface or channel or experiment):
-            raise InputError("--order, --interface, --channel and --experiment belong to --scan, which is not given")
+        if not scan and (order or interface or channel or bitrate or experiment):
+            raise InputError(
+                "--order, --interface, --channel, --bitrate and --experiment belong to --scan, which is not given"
+            )
         _check_out(out, ".toml", force)
         if modules is not None:
             text = text_of_modules([each.strip() for each in modules.split(",")], out.stem)
         else:
-            text = _scanned(out.stem, order, interface, channel, experiment) if scan else _from_file(script, out.stem)
+            text = (
+                _scanned(out.stem, order, interface, channel, experiment, bitrate)
+                if scan
+                else _from_file(script, out.stem)
+            )
         _write(out, text)
         judged = verdict(load_machine(str(out)))
     _show_verdict(judged, json, f"wrote {out}")
@@ -86,13 +93,20 @@ def _from_file(path: Path | None, name: str) -> str:
     return machine_text_of_script(read_script(text, str(path)), name)
 
 
-def _scanned(name: str, order: str | None, interface: str | None, channel: str | None, experiment: Path | None) -> str:
+def _scanned(
+    name: str,
+    order: str | None,
+    interface: str | None,
+    channel: str | None,
+    experiment: Path | None,
+    bitrate: int | None,
+) -> str:
     from rds.bus.modules.oacs.remote import Module
     from rds.bus.tools.scan import scan_all
     from rds.core.errors import MachineError
     from rds.machines.assembly import first_order, machine_text
 
-    place = chosen_bus(interface, channel, experiment)
+    place = chosen_bus(interface, channel, experiment, bitrate)
     rows = scan_all(place.interface, place.channel, **place.options)
     numbers = [row["id"] for row in rows if row["dialect"] == "oacs"]
     if not numbers:

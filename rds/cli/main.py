@@ -38,6 +38,7 @@ from rds.cli import (
     network,
     reports,
     robustness,
+    scan,
     schema,
     validate,
 )
@@ -83,7 +84,7 @@ app.add_typer(cutting.app, name="cutting")
 bus.app.command()(analyse.analyse)
 bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
-app.command()(modules.scan)
+app.command()(scan.scan)
 app.command()(estop.estop)
 app.command()(jog.jog)
 app.command()(reports.report)
