@@ -19,6 +19,7 @@ from rds.cli import (
     data,
     design,
     docs,
+    doctor,
     estop,
     excite,
     fault,
@@ -86,6 +87,7 @@ bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
 app.command()(scan.scan)
 app.command()(estop.estop)
+app.command()(doctor.doctor)
 app.command()(jog.jog)
 app.command()(reports.report)
 app.command()(fit.fit)
