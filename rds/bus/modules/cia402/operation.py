@@ -62,6 +62,7 @@ class Operation:
             (0x6041, 0): self.statusword,
             (0x6061, 0): lambda: self.objects[0x6060],
             (0x6062, 0): lambda: _wrap(round(servo.position_demand)),
+            (0x6063, 0): lambda: _wrap(servo.raw),
             (0x6064, 0): lambda: _wrap(servo.position),
             (0x606B, 0): lambda: _wrap(round(servo.velocity_demand)),
             (0x606C, 0): lambda: _wrap(round(servo.velocity)),
