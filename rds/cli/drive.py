@@ -15,6 +15,7 @@ from rds.cli.common import Json, ends_as_ctrl_c, print_json, refusals, writes_fi
 
 app = typer.Typer(no_args_is_help=True, help="CiA 402 drives out of the box: set-up, node-ID, stored parameters.")
 
+PRIORITY = 80  # as a run's
 Node = Annotated[int | None, typer.Option(help="Node-ID; by default the only drive's on the bus.", min=1, max=127)]
 Yes = Annotated[
     bool, typer.Option("--yes", help="Do not ask: every step is agreed to. Somebody has to watch the axis.")
@@ -64,6 +65,7 @@ def setup(
         from rds.bus.modules.cia402.commissioning import Declined, Wishes, commission
         from rds.core.atomic import write_whole
         from rds.core.errors import InputError
+        from rds.modes.process.environment import prepared
 
         if not (yes or sys.stdin.isatty()):
             raise InputError("set-up asks before each step, and there is no terminal: add --yes if somebody watches")
@@ -83,7 +85,8 @@ def setup(
             number, axis, unit, lead, counts, travel, sample_period, mode, eds, torque, distance, keep_in_drive=store
         )
         try:
-            with _opened(place) as bus:
+            # a drive bears no host that is held up for ten periods
+            with _opened(place) as bus, prepared(PRIORITY, None):
                 made = commission(bus, wishes, out.stem, _Terminal(yes, json, direction, axis))
         except Declined:
             typer.echo("rds: ended; what was changed on the drive has been written back", err=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from json import dumps
 from typing import Any
 
 
@@ -99,7 +100,11 @@ def experiment_text(choices: Choices, machine: str, bus: Mapping[str, Any]) -> s
     ]
     table = cia402_table(choices)
     lines += ["[bus.cia402]", f'mode = "{table["mode"]}"', "", f"[bus.cia402.axis.{choices.axis}]"]
-    lines += [f"{key} = {_toml(value)}" for key, value in table["axis"][choices.axis].items()]
+    axis = dict(table["axis"][choices.axis])
+    writes = [f"[0x{index:04X}, {subindex}, {value}]" for index, subindex, value in axis.pop("write", ())]
+    lines += [f"{key} = {_toml(value)}" for key, value in axis.items()]
+    if writes:
+        lines.append(f"write = [{', '.join(writes)}]  # object, sub-index, value; before each run")
     return "\n".join(lines) + "\n"
 
 
@@ -107,9 +112,5 @@ def _toml(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        import json
-
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, Sequence):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+        return dumps(value, ensure_ascii=False)
     return repr(value)
