@@ -17,6 +17,7 @@ __getattr__, __dir__ = face(
         "analyse_messages": "analysis.analysis_report",
         "estop": "modules.oacs.host",
         "messages_of": "analysis.messages",
+        "read_messages": "analysis.message_tables",
         "reset_everything": "tools.estop",
         "scan": "modules.oacs.host",
         "stop_everything": "tools.estop",

@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rds.cli.common import Json, print_json, refusals, writes_files
 
+if TYPE_CHECKING:
+    from rds.bus.analysis.response_times import Errors
+
 
 @writes_files
 def analyse(
-    machine: Annotated[str, typer.Argument(help="A machine's name, or the path of its TOML file.")],
+    machine: Annotated[
+        str,
+        typer.Argument(
+            help="A machine's name, the path of its TOML file, or a message table: a .dbc, or a .csv with the columns "
+            "identifier, period_ms, length."
+        ),
+    ],
     bitrate: Annotated[int | None, typer.Option(help="Bit rate of CAN, bit/s (default 1000000).", min=1)] = None,
     sample_period: Annotated[
-        float | None, typer.Option("--sample-period", "--period", help="Sample period, s; by default the machine's.")
+        float | None,
+        typer.Option(
+            "--sample-period",
+            "--period",
+            help="Sample period, s; by default the machine's. Of a message table: the period of messages without one.",
+        ),
     ] = None,
     dialect: Annotated[
         str, typer.Option(help="What the modules speak: rds, oacs, cia402, or dcs (a serial line).")
@@ -69,10 +83,17 @@ def analyse(
         from math import inf
 
         from rds.bus.analysis.analysis_report import analyse as analyse_bus
+        from rds.bus.analysis.message_tables import is_message_table
         from rds.bus.analysis.response_times import Errors
         from rds.machines import load_machine
 
         interval = inf if error_interval is None else error_interval
+        disturbed = Errors(errors or 1, interval) if errors or error_interval is not None else None
+        if is_message_table(table := Path(machine)):
+            words = {"--dialect": dialect != "rds", "--response-time": response_time, "--host-jitter": host_jitter}
+            if wrong := [name for name, value in (words | {"--fits": fits}).items() if value]:
+                raise InputError(f"{', '.join(wrong)} is for a machine, not for a message table; leave it out")
+            _analyse_table(table, 1_000_000 if bitrate is None else bitrate, sample_period, disturbed, plot, json)
         analysis = analyse_bus(
             load_machine(machine),
             1_000_000 if bitrate is None else bitrate,
@@ -80,7 +101,7 @@ def analyse(
             dialect=dialect,
             response_time=response_time,
             host_jitter=host_jitter,
-            errors=Errors(errors or 1, interval) if errors or error_interval is not None else None,
+            errors=disturbed,
         )
         if plot is not None:
             from rds.cli.analyse_fits import draw_can
@@ -110,4 +131,33 @@ def analyse(
             show_can(rows, methods)
         if plot is not None:
             typer.echo(f"plot: {plot}")
+    raise typer.Exit(0 if analysis.met else 1)
+
+
+def _analyse_table(
+    path: Path, bitrate: int, period: float | None, errors: Errors | None, plot: Path | None, json: bool
+) -> None:
+    """The bus of somebody else's message table."""
+    from rds.bus.analysis.analysis_report import analyse_messages
+    from rds.bus.analysis.message_tables import read_messages
+
+    table = read_messages(path, period)
+    analysis = analyse_messages(table.messages, bitrate, errors=errors, title=path.name)
+    if plot is not None:
+        from rds.cli.analyse_fits import draw
+
+        draw(plot, analysis)
+    if json:
+        print_json(analysis.to_json() | {"without_period": table.without_period})
+    else:
+        typer.echo(str(analysis))
+        if plot is not None:
+            typer.echo(f"plot: {plot}")
+    if table.without_period:
+        names = ", ".join(table.without_period[:6]) + (", ..." if len(table.without_period) > 6 else "")
+        typer.echo(
+            f"rds: {len(table.without_period)} of {len(table.without_period) + len(table.messages)} messages have no "
+            f"period in the file and are left out: {names}; --sample-period gives them one",
+            err=True,
+        )
     raise typer.Exit(0 if analysis.met else 1)

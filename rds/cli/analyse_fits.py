@@ -98,12 +98,17 @@ def show_can(rows: list[list[Any]], methods: list[list[Any]]) -> None:
         show_table("A part program by methods", COLUMNS, [[cell(value) for value in row] for row in methods])
 
 
+def draw(plot: Path, analysis: Analysis) -> None:
+    """The timeline and response times of an analysis."""
+    from rds.bus.analysis.analysis_plot import plot as draw_analysis
+
+    _save(plot, draw_analysis(analysis))
+
+
 def draw_can(plot: Path, analysis: Analysis, machine: Machine, period: float | None, dialect: str, fits: bool) -> None:
     """The timeline of an analysis; with `fits` the curves of methods A, B and C, which are of dialect rds."""
     if not fits:
-        from rds.bus.analysis.analysis_plot import plot as draw
-
-        _save(plot, draw(analysis))
+        draw(plot, analysis)
         return
     if dialect != "rds":
         raise InputError(f"--fits --plot draws the curves of dialect rds, not of {dialect}; leave --fits or --plot out")

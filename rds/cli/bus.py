@@ -11,13 +11,12 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.buses import BUILTIN, Channel, ChosenBus, Experiment, Interface, chosen_bus
+from rds.cli.buses import BUILTIN, Bitrate, Channel, ChosenBus, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, stdout_kept, until_ctrl_c, writes_files
 
 app = typer.Typer(no_args_is_help=True, help="The bus: monitor, record and replay it, offer it to other tools.")
 
 Seconds = Annotated[float | None, typer.Option(help="End after so many seconds instead of at Ctrl-C.", min=0.0)]
-Bitrate = Annotated[int | None, typer.Option(help="Bit rate, bit/s, for interfaces that have to be told.", min=1)]
 Identifiers = Annotated[
     list[str] | None,
     typer.Option("--id", help="Only this identifier or range, as in 0x020-0x07F; may be given more than once."),
@@ -213,6 +212,36 @@ def serve_socketcand(
                 pass
             alive = server.alive()
     raise typer.Exit(0 if alive else 1)
+
+
+@app.command("serve-slcan")
+def serve_slcan(
+    interface: Interface = None,
+    channel: Channel = None,
+    experiment: Experiment = None,
+    bitrate: Bitrate = None,
+    latency: Annotated[
+        float,
+        typer.Option(help="Frames wait up to so many ms, as in USB chips that collect bytes.", min=0.0, max=100.0),
+    ] = 0.0,
+    garble: Annotated[
+        float, typer.Option(help="Share of frames in which one character is wrong.", min=0.0, max=1.0)
+    ] = 0.0,
+) -> None:
+    """Emulate a serial CAN adapter (slcan) in front of a bus, until Ctrl-C: to try everything without one."""
+    with refusals():
+        from rds.bus.tools.slcan_adapter import SlcanAdapter
+
+        place = chosen_bus(interface, channel, experiment)
+        with (
+            _opener(place, bitrate, "adapter")() as bus,
+            until_ctrl_c() as stop,
+            SlcanAdapter(bus, latency * 1e-3, garble) as adapter,
+        ):
+            _say(f"{place.name} behind an emulated adapter; Ctrl-C ends")
+            _say(f"programs open it with --interface slcan --channel {adapter.path} --bitrate 1000000")
+            while adapter.alive() and not stop.wait(0.2):
+                pass
 
 
 def _opener(place: ChosenBus, bitrate: int | None, node: str, errors: bool = False) -> Any:

@@ -25,6 +25,9 @@ Channel = Annotated[
     ),
 ]
 Baud = Annotated[int | None, typer.Option(help="With --interface serial: bit/s; by default the experiment's.")]
+Bitrate = Annotated[
+    int | None, typer.Option(help="Bit rate of CAN, bit/s, for interfaces that have to be told.", min=1)
+]
 Experiment = Annotated[
     Path | None,
     typer.Option(help="An experiment's TOML file, for its \\[bus]: interface, channel, options of the adapter."),
@@ -74,8 +77,10 @@ class ChosenBus:
             bus.shutdown()
 
 
-def bus_table_of(experiment: Path | None, interface: str | None = None, channel: str | None = None) -> dict[str, Any]:
-    """The [bus] table of an experiment, `channel` and `interface` over it; empty where nothing is said.
+def bus_table_of(
+    experiment: Path | None, interface: str | None = None, channel: str | None = None, bitrate: int | None = None
+) -> dict[str, Any]:
+    """The [bus] table of an experiment, `channel`, `interface` and `bitrate` over it; empty where nothing is said.
 
     InputError for a table that will not do, and for an interface other than the table's, whose options are not its own.
     """
@@ -94,7 +99,7 @@ def bus_table_of(experiment: Path | None, interface: str | None = None, channel:
                 f"--interface {interface}, and [bus] of {experiment} is for {said}: its channel and options are no "
                 "other interface's; leave one of the two out"
             )
-    given = {"interface": interface, "channel": channel}
+    given = {"interface": interface, "channel": channel, "bitrate": bitrate}
     return table | {key: value for key, value in given.items() if value is not None}
 
 
@@ -109,20 +114,28 @@ def machine_of(experiment: Path | None) -> str:
     return machine_name(TomlTable.open(experiment, EXPERIMENT), experiment.parent)
 
 
-def chosen_bus(interface: str | None, channel: str | None, experiment: Path | None) -> ChosenBus:
-    """The bus that a command is for. InputError as `bus_table_of`.
+def chosen_bus(
+    interface: str | None, channel: str | None, experiment: Path | None, bitrate: int | None = None
+) -> ChosenBus:
+    """The bus that a command is for. InputError as `bus_table_of`, and for a bit rate of a serial line.
 
-    The built-in bus is joined as it is: its timing is that of whoever serves the machine.
+    The built-in bus is joined as it is: its timing is that of whoever serves the machine. One with another `bitrate`
+    is refused when it is opened.
     """
-    table = bus_table_of(experiment, interface, channel)
+    table = bus_table_of(experiment, interface, channel, bitrate)
     where, place, dialect = str(table.get("interface", BUILTIN)), table.get("channel"), table.get("dialect")
+    if bitrate is not None and where == SERIAL and dialect in (None, "dcs"):
+        from rds.core.errors import InputError
+
+        raise InputError("--bitrate is for CAN, and this is a serial line; say --baud, or leave it out")
     if where == SERIAL and place is None and dialect in (None, "dcs"):
         place = SERIAL_MACHINE if experiment is None else _channel_of(experiment)
     if where != BUILTIN:
         from rds.bus.tools.link import bus_options
 
         return ChosenBus(where, place, bus_options(table), dialect)
-    return ChosenBus(where, str(place) if place is not None else _channel_of(experiment), {}, dialect)
+    asked = {} if bitrate is None else {"bitrate": bitrate}
+    return ChosenBus(where, str(place) if place is not None else _channel_of(experiment), asked, dialect)
 
 
 def refuse_baud(place: ChosenBus, baud: int | None) -> None:

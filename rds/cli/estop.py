@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rds.cli.buses import Baud, Channel, Experiment, Interface, chosen_bus, refuse_baud
+from rds.cli.buses import Baud, Bitrate, Channel, Experiment, Interface, chosen_bus, refuse_baud
 from rds.cli.common import Json, print_json, refusals
 
 
@@ -14,6 +14,7 @@ def estop(
     reset: Annotated[bool, typer.Option("--reset", help="Release the latch of an emergency stop.")] = False,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     baud: Baud = None,
     experiment: Experiment = None,
     json: Json = False,
@@ -28,7 +29,7 @@ def estop(
         from rds.bus.tools.estop import reset_everything, stop_everything
         from rds.core.errors import InputError
 
-        place = chosen_bus(interface, channel, experiment)
+        place = chosen_bus(interface, channel, experiment, bitrate)
         refuse_baud(place, baud)
         if place.is_line:
             if reset:

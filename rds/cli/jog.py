@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.buses import Channel, Experiment, Interface, Machine, bus_table_of, machine_of
+from rds.cli.buses import Bitrate, Channel, Experiment, Interface, Machine, bus_table_of, machine_of
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, refusals
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ def jog(
     machine: Machine = None,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
@@ -45,7 +46,7 @@ def jog(
         from rds.panels.jog.state import Jog
         from rds.panels.session.session import Session
 
-        bus = bus_table_of(experiment, interface, channel)
+        bus = bus_table_of(experiment, interface, channel, bitrate)
         with tempfile.TemporaryDirectory(prefix="rds-jog-") as folder, ends_as_ctrl_c():
             hand = Jog(Session(Path(folder), machine or machine_of(experiment), bus))
             hand.check(axis)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rds.cli.buses import Channel, Experiment, Interface, chosen_bus
+from rds.cli.buses import Bitrate, Channel, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, until_ctrl_c, writes_files
 
 _INTERVAL = 0.1  # s between two looks
@@ -33,6 +33,7 @@ def watch(
     once: Annotated[bool, typer.Option("--once", help="End with the first machine that is accepted.")] = False,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the files of --out and --events.")] = False,
     json: Json = False,
@@ -55,7 +56,9 @@ def watch(
             raise InputError("there is such a file already; choose another name, or give --force", str(out))
         motion = _motion(move) if move else None
         before = load_machine(machine)
-        place = chosen_bus(interface, channel or (None if experiment or interface else before.name), experiment)
+        place = chosen_bus(
+            interface, channel or (None if experiment or interface else before.name), experiment, bitrate
+        )
         bus = stack.enter_context(place.opened())
         offers = Offers(bus, before)
         file = EventFile(events, force) if events is not None else None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli.buses import Channel, ChosenBus, Experiment, Interface, chosen_bus
+from rds.cli.buses import Bitrate, Channel, ChosenBus, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, print_json, refusals, writes_files
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ def new(
     ] = None,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     force: Force = False,
     json: Json = False,
@@ -66,8 +67,10 @@ def new(
         if ways != 1:
             given = "none is given" if not ways else f"{ways} are given"
             raise InputError(f"{given}: name a script, or ask the bus with --scan, or name --modules of the library")
-        if not scan and (order or interface or channel or experiment):
-            raise InputError("--order, --interface, --channel and --experiment belong to --scan, which is not given")
+        if not scan and (order or interface or channel or bitrate or experiment):
+            raise InputError(
+                "--order, --interface, --channel, --bitrate and --experiment belong to --scan, which is not given"
+            )
         if like is not None and modules is not None:
             raise InputError("--like belongs to a script or --scan; modules of the library are chosen whole")
         _check_out(out, ".toml", force)
@@ -75,7 +78,7 @@ def new(
         if modules is not None:
             text = text_of_modules([each.strip() for each in modules.split(",")], out.stem)
         elif scan:
-            text = _scanned(out.stem, order, before, chosen_bus(interface, channel, experiment))
+            text = _scanned(out.stem, order, before, chosen_bus(interface, channel, experiment, bitrate))
         else:
             text = _from_file(script, out.stem, before)
         _write(out, text)

@@ -19,6 +19,8 @@ from rds.cli import (
     data,
     design,
     docs,
+    doctor,
+    drive,
     estop,
     excite,
     fault,
@@ -39,6 +41,7 @@ from rds.cli import (
     network,
     reports,
     robustness,
+    scan,
     schema,
     validate,
 )
@@ -76,6 +79,7 @@ machine_app = typer.Typer(
 app.add_typer(machine_app, name="machine")
 app.add_typer(modules.module_app, name="module")
 app.add_typer(bus.app, name="bus")
+app.add_typer(drive.app, name="drive")
 app.add_typer(nc.app, name="nc")
 app.add_typer(network.app, name="network")
 app.add_typer(jobs.app, name="jobs")
@@ -84,8 +88,9 @@ app.add_typer(cutting.app, name="cutting")
 bus.app.command()(analyse.analyse)
 bus.app.command()(fault.fault)
 bus.app.command()(fault.nodes)
-app.command()(modules.scan)
+app.command()(scan.scan)
 app.command()(estop.estop)
+app.command()(doctor.doctor)
 app.command()(jog.jog)
 app.command()(reports.report)
 app.command()(fit.fit)
@@ -263,6 +268,13 @@ def machine_serve(
     drift: Annotated[
         str | None, typer.Option(help="How much too fast clocks of modules go, ppm: X=50,Y=-30 (dialects rds, dcs).")
     ] = None,
+    quirks: Annotated[
+        str | None,
+        typer.Option(
+            help="What is wrong with simulated drives: wrong-sign, wrong-gear, zero-limits, closed-brake, "
+            "fixed-mapping, no-node-id."
+        ),
+    ] = None,
     axes: Annotated[
         str | None,
         typer.Option(help="Only these modules, as in X,Z: end this command and they are unplugged. By default all."),
@@ -295,6 +307,10 @@ def machine_serve(
             if spoken not in ("rds", "dcs"):
                 raise InputError(f"--drift {drift}: modules of dialect {spoken} have no clock that they tell")
             options["drift"] = drift
+        if quirks is not None:
+            if spoken != "cia402":
+                raise InputError(f"--quirks {quirks}: only simulated drives (--dialect cia402) have them")
+            options["quirks"] = quirks
         if faults is not None:
             from rds.bus.medium.fault_file import read_faults
 

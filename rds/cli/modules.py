@@ -1,4 +1,4 @@
-"""Commands for the modules on a bus: who is there, one module's motions and tuning."""
+"""Commands for one distributed module: its motions and tuning."""
 
 from __future__ import annotations
 
@@ -12,78 +12,14 @@ from typing import Annotated, Any
 import typer
 
 from rds.bus.modules.oacs.pid import MEANINGS
-from rds.cli.buses import Baud, Channel, Experiment, Interface, chosen_bus, refuse_baud
+from rds.cli.buses import Bitrate, Channel, Experiment, Interface, chosen_bus
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, writes_files
 
 module_app = typer.Typer(
     no_args_is_help=True, help="One distributed module (oacs dialect): information, tuning, motions, recorded steps."
 )
 
-Place = tuple[str | None, str | None, Path | None]  # --interface, --channel, --experiment
-
-
-@writes_files
-def scan(
-    watching: Annotated[
-        bool, typer.Option("--watch", help="Go on, and say which distributed modules come and go, until Ctrl-C.")
-    ] = False,
-    events: Annotated[
-        Path | None,
-        typer.Option(help="With --watch: CSV file of what happens, for `rds report reconfiguration`."),
-    ] = None,
-    modules: Annotated[
-        int | None, typer.Option(help="With --watch: how many there should be (default: as many as at its beginning).")
-    ] = None,
-    seconds: Annotated[float | None, typer.Option(help="With --watch: end after so long.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="With --events: overwrite the file.")] = False,
-    interface: Interface = None,
-    channel: Channel = None,
-    baud: Baud = None,
-    experiment: Experiment = None,
-    json: Json = False,
-) -> None:
-    """List the modules on a bus: number, type, dialect, version, state. Numbers used twice are refused.
-
-    With --interface serial: the units on a serial line.
-    """
-    with refusals():
-        _check_watch(watching, events=events, modules=modules, seconds=seconds, force=force or None)
-        if force and events is None:
-            raise _refused("--force overwrites the file of --events, which is not given")
-        place = chosen_bus(interface, channel, experiment)
-        refuse_baud(place, baud)
-        if watching:
-            if place.is_line:
-                raise _refused("--watch is for distributed modules on CAN; units on a serial line do not come and go")
-            from rds.cli.watch import watch
-
-            with place.opened() as bus:
-                watch(bus, json, events, modules, seconds, force)
-            return
-        if place.is_line:
-            from rds.bus.modules.dcs.scan import scan_channel
-
-            rows = scan_channel(str(place.channel), place.baud(baud))
-        else:
-            from rds.bus.tools.scan import scan_all
-
-            rows = scan_all(place.interface, place.channel, **place.options)
-    if json:
-        print_json({"channel": place.channel, "interface": place.interface, "modules": rows})
-        return
-    if not rows:
-        typer.echo(f"no module answers on {place.name}; is a machine served, or switched on?")
-        return
-    from rds.cli.console import show_table
-
-    columns = ["id", "type", "dialect", "version", "state"]
-    show_table("Modules", columns, [["–" if row[c] is None else str(row[c]) for c in columns] for row in rows])
-
-
-def _check_watch(watching: bool, **words: Any) -> None:
-    given = [f"--{name}" for name, value in words.items() if value is not None]
-    if given and not watching:
-        raise _refused(f"{', '.join(given)} belongs to --watch, which is not given")
+Place = tuple[str | None, str | None, Path | None, int | None]  # --interface, --channel, --experiment, --bitrate
 
 
 def _refused(sentence: str) -> Exception:
@@ -129,11 +65,12 @@ def info(
     context: typer.Context,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Download what the module says of itself, and its tuning."""
-    with _module(context, (interface, channel, experiment)) as module:
+    with _module(context, (interface, channel, experiment, bitrate)) as module:
         found = module.info().as_dict()
     if json:
         print_json(found)
@@ -152,11 +89,12 @@ def tune(
     ] = None,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Select PI or PID and set gains and limits; without options, show what is in force."""
-    with _module(context, (interface, channel, experiment)) as module:
+    with _module(context, (interface, channel, experiment, bitrate)) as module:
         parameters = _pairs(set_ or ())
         if from_step is not None:
             parameters = _gains(from_step, controller or "PID") | parameters
@@ -210,6 +148,7 @@ def move(
     to: Annotated[float | None, typer.Option(help="Point, mm or degrees.")] = None,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
@@ -219,7 +158,10 @@ def move(
             given = "neither is given" if by is None else "both are given"
             raise _refused(f"{given}: move by a distance with --by, or to a point with --to, as in --by 5")
     _moved(
-        context, (interface, channel, experiment), json, lambda module, show: module.move(by=by, to=to, progress=show)
+        context,
+        (interface, channel, experiment, bitrate),
+        json,
+        lambda module, show: module.move(by=by, to=to, progress=show),
     )
 
 
@@ -231,11 +173,17 @@ def jog(
     duty: Annotated[float, typer.Option(help="Share of the supply voltage, up to 1.")] = 1.0,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Run for a time, a tool too; it also ends if this command is killed."""
-    _moved(context, (interface, channel, experiment), json, lambda module, show: module.jog(direction, seconds, duty))
+    _moved(
+        context,
+        (interface, channel, experiment, bitrate),
+        json,
+        lambda module, show: module.jog(direction, seconds, duty),
+    )
 
 
 @module_app.command()
@@ -243,11 +191,12 @@ def home(
     context: typer.Context,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Find the zero."""
-    _moved(context, (interface, channel, experiment), json, lambda module, show: module.home(progress=show))
+    _moved(context, (interface, channel, experiment, bitrate), json, lambda module, show: module.home(progress=show))
 
 
 def _moved(context: typer.Context, place: Place, json: bool, act: Any) -> None:
@@ -283,11 +232,12 @@ def stop(
     context: typer.Context,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Zero volts now."""
-    with _module(context, (interface, channel, experiment)) as module:
+    with _module(context, (interface, channel, experiment, bitrate)) as module:
         module.stop()
     if json:
         print_json({"stopped": context.obj})
@@ -300,11 +250,12 @@ def reset(
     context: typer.Context,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Release the latch of the emergency stop."""
-    with _module(context, (interface, channel, experiment)) as module:
+    with _module(context, (interface, channel, experiment, bitrate)) as module:
         module.reset_emergency()
     if json:
         print_json({"reset": context.obj})
@@ -329,11 +280,12 @@ def step(
     force: Annotated[bool, typer.Option("--force", help="Replace what is in the folder of --out.")] = False,
     interface: Interface = None,
     channel: Channel = None,
+    bitrate: Bitrate = None,
     experiment: Experiment = None,
     json: Json = False,
 ) -> None:
     """Step the set point, record the response and plot it."""
-    with _moving(context, (interface, channel, experiment)) as module, progress_bars() as bar:
+    with _moving(context, (interface, channel, experiment, bitrate)) as module, progress_bars() as bar:
         folder = folder_for(out, force)
         result = module.step(by, period, settled=settled, progress=bar(f"step by {by:g}"))
         bar("save")

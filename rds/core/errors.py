@@ -26,3 +26,7 @@ class Notice(UserWarning):
 
 class MachineError(RdsError):
     """The machine or its bus does not do its part: no answer, a lost node, a fault in its status."""
+
+
+class AdapterError(MachineError):
+    """The adapter between computer and bus has failed: unplugged, without power, or its line garbled."""

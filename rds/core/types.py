@@ -127,6 +127,7 @@ class Ending(StrEnum):
     OVERLOADED = "overloaded"  # more late samples in a row than the late policy allows
     FAULT = "fault"  # the student's code broke its contract or raised
     MACHINE_LOST = "machine lost"  # a module stopped answering, or the bus failed
+    ADAPTER_LOST = "adapter lost"  # the adapter between computer and bus was unplugged, or its line garbled
     KILLED = "killed"  # the target process ended without saying why
 
 

@@ -51,6 +51,33 @@ def test_sync_without_commands_is_a_fault_too(rig: Rig) -> None:
     assert rig.emergencies() == [0x8250] and rig.voltage == 0.0
 
 
+@pytest.mark.parametrize("phase", [0.05, 0.25, 0.45, 0.55, 0.75, 0.95])
+def test_a_command_out_of_a_queue_moves_nothing_at_whatever_time_it_comes(rig: Rig, phase: float) -> None:
+    """One command of 7 V comes beside those of zero volts, `phase` periods after a SYNC; theirs come at half of it."""
+    push(rig, 0)
+    late = rig.t + phase * T
+    for _ in range(3):
+        due = rig.t + T
+        for at, torque in sorted([(due - 0.5 * T, 0), (late, 700)]):
+            if at > rig.t:
+                rig.t = at
+                rig.send(0x200 + rig.node, rig.pack(0x0F, torque))
+        rig.t = due
+        rig.send(0x80)
+        assert rig.voltage == 0.0
+    assert rig.drive.state is State.FAULT and rig.emergencies() == [0x8150]
+
+
+def test_one_lost_sync_between_two_commands_is_borne(rig: Rig) -> None:
+    push(rig, 100)
+    rig.t += 0.5 * T
+    rig.send(0x200 + rig.node, rig.pack(0x0F, 101))
+    rig.t += 0.5 * T  # its SYNC is lost
+    rig.cycle(102)
+    rig.cycle(103)
+    assert rig.drive.state is State.OPERATION_ENABLED and not rig.emergencies()
+
+
 def test_one_lost_command_is_borne(rig: Rig) -> None:
     push(rig)
     rig.t += T
@@ -97,6 +124,26 @@ def test_a_host_that_dies_is_treated_by_the_option_code(rig: Rig, option: int, s
     assert rig.emergencies() == [0x8130] and rig.read(0x1001) & 0x11 == 0x11
     assert (rig.voltage == 0.0) == (option != 0)
     assert rig.drive.nmt is Nmt.PRE_OPERATIONAL  # error behaviour 0x1029
+
+
+def test_a_drive_that_lost_its_host_is_not_enabled_until_it_is_heard_again(rig: Rig) -> None:
+    watched(rig, 2)
+    rig.wait(0.3)
+    for heard in (False, True):
+        if heard:
+            rig.send(0x700 + HOST, b"\x05")
+        for word in (6, 7, 15):
+            rig.write(0x6040, word, 2)
+        assert (rig.drive.state is State.OPERATION_ENABLED) == heard
+
+
+def test_a_new_host_that_is_to_be_watched_enables_it(rig: Rig) -> None:
+    watched(rig, 2)
+    rig.wait(0.3)
+    rig.write(0x1016, HOST << 16 | 50, 4, 1)
+    for word in (6, 7, 15):
+        rig.write(0x6040, word, 2)
+    assert rig.drive.state is State.OPERATION_ENABLED
 
 
 def test_a_heartbeat_that_comes_back_clears_the_error(rig: Rig) -> None:

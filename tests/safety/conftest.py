@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -182,15 +183,23 @@ def is_report(data: bytes) -> bool:
     return data[5] == frames.Kind.REPORT
 
 
-def expect(process: subprocess.Popen[str], word: str) -> str:
-    """The next line of a process's stdout that begins with the word; fails if it ends without one."""
+def expect(process: subprocess.Popen[str], word: str, patience: float = 60.0) -> str:
+    """The next line of a process's stdout that begins with the word.
+
+    Fails if the process ends without one; after `patience` s without one it is killed: no test waits for ever.
+    """
     assert process.stdout is not None and process.stderr is not None
     said = []
-    for line in process.stdout:
-        if line.startswith(word):
-            return line
-        said.append(line)
-    raise AssertionError(f"no {word!r}, but {said} {process.stderr.read()}")
+    limit = threading.Timer(patience, process.kill)
+    limit.start()
+    try:
+        for line in process.stdout:
+            if line.startswith(word):
+                return line
+            said.append(line)
+    finally:
+        limit.cancel()
+    raise AssertionError(f"no {word!r} within {patience:g} s, but {said} {process.stderr.read()}")
 
 
 def tell(process: subprocess.Popen[str], line: str) -> None:

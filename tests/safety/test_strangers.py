@@ -127,7 +127,7 @@ def oacs_module(state: str) -> BusNode:
 
 
 def drive(state: str) -> BusNode:
-    node = DriveNode("X", lambda _: Drive(CNC.axis("X"), NOW, 10.0, NODE), opener)
+    node = DriveNode("X", lambda _, __: Drive(CNC.axis("X"), NOW, 10.0, NODE), opener)
     if state == "commanded":
         feed(node, 0x600 + NODE, b"\x23\x16\x10\x01\xe8\x03\x7f\x00")  # it waits for the host's heartbeat
         feed(node, 0x600 + NODE, b"\x2f\x60\x60\x00\x03\0\0\0")  # profile velocity

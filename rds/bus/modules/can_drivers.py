@@ -9,8 +9,9 @@ from typing import Any
 import can
 
 from rds.bus.modules.drivers_base import DriversBase, M
+from rds.bus.tools.adapter import AdapterFailure
 from rds.bus.tools.link import bus_name, default_channel, open_bus
-from rds.core.errors import MachineError
+from rds.core.errors import AdapterError, MachineError
 from rds.machines.machine import Machine
 
 HOST = "host"  # what the built-in bus calls this node
@@ -84,7 +85,11 @@ class CanDrivers(DriversBase[M, can.Message]):
         try:
             self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data), 0.5)
         except self.failures as error:
-            raise MachineError(f"bus {self._bus_name} failed: {error}") from error
+            raise self._failed(error) from error
+
+    def _failed(self, error: Exception) -> MachineError:
+        """An adapter that fails has an error of its own."""
+        return AdapterError(str(error)) if isinstance(error, AdapterFailure) else super()._failed(error)
 
     def _shut(self) -> None:
         if self._owns_bus:

@@ -20,7 +20,8 @@ import can
 from rds.bus.hub.faults import Faults
 from rds.bus.hub.poller import READ, Poller, SelectPoller, make_poller
 from rds.bus.medium.fault_kinds import Fault
-from rds.bus.tools.link import BUILTIN, bus_name, default_channel, open_bus
+from rds.bus.modules.shared_bus import opener_of
+from rds.bus.tools.link import BUILTIN, bus_name, default_channel
 from rds.core.errors import InputError
 from rds.core.interrupt import SignalEvent
 from rds.core.scheduling import lock_memory, raise_priority
@@ -104,11 +105,12 @@ def serve_nodes(
     for name in axes or ():
         machine.axis(name)
     nodes = [] if nodes is None else nodes
+    opener = opener_of(interface, channel, **options)
     try:
         for axis in machine.axes.values():
             if axes is None or axis.name in axes:
                 slot = machine.slots[axis.name]
-                nodes.append(make_node(slot, axis, partial(open_bus, interface, channel, node=axis.name, **options)))
+                nodes.append(make_node(slot, axis, partial(opener, node=axis.name)))
         with as_process(stop), _injected(channel, faults):
             if ready is not None:
                 ready()

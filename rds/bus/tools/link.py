@@ -50,6 +50,8 @@ def open_bus(
     """
     import can
 
+    from rds.bus.tools.adapter import NOT_ADAPTERS, guard
+
     if node is not None and interface == BUILTIN:
         options.setdefault("name", node)
     if interface != BUILTIN:
@@ -58,7 +60,7 @@ def open_bus(
     if identifiers is not None:
         filters = standard_filters(identifiers, mask)
     try:
-        return can.Bus(
+        bus = can.Bus(
             interface=interface,
             channel=channel,
             can_filters=filters,
@@ -71,6 +73,9 @@ def open_bus(
             f"bus {bus_name(interface, channel)} can't be opened: {error}; check interface, channel and "
             "options (on the command line, or in the [bus] table)"
         ) from error
+    if interface in NOT_ADAPTERS:
+        return bus
+    return guard(bus, interface, bus_name(interface, channel))
 
 
 def standard_filters(identifiers: Sequence[int], mask: int = 0x7FF) -> list[Any]:

@@ -240,7 +240,9 @@ class Experiment:
             kept = f" (the samples up to then are in {folder})" if len(rows.values) else ""
             raise ContractError(f"{rows.reason}{kept}")
         if not len(rows.values):
-            raise (MachineError if rows.ending is Ending.MACHINE_LOST else RdsError)(rows.reason or str(rows.ending))
+            raise (MachineError if rows.ending in (Ending.MACHINE_LOST, Ending.ADAPTER_LOST) else RdsError)(
+                rows.reason or str(rows.ending)
+            )
         return self._saved(plan, known, rows, out)
 
     def _saved(self, plan: Plan, known: dict[str, Any], rows: Rows, out: str | Path | None) -> Result:

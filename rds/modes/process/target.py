@@ -22,7 +22,7 @@ from typing import Any
 
 from rds.core.clock import RealTimeClock
 from rds.core.contracts import Drivers
-from rds.core.errors import MachineError, RdsError
+from rds.core.errors import AdapterError, MachineError, RdsError
 from rds.core.private_files import keep_process_private, open_private
 from rds.core.types import Ending
 from rds.modes import load_mode
@@ -85,7 +85,8 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
         if report["ending"] is Ending.DONE:
             drivers.confirm()
     except MachineError as error:
-        report |= {"ending": Ending.MACHINE_LOST, "reason": str(error)}
+        ending = Ending.ADAPTER_LOST if isinstance(error, AdapterError) else Ending.MACHINE_LOST
+        report |= {"ending": ending, "reason": str(error)}
     except BaseException as error:  # the student's code may raise anything, SystemExit included
         if not isinstance(error, RdsError):
             log.exception("the run ended by an exception")

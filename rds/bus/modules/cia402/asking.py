@@ -39,7 +39,7 @@ def ask(bus: can.BusABC, drive: Remote) -> int | None:
                 code = int.from_bytes(data[:2], "little")
             elif identifier == 0x580 + drive.node and data[1:4] == _ERROR_CODE and data[0] & 0xE0 == 0x40:
                 code = code or int.from_bytes(data[4:6], "little")
-            elif identifier == 0x180 + drive.node and len(data) >= 6:
+            elif identifier == drive.answers_at:
                 before = drive.status, drive.state
                 drive.take_status(message)
                 if drive.state not in _FAULTS:  # what stop() has made of it isn't what was wrong

@@ -19,6 +19,7 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
 from rds.bus.modules.cia402 import codes
 from rds.bus.modules.cia402.codes import Mode, NmtCommand, State, error_text, state_of, status_text
+from rds.bus.modules.cia402.mapping import Layout, find_fixed, map_dynamically
 from rds.bus.modules.cia402.presence import refuse_clashes
 from rds.bus.modules.cia402.settings import Command, DriveSettings, Settings
 from rds.bus.tools.listening import pause
@@ -63,21 +64,25 @@ def library(bus: can.BusABC) -> Iterator[canopen.Network]:
         network.notifier.stop()
 
 
-def prepare(network: canopen.Network, settings: Settings, period: float, watch: Watch = unwatched) -> list[Limits]:
+def prepare(
+    network: canopen.Network, settings: Settings, period: float, watch: Watch = unwatched
+) -> tuple[list[Limits], list[Layout]]:
     """Bring all drives to OPERATIONAL (NMT) and SWITCH ON DISABLED, mapped, in their mode, homed where asked for.
 
-    Returns the software limits of each. While a drive is homed it waits for the host's heartbeats, as it does under
-    command: should the host die, it ends the homing. `watch` is called all the while; what it raises ends the homing.
+    Returns the software limits of each, and where its words stand in its PDOs. While a drive is homed it waits for the
+    host's heartbeats, as it does under command: should the host die, it ends the homing. `watch` is called all the
+    while; what it raises ends the homing.
 
     Raises MachineError naming node and object, and what the drive said; InputError for an EDS that can't be read.
     """
     search(network, settings.drives)
-    nodes = [_load(network, drive) for drive in settings.drives]
+    nodes = [load(network, drive) for drive in settings.drives]
+    layouts: list[Layout] = []
     for drive, node in zip(settings.drives, nodes, strict=True):
         with _naming(drive):
             node.nmt.state = "PRE-OPERATIONAL"
             _communication(node, drive, settings, period)
-            _map(node, drive, settings.transmission)
+            layouts.append((find_fixed if drive.fixed_mapping else map_dynamically)(node, drive, settings.transmission))
             _reset_fault(node, drive)
             if drive.command is Command.PP:
                 _profile(node, drive)
@@ -102,7 +107,7 @@ def prepare(network: canopen.Network, settings: Settings, period: float, watch: 
             _still_target(node, drive)
             _watch_host(node, drive, settings)
             limits.append(_software_limits(node, drive))
-    return limits
+    return limits, layouts
 
 
 def search(network: canopen.Network, drives: Sequence[DriveSettings]) -> None:
@@ -216,7 +221,7 @@ def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: flo
 # --- steps
 
 
-def _load(network: canopen.Network, drive: DriveSettings) -> canopen.RemoteNode:
+def load(network: canopen.Network, drive: DriveSettings) -> canopen.RemoteNode:
     try:
         node = network.add_node(drive.node, drive.eds)
     except Exception as error:  # the library raises whatever its parser stumbles over
@@ -238,27 +243,6 @@ def _communication(node: canopen.RemoteNode, drive: DriveSettings, settings: Set
         raise InputError(f"a sample period of {period} s can't be said as an interpolation time 0x60C2", drive.name)
     _optional(node, drive, 0x60C2, 2, exponent)
     _optional(node, drive, 0x60C2, 1, value)
-
-
-def _map(node: canopen.RemoteNode, drive: DriveSettings, transmission: int) -> None:
-    """RPDO 1: controlword and target. TPDO 1: statusword and actual position (or velocity). No other PDO."""
-    for maps in (node.rpdo, node.tpdo):
-        for number, pdo in maps.items():
-            identifier = pdo.com_record[1].raw
-            if number > 1 and not identifier & 1 << 31:
-                pdo.com_record[1].raw = identifier | 1 << 31
-    received, sent = node.rpdo[1], node.tpdo[1]
-    actual = 0x606C if drive.reads_velocity else 0x6064
-    for pdo, objects, kind in (
-        (received, (0x6040, drive.command.target), transmission),
-        (sent, (0x6041, actual), 1),
-    ):
-        pdo.clear()
-        for index in objects:
-            pdo.add_variable(index)
-        pdo.cob_id, pdo.trans_type, pdo.enabled = pdo.predefined_cob_id, kind, True
-        pdo.rtr_allowed = pdo is received  # the bit has no meaning there
-        pdo.save()
 
 
 def _reset_fault(node: canopen.RemoteNode, drive: DriveSettings) -> None:

@@ -15,6 +15,7 @@ from canopen.sdo import SdoAbortedError
 from rds.bus.modules.cia402.codes import Abort
 
 Key = tuple[int, int]  # index, sub-index
+_NO_PARAMETERS = (0x1003, 0x1010, 0x1011, 0x6040, 0x6060, 0x6071, 0x607A, 0x60FF)  # errors, orders, targets
 
 
 def axis_eds(node: int) -> canopen.ObjectDictionary:
@@ -49,13 +50,27 @@ class Dictionary:
         self.values: dict[Key, Any] = {}
         self.readers: dict[Key, Callable[[], Any]] = {}
         self.writers: dict[Key, Callable[[Any], None]] = {}
+        self._stored: dict[Key, Any] = {}  # what is there when it is switched on again, instead of the EDS's values
         self.reset()
 
     def reset(self, lowest: int = 0, highest: int = 0xFFFF) -> None:
         """Values as in the EDS, for the objects from `lowest` to `highest`."""
         for key, variable in self.variables.items():
             if lowest <= key[0] <= highest:
-                self.values[key] = variable.default if variable.default is not None else 0
+                default = variable.default if variable.default is not None else 0
+                self.values[key] = self._stored.get(key, default)
+
+    def store(self) -> None:
+        """Keep the values of parameters as they are now, for when it is switched on again (0x1010)."""
+        self._stored = {
+            key: self.values[key]
+            for key, variable in self.variables.items()
+            if variable.writable and key[0] not in _NO_PARAMETERS
+        }
+
+    def forget(self) -> None:
+        """The EDS's values come back when it is switched on again (0x1011)."""
+        self._stored = {}
 
     def __getitem__(self, index: int) -> Any:
         """The stored value of an object without sub-indices."""

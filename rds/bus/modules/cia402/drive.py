@@ -19,6 +19,7 @@ from rds.bus.modules.cia402.errors import Errors
 from rds.bus.modules.cia402.heartbeat import Heartbeats
 from rds.bus.modules.cia402.operation import Operation
 from rds.bus.modules.cia402.pdo import COUNT, Rpdo, Tpdo
+from rds.bus.modules.cia402.quirks import Quirk
 from rds.bus.modules.cia402.sdo import Server
 from rds.bus.modules.cia402.servo import Servo
 from rds.bus.modules.cia402.state_machine import Command, command
@@ -29,14 +30,28 @@ from rds.machines.machine import Axis
 Frame = tuple[int, bytes]
 NODES = range(1, 128)
 NMT, HEARTBEAT = 0x000, 0x700
+SAVE, LOAD = 0x65766173, 0x64616F6C  # "save" and "load": what 0x1010 and 0x1011 take
+_ON_COMMAND = 1  # 0x1010 and 0x1011: it does so on command
 _CLOSE = 0.75  # periods: of any two hosts with one period, one comes closer than that after the other
+_NONE_LOST = 1.5  # periods between two SYNCs: in less, none can have been lost
 _MOVING = 2e-3  # s between two looks at an axis under power if no frame comes
 
 
 class Drive:
-    """The drive of `axis`; `node` is its node-ID (default: the axis's), `volts` its full voltage at 1000 ‰ torque."""
+    """The drive of `axis`; `node` is its node-ID (default: the axis's), `volts` its full voltage at 1000 ‰ torque.
 
-    def __init__(self, axis: Axis, start: float, volts: float = 10.0, node: int | None = None):
+    `quirks` are things that are wrong with it.
+    """
+
+    def __init__(
+        self,
+        axis: Axis,
+        start: float,
+        volts: float = 10.0,
+        node: int | None = None,
+        quirks: frozenset[Quirk] = frozenset(),
+    ):
+        self.quirks = quirks
         self.name = axis.name
         self.node = axis.node if node is None else node
         if self.node not in NODES:
@@ -50,14 +65,26 @@ class Drive:
         self.errors = Errors(self.objects, self._send)
         self.operation = Operation(self.objects, self.servo, self.errors.report, self.errors.clear)
         self.heartbeats = Heartbeats(self.objects, lambda: self.operation.now)
+        self.operation.is_host_missing = lambda: self.heartbeats.is_one_missing
         self.receive_pdos = [Rpdo(number, self.objects) for number in range(COUNT)]
         self.transmit_pdos = [Tpdo(number, self.objects) for number in range(COUNT)]
         self._server = Server(self.node, self.objects, self._send)
         self.objects.writers[0x1005, 0] = self._check_sync_identifier
         self.objects.writers[0x1014, 0] = self._check_emergency_identifier
         self.objects.writers[0x1019, 0] = self._check_sync_counter
+        self.objects.writers[0x1010, 1] = self._store
+        self.objects.writers[0x1011, 1] = self._restore
+        self.objects.readers |= {(0x1010, 1): lambda: _ON_COMMAND, (0x1011, 1): lambda: _ON_COMMAND}
+        if Quirk.FIXED_MAPPING in quirks:
+            for key in self.objects.variables:
+                if 0x1600 <= key[0] < 0x1604 or 0x1A00 <= key[0] < 0x1A04:
+                    self.objects.writers[key] = _refuse_mapping
+        self.servo.polarity = -1 if Quirk.WRONG_SIGN in quirks else 1
+        self.servo.brake_is_closed = Quirk.CLOSED_BRAKE in quirks
         self.objects.readers[0x1018, 4] = lambda: self.serial
         self._bad_length = False
+        self._synced_at = -inf  # s: the last SYNC
+        self._contradicted = False  # two commands have come since then
         # what the objects say, looked up once for a thousand frames a second
         self._sync_identifier = 0x80
         self._taken: dict[int, list[Rpdo]] = {}
@@ -215,6 +242,10 @@ class Drive:
             values = self.objects.values
             turn = round(self.servo.counts_per_unit * (60.0 if self.servo.rotates else 1.0))
             values[0x608F, 1] = values[0x6092, 1] = turn  # a linear axis has a screw of 1 mm
+            if Quirk.WRONG_GEAR in self.quirks:
+                values[0x6091, 1] = 10
+            if Quirk.ZERO_LIMITS in self.quirks:
+                values |= dict.fromkeys([(0x6072, 0), (0x607D, 1), (0x607D, 2)], 0)
             self.operation.power_off()
         for pdo in (*self.receive_pdos, *self.transmit_pdos):
             pdo.reset()
@@ -241,6 +272,11 @@ class Drive:
             self._complain(0x8240)
             return
         self.syncs += 1
+        was_lost = self.operation.now - self._synced_at > _NONE_LOST * self.operation.period
+        self._synced_at = self.operation.now
+        contradicted, self._contradicted = self._contradicted, False
+        if contradicted and not was_lost and self.state is State.OPERATION_ENABLED:
+            self.operation.fault(codes.IDENTIFIER_COLLISION)
         for received in self.receive_pdos:
             if received.waiting is not None:
                 waiting, received.waiting = received.waiting, None
@@ -270,13 +306,15 @@ class Drive:
     def _contradicts(self, pdo: Rpdo, data: bytes) -> bool:
         """Whether two hosts command: two commands for one SYNC, too close for one whose SYNC was lost.
 
-        A host that takes the power away may always change its mind.
+        The next SYNC decides about those that are further apart: if it comes in time, none was lost between them. A
+        host that takes the power away may always change its mind.
         """
         if pdo.waiting is None or pdo.waiting == data or self.state is not State.OPERATION_ENABLED:
             return False
         word = int.from_bytes(data[:2], "little") if pdo.mapped[0] == (0x6040, 0) else codes.ENABLE_OPERATION
         if command(word) is not Command.ENABLE_OPERATION:
             return False
+        self._contradicted = True
         return self.operation.now - pdo.came_at < _CLOSE * self.operation.period
 
     def _complain(self, code: int) -> None:
@@ -336,6 +374,16 @@ class Drive:
         if self.objects[0x1006]:
             raise SdoAbortedError(Abort.DEVICE_STATE)
 
+    def _store(self, word: int) -> None:
+        if word != SAVE:
+            raise SdoAbortedError(Abort.DEVICE_STATE)
+        self.objects.store()
+
+    def _restore(self, word: int) -> None:
+        if word != LOAD:
+            raise SdoAbortedError(Abort.DEVICE_STATE)
+        self.objects.forget()
+
     # --- frames
 
     def _send(self, identifier: int, data: bytes) -> None:
@@ -346,3 +394,7 @@ class Drive:
     def _flush(self) -> list[Frame]:
         out, self._out = self._out, []
         return out
+
+
+def _refuse_mapping(_: Any) -> None:
+    raise SdoAbortedError(Abort.READ_ONLY)

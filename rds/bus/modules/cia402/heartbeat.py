@@ -34,6 +34,11 @@ class Heartbeats:
             entry >> 16 & 0x7F: (entry & 0xFFFF) * 1e-3 for entry in entries if entry >> 16 & 0x7F and entry & 0xFFFF
         }
 
+    @property
+    def is_one_missing(self) -> bool:
+        """Whether a watched node has fallen silent."""
+        return bool(self._missing)
+
     def restart(self) -> None:
         """After boot-up: send again as 0x1017 says, and wait for the first heartbeat of each watched node."""
         self._deadlines, self._missing = {}, set()
@@ -78,4 +83,6 @@ class Heartbeats:
         others = [self._objects.values[0x1016, other] for other in _PLACES if other != place]
         if node and time and any(other >> 16 & 0x7F == node and other & 0xFFFF for other in others):
             raise SdoAbortedError(Abort.PARAMETERS_INCOMPATIBLE)  # one time for each node
-        self._deadlines.pop(self._objects.values[0x1016, place] >> 16 & 0x7F, None)
+        before = self._objects.values[0x1016, place] >> 16 & 0x7F
+        self._deadlines.pop(before, None)
+        self._missing.discard(before)

@@ -22,6 +22,7 @@ from rds.bus.modules.cia402 import codes
 from rds.bus.modules.cia402.asking import ask, frame
 from rds.bus.modules.cia402.codes import Nmt, NmtCommand, State, error_text, status_text
 from rds.bus.modules.cia402.configure import library, prepare
+from rds.bus.modules.cia402.mapping import RPDOS, TPDOS
 from rds.bus.modules.cia402.remote import Remote
 from rds.bus.modules.cia402.settings import read_settings
 from rds.bus.modules.rds.identity import WAIT as LISTENING
@@ -82,15 +83,16 @@ class Cia402Drivers(CanDrivers[Remote]):
         self.drives = [Remote(drive, self.settings.absolute) for drive in self.settings.drives]
         handlers: dict[int, Handler[Remote]] = {}
         for drive in self.drives:
-            handlers[_TPDO + drive.node] = drive.take_status
+            for base in TPDOS if drive.fixed_mapping else TPDOS[:1]:
+                handlers[base + drive.node] = _pass_over  # until start() knows which one it is
             handlers[_EMERGENCY + drive.node] = partial(self._take_emergency, drive)
             handlers[_HEARTBEAT + drive.node] = partial(self._take_heartbeat, drive)
-            handlers[_ANSWER + drive.node] = _pass_over
+            handlers[_ANSWER + drive.node] = partial(self._take_answer, drive)
         super().__init__(
             machine,
             self.drives,
             handlers,
-            hosts=(_SYNC, *(_RPDO + drive.node for drive in self.drives)),
+            hosts=(_SYNC, *_received(self.drives)),
             also=(_NMT,),
             bus=bus,
             interface=interface,
@@ -113,6 +115,7 @@ class Cia402Drivers(CanDrivers[Remote]):
         self._commanded = (0.0,) * len(self.drives)  # what the next SYNC makes act
         self._acting = self._commanded
         self._stopping = False  # after stop()
+        self.told: dict[tuple[int, int], bytes] = {}  # answers to ask_for()
         self._configured = False  # from then on the drives take process data
 
     def _count_anew(self) -> None:
@@ -141,7 +144,10 @@ class Cia402Drivers(CanDrivers[Remote]):
 
     def _set_up(self, watch: Watch) -> None:
         with library(self._bus) as network:
-            self.limits = prepare(network, self.settings, self._period, watch)
+            self.limits, layouts = prepare(network, self.settings, self._period, watch)
+        for drive, layout in zip(self.drives, layouts, strict=True):
+            drive.use(layout)
+            self._handlers[layout.send] = drive.take_status
         self._configured = True
         for drive in self.drives:
             drive.heard_at = inf
@@ -250,6 +256,18 @@ class Cia402Drivers(CanDrivers[Remote]):
                 drive.lead(self._armed)
             self._bus.send(drive.fill(), self._send_timeout)
 
+    def ask_for(self, drive: Remote, index: int, subindex: int = 0) -> None:
+        """Ask for an object of at most 4 bytes between cycles; `told` has it once it has come, by node and index."""
+        request = bytes((0x40, index & 0xFF, index >> 8, subindex)) + bytes(4)
+        with self._failing():
+            self._bus.send(frame(0x600 + drive.node, request), self._send_timeout)
+
+    def _take_answer(self, drive: Remote, message: can.Message, late: bool) -> None:
+        data = bytes(message.data)
+        if len(data) == 8 and data[0] & 0xE3 == 0x43:  # an expedited upload
+            size = 4 - (data[0] >> 2 & 3)
+            self.told[drive.node, int.from_bytes(data[1:3], "little")] = data[4 : 4 + size]
+
     def _take_emergency(self, drive: Remote, message: can.Message, late: bool) -> None:
         if len(message.data) >= 2 and (code := int.from_bytes(message.data[:2], "little")):
             drive.emergency = code
@@ -340,6 +358,11 @@ class Cia402Drivers(CanDrivers[Remote]):
             f"{drive} {what}: state {drive.state}, statusword {status_text(drive.status)}, "
             f"error code {error_text(code) if code is not None else 'unknown (no answer)'}"
         )
+
+
+def _received(drives: Sequence[Remote]) -> list[int]:
+    """The identifiers that a host commands these drives by."""
+    return [base + drive.node for drive in drives for base in (RPDOS if drive.fixed_mapping else RPDOS[:1])]
 
 
 def _pass_over(message: can.Message, late: bool) -> None:

@@ -42,6 +42,7 @@ class Operation:
         self.objects, self.servo = objects, servo
         self.now = servo.axis.now
         self.remote = False  # whether NMT is OPERATIONAL
+        self.is_host_missing: Callable[[], bool] = lambda: False  # whether heartbeats that it waits for have stopped
         self.interlock = False  # whether the emergency stop button is pressed: no fault can be reset meanwhile
         self._report, self._cleared = report, cleared
         self._mode: OperationMode | None = None  # while OPERATION ENABLED
@@ -61,6 +62,7 @@ class Operation:
             (0x6041, 0): self.statusword,
             (0x6061, 0): lambda: self.objects[0x6060],
             (0x6062, 0): lambda: _wrap(round(servo.position_demand)),
+            (0x6063, 0): lambda: _wrap(servo.raw),
             (0x6064, 0): lambda: _wrap(servo.position),
             (0x606B, 0): lambda: _wrap(round(servo.velocity_demand)),
             (0x606C, 0): lambda: _wrap(round(servo.velocity)),
@@ -115,6 +117,8 @@ class Operation:
     def control(self, word: int) -> None:
         """Obey a controlword, 0x6040."""
         if self.interlock and word & codes.FAULT_RESET:
+            return
+        if command(word) is Command.ENABLE_OPERATION and not self._is_powered() and self.is_host_missing():
             return
         option = {Command.SWITCH_ON: 0x605C, Command.SHUTDOWN: 0x605B}.get(command(word))
         if self.machine.state is State.OPERATION_ENABLED and option and self.objects[option] and self._is_powered():

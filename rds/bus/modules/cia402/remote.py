@@ -8,11 +8,11 @@ import can
 
 from rds.bus.modules.cia402 import codes
 from rds.bus.modules.cia402.codes import State, state_of
+from rds.bus.modules.cia402.mapping import Layout, standard
 from rds.bus.modules.cia402.settings import Command, DriveSettings
 from rds.bus.modules.drivers_base import Module
 from rds.core.errors import InputError
 
-_STATUS = Struct("<Hi")  # statusword, actual position or velocity
 _HALF, _TURN = 1 << 31, 1 << 32
 
 # The controlword that leads from a state towards OPERATION ENABLED; where power stays off, the way ends before.
@@ -36,6 +36,9 @@ class Remote(Module):
         "_pack",
         "_placed",
         "_settings",
+        "_size",
+        "_unpack",
+        "answers_at",
         "controlword",
         "emergency",
         "enabled",
@@ -54,7 +57,6 @@ class Remote(Module):
         )  # a speed has no origin
         self._settings, self._command = settings, settings.command
         torque = settings.command is Command.CST
-        self._pack = Struct("<Hh" if torque else "<Hi").pack_into
         self._factor = (
             settings.direction
             * {
@@ -65,9 +67,7 @@ class Remote(Module):
             }[settings.command]
         )
         self._counts_limit = settings.torque_limit if torque else _HALF - 1
-        self.message = can.Message(
-            arbitration_id=0x200 + settings.node, is_extended_id=False, data=bytes(4 if torque else 6)
-        )
+        self.use(standard(settings))
         self.controlword = codes.DISABLE_VOLTAGE
         self.target = 0  # in the drive's units, as the next RPDO carries it
         self._placed: int | None = None  # mode pp: the target that the RPDO before carried,
@@ -77,6 +77,19 @@ class Remote(Module):
         self.enabled = self.was_enabled = False
         self.emergency = 0  # error code of the last emergency message; 0 none
         self.heard_at = 0.0  # s, of the last heartbeat; infinite before the first
+
+    def use(self, layout: Layout) -> None:
+        """Where the words stand in the PDOs."""
+        self._pack = Struct(layout.command).pack_into
+        answer = Struct(layout.answer)  # statusword, actual position or velocity
+        self._unpack, self._size = answer.unpack_from, answer.size
+        self.answers_at = layout.send
+        self.message = can.Message(arbitration_id=layout.receive, is_extended_id=False, data=bytes(layout.command_size))
+
+    @property
+    def fixed_mapping(self) -> bool:
+        """Whether its PDOs are used as they are."""
+        return self._settings.fixed_mapping
 
     @property
     def node(self) -> int:
@@ -88,9 +101,9 @@ class Remote(Module):
         if late:
             return self
         data = message.data
-        if len(data) < 6:
+        if len(data) < self._size:
             return None
-        self.status, self.counts = _STATUS.unpack_from(data)
+        self.status, self.counts = self._unpack(data)
         if self.status & 0x6F != 0x27 or not self.enabled:
             self.state = state_of(self.status)
             self.enabled = self.state is State.OPERATION_ENABLED

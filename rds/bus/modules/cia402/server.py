@@ -15,7 +15,7 @@ if __name__ == "__main__":  # a program of our own
 import queue
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -23,6 +23,7 @@ from rds.bus.modules import server_program
 from rds.bus.modules.buttons import press_buttons
 from rds.bus.modules.cia402.drive import Drive
 from rds.bus.modules.cia402.node import DriveNode
+from rds.bus.modules.cia402.quirks import Quirk, read_quirks
 from rds.bus.modules.serve_loop import Opener, serve_nodes
 from rds.bus.tools.link import BUILTIN
 from rds.core.private_files import keep_process_private
@@ -37,23 +38,26 @@ def serve(
     axes: Sequence[str] | None = None,
     ready: Callable[[], Any] | None = None,
     stop: threading.Event | None = None,
+    quirks: str | Iterable[str] = (),
     **options: Any,
 ) -> None:
     """Serve a drive for each axis of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`.
 
+    `quirks` are things that are wrong with the drives, as in "wrong-sign,zero-limits" (see quirks.py).
+
     A drive's node-ID is its axis's node, its full voltage the converter's range. It counts as commanded while SYNC
     comes.
     """
-    make_node = partial(_make_node, machine.converter.range)
+    make_node = partial(_make_node, machine.converter.range, read_quirks(quirks))
     serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
 
 
-def _make_node(volts: float, slot: int, axis: Axis, opener: Opener) -> DriveNode:
-    return DriveNode(axis.name, partial(_make_drive, axis, volts), opener)
+def _make_node(volts: float, quirks: frozenset[Quirk], slot: int, axis: Axis, opener: Opener) -> DriveNode:
+    return DriveNode(axis.name, partial(_make_drive, axis, volts, quirks), opener)
 
 
-def _make_drive(axis: Axis, volts: float, start: float) -> Drive:
-    return Drive(axis, start, volts)
+def _make_drive(axis: Axis, volts: float, quirks: frozenset[Quirk], start: float, node: int | None) -> Drive:
+    return Drive(axis, start, volts, node, quirks)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -63,6 +63,8 @@ class Servo:
         self.motion: Motion | None = None  # leads the loop; None: no loop
         self.torque: float | None = None  # V of cyclic torque; None: no voltage by command
         self.guarded = True  # whether limit switches and software limits count (not while homing or stopping)
+        self.polarity = 1  # -1: the encoder counts downwards under a positive voltage
+        self.brake_is_closed = False  # then the axis does not move
         self.software_limits = (-(1 << 31), (1 << 31) - 1)
         self.following_window, self.following_time = 0xFFFFFFFF, 0.0  # counts, s
         self.position_demand = 0.0
@@ -92,7 +94,7 @@ class Servo:
     @property
     def applied(self) -> float:
         """Voltage at the motor now, as a part of the full one in ‰."""
-        return 1000.0 * self.axis.voltage / self.volts
+        return 1000.0 * self.polarity * self.axis.voltage / self.volts
 
     def lead(self, motion: Motion, demand: float | None = None) -> None:
         """Close the loop, led by `motion`; the position demand is the position if not given."""
@@ -108,7 +110,10 @@ class Servo:
         self.torque = voltage
         allowed = self._allowed(max(-self.voltage_limit, min(self.voltage_limit, voltage)))
         self.limited = allowed != voltage
-        self.axis.command(allowed, at)
+        self._give(allowed, at)
+
+    def _give(self, voltage: float, at: float) -> None:
+        self.axis.command(0.0 if self.brake_is_closed else self.polarity * voltage, at)
 
     def cut(self, at: float) -> None:
         """Zero volts from the instant `at` on; what was under way is dropped."""
@@ -180,7 +185,7 @@ class Servo:
         self.limited = allowed != voltage
         if not self.limited or error * (voltage - allowed) < 0.0:  # no winding up
             self._integral += self.velocity_gain * error * TICK / self.integral_time
-        self.axis.command(allowed, now)
+        self._give(allowed, now)
 
     def _falls_behind(self, error: float, now: float) -> bool:
         """Whether the following error has been outside its window for longer than its time."""

@@ -61,6 +61,7 @@ class DriveSettings:
     direction: int  # 1, or -1 if the drive counts the other way round
     homing: int | None  # method 0x6098, carried out at the start
     home_offset: int | None  # 0x607C, counts: minus the position that home gets; None: as the drive has it
+    fixed_mapping: bool  # its PDOs cannot be mapped: those that it has are used as they are
     write: tuple[tuple[int, int, int], ...]  # (index, sub-index, value) to write before the drive is enabled
 
     @property
@@ -101,6 +102,7 @@ _AXIS = (
     "direction",
     "homing",
     "home",
+    "mapping",
     "write",
 )
 _MORE_THAN_0 = {
@@ -203,6 +205,7 @@ def _drive(axis: Axis, table: Mapping[str, Any], machine: Machine) -> DriveSetti
         direction=direction,
         homing=homing,
         home_offset=_home_offset(table, direction * counts, where),
+        fixed_mapping=_is_fixed(table.get("mapping", "dynamic"), where),
         write=_writes(table.get("write", ()), where),
     )
 
@@ -239,6 +242,12 @@ def _eds(path: Any, machine: Machine, where: str) -> str:
     if not found:
         raise InputError(f"eds = {path!r}: there is no such file, neither beside {machine.path} nor here", where)
     return str(found[0])
+
+
+def _is_fixed(mapping: Any, where: str) -> bool:
+    if mapping not in ("dynamic", "fixed"):
+        raise InputError(f'mapping = {mapping!r} must be "dynamic" or "fixed"', where)
+    return bool(mapping == "fixed")
 
 
 def _writes(entries: Any, where: str) -> tuple[tuple[int, int, int], ...]:

@@ -1,0 +1,161 @@
+"""Message tables of others: DBC files, and CSV files of identifiers, periods and lengths."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from rds.bus.analysis.messages import Message
+from rds.core.errors import InputError
+
+ENDINGS = (".dbc", ".csv")
+_NEEDED = ("identifier", "length")
+_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+_OF_TIME = ("period", "jitter", "deadline")
+_COLUMNS = (
+    *_NEEDED,
+    "name",
+    "sender",
+    "extended",
+    "fd",
+    *(f"{column}_{unit}" for column in _OF_TIME for unit in _TIMES),
+)
+_YES, _NO = ("1", "yes", "true", "x"), ("", "0", "no", "false")
+_HIGHEST_STANDARD = 0x7FF
+_NO_MESSAGE = "VECTOR__INDEPENDENT_SIG_MSG"  # where Vector's editor keeps signals of no message
+
+
+class MessageTable(NamedTuple):
+    """Messages of a file, and the names of those that it gives no period."""
+
+    messages: list[Message]
+    without_period: list[str]
+
+
+def is_message_table(path: Path) -> bool:
+    """Whether a file's name says that it is one."""
+    return path.suffix.lower() in ENDINGS
+
+
+def read_messages(path: Path, period: float | None = None) -> MessageTable:
+    """The messages of a DBC file or a CSV table. `period` (s) is for those whose period the file does not say.
+
+    Without it they are left out, and named. InputError for a file that is none, with the line of a CSV table.
+    """
+    if not path.is_file():
+        raise InputError("there is no such file; check the name", str(path))
+    found = _of_dbc(path, period) if path.suffix.lower() == ".dbc" else _of_csv(path, period)
+    if not found.messages:
+        raise InputError("no message of the file has a period; give one for all by --sample-period, in s", str(path))
+    return found
+
+
+def _of_dbc(path: Path, period: float | None) -> MessageTable:
+    """By the attribute GenMsgCycleTime (ms); CAN FD by VFrameFormat."""
+    from rds.bus.tools.decode import load_dbc
+
+    messages: list[Message] = []
+    silent: list[str] = []
+    for entry in load_dbc(path).messages:
+        if entry.name == _NO_MESSAGE:
+            continue
+        its_period = entry.cycle_time * 1e-3 if entry.cycle_time else period
+        if its_period is None:
+            silent.append(entry.name)
+            continue
+        messages.append(
+            Message(
+                name=entry.name,
+                identifier=entry.frame_id,
+                extended=entry.is_extended_frame,
+                size=entry.length,
+                period=its_period,
+                sender=entry.senders[0] if entry.senders else None,
+                fd=entry.is_fd,
+                bitrate_switch=entry.is_fd,
+            )
+        )
+    return MessageTable(messages, silent)
+
+
+def _of_csv(path: Path, period: float | None) -> MessageTable:
+    messages: list[Message] = []
+    silent: list[str] = []
+    with path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
+        head = file.readline()
+        separator = max(",;\t", key=head.count)
+        columns = [column.strip().lower() for column in head.rstrip("\r\n").split(separator)]
+        _check_columns(columns, path)
+        for row in csv.reader(file, delimiter=separator):
+            if not row or row[0].lstrip().startswith("#"):
+                continue
+            where = f"{path}:{len(messages) + len(silent) + 2}"
+            if len(row) != len(columns):
+                raise InputError(f"the line has {len(row)} columns, and the heading {len(columns)}", where)
+            message = _message(dict(zip(columns, map(str.strip, row), strict=True)), period, where)
+            if isinstance(message, str):
+                silent.append(message)
+            else:
+                messages.append(message)
+    return MessageTable(messages, silent)
+
+
+def _check_columns(columns: list[str], path: Path) -> None:
+    missing = [column for column in _NEEDED if column not in columns]
+    unknown = [column for column in columns if column not in _COLUMNS]
+    if missing or unknown:
+        what = f"has no column {' and no column '.join(missing)}" if missing else f"has the column {unknown[0]!r}"
+        raise InputError(f"the first line {what}; the columns are {', '.join(_COLUMNS)}", f"{path}:1")
+    for column in _OF_TIME:
+        if sum(name.startswith(f"{column}_") for name in columns) > 1:
+            raise InputError(f"{column} is given twice, in different units; leave one out", f"{path}:1")
+
+
+def _message(row: Mapping[str, str], period: float | None, where: str) -> Message | str:
+    """The message of a line, or its name if no period is known."""
+    identifier = _whole(row["identifier"], "identifier", where)
+    name = row.get("name") or f"{identifier:#x}"
+    its_period = _time(row, "period", where) or period
+    if its_period is None:
+        return name
+    extended = _flag(row.get("extended", ""), "extended", where) or identifier > _HIGHEST_STANDARD
+    is_fd = _flag(row.get("fd", ""), "fd", where)
+    return Message(
+        name=name,
+        identifier=identifier,
+        extended=extended,
+        size=_whole(row["length"], "length", where),
+        period=its_period,
+        jitter=_time(row, "jitter", where) or 0.0,
+        deadline=_time(row, "deadline", where),
+        sender=row.get("sender") or None,
+        fd=is_fd,
+        bitrate_switch=is_fd,
+    )
+
+
+def _time(row: Mapping[str, str], column: str, where: str) -> float | None:
+    """In s; None where the table says nothing."""
+    for unit, factor in _TIMES.items():
+        text = row.get(f"{column}_{unit}")
+        if text:
+            try:
+                return float(text) * factor
+            except ValueError:
+                raise InputError(f"{column} {text!r} must be a number of {unit}", where) from None
+    return None
+
+
+def _whole(text: str, column: str, where: str) -> int:
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise InputError(f"{column} {text!r} must be a whole number, as in 291 or 0x123", where) from None
+
+
+def _flag(text: str, column: str, where: str) -> bool:
+    if text.lower() in _YES or text.lower() in _NO:
+        return text.lower() in _YES
+    raise InputError(f"{column} {text!r} must be yes or no", where)

@@ -1,0 +1,338 @@
+"""A drive out of the box made ready, step by step: each says what it will do, waits for a yes, and can be taken back.
+
+Nothing here prints or asks: the `Desk` does. `rds drive setup` is one (rds/cli/drive.py).
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import can
+import canopen
+from canopen.sdo import SdoAbortedError
+
+from rds.bus.modules.cia402 import examination
+from rds.bus.modules.cia402.codes import NmtCommand
+from rds.bus.modules.cia402.commissioned import Choices, cia402_table, machine_text
+from rds.bus.modules.cia402.configure import library, load
+from rds.bus.modules.cia402.first_motion import FirstMotion, first_motion
+from rds.bus.modules.cia402.identity import Identity, check_eds, identify, keep_eds, kept_eds, number
+from rds.bus.modules.cia402.mapping import find_fixed, map_dynamically
+from rds.bus.modules.cia402.parameters import store
+from rds.bus.modules.cia402.settings import Command, DriveSettings, read_settings
+from rds.core.errors import InputError, MachineError
+from rds.machines import load_machine
+from rds.machines.machine import Machine
+
+ORDER = ("csp", "csv", "cst")  # modes, the easiest to track a sine with first
+
+
+class Declined(Exception):
+    """Somebody said no; what was changed until then has been taken back."""
+
+
+class Desk(Protocol):
+    """Where a set-up says what it does, and asks."""
+
+    def say(self, text: str) -> None:
+        """A finding."""
+
+    def agree(self, step: str) -> bool:
+        """What will be done now; whether it may."""
+
+    def choose_direction(self, moved: int) -> int:
+        """Whether a motion of so many counts went towards the machine's plus: 1, else -1."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a user has said beforehand; None: find out."""
+
+    node: int
+    axis: str = "X"
+    unit: str = "mm"
+    lead: float = 1.0  # axis units per revolution of the shaft
+    counts: float | None = None
+    travel: float = 10.0  # to both sides
+    period: float = 0.002  # s
+    mode: str | None = None
+    eds: Path | None = None
+    torque: int = 100  # ‰ at most, of the first motion
+    distance: int = 40  # counts of it
+    keep_in_drive: bool = False  # store parameters in the drive at the end
+
+
+@dataclass
+class Commissioned:
+    """What a set-up ends with."""
+
+    identity: Identity
+    choices: Choices
+    units: examination.Units
+    motion: FirstMotion
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain values."""
+        found = asdict(self)
+        found["loop_delay_s"] = self.motion.loop_delay(self.choices.period)
+        return found
+
+
+def commission(bus: can.BusABC, wishes: Wishes, name: str, desk: Desk, eds_folder: Path | None = None) -> Commissioned:
+    """Make the drive with node-ID `wishes.node` ready.
+
+    Declined after a no; MachineError and InputError say what is wrong.
+    What is changed on the drive for the set-up alone is written back at its end, whatever the end is.
+    """
+    before: dict[tuple[int, int], bytes] = {}
+    made: Commissioned | None = None
+    try:
+        made = _commission(bus, wishes, name, desk, before, eds_folder)
+        return made
+    finally:
+        keep = set() if made is None else {(index, subindex) for index, subindex, _ in made.choices.write}
+        _take_back(bus, wishes.node, {key: data for key, data in before.items() if key not in keep})
+
+
+def _commission(
+    bus: can.BusABC,
+    wishes: Wishes,
+    name: str,
+    desk: Desk,
+    before: dict[tuple[int, int], bytes],
+    eds_folder: Path | None,
+) -> Commissioned:
+    with library(bus) as network:
+        identity, eds = _recognize(network, wishes, desk, eds_folder)
+        units = examination.read_units(_bare(network, wishes.node))
+        choices = _units(wishes, name, units, eds, desk)
+        with _machine(choices) as machine:
+            _mapping(network, machine, choices, identity, wishes, desk)
+        _limits(_bare(network, wishes.node), choices, wishes, desk, before)
+    motion = _move(bus, choices, wishes, units, desk, before)
+    choices.direction = desk.choose_direction(motion.moved)
+    worst, whole = motion.exchange_worst * 1e3, motion.loop_delay(choices.period) * 1e3
+    desk.say(
+        f"a cycle takes {motion.exchange * 1e3:.2f} ms from SYNC to answer (99 %: {worst:.2f} ms); from a sample to "
+        f"the effect of its command {whole:.1f} ms"
+    )
+    if motion.exchange_worst > choices.period:
+        desk.say(
+            f"that is more than the sample period of {choices.period * 1e3:g} ms: give a longer one (--sample-period)"
+        )
+    if wishes.keep_in_drive:
+        if not desk.agree("store the drive's parameters in its memory (0x1010); the way back is `rds drive restore`"):
+            raise Declined
+        with library(bus) as network:
+            store(_bare(network, wishes.node))
+    return Commissioned(identity, choices, units, motion)
+
+
+# --- steps
+
+
+def _recognize(
+    network: canopen.Network, wishes: Wishes, desk: Desk, folder: Path | None
+) -> tuple[Identity, Path | None]:
+    """Identity and EDS."""
+    network.send_message(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, wishes.node]))
+    node = _bare(network, wishes.node)
+    if number(node, 0x1000) is None:
+        raise MachineError(
+            f"no device answers as node {wishes.node}; `rds scan` lists those that do, and `rds drive node-id` gives "
+            "one to a drive that has none"
+        )
+    identity = identify(node)
+    desk.say(str(identity))
+    eds = wishes.eds or kept_eds(identity, folder)
+    if eds is None:
+        if identity.vendor or identity.product != 0x402:  # not our simulated drive
+            desk.say(
+                "no EDS of this drive is kept here: the objects of CiA 402 are assumed; give its own by --eds FILE"
+            )
+        return identity, None
+    doubts = check_eds(eds, identity)
+    for doubt in doubts:
+        desk.say(f"note: {doubt}")
+    if doubts and not desk.agree(f"use {eds} all the same"):
+        raise Declined
+    if wishes.eds is not None and not doubts:
+        eds = keep_eds(eds, identity, folder)
+        desk.say(f"its EDS is kept for the next time: {eds}")
+    return identity, eds
+
+
+def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None, desk: Desk) -> Choices:
+    desk.say(str(units))
+    counts = wishes.counts or units.counts(wishes.lead)
+    if counts is None:
+        raise InputError(
+            "the drive does not say how it counts (0x6092, 0x608F): give the position units per axis unit by --counts"
+        )
+    proposal = (
+        f"take {counts:g} counts per {wishes.unit} ({wishes.lead:g} {wishes.unit} per revolution of the shaft), travel "
+        f"±{wishes.travel:g} {wishes.unit} from where the axis stands at the start"
+    )
+    if not desk.agree(proposal):
+        raise Declined
+    return Choices(
+        name=name,
+        axis=wishes.axis,
+        unit=wishes.unit,
+        travel=(-wishes.travel, wishes.travel),
+        period=wishes.period,
+        mode=wishes.mode or ORDER[0],
+        node=wishes.node,
+        counts=counts,
+        eds=None if eds is None else str(eds),
+    )
+
+
+def _mapping(
+    network: canopen.Network, machine: Machine, choices: Choices, identity: Identity, wishes: Wishes, desk: Desk
+) -> None:
+    """The first mode that the drive has and that can be commanded in process data."""
+    if not desk.agree(
+        "map statusword and position, controlword and target into the drive's process data; the way back is to switch "
+        "it off and on"
+    ):
+        raise Declined
+    refused = ""
+    for mode in (wishes.mode,) if wishes.mode else ORDER:
+        if not identity.has(Command[mode.upper()].mode):
+            refused = f"it has no mode {mode} (0x6502 = {identity.modes or 0:#x})"
+            continue
+        for fixed in (False, True):
+            settings = _settings(machine, replace(choices, mode=mode, fixed_mapping=fixed))
+            node = load(network, settings)
+            try:
+                (find_fixed if fixed else map_dynamically)(node, settings, 1)
+            except (SdoAbortedError, MachineError, KeyError) as error:
+                refused = str(error)
+                continue
+            choices.mode, choices.fixed_mapping = mode, fixed
+            desk.say(
+                f"mode {mode}" + (", by the process data that the drive has: its mapping is fixed" if fixed else "")
+            )
+            return
+    raise MachineError(f"node {choices.node} takes no command in process data: {refused}")
+
+
+def _limits(
+    node: canopen.RemoteNode,
+    choices: Choices,
+    wishes: Wishes,
+    desk: Desk,
+    before: dict[tuple[int, int], bytes],
+) -> None:
+    for doubt in examination.limits(node, choices.torque_limit):
+        if doubt.stops:
+            raise MachineError(doubt.text)
+        if not doubt.write:
+            desk.say(doubt.text)
+            continue
+        what = ", ".join(f"0x{index:04X}:{subindex:02X} = {value}" for index, subindex, value in doubt.write)
+        if not desk.agree(f"{doubt.text}: write {what} before each run"):
+            raise Declined
+        choices.write += doubt.write
+    for key in {(index, subindex) for index, subindex, _ in choices.write} | {(0x6072, 0)}:
+        data = node.sdo.upload(*key) if number(node, *key) is not None else None
+        if data is not None:
+            before[key] = bytes(data)
+
+
+def _move(
+    bus: can.BusABC,
+    choices: Choices,
+    wishes: Wishes,
+    units: examination.Units,
+    desk: Desk,
+    before: Mapping[tuple[int, int], bytes],
+) -> FirstMotion:
+    distance = wishes.distance / choices.counts
+    pushes = not choices.fixed_mapping and _has_torque(bus, choices.node)
+    how = f"by a torque that rises to {wishes.torque} ‰ at most" if pushes else "by its position loop"
+    if not desk.agree(
+        f"switch the power on and move {choices.axis} by {wishes.distance} counts ({distance:.3g} {choices.unit}) and "
+        f"back, {how}; the axis must be free, and a hand on the emergency stop"
+    ):
+        raise Declined
+    limit = [(0x6072, 0, wishes.torque)] if (0x6072, 0) in before else []
+    writes = [entry for entry in choices.write if entry[0] != 0x6072] + limit
+    trial = replace(
+        choices, mode="cst" if pushes else choices.mode, write=writes, torque_limit=wishes.torque if pushes else 1000
+    )
+    with _machine(trial) as machine:
+        motion = first_motion(
+            machine,
+            choices.axis,
+            bus,
+            cia402_table(trial, write=[*map(list, writes)]),
+            choices.period,
+            wishes.distance,
+            wishes.torque,
+        )
+    if motion.torque is not None:
+        desk.say(f"{choices.axis} moved by {motion.moved} counts, at a torque of {motion.torque:.0f} ‰")
+    else:
+        desk.say(f"{choices.axis} moved by {motion.moved} counts")
+    if not motion.agrees:
+        raise MachineError(
+            "a positive torque moves the position downwards: closed loops would run away. Swap two phases of the motor "
+            "or the encoder's tracks, or correct the drive's motor direction (see its manual, and 0x607E)"
+        )
+    if wishes.counts is None and motion.increments is not None:
+        doubt = examination.gear_doubt(units, motion.increments, motion.moved)
+        if doubt is not None:
+            raise MachineError(doubt.text)
+    return motion
+
+
+# --- helpers
+
+
+def _bare(network: canopen.Network, number_: int) -> canopen.RemoteNode:
+    """A node without any EDS: objects are asked for by their numbers."""
+    node = network.add_node(number_, canopen.ObjectDictionary())
+    node.sdo.RESPONSE_TIMEOUT = 1.0
+    return node
+
+
+def _has_torque(bus: can.BusABC, node: int) -> bool:
+    with library(bus) as network:
+        return identify(_bare(network, node)).has(Command.CST.mode)
+
+
+class _machine:
+    """The machine of these choices, as a file for as long as it is needed."""
+
+    def __init__(self, choices: Choices):
+        self._text, self._folder = machine_text(choices, "a trial"), tempfile.TemporaryDirectory(prefix="rds-drive-")
+
+    def __enter__(self) -> Machine:
+        path = Path(self._folder.name) / "machine.toml"
+        path.write_text(self._text, encoding="utf-8")
+        return load_machine(str(path))
+
+    def __exit__(self, *_: object) -> None:
+        self._folder.cleanup()
+
+
+def _settings(machine: Machine, choices: Choices) -> DriveSettings:
+    return read_settings(cia402_table(choices), machine).drives[0]
+
+
+def _take_back(bus: can.BusABC, node: int, values: Mapping[tuple[int, int], bytes]) -> None:
+    if not values:
+        return
+    with library(bus) as network:
+        bare = _bare(network, node)
+        for key, data in values.items():
+            try:
+                bare.sdo.download(*key, data)
+            except (SdoAbortedError, canopen.SdoCommunicationError):
+                continue  # it has been switched off, or refuses its own value

@@ -1,0 +1,167 @@
+"""An emulated serial CAN adapter (slcan, Lawicel's protocol) at a pseudo-terminal, in front of any bus.
+
+Programs open it as they open the real one, and what goes wrong with real ones can be had on purpose: the latency timer
+of a USB chip, a line that garbles, a plug that is pulled. Not on Windows, which has no pseudo-terminals.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import threading
+import time
+from types import TracebackType
+
+import can
+
+from rds.core.errors import InputError
+
+_OK, _ERROR = b"\r", b"\a"
+_LOOK = 0.05  # s between two looks at whether it shall end
+_BITRATES = {b"S0": 10_000, b"S1": 20_000, b"S2": 50_000, b"S3": 100_000, b"S4": 125_000, b"S5": 250_000}
+_BITRATES |= {b"S6": 500_000, b"S7": 750_000, b"S8": 1_000_000}
+_ENDS = b"\r"
+_LONGEST = 64  # bytes of a command
+
+
+class SlcanAdapter:
+    """Serves `bus` at the pseudo-terminal `path` from entering the context to leaving it.
+
+    `latency` (s): frames for the computer wait up to so long, as in a USB chip that collects bytes; `garble`: the share
+    of frames for the computer in which one character is another one, by `seed`.
+    """
+
+    def __init__(self, bus: can.BusABC, latency: float = 0.0, garble: float = 0.0, seed: int = 1):
+        try:
+            import pty
+            import tty
+        except ImportError:
+            raise InputError("this system has no pseudo-terminals; emulated serial adapters need one") from None
+        self._bus, self._latency, self._garble = bus, latency, garble
+        self._chance = random.Random(seed)
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        self.path = os.ttyname(self._slave)
+        self.bitrate: int | None = None  # that the computer has asked for, bit/s
+        self.is_open = False
+        self._ended = threading.Event()
+        self._write_lock = threading.Lock()
+        self._threads = [threading.Thread(target=run, daemon=True) for run in (self._serve, self._forward)]
+
+    def __enter__(self) -> SlcanAdapter:
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.unplug()
+
+    def unplug(self) -> None:
+        """Pull the plug: programs that have it open lose it."""
+        if self._ended.is_set():
+            return
+        self._ended.set()
+        with contextlib.suppress(OSError):
+            os.close(self._slave)
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join()
+        os.close(self._master)
+
+    def alive(self) -> bool:
+        """Whether it still serves."""
+        return all(thread.is_alive() for thread in self._threads)
+
+    def _serve(self) -> None:
+        """What the computer says: lines that end in a carriage return."""
+        import select
+
+        pending = b""
+        while not self._ended.is_set():
+            if not select.select([self._master], [], [], _LOOK)[0]:
+                continue
+            try:
+                pending += os.read(self._master, 4096)
+            except OSError:
+                return
+            while _ENDS in pending:
+                line, _, pending = pending.partition(_ENDS)
+                self._say(self._obey(line))
+            pending = pending[-_LONGEST:]
+
+    def _obey(self, line: bytes) -> bytes:
+        if line in _BITRATES:
+            self.bitrate = _BITRATES[line]
+            return _OK
+        if line in (b"O", b"L", b"C"):
+            self.is_open = line != b"C"
+            return _OK
+        if line == b"V":
+            return b"V1013" + _OK
+        if line == b"N":
+            return b"NRDS0" + _OK
+        if line == b"F":
+            return b"F00" + _OK
+        if line[:1] in (b"t", b"T", b"r", b"R") and self.is_open:
+            message = _decode(line)
+            if message is not None:
+                with contextlib.suppress(can.CanError, OSError):
+                    self._bus.send(message, 0.1)
+                    return (b"Z" if message.is_extended_id else b"z") + _OK
+        return _OK if not line or line[:1] in (b"Z", b"X") else _ERROR
+
+    def _forward(self) -> None:
+        """What comes over the bus."""
+        while not self._ended.is_set():
+            try:
+                message = self._bus.recv(_LOOK)
+            except (can.CanError, OSError):
+                return
+            if message is None or message.is_error_frame or message.is_fd:
+                continue
+            lines = [message]
+            if self._latency:
+                until = time.monotonic() + self._latency
+                while (left := until - time.monotonic()) > 0 and not self._ended.is_set():
+                    more = self._bus.recv(left)
+                    if more is not None and not more.is_error_frame:
+                        lines.append(more)
+            if self.is_open:
+                self._say(b"".join(self._disturbed(_encode(line)) for line in lines))
+
+    def _disturbed(self, line: bytes) -> bytes:
+        if self._garble and self._chance.random() < self._garble:
+            place = self._chance.randrange(1, len(line) - 1)
+            return line[:place] + b"?" + line[place + 1 :]
+        return line
+
+    def _say(self, answer: bytes) -> None:
+        with self._write_lock, contextlib.suppress(OSError):
+            os.write(self._master, answer)
+
+
+def _encode(message: can.Message) -> bytes:
+    letter, digits = ("t", 3) if not message.is_extended_id else ("T", 8)
+    if message.is_remote_frame:
+        letter = "r" if letter == "t" else "R"
+    data = "" if message.is_remote_frame else bytes(message.data).hex().upper()
+    return f"{letter}{message.arbitration_id:0{digits}X}{message.dlc}{data}\r".encode()
+
+
+def _decode(line: bytes) -> can.Message | None:
+    extended = line[:1] in (b"T", b"R")
+    digits = 8 if extended else 3
+    try:
+        identifier, size = int(line[1 : 1 + digits], 16), int(line[1 + digits : 2 + digits])
+        data = bytes.fromhex(line[2 + digits :].decode("ascii"))
+    except ValueError:
+        return None
+    is_remote = line[:1] in (b"r", b"R")
+    if size > 8 or identifier > (0x1FFFFFFF if extended else 0x7FF) or len(data) != (0 if is_remote else size):
+        return None
+    return can.Message(
+        arbitration_id=identifier, is_extended_id=extended, is_remote_frame=is_remote, dlc=size, data=data
+    )

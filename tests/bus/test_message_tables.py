@@ -1,0 +1,90 @@
+"""Message tables of others: DBC files and CSV tables, analysed as our machines are."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rds.bus import read_messages
+from rds.cli.main import app
+from rds.core.errors import InputError
+
+DBC = """VERSION ""
+
+BU_: ENGINE
+
+BO_ 256 Speed: 8 ENGINE
+ SG_ rpm : 0|16@1+ (1,0) [0|0] "" ENGINE
+
+BO_ 2566844926 Status: 8 ENGINE
+ SG_ load : 0|8@1+ (1,0) [0|0] "" ENGINE
+
+BO_ 512 OnChange: 2 ENGINE
+ SG_ lamp : 0|8@1+ (1,0) [0|0] "" ENGINE
+
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
+BA_DEF_DEF_ "GenMsgCycleTime" 0;
+BA_ "GenMsgCycleTime" BO_ 256 10;
+BA_ "GenMsgCycleTime" BO_ 2566844926 100;
+"""
+
+
+def test_a_dbc_file_is_analysed_and_messages_without_a_period_are_named(tmp_path: Path) -> None:
+    (tmp_path / "car.dbc").write_text(DBC)
+    done = CliRunner().invoke(
+        app, ["bus", "analyse", str(tmp_path / "car.dbc"), "--bitrate", "250000", "--json"], catch_exceptions=False
+    )
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert [(row["name"], row["identifier"], row["period_us"]) for row in found["messages"]] == [
+        ("Speed", 256, 10_000.0),
+        ("Status", 0x18FEF1FE, 100_000.0),
+    ]
+    assert found["messages"][1]["extended"] and found["without_period"] == ["OnChange"]
+    # 8 bytes: at most 135 bits in 10 ms, and 160 in 100 ms, of 250 kbit/s
+    assert found["worst_load_percent"] == pytest.approx(100 * (135 / 0.01 + 160 / 0.1) / 250e3, abs=0.01)
+    assert "OnChange" in done.stderr
+
+
+def test_a_csv_table_says_the_same(tmp_path: Path) -> None:
+    (tmp_path / "car.csv").write_text(
+        "identifier;period_ms;length;name;jitter_us\n0x100;10;8;Speed;50\n# slow ones\n0x18FEF1FE;100;8;Status;\n"
+    )
+    table = read_messages(tmp_path / "car.csv").messages
+    assert [(m.name, m.extended, m.period, m.jitter) for m in table] == [
+        ("Speed", False, 0.01, pytest.approx(50e-6)),
+        ("Status", True, 0.1, 0.0),
+    ]
+
+
+def test_a_period_for_those_without_one(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("identifier,length\n1,8\n2,0\n")
+    assert [m.period for m in read_messages(tmp_path / "a.csv", 0.02).messages] == [0.02, 0.02]
+    with pytest.raises(InputError, match="--sample-period"):
+        read_messages(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("identifier,period_ms\n1,8\n", "no column length"),
+        ("identifier,period,length\n1,8,8\n", "has the column 'period'"),
+        ("identifier,period_ms,period_s,length\n1,1,1,8\n", "given twice"),
+        ("identifier,period_ms,length\n1,10,8\nfast,10,8\n", ":3: identifier 'fast'"),
+        ("identifier,period_ms,length\n1,10\n", ":2: the line has 2 columns"),
+        ("identifier,period_ms,length\n1,10,9\n", "9"),
+        ("identifier,period_ms,length\n1,0,8\n", "--sample-period"),
+    ],
+)
+def test_a_table_that_will_not_do_is_told_by_its_line(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_messages(tmp_path / "a.csv")
+
+
+def test_options_of_machines_are_refused_for_tables(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["bus", "analyse", str(tmp_path / "car.dbc"), "--fits"])
+    assert done.exit_code == 2 and "--fits is for a machine" in done.stderr

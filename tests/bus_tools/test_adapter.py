@@ -1,0 +1,159 @@
+"""Adapters: what goes wrong in them is told by name, one opened interface serves all modules, own frames come back."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from uuid import uuid4
+
+import can
+import pytest
+
+from rds.bus.modules.rds import frames
+from rds.bus.modules.rds.drivers import AxisDrivers
+from rds.bus.modules.rds.server import serve
+from rds.bus.modules.shared_bus import opener_of
+from rds.bus.tools.adapter import AdapterFailure
+from rds.bus.tools.link import open_bus
+from rds.bus.tools.slcan_adapter import SlcanAdapter
+from rds.core.errors import AdapterError, MachineError
+from rds.machines import load_machine
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are not on Windows")
+QUICK = {"sleep_after_open": 0.0, "bitrate": 500_000}
+
+
+@contextmanager
+def adapter(channel: str, **faults: float) -> Iterator[SlcanAdapter]:
+    """In front of a channel of python-can's virtual bus."""
+    with can.Bus(interface="virtual", channel=channel) as wire, SlcanAdapter(wire, **faults) as plugged:
+        yield plugged
+
+
+@pytest.fixture
+def channel() -> str:
+    return f"adapter-{uuid4().hex[:8]}"
+
+
+def until_open(plugged: SlcanAdapter) -> None:
+    """The adapter has obeyed the computer's command to open."""
+    deadline = time.monotonic() + 10.0
+    while not plugged.is_open and time.monotonic() < deadline:
+        time.sleep(0.002)
+
+
+def message(identifier: int, data: bytes = b"", extended: bool = False) -> can.Message:
+    return can.Message(arbitration_id=identifier, data=data, is_extended_id=extended)
+
+
+def test_frames_go_both_ways(channel: str) -> None:
+    with adapter(channel) as plugged, can.Bus(interface="virtual", channel=channel) as other:
+        bus = open_bus("slcan", plugged.path, **QUICK)
+        try:
+            bus.send(message(0x123, b"\x01\x02"))
+            heard = other.recv(5.0)
+            assert heard is not None and (heard.arbitration_id, bytes(heard.data)) == (0x123, b"\x01\x02")
+            other.send(message(0x18FEF1FE, b"\xff", True))
+            back = bus.recv(5.0)
+            assert back is not None and back.arbitration_id == 0x18FEF1FE and back.is_extended_id
+            assert plugged.bitrate == 500_000
+        finally:
+            bus.shutdown()
+
+
+def test_a_garbled_line_names_the_adapter_the_cause_and_the_remedy(channel: str) -> None:
+    with adapter(channel, garble=1.0) as plugged, can.Bus(interface="virtual", channel=channel) as other:
+        bus = open_bus("slcan", plugged.path, **QUICK)
+        try:
+            until_open(plugged)
+            other.send(message(0x123, b"\x01"))
+            with pytest.raises(
+                AdapterFailure, match=f"adapter slcan:{plugged.path} sent what is no frame.*tty_baudrate"
+            ):
+                bus.recv(5.0)
+        finally:
+            bus.shutdown()
+
+
+def test_an_adapter_that_is_unplugged_ends_a_run_by_its_name(channel: str) -> None:
+    machine, stop, ready = load_machine("mini-cnc"), threading.Event(), threading.Event()
+    server = threading.Thread(target=serve, args=(machine, "virtual", channel, ["X"], ready.set, stop))
+    server.start()
+    try:
+        assert ready.wait(20.0)
+        with adapter(channel) as plugged:
+            drivers = AxisDrivers(
+                machine, ["X"], interface="slcan", channel=plugged.path, sample_period=0.02, timeout=0.2, **QUICK
+            )
+            drivers.start()
+            for _ in range(3):
+                drivers.exchange()
+                drivers.write([0.0])
+            plugged.unplug()
+            with pytest.raises(AdapterError, match=r"adapter slcan:\S+ is gone or has failed.*plug it in again"):
+                for _ in range(20):
+                    drivers.exchange()
+            drivers.close()
+    finally:
+        stop.set()
+        server.join()
+
+
+def test_all_modules_share_an_adapter_that_can_be_opened_once(channel: str) -> None:
+    """Three modules behind one serial adapter answer one tick, and each hears what another one sends."""
+    machine, stop, ready = load_machine("mini-cnc"), threading.Event(), threading.Event()
+    with adapter(channel) as plugged, can.Bus(interface="virtual", channel=channel) as host:
+        server = threading.Thread(
+            target=serve, args=(machine, "slcan", plugged.path, ["X", "Y", "Z"], ready.set, stop), kwargs=QUICK
+        )
+        server.start()
+        try:
+            assert ready.wait(20.0)
+            until_open(plugged)
+            host.send(message(frames.CALL))
+            nodes, deadline = set(), time.monotonic() + 10.0
+            while len(nodes) < 3 and time.monotonic() < deadline:
+                heard = host.recv(0.5)
+                nodes |= {heard.arbitration_id - frames.ANSWER} if heard is not None else set()
+            assert nodes == {machine.axis(name).node for name in "XYZ"}
+        finally:
+            stop.set()
+            server.join()
+
+
+def test_the_modules_on_one_adapter_hear_each_other(channel: str) -> None:
+    with adapter(channel) as plugged, ExitStack() as stack:
+        opener = opener_of("slcan", plugged.path, **QUICK)
+        first, second = (stack.enter_context(opener([0x10, number], node=f"{number}")) for number in (1, 2))
+        first.send(message(0x10, b"\x07"))
+        heard = second.recv(5.0)
+        assert heard is not None and bytes(heard.data) == b"\x07"
+        assert first.recv(0.0) is None
+        plugged.unplug()
+        with pytest.raises(can.CanError, match="is gone or has failed"):
+            second.recv(5.0)
+        with pytest.raises(MachineError, match="can't be opened"):
+            opener([0x10])
+
+
+def test_own_frames_that_an_interface_gives_back_are_dropped() -> None:
+    group = f"ff15::{uuid4().hex[:4]}"
+    options = {"port": 43000 + os.getpid() % 1000, "beyond_this_computer": True}
+    try:
+        bus, other = (open_bus("udp_multicast", group, **options) for _ in range(2))
+    except MachineError as error:
+        pytest.skip(f"no multicast here: {error}")
+    try:
+        for number in range(5):
+            bus.send(message(0x100 + number, bytes([number])))
+            other.send(message(0x200 + number, bytes([number])))
+        for ends, first in ((bus, 0x200), (other, 0x100)):
+            heard = [frame.arbitration_id for _ in range(5) if (frame := ends.recv(5.0)) is not None]
+            assert heard == [first + number for number in range(5)]
+            assert ends.recv(0.05) is None
+    finally:
+        bus.shutdown()
+        other.shutdown()
