@@ -342,3 +342,56 @@ def test_segments_that_cannot_be_are_refused_by_line(path: object, message: str)
         list(plan([path()], MACHINES[0], T))  # type: ignore[operator]
     with pytest.raises(InputError, match="sample period"):
         list(plan([], MACHINES[0], 0.0))
+
+
+def _passed(points: list[tuple[float, float]], feed: float, tolerance: float, mode: int = BLEND) -> tuple[float, float]:
+    """Time (s) of a way through points at P `tolerance`, or stopping at each, and how far off the path it is (mm)."""
+    limits = Limits(np.r_[[130.0] * 3, [0.0] * 3], np.r_[[400.0] * 3, [0.0] * 3], np.r_[[12000.0] * 3, [0.0] * 3])
+    certificate = Certificate(limits)
+    blocks = list(certified(plan([polygon(points, feed, mode=mode, tolerance=tolerance)], limits, T), certificate))
+    assert certificate.ok, certificate.violations
+    speed = np.linalg.norm(np.concatenate([block.velocity for block in blocks]), axis=1)
+    middle = speed[len(speed) // 2 - 100 : len(speed) // 2 + 100].min() if len(speed) > 200 else 0.0
+    return (float(middle), certificate.worst["deviation", ""].value) if mode == BLEND else (certificate.time, 0.0)
+
+
+def test_a_right_angle_is_passed_at_the_jerk_limited_optimum() -> None:
+    """Within a path tolerance P and a jerk j each axis changes its speed v in 2 √(v/j), and is vτ/6 off: 7.25 mm/s."""
+    optimum = (6 * 0.05 * 12000**0.5) ** (2 / 3) / 2**0.5
+    speed, away = _passed([(0, 0), (20, 0), (20, 20)], 40.0, 0.05)
+    assert 0.98 * optimum < speed <= optimum
+    assert 0.95 * 0.05 < away <= 0.05
+
+
+def test_the_tolerance_is_measured_to_the_path_at_a_sharp_turn() -> None:
+    _, away = _passed([(0, 0), (20, 0), (10, 10)], 2.0, 0.05)
+    assert 0.9 * 0.05 < away <= 0.05
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_plan_is_slower_than_stopping_at_every_move(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn = np.cumsum(rng.uniform(-2.5, 2.5, 20))
+    steps = 10 ** rng.uniform(-1, 1) * rng.uniform(0.1, 1.0, 20)
+    points = [tuple(p) for p in np.cumsum(np.column_stack((np.cos(turn), np.sin(turn))) * steps[:, None], axis=0)]
+    limits = Limits(np.r_[[130.0] * 3, [0.0] * 3], np.r_[[400.0] * 3, [0.0] * 3], np.r_[[12000.0] * 3, [0.0] * 3])
+    times = [
+        sum(map(len, plan([polygon(points, 30.0, mode=mode, tolerance=0.01)], limits, T)))
+        for mode in (BLEND, EXACT_STOP)
+    ]
+    assert times[0] <= times[1] + 1
+
+
+@pytest.mark.parametrize("way", [0.02, 0.1, 0.5, 3.0, 30.0])
+def test_a_short_move_takes_the_least_time_within_two_per_cent(way: float) -> None:
+    """Against the closed form of the time-optimal move within v, a and j, which `ruckig` computes too."""
+    v, a, j = 40.0, 400.0, 12000.0
+    limits = Limits(np.r_[[v] * 3, [0.0] * 3], np.r_[[a] * 3, [0.0] * 3], np.r_[[j] * 3, [0.0] * 3])
+    took = sum(map(len, plan([line((0, 0), (way, 0), v)], limits, T))) * T
+    if way >= v * v / a + v * a / j:
+        best = way / v + v / a + a / j
+    elif way >= 2 * a**3 / j**2:
+        best = a / j + ((a / j) ** 2 + 4 * way / a) ** 0.5
+    else:
+        best = 4 * (way / (2 * j)) ** (1 / 3)
+    assert took <= 1.02 * best + 2 * T

@@ -20,6 +20,7 @@ from rds.core.compiling import kernel
 from rds.interpolators.motion.pieces import (
     AXIS_1,
     AXIS_2,
+    BEND,
     BENDING,
     BLENDED,
     CIRCULAR,
@@ -35,6 +36,7 @@ from rds.interpolators.motion.pieces import (
     REST,
     SHARE,
     STRAIGHT,
+    TWIST,
     bound,
     evaluate,
     make_blend,
@@ -156,6 +158,32 @@ def _turn_speed(f, g, jerk, T):
 
 
 @kernel
+def _stopping_is_faster(b, f, g, d0, d1, acceleration, jerk, tau, work):
+    """Whether a rest at the corner of pieces f and g takes less time than the blend b, as far as both can be told here.
+
+    With v the speed before and after it, a the acceleration along the lines, c the speed in the blend of length h and
+    r = min(τ, √(v/j)) the ramp of the acceleration, passing costs (v − c)²/(v a) + (r + h/c)(1 − c/v), resting v/a + r.
+    """
+    bound(b, BLENDED, 0, 1, work[8, :6], work[9, :6], work[10, :6])
+    a = j = inf
+    c = b[FEED]
+    for i in range(6):
+        along = max(fabs(d0[i]), fabs(d1[i]))
+        if along > 0.0:
+            a, j = min(a, acceleration[i] / along), min(j, jerk[i] / along)
+        if b[BEND + i] > 0.0:
+            c = min(c, sqrt(acceleration[i] / b[BEND + i]))
+        if b[TWIST + i] > 0.0:
+            c = min(c, (jerk[i] / b[TWIST + i]) ** (1.0 / 3.0))
+    v = min(min(f[FEED], g[FEED]), sqrt(a * min(f[LENGTH], g[LENGTH])))
+    if c >= v:
+        return False
+    ramp = min(tau, sqrt(v / j))
+    length = 2.0 * b[LENGTH]  # of both halves
+    return (v - c) ** 2 / (v * a) + (ramp + length / c) * (1.0 - c / v) > v / a + ramp
+
+
+@kernel
 def _emit(out, ints, count, f, u, first, last, rest, distance, work):
     p, dp, ddp = work[8, :6], work[9, :6], work[10, :6]
     out[count, :] = f[:FLOATS]
@@ -176,7 +204,24 @@ def _close(out, ints, count, f, u, first, last, front, distance, work):
 
 @kernel
 def build(
-    start, end, centre, plane, sweep, length, rate, mode, tolerance, collinear, rest, point, final, state, jerk, T
+    start,
+    end,
+    centre,
+    plane,
+    sweep,
+    length,
+    rate,
+    mode,
+    tolerance,
+    collinear,
+    rest,
+    point,
+    final,
+    state,
+    acceleration,
+    jerk,
+    tau,
+    T,
 ):
     """Pieces of the segments given as columns: (floats, whole numbers, segments that are done with).
 
@@ -263,6 +308,12 @@ def build(
                 left = min(held_room, room)
                 if not stops and left > 0.0:
                     half = _blend_half(g, w, f, u, left, work)
+                if half > 0.0 and u[KIND] == STRAIGHT and w[KIND] == STRAIGHT:
+                    work[0, FEED] = min(g[FEED], f[FEED])
+                    evaluate(g, w[KIND], w[AXIS_1], w[AXIS_2], g[LENGTH], p0, d0, dd)
+                    evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], 0.0, p1, d1, dd)
+                    if _stopping_is_faster(work[0], g, f, d0, d1, acceleration, jerk, tau, work):
+                        stops, half = True, 0.0
             if not stops and half == 0.0:
                 evaluate(g, w[KIND], w[AXIS_1], w[AXIS_2], g[LENGTH], p0, d0, dd)
                 evaluate(f, u[KIND], u[AXIS_1], u[AXIS_2], 0.0, p1, d1, dd)

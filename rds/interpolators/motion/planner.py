@@ -149,7 +149,15 @@ class _Planner:
         path["rate"] = np.where(new["rapid"], inf, new["rate"])
         path["tolerance"] = np.where(np.isfinite(new["tolerance"]), new["tolerance"], self.tolerance)
         f, u, done = build(
-            **path, rest=rest, point=self.point, final=final, state=self.state, jerk=self.within.jerk, T=self.T
+            **path,
+            rest=rest,
+            point=self.point,
+            final=final,
+            state=self.state,
+            tau=self.tau,
+            T=self.T,
+            acceleration=self.within.acceleration,
+            jerk=self.within.jerk,
         )
         u[:, 1:3] += first
         self.stretch.extend(f, u)

@@ -5,7 +5,8 @@ memory is bounded. What is in a window does not depend on how many pieces come a
 
 Two choices are made by trying, and counting the time: how long a stretch is averaged over (τ: on short ways less than
 the whole ramp of the acceleration, which is not reached there), and how much of acceleration and jerk the bends of the
-path may take where the motion goes through them at an even speed, and needs nothing to change it.
+path may take: little where the motion slows down and speeds up within them, and nearly all where it goes through them
+at an even speed.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ WINDOW = 1024  # pieces that are looked ahead over, at least
 LONGEST_WINDOW = 65536  # pieces: if these are too short a way to stop in, the motion stops after them
 PROGRESS = 0.2  # of a window, that must be settled; else a longer one is taken
 MOST_ROWS = 16384  # samples at a time
-SHARES = (0.85, 0.98)  # of acceleration and jerk for bends that are passed at an even speed
+FIRST_SHARES = (0.7, 0.4, 0.15)  # of acceleration and jerk for bends; less leaves more for changes of the speed
+SHARES = (0.4, 0.7, 0.85, 0.98)  # for those that are passed at an even speed
 AVERAGES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.13)  # of the longest ramp, to average over
 SHORTEST_AVERAGE = 4  # samples
 FINE = 1.06  # the best average of a stretch of few pieces is found to so much
@@ -53,6 +55,7 @@ class Stretch:
     def _begin(self) -> None:
         self._place, self._speed, self._time = 0.0, 0.0, 0.0  # where the profile is known to
         self._tau = 0.0  # not chosen yet
+        self._known = 0  # pieces whose shares have been chosen
         self._passed = 0  # pieces before this place
         self._next = 1  # sample of the stretch
         self._window = WINDOW
@@ -104,18 +107,18 @@ class Stretch:
             return False
         if not self._tau:
             self._tau = self._best_average(f, at, end)
-        edges, cap, push, v, phases = self._profile(f, at, end, self._tau)
+        edges, cap, push, v, phases = self._first_shares(f, at, end)
         for share in SHARES:
             bent = self._evenly_passed(f, at, edges, v, share)
             if not bent.any():
-                break
-            before = f[bent, SHARE].copy()
+                continue
+            before = f[:, SHARE].copy()
             f[bent, SHARE] = share
             found = self._profile(f, at, end, self._tau)
             if _lasting(found[4]) >= _lasting(phases):
-                f[bent, SHARE] = before
+                f[:, SHARE] = before
                 self._limit(f, self._tau)
-                break
+                continue
             edges, cap, push, v, phases = found
         if not ends:
             done = settled(edges, cap, push, self._speed, v) - self._place
@@ -128,6 +131,27 @@ class Stretch:
         self._speed = float(phases[-1, 2])
         self._time = float(rows[-1, SINCE] + rows[-1, LASTS])
         return True
+
+    def _first_shares(self, f: np.ndarray, at: np.ndarray, end: float) -> _Profile:
+        """The profile with the best share for the bends of pieces that were in no window before."""
+        new = self._untouched(f, at)
+        new[: self._known] = False
+        self._known = len(f)
+        best, best_share = self._profile(f, at, end, self._tau), FIRST_SHARES[0]
+        if not new.any():
+            return best
+        for share in FIRST_SHARES[1:]:
+            f[new, SHARE] = share
+            found = self._profile(f, at, end, self._tau)
+            if _lasting(found[4]) < _lasting(best[4]):
+                best, best_share = found, share
+        f[new, SHARE] = best_share
+        self._limit(f, self._tau)
+        return best
+
+    def _untouched(self, f: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Which pieces are so far on that their limits do not reach back to where the profile is settled."""
+        return at[:-1] - self._longest * f[:, CAP] > self._place if self._place > 0.0 else np.ones(len(f), bool)
 
     def _limit(self, f: np.ndarray, tau: float) -> None:
         piece_limits(f, self._limits.velocity, self._limits.acceleration, self._limits.jerk, tau)
@@ -169,7 +193,7 @@ class Stretch:
         """
         first = np.searchsorted(edges, at[:-1], side="right") - 1
         last = np.searchsorted(edges, at[1:], side="left")
-        inside = (at[:-1] - self._longest * f[:, CAP] > self._place) & (last < len(edges)) & (first >= 0)
+        inside = self._untouched(f, at) & (last < len(edges)) & (first >= 0)
         bent = np.zeros(len(f), bool)
         which = np.flatnonzero(inside & (f[:, SHARE] < share))
         if not len(which):
@@ -215,6 +239,7 @@ class Stretch:
         self._passed = max(int(np.searchsorted(at, self._place, side="right")) - 1 - gone, 0)
         if gone > 0:
             self._f, self._u = self._f[gone:], self._u[gone:]
+            self._known = max(self._known - gone, 0)
             self._rows[:, PLACE] -= at[gone]
             self._place -= at[gone]
 
