@@ -26,6 +26,9 @@ def methods(
     acceleration_time: Annotated[
         float | None, typer.Option(help="How long the velocity rises, s; of exponential its time constant.")
     ] = None,
+    plant: Annotated[
+        str, typer.Option(help="machine: the axes behind the bus, friction, play and delay included; or model.")
+    ] = "machine",
     period: Annotated[float | None, typer.Option(help="Sample period, s (default the machine's).")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for the table, the picture and a page.")
@@ -35,10 +38,13 @@ def methods(
     """Compare interpolators on a simulated machine: contour error, feed ripple, jerk, and compute time of a sample."""
     with refusals():
         from rds.cli.interpolate import acceleration_of
+        from rds.core.errors import InputError
         from rds.modes.experiment.folder import require_writable
         from rds.nc.run.methods import compare_methods, methods_report
         from rds.results.reports.write import write
 
+        if plant not in ("machine", "model"):
+            raise InputError(f"--plant {plant!r} must be machine or model")
         if out is not None:
             require_writable(out)
         filter_ = acceleration_of(acceleration, acceleration_time, None, False)
@@ -50,9 +56,10 @@ def methods(
                 controller=controller,
                 acceleration=filter_,
                 sample_period=period,
+                as_built=plant == "machine",
                 progress=bar("methods"),
             )
-        settings = {"machine": machine, "controller": controller, "acceleration": acceleration}
+        settings = {"machine": machine, "plant": plant, "controller": controller, "acceleration": acceleration}
         made = methods_report(compared, file, settings)
         files = write(made, out) if out is not None else []
     if json:

@@ -43,6 +43,20 @@ def test_the_library_along_a_circle(tmp_path: Path) -> None:
     assert 1.0 < circular["contour error, RMS [µm]"] < circular["contour error, max [µm]"] < 100.0
 
 
+def test_the_axes_are_those_behind_the_bus(tmp_path: Path) -> None:
+    """What is commanded is the same; the machine's gains, play and delay are in what is measured."""
+    path = tmp_path / "circle.toml"
+    path.write_text(CIRCLE)
+    built, model = (
+        {each.name: each.numbers for each in compare_methods(path, sample_period=0.005, as_built=as_built)}
+        for as_built in (True, False)
+    )
+    assert built["tustin"][2:5] == model["tustin"][2:5] and built["tustin"][:2] != model["tustin"][:2]
+    assert built["tustin"][1] > model["tustin"][1]
+    refused = CliRunner().invoke(app, ["nc", "methods", str(path), "--plant", "real"])
+    assert refused.exit_code == 2 and "--plant 'real' must be machine or model" in refused.output
+
+
 def test_a_method_of_one_kind_is_refused_where_the_other_comes(tmp_path: Path) -> None:
     """In the middle of the path, by the loop; the others are compared all the same."""
     path = tmp_path / "both.toml"

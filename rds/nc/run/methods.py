@@ -17,6 +17,7 @@ import numpy as np
 from rds.core.errors import ContractError, InputError
 from rds.interpolators import LIBRARY
 from rds.interpolators.segment_rows import read_segments
+from rds.machines import Machine, load_machine
 from rds.modes import SIMULATION
 from rds.modes.experiment import Experiment
 from rds.modes.loop.execution import State
@@ -68,10 +69,13 @@ def compare_methods(
     controller: Any = "tracking",
     acceleration: Any = None,
     sample_period: float | None = None,
+    as_built: bool = True,
     progress: Progress | None = None,
 ) -> list[Compared]:
     """Every method of the library, and the users' files `own`, along the path (or part program) in `file`, simulated.
 
+    The axes are those behind the bus, with friction, play and the loop's sample of delay; without `as_built`, the
+    machine's model that controllers are designed for.
     A method that refuses a segment of the path (`circular` a line) says so in `refused`. InputError for what is wrong
     with the path, the machine or the words; ContractError for an own interpolator that breaks its interface.
     """
@@ -80,12 +84,13 @@ def compare_methods(
         raise InputError("there is no such path or part program; check the name and the folder", str(file))
     axes = list("XYZ") if path.suffix != SUFFIX else list("XYZ")[: len(read_segments(path)[0].start)]
     names = [*LIBRARY.names(), *map(str, own)]
+    of_axes = _as_built(load_machine(machine), axes, sample_period) if as_built else {}
     found = []
     for number, name in enumerate(names):
         if progress is not None:
             progress(number, len(names))
         words = {"kind": "path", "file": str(path.resolve()), "interpolator": name}
-        table: dict[str, Any] = {"machine": machine, "axes": axes, "controller": controller}
+        table: dict[str, Any] = {"machine": machine, "axes": axes, "controller": controller} | of_axes
         table["reference"] = words | ({} if acceleration is None else {"acceleration": acceleration})
         if sample_period is not None:
             table["sample_period"] = sample_period
@@ -103,6 +108,19 @@ def compare_methods(
     if progress is not None:
         progress(len(names), len(names))
     return found
+
+
+def _as_built(machine: Machine, axes: Sequence[str], sample_period: float | None) -> dict[str, Any]:
+    """The words that put the machine's own axes in the place of their models, as far as its file tells them."""
+    T = sample_period or machine.sample_period
+    own = {name: machine.axis(name).machine for name in axes}
+    return {
+        "axis": {
+            name: {"model": {"name": "machine-axis", **behind, "delay": behind.get("delay", 0.0) + T}}
+            for name, behind in own.items()
+            if behind
+        }
+    }
 
 
 def _numbers(result: Result, program: InterpolatedProgram, T: float) -> tuple[float, ...]:
