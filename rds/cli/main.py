@@ -279,6 +279,9 @@ def machine_serve(
         str | None,
         typer.Option(help="Only these modules, as in X,Z: end this command and they are unplugged. By default all."),
     ] = None,
+    cut: Annotated[
+        Path | None, typer.Option(help="What the machine cuts (TOML): its load cell measures the force (dialect rds).")
+    ] = None,
 ) -> None:
     """Run the machine's axis modules as CAN nodes, or as units on a serial line (--dialect dcs), until Ctrl-C."""
     with refusals():
@@ -311,6 +314,10 @@ def machine_serve(
             if spoken != "cia402":
                 raise InputError(f"--quirks {quirks}: only simulated drives (--dialect cia402) have them")
             options["quirks"] = quirks
+        if cut is not None:
+            if spoken != "rds":
+                raise InputError(f"--cut {cut}: modules of dialect {spoken} have no load cell; those of rds may")
+            options["cut"] = str(cut)
         if faults is not None:
             from rds.bus.medium.fault_file import read_faults
 

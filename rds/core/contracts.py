@@ -65,6 +65,10 @@ class Drivers(Protocol):
     def limits(self) -> Sequence[Limits]:
         """The limits that each module has itself, axis units from its own zero, known since start()."""
 
+    @property
+    def force(self) -> float | None:
+        """What the load cell of the cutting head measured last, N; None where none has said anything."""
+
     def start(self, watch: Watch = unwatched) -> None:
         """Set the modules up, and return when every one answers and all axes stand.
 

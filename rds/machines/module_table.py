@@ -72,6 +72,7 @@ MODULE = Table(
         "vibration": _three("amplitude of the readings at full speed, x, y and z"),
         "matrix": Items("the module's homogeneous transformation", _ROW, "4 rows of 4 numbers", 4),
         "switches": Flag("it has limit switches"),
+        "load_cell": Flag("of a cutting head: a load cell measures the cutting force (dialect rds)"),
         MOUNTED_BY: replace(INTERFACE, meaning="the interface by which it is mounted"),
         CARRIES_ON: replace(INTERFACE, meaning="the interface on which it carries the next module"),
         "accessory": Text("the accessory mounted on it, which has no board: its type text in the library"),

@@ -13,7 +13,7 @@ def build(plan: Plan, drivers: Drivers | None) -> Loop:
     """The loop of an implementation, and of a model validation: what drives the axes is the plan's."""
     assert drivers is not None
     models = SimulatedAxes(plan)
-    return loop(plan, drivers.exchange, drivers.write, models.follow_and_tell)
+    return loop(plan, drivers.exchange, drivers.write, models.follow_and_tell, cell=lambda: drivers.force)
 
 
 # A machine does not wait: what was due while the loop was late is past, and is not caught up.

@@ -9,6 +9,7 @@ from typing import Any, cast
 from rds.core.contracts import Motion
 from rds.core.types import Ending, Model
 from rds.machines.encoder import diverged, encoder
+from rds.modes.loop.force_guard import Cell
 from rds.modes.loop.loop import Loop
 from rds.modes.loop.plan import Plan
 from rds.modes.networked import Links
@@ -132,12 +133,13 @@ def loop(
     write: Callable[[Sequence[float]], Sequence[float]],
     follow: Callable[[Sequence[float]], Sequence[float]],
     links: Links | None = None,
+    cell: Cell | None = None,
 ) -> Loop:
     """The loop of these parts in virtual time, its rows going nowhere.
 
-    With a network between them, that of the plan, unless `links` are handed in.
+    With a network between them, that of the plan, unless `links` are handed in. `cell` is the machine's load cell.
     """
-    drive = plan.start()
+    drive = plan.start(cell)
     if plan.network is not None:
         read, write, follow = (links or Links(plan)).around(read, write, follow)
     return Loop(

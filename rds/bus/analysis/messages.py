@@ -167,6 +167,22 @@ def messages_of(
         )
         for axis in machine.axes.values()
     ]
+    answers += [
+        Message(
+            name=f"force {axis.name}",
+            identifier=frames.FORCE,
+            extended=False,
+            size=8,
+            period=frames.FORCE_EVERY * period,
+            jitter=response_time,
+            deadline=period,
+            data=frames.encode_force(0.0, 0),
+            sender=axis.name,
+            after=command.name,
+        )
+        for axis in machine.axes.values()
+        if axis.module.get("load_cell")
+    ]
     if len(machine.axes) <= frames.SLOTS:
         return in_order([command, *answers])
     more = replace(command, name="voltages 5 to 8", identifier=frames.MORE_VOLTAGES)

@@ -77,6 +77,7 @@ class DriversBase(ABC, Generic[M, Frame]):
         self._unheard: set[M] = set()  # those that have been silent since the last tick
         self._started = self._closed = False
         self.limits: list[Limits] = [(-inf, inf)] * len(self._modules)
+        self.force: float | None = None  # N, of a load cell: as it was measured last
         self._count_anew()
 
     # --- what a dialect adds

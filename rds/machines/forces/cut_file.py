@@ -50,6 +50,7 @@ CUT = Table(
         "rake": MILLING["rake"],
         "efficiency": MILLING["efficiency"],
         "hardness": Quantity("what the simulated load cell measures of the force by the law", above=0.0, default=1.0),
+        "top": Quantity("of the work, in its coordinates: the load cell of a served machine measures below it", "mm"),
         "limits": LIMITS,
     },
     needed=("depth", "diameter"),
@@ -76,6 +77,7 @@ class CutFile:
     rake: float = 0.0
     efficiency: float = 1.0
     hardness: float = 1.0
+    top: float | None = None  # mm, along z of the work
     limits: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -106,7 +108,9 @@ class CutFile:
         return made
 
 
-_NUMBERS = (*("depth", "teeth", "diameter", "speed", "axial", "direction", "width", "rake", "efficiency", "hardness"),)
+_NUMBERS = (
+    *("depth", "teeth", "diameter", "speed", "axial", "direction", "width", "rake", "efficiency", "hardness", "top"),
+)
 
 
 def read_cut(path: str | Path) -> CutFile:

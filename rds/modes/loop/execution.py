@@ -12,7 +12,7 @@ from typing import Protocol
 
 from rds.core.types import Ending
 from rds.modes.loop.changes import STOP
-from rds.modes.loop.force_guard import MOST
+from rds.modes.loop.force_guard import MOST, Cell
 from rds.modes.loop.homing import Homing
 from rds.modes.loop.laws import LiveReference
 from rds.modes.loop.program import (
@@ -76,7 +76,8 @@ class Execution:
     """A program that has begun.
 
     `references` are set at each sample, those of the program's axes in order and then the spindle's, which is axis
-    number `spindle_axis` of the run. `expects(names)` says whether one of these live values can still change.
+    number `spindle_axis` of the run. `expects(names)` says whether one of these live values can still change. `cell` is
+    the machine's load cell, for the program's guard.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class Execution:
         spindle_axis: int | None,
         resolution: float,
         expects: Callable[[Sequence[str]], bool],
+        cell: Cell | None = None,
     ):
         self._program, self._T, self._follower = program, T, follower
         self._references, self._spindle_axis, self._resolution = references, spindle_axis, resolution
@@ -108,7 +110,7 @@ class Execution:
         self._position = list(program.start)
         self._way: Homing | None = None  # home
         guard = program.guard if isinstance(program, Program) else None
-        self._guard = None if guard is None else guard.start(T)
+        self._guard = None if guard is None else guard.start(T, cell)
         self._allowed = MOST  # rate, by the guard
         for reference, value in zip(references, self._position, strict=False):
             reference.position.value = value

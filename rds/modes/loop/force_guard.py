@@ -5,11 +5,13 @@ root is a misprint), so that the feed becomes K f; here the override's rate is K
 power α, and loads in proportion to the force: a plan that takes the share s of a limit keeps it at K = s^(-1/α).
 
 What the plan takes is known ahead, so that the rate is down before the cut begins; what the load cell measures beside
-it says by how much the work is harder than its law. Without a cell among the drivers its signal is simulated.
+it says by how much the work is harder than its law. Where the drivers hear no cell its signal is simulated. A machine's
+cell lowers the rate only: where it measures less than the law, the tool may not be in the work yet.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +26,7 @@ LEAST, MOST = 0.01, 2.0  # rates
 _HARDER, _SOFTER = 20.0, 0.05  # bounds of what the cell may say beside the law
 _FELT = 0.02  # of the largest force: less says nothing about the material
 COLUMN = {"cutting_force": "N"}
+Cell = Callable[[], "float | None"]  # what a load cell measured last, N; None: it has not said anything
 
 
 @dataclass(frozen=True)
@@ -38,15 +41,15 @@ class ForceGuard:
     exponent: float
     hardness: float = 1.0
 
-    def start(self, T: float) -> Guarding:
-        """The guard of a run that begins, with samples of `T` s."""
-        return Guarding(self, T)
+    def start(self, T: float, cell: Cell | None = None) -> Guarding:
+        """The guard of a run that begins, with samples of `T` s, and the machine's load `cell` if it has one."""
+        return Guarding(self, T, cell)
 
 
 class Guarding:
     """A guard at work: `measured` is the cell's signal now, N, and `factor` what it is of the force by the law."""
 
-    def __init__(self, guard: ForceGuard, T: float):
+    def __init__(self, guard: ForceGuard, T: float, cell: Cell | None = None):
         import numpy as np
 
         views: list[Any] = [
@@ -54,7 +57,7 @@ class Guarding:
         ]
         self._force, self._share = views
         self._last = len(guard.force) - 1
-        self._exponent, self._hardness = guard.exponent, guard.hardness
+        self._exponent, self._hardness, self._cell = guard.exponent, guard.hardness, cell
         self._felt = _FELT * float(guard.force.max(initial=0.0))
         self._gain = T / (T + SETTLING)
         self.factor = 1.0
@@ -62,15 +65,17 @@ class Guarding:
         self._allowed = MOST
 
     def cell(self, place: float, rate: float) -> float:
-        """What the simulated load cell measures at a place of the plan that is passed at this rate, N."""
-        return self._hardness * self._expected(place, rate)
+        """What the load cell measures, N: the machine's, or simulated at a place of the plan passed at this rate."""
+        measured = None if self._cell is None else self._cell()
+        return self._hardness * self._expected(place, rate) if measured is None else measured
 
     def allowed(self, place: float, rate: float) -> float:
         """The rate that keeps the limits from here on, when the sample at `place` was passed at `rate`."""
         self.measured = self.cell(place, rate)
         expected = self._expected(place, rate)
         if expected > self._felt:
-            said = min(max(self.measured / expected, _SOFTER), _HARDER)
+            least = _SOFTER if self._cell is None or self._cell() is None else 1.0
+            said = min(max(self.measured / expected, least), _HARDER)
             self.factor += self._gain * (said - self.factor)
         share = self.factor * self._share[min(int(place), self._last)]
         keeps = MOST

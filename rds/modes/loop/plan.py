@@ -19,6 +19,7 @@ from rds.machines.converter import converter
 from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
 from rds.modes.loop.commands import Command, limiter
 from rds.modes.loop.execution import Execution, Follower
+from rds.modes.loop.force_guard import Cell
 from rds.modes.loop.interpolated import Interpolated
 from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, coupled, played
 from rds.modes.loop.live_values import Channel
@@ -122,8 +123,11 @@ class Plan:
         for tuning in self._tunings():
             tuning.verify(values)
 
-    def start(self) -> Drive:
-        """What drives the axes, fresh from its initial state, and what takes the changes of live values."""
+    def start(self, cell: Cell | None = None) -> Drive:
+        """What drives the axes, fresh from its initial state, and what takes the changes of live values.
+
+        `cell` is the machine's load cell, which a guarded program heeds.
+        """
         tunings = self._tunings()
         actions = {name: act for tuning in tunings for name, act in tuning.actions().items()}
         params = [tuning.params for tuning in tunings]
@@ -142,6 +146,7 @@ class Plan:
             spindle,
             0.0 if spindle is None else self.axes[spindle].axis.resolution,
             lambda names: changes.expects(names),
+            cell,
         )
         changes = LiveChanges(
             self.channels(), actions | execution.actions(), self.changes, execution.over, execution.waits

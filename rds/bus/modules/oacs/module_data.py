@@ -24,6 +24,7 @@ from rds.models.machine_axis import MachineParameters
 IDENTITY: Matrix = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 _KINDS = {"translational": Kind.TRANSLATIONAL, "rotary": Kind.ROTARY, "tool": Kind.TOOL}
 _MODELS = ("linear-axis", "spindle", "machine-axis")  # whose parameters are those of a machine's axis
+_OF_OTHERS = ("drift", "motor", "load_cell")  # what modules of other dialects have
 _ROUNDING = 1e-4  # of a resolution that is written with few digits
 
 
@@ -116,7 +117,8 @@ def module_data(axis: Axis, supply: float, path: str = "", mounted: Mapping[str,
     data that a download can't carry.
     """
     where = f"{path}, [axis.{axis.name}.module]" if path else f"[axis.{axis.name}.module]"
-    values = {**(mounted or {}), **axis.module}
+    told = {key: value for key, value in axis.module.items() if key not in _OF_OTHERS}
+    values = {**(mounted or {}), **told}
     kind = values.pop("kind", _kind_by_unit(axis.unit))
     letter = values.pop("letter", "T" if kind == "tool" else _first_letter(axis.name))
     supply = values.setdefault("supply", supply)

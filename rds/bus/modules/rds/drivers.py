@@ -17,7 +17,7 @@ from typing import Any
 import can
 
 from rds.bus.modules import drivers_base
-from rds.bus.modules.can_drivers import CanDrivers
+from rds.bus.modules.can_drivers import CanDrivers, Handler
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.answer_order import AnswerOrder, Place
 from rds.bus.modules.rds.frames import Answer, Kind, Status
@@ -97,13 +97,16 @@ class AxisDrivers(CanDrivers[_Module]):
         period = machine.sample_period if sample_period is None else sample_period
         self._setup = frames.encode_setup(period)
         modules = [_Module(axis) for axis in used]
+        handlers: dict[int, Handler[_Module]] = {
+            frames.answer_identifier(axis.node): partial(self._take_answer, module)
+            for axis, module in zip(used, modules, strict=True)
+        }
+        if any(axis.module.get("load_cell") for axis in used):
+            handlers[frames.FORCE] = self._take_force
         super().__init__(
             machine,
             modules,
-            {
-                frames.answer_identifier(axis.node): partial(self._take_answer, module)
-                for axis, module in zip(used, modules, strict=True)
-            },
+            handlers,
             hosts=(frames.COMMAND, frames.DRY_COMMAND, frames.SETUP, frames.MORE_VOLTAGES),
             also=(frames.GENERAL,),
             bus=bus,
@@ -205,6 +208,10 @@ class AxisDrivers(CanDrivers[_Module]):
         if place is Place.EARLIER:
             module.doubtful = answer
         return None
+
+    def _take_force(self, message: can.Message, late: bool) -> None:
+        """What the load cell says; MachineError for what is no force."""
+        self.force = frames.decode_force(message.data)
 
     def _take_alarm(self, module: _Module, answer: Answer) -> None:
         """What a module says besides its position."""

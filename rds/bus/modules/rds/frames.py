@@ -14,6 +14,8 @@ All frames are little-endian, and standard (11-bit) but for the last:
 |            |        |       | 10: every module says what its clock showed when this frame was on the bus           |
 | 0x014 to   | host   | 2-8   | set points of methods A, B and C, and what goes with them: motion_frames.py          |
 | 0x016      |        |       |                                                                                      |
+| 0x01F      | module | 8     | float32 force in N that the load cell of the cutting head measured at a tick, uint16 |
+|            |        |       | count of ticks heard, uint16 reserved; at every tenth tick                           |
 | 0x020+node | module | 8     | int32 position counts, uint8 status, uint8 kind, uint16 count of ticks heard         |
 | 0x1C000000 | module | 8     | identity; + serial number (24 bits): uint8 node, uint8 version, 2 reserved,          |
 |            |        |       | uint32 process (0: firmware); extended, so that two modules of one node never collide |
@@ -34,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import IntEnum, IntFlag
+from math import isfinite
 from struct import Struct
 from typing import NamedTuple
 
@@ -47,6 +50,8 @@ DRY_COMMAND = 0x011
 SETUP = 0x012
 CALL = 0x013
 MOTION = range(0x014, 0x017)  # methods A, B and C: motion_frames.py
+FORCE = 0x01F
+FORCE_EVERY = 10  # ticks
 ANSWER = 0x020  # + node
 IDENTITY = 0x1C000000  # + serial number; extended
 SERIALS = 1 << 24
@@ -75,6 +80,7 @@ IDENTIFIERS = (
     (SETUP, SETUP, "sets the sample period"),
     (CALL, CALL, "calls modules, or resets their emergency stop"),
     (MOTION[0], MOTION[-1], "moves axes by set points"),
+    (FORCE, FORCE, "would pass for a measured force"),
     (ANSWER + NODES[0], ANSWER + NODES[-1], "would pass for a module's measured position"),
 )
 
@@ -83,6 +89,7 @@ _NUMBER_BITS = 0x0003_0003_0003_0003
 _SETUP = Struct("<II")
 _IDENTITY = Struct("<BBHI")
 _ANSWER = Struct("<iBBH")
+_FORCE = Struct("<fHH")
 
 
 class Status(IntFlag):
@@ -186,6 +193,21 @@ def answer_identifier(node: int) -> int:
     if node not in NODES:
         raise InputError(f"node {node!r} must be from {NODES[0]} to {NODES[-1]}")
     return ANSWER + node
+
+
+def encode_force(force: float, ticks: int) -> bytes:
+    """Data of a measured force, N, at the tick that is number `ticks` of those heard."""
+    return _FORCE.pack(force, ticks % COUNT_TURNS, 0)
+
+
+def decode_force(data: bytes | bytearray) -> float:
+    """The measured force, N. MachineError for data that are none."""
+    if len(data) != _FORCE.size:
+        raise MachineError(f"frame {FORCE:#05x} has {len(data)} bytes; a measured force has {_FORCE.size}")
+    force: float = _FORCE.unpack(data)[0]
+    if not isfinite(force):
+        raise MachineError(f"frame {FORCE:#05x} says a force of {force} N; check the load cell")
+    return force
 
 
 def encode_answer(answer: Answer) -> bytes:

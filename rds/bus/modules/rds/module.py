@@ -20,6 +20,7 @@ import logging
 import os
 import secrets
 import struct
+from collections.abc import Callable
 from math import floor, inf
 
 from rds.bus.modules.rds import frames, motion_frames
@@ -62,6 +63,7 @@ class AxisModule:
         self.motion = MachineAxis(machine_parameters(axis), start, axis.unit == SPINDLE_UNIT)
         self.drift = float(axis.module.get("drift", 0.0)) * 1e-6 if drift is None else drift
         self.by_itself = NodeMotion(axis.name, self.motion, axis.resolution, frames.HIGHEST_VOLTAGE, self.drift)
+        self.cell: Callable[[], float] | None = None  # what its load cell measures now, N
         self.status = Status.NONE
         self.ticks = 0
         self.emergency = False  # latched
@@ -121,6 +123,12 @@ class AxisModule:
         except MachineError as error:
             LOG.warning("module %s ignored a frame: %s", self.name, error)
         return []
+
+    def force(self) -> list[bytes]:
+        """Data of the frame with the load cell's signal, if one is due with the answer to a tick."""
+        if self.cell is None or self.ticks % frames.FORCE_EVERY:
+            return []
+        return [frames.encode_force(self.cell(), self.ticks)]
 
     def expire(self, now: float) -> list[bytes]:
         """Cut the voltage if the last command's time is over by `now`; return the watchdog's report, if it is due."""

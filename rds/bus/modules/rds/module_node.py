@@ -57,6 +57,8 @@ class ModuleNode(BusNode):
             told = self.module.control(message.data, at)
             return [] if told is None else [(*told, True)]
         answers = self._answers(self.module.receive(message.arbitration_id, message.data, at))
+        if self.module.cell is not None and answers and message.arbitration_id in (frames.COMMAND, frames.DRY_COMMAND):
+            return [*answers, *((frames.FORCE, data, False) for data in self.module.force())]
         if message.arbitration_id == frames.CALL and message.data == frames.WHO:
             return [(*frames.encode_identity(self.module.identity), True), *answers]
         return answers

@@ -22,6 +22,7 @@ from typing import Any
 from rds.bus.modules import server_program
 from rds.bus.modules.buttons import press_buttons
 from rds.bus.modules.drift import drift_by_axis
+from rds.bus.modules.rds.load_cell import fit_load_cell
 from rds.bus.modules.rds.module import AxisModule
 from rds.bus.modules.rds.module_node import ModuleNode
 from rds.bus.modules.serve_loop import Opener, serve_nodes
@@ -40,13 +41,15 @@ def serve(
     stop: threading.Event | None = None,
     drift: Any = (),
     trace: str | None = None,
+    cut: str | None = None,
     **options: Any,
 ) -> None:
     """Serve the modules of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`.
 
     `drift` is how much too fast their clocks go, ppm by axis, as in "X:50,Y:-30", beside what the machine file says:
     what they tell, and by which they move in methods B and C. At the end the file `trace` (CSV) gets where the
-    carriages really were at each step of such a motion.
+    carriages really were at each step of such a motion. `cut` is a file (`rds.machines.forces.cut_file`) of what the
+    machine cuts, for the load cell in its cutting head.
     """
     drifting = drift_by_axis(drift, machine)
     served: list[ModuleNode] = []
@@ -60,8 +63,14 @@ def serve(
         served.append(node)
         return node
 
+    def begin() -> None:
+        if cut is not None:
+            fit_load_cell(machine, {node.name: node.module for node in served}, cut)
+        if ready is not None:
+            ready()
+
     try:
-        serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
+        serve_nodes(machine, make_node, interface, channel, axes, begin, stop, **options)
     finally:
         if trace is not None:
             write_private(Path(trace), gauge_rows({node.name: node.module for node in served}).encode())
