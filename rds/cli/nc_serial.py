@@ -92,6 +92,8 @@ def run_methods(
             period=period,
             whole=offered is METHODS,
         )
+        for note in made.notes:
+            typer.echo(f"rds: note: {note}", err=True)
         show = bar("methods")
         runs = []
         for number, name in enumerate(names):

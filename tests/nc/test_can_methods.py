@@ -164,6 +164,16 @@ def test_what_goes_wrong_is_named_and_the_axis_stands(what: str, said: str, monk
     assert module.motion.velocity == 0.0 and not module.by_itself.active
 
 
+def test_the_spindle_turns_by_every_method(tmp_path: Path) -> None:
+    file = tmp_path / "turned.ngc"
+    file.write_text("G21 G90 F480 G61\nM3 S1000\nG4 P0.6\nG1 X1\nM5\nG4 P1\nM2\n")
+    turned = serial_motion(file, CNC, period=T, whole=False)
+    for name in "ABC":
+        run = run_can_method(name, turned, CNC, bitrate=500_000)
+        assert run.speed[run.position[:, 0] > 0.5].max() == pytest.approx(935.0, rel=0.02), name  # no loop holds it
+        assert abs(run.speed[-1]) < 10.0 and run.error.max() < 0.1, name
+
+
 def test_voltages_and_set_points_keep_out_of_each_others_way() -> None:
     module, bus, host = bench()
     begin(host)

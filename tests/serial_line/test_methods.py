@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.nc.run.serial_methods import METHODS, MethodRun, run_method
 from rds.nc.run.serial_motion import serial_motion
+from rds.nc.run.serial_records import write_records
 from rds.nc.run.serial_report import methods_report
 
 from .conftest import Bench
@@ -25,7 +26,7 @@ CIRCLE = "G21 G17 G90 F480 G61\nG1 X3\nG3 X3 Y0 I-3 J0\nG1 X0\nM2\n"
 PYRAMID_EDGE = "G21 G17 G90 F600 G61.1\nG1 X5 Y5 Z-8\nG1 X10 Y0 Z0\nG1 X15 Y5 Z-8\nG1 X20 Y0 Z0\nM2\n"
 
 
-def runs(tmp_path: Path, program: str, names: str = "ABC", **words: object) -> dict[str, MethodRun]:
+def runs(tmp_path: Path, program: str, names: Sequence[str] = "ABC", **words: object) -> dict[str, MethodRun]:
     file = tmp_path / "part.ngc"
     file.write_text(program)
     machine = load_machine("starmill")
@@ -55,6 +56,41 @@ def test_a_dwell_takes_its_time_by_every_method(tmp_path: Path) -> None:
         assert 95 < (x < 0.005).sum() < 200, name  # ms, of 100; a planned motion begins slowly
         assert 295 < (abs(x - 1.0) < 0.005).sum() < 450, name
         assert run.error.max() < 0.02 and not any(run.lost.values()), name
+
+
+def test_the_spindle_turns_by_every_method(tmp_path: Path) -> None:
+    turned = "G21 G90 G61 F240\nM3 S1000\nG4 P1\nG1 X1\nM4 S500\nG4 P1\nG1 X0\nM5\nG4 P2\nM2\n"
+    for name, run in [*runs(tmp_path, turned).items(), *runs(tmp_path, turned, ["C-thesis"]).items()]:
+        forward, backward = run.speed[run.position[:, 0] > 0.9].max(), run.speed.min()
+        assert forward == pytest.approx(1000.0, rel=0.02) and backward == pytest.approx(-500.0, rel=0.02), name
+        assert abs(run.speed[-1]) < 10.0 and not any(run.astray.values()), name
+        assert [file.name for file in write_records([run], tmp_path)] == ["path.csv", f"gauges-{name}.csv"]
+    assert (tmp_path / "gauges-A.csv").read_text().startswith("time_s,x_mm,y_mm,z_mm,segment,spindle_rev_min\n")
+
+
+@pytest.mark.parametrize(("mode", "longest"), [("A", 0.1), ("C", 15.0), ("C-thesis", 16.0)])
+def test_a_host_that_dies_leaves_no_spindle_turning(bench: Maker, mode: str, longest: float) -> None:
+    """At the end of what it holds; while buffers are filled again, after ten seconds."""
+    b = bench(baud=115_200)
+    dies = b.port.now() + 8.0
+    full = np.full((3000, 1), 127)
+    plain = b.port.write
+
+    def write(data: bytes) -> None:
+        if b.port.now() > dies:
+            raise MachineError("dead")
+        plain(data)
+
+    b.port.write = write  # type: ignore[method-assign]
+    with pytest.raises(MachineError, match="dead"):
+        if mode == "A":
+            methods.method_a(b.host, full, {5: 3})
+        else:
+            methods.method_c(b.host, full, [5], as_thesis=mode == "C-thesis")
+    speed = b.position(5)
+    assert speed > 1900.0
+    b.port.sleep(b.port.now() + longest + 4.0)
+    assert abs(b.position(5)) < 1.0
 
 
 def test_a_full_buffer_is_sent_nothing_that_it_cannot_take(bench: Maker) -> None:

@@ -52,10 +52,12 @@ def test_a_pwm_output_has_255_levels(tmp_path: Path) -> None:
     assert speed == pytest.approx(3.0 * round(5.0 * 255 / 10) * 10 / 255 - 0.4, abs=1e-6)
 
 
-def test_steps_do_not_turn_a_spindle() -> None:
+def test_a_step_of_a_spindle_is_a_share_of_its_voltage() -> None:
     axis = make_motor(load_machine("starmill").axis("spindle"), 0.0, 10.0)
-    axis.steps(5, 0.0, 0.01)
-    assert axis.advance(1.0) == 0.0 and not axis.moving
+    axis.steps(-127, 0.0, 0.01)
+    assert axis.advance(3.0) == pytest.approx(-2030.0, rel=0.02)  # rev/min: 204 a volt, less friction
+    axis.steps(0, 3.0, 0.01)
+    assert axis.advance(6.0) == 0.0 and not axis.moving
 
 
 def test_what_no_unit_can_have_is_refused(tmp_path: Path) -> None:

@@ -39,11 +39,17 @@ METHODS = ("A", "B", "C", "B-free", "C-free")
 BITRATE = 1_000_000
 _SETTLE = 0.2  # s after the last step
 _SPEED = 0.3  # of an axis's largest, on the way to where the program starts
+_FULL_SPEED = 1000  # counts in a period that stand for the whole range of a spindle's voltage
 _FULL = 0.8  # of the bus: a share above which it is too full to be relied on
 
 
-def can_gains(axis: Axis) -> tuple[float, ...]:
-    """The gains of a module's position loop, by the model of its axis. InputError for a model without K and tau."""
+def can_gains(axis: Axis, volts: float = 0.0, period: float = 1.0) -> tuple[float, ...]:
+    """The gains of a module's position loop, by the model of its axis. InputError for a model without K and tau.
+
+    Of a spindle: `volts` for `_FULL_SPEED` counts in a period.
+    """
+    if axis.is_spindle:
+        return 0.0, volts * period / _FULL_SPEED, 0.0, 0.0, 0.0
     try:
         tau, K = float(axis.model["tau"]), float(axis.model["K"])
     except KeyError:
@@ -59,14 +65,15 @@ def can_gains(axis: Axis) -> tuple[float, ...]:
 
 def check_room(machine: Machine, motion: SerialMotion, method: str, bitrate: int, period: float) -> None:
     """InputError for what does not fit: axes beyond a frame's set points, steps too long, a bus too slow."""
-    if method == "A" and any(list(machine.axes).index(name) >= motion_frames.SLOTS for name in motion.axes):
+    names = [*motion.axes, *([motion.spindle.name] if motion.spindle is not None else [])]
+    if method == "A" and any(list(machine.axes).index(name) >= motion_frames.SLOTS for name in names):
         raise InputError(f"a frame of method A carries the set points of a machine's first {motion_frames.SLOTS} axes")
     steps = np.abs(np.diff(motion.positions, axis=0)).max(initial=0.0, axis=0) / motion.blu
     most = 1024.0 if method == "A" else motion_frames.MOST_INCREMENT
     if (steps > most).any():
         name = motion.axes[int(np.argmax(steps))]
         raise InputError(f"{name} moves {steps.max():.0f} counts in a step; {most:.0f} at most: feed less")
-    count = len(motion.axes)
+    count = len(names)
     bits = (1 + count) * longest(8) if method == "A" else count * longest(8) * 2 // motion_frames.PIECE
     share = bits / (bitrate * period)
     if method in ("A", "C", "C-free") and share > _FULL:
@@ -177,13 +184,22 @@ def _carry_out(
     if not dry:
         _approach(host, motion, machine)
     fine = np.rint(motion.positions / motion.blu * FINE).astype(np.int64)
+    names, equations = list(motion.axes), list(motion.nodes)
+    if motion.spindle is not None:
+        turned = np.append(0, np.cumsum(motion.spindle.counts(_FULL_SPEED) * FINE))
+        fine, names, nodes = (
+            np.column_stack([fine, turned]),
+            [*names, motion.spindle.name],
+            (*nodes, motion.spindle.unit),
+        )
+        equations.append(motion.spindle.segments(_FULL_SPEED))
     kind = {"A": Buffer.NONE, "B": Buffer.SEGMENTS, "C": Buffer.INCREMENTS}[method[0]]
-    for i, (name, node) in enumerate(zip(motion.axes, nodes, strict=True)):
-        start = round(motion.nodes[i][0].own * FINE) if kind is Buffer.SEGMENTS else int(fine[0, i])
-        host.begin(node, kind, start, can_gains(machine.axis(name)))
+    for i, (name, node) in enumerate(zip(names, nodes, strict=True)):
+        start = round(equations[i][0].own * FINE) if kind is Buffer.SEGMENTS else int(fine[0, i])
+        host.begin(node, kind, start, can_gains(machine.axis(name), machine.converter.range, period))
     since = host.port.bits
     if method == "A":
-        slots = {node: list(machine.axes).index(name) for name, node in zip(motion.axes, nodes, strict=True)}
+        slots = {node: list(machine.axes).index(name) for name, node in zip(names, nodes, strict=True)}
         steps = len(fine) - 1
         if dry:
             host.stop_all()
@@ -192,7 +208,7 @@ def _carry_out(
             course = host.set_points(fine[1:].tolist(), slots, period)
     else:
         if method.startswith("B"):
-            pieces = [motion_frames.pieces_of_segments(each) for each in motion.nodes]
+            pieces = [motion_frames.pieces_of_segments(each) for each in equations]
             steps = sum(motion.counts)
         else:
             pieces = [motion_frames.pieces_of_increments(np.diff(fine[:, i]).tolist()) for i in range(len(nodes))]
@@ -238,8 +254,7 @@ def _measured(
     """What the dial gauges say of it, each millisecond."""
     length = course.ended - course.begun
     time = np.arange(0.0, length, 1e-3)
-    columns = [np.interp(time, rows[name][:, 0] - course.begun, rows[name][:, 1]) for name in motion.axes]
-    position = np.column_stack(columns)
+    position = np.column_stack([_at(time, rows[name], course) for name in motion.axes])
     segment = segment_at(method, motion, course, time)
     exact, places = motion.positions, motion.segment
     if method.startswith("B"):
@@ -258,4 +273,10 @@ def _measured(
         sent,
         busy / length,
         segment,
+        np.zeros(0) if motion.spindle is None else _at(time, rows[motion.spindle.name], course),
     )
+
+
+def _at(time: np.ndarray, rows: np.ndarray, course: Course) -> np.ndarray:
+    """What a gauge showed at these instants since the motion began; `rows` are instants and readings."""
+    return np.interp(time, rows[:, 0] - course.begun, rows[:, 1])

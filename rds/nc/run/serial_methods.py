@@ -26,6 +26,7 @@ from rds.bus.modules.dcs import dry_run
 from rds.bus.modules.dcs import methods as on_line
 from rds.bus.modules.dcs.buffers import bytes_of
 from rds.bus.modules.dcs.build import make_line
+from rds.bus.modules.dcs.commands import MOST_STEPS
 from rds.bus.modules.dcs.host import Host
 from rds.bus.modules.dcs.port import SerialPort, VirtualPort, is_device
 from rds.core.errors import InputError
@@ -58,6 +59,7 @@ class MethodRun:
     bytes: int = 0  # of the host
     load: float = 0.0  # share of the motion's time in which the host's wires are busy
     segment: np.ndarray = field(default_factory=lambda: np.zeros(0, int))  # of the path, at each instant of `time`
+    speed: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of a spindle that turned, rev/min
     astray: Mapping[str, int] = field(default_factory=dict)  # steps that a unit was sent and did not get, by axis
 
 
@@ -201,15 +203,19 @@ def _approach(host: Host, motion: SerialMotion) -> None:
 
 
 def _carry_out(method: str, host: Host, motion: SerialMotion, machine: Machine) -> Course:
+    pulses, names, units = motion.pulses, list(motion.axes), list(motion.units)
+    nodes = dict(zip(units, motion.nodes, strict=True))
+    if motion.spindle is not None:
+        pulses = np.column_stack([pulses, motion.spindle.counts(MOST_STEPS)])
+        names, units = [*names, motion.spindle.name], [*units, motion.spindle.unit]
+        nodes[motion.spindle.unit] = motion.spindle.segments(MOST_STEPS)
     if method == "A":
-        names = list(machine.axes)
-        slots = {unit: names.index(name) for unit, name in zip(motion.units, motion.axes, strict=True)}
-        return on_line.method_a(host, motion.pulses, slots)
+        order = list(machine.axes)
+        return on_line.method_a(host, pulses, {u: order.index(name) for u, name in zip(units, names, strict=True)})
     synchronize = not method.endswith(FREE)
     if method.startswith("B"):
-        return on_line.method_b(host, dict(zip(motion.units, motion.nodes, strict=True)), synchronize=synchronize)
-    thesis = method == "C-thesis"
-    return on_line.method_c(host, motion.pulses, motion.units, as_thesis=thesis, synchronize=synchronize)
+        return on_line.method_b(host, nodes, synchronize=synchronize)
+    return on_line.method_c(host, pulses, units, as_thesis=method == "C-thesis", synchronize=synchronize)
 
 
 def _astray(method: str, host: Host, motion: SerialMotion, machine: Machine) -> dict[str, int]:
@@ -256,6 +262,7 @@ def _measured(
         traffic[0],
         traffic[1] / (course.ended - course.begun),
         segment,
+        np.zeros(0) if motion.spindle is None else rows[during][:, 1 + list(names).index(motion.spindle.name)],
     )
 
 

@@ -33,6 +33,32 @@ _MOST_STEPS = 65_535  # of a segment in method B
 
 
 @dataclass(frozen=True)
+class SpindleTrack:
+    """What the spindle's node does: the voltage of each step as a share of the converter's range, -1 to 1.
+
+    `shares` go with the samples of the motion (methods A and C), `stretches` with its equations (B): steps and share.
+    """
+
+    name: str
+    unit: int
+    shares: np.ndarray
+    stretches: tuple[tuple[int, float], ...]
+
+    def counts(self, full: int) -> np.ndarray:
+        """BLU of each step, where `full` are those of the whole range."""
+        return np.rint(full * self.shares).astype(np.int64)
+
+    def segments(self, full: int) -> list[NodeSegment]:
+        """The same for method B."""
+        found, place = [], 0
+        for steps, share in self.stretches:
+            end = place + steps * round(full * share)
+            found.append(line(place, end, steps))
+            place = end
+        return found
+
+
+@dataclass(frozen=True)
 class SerialMotion:
     """What the nodes are to do, in steps of `period` s: 10 ms on a serial line, the sample period on CAN.
 
@@ -52,6 +78,7 @@ class SerialMotion:
     counts: tuple[int, ...]
     notes: tuple[str, ...]
     period: float = BYTE_TIME
+    spindle: SpindleTrack | None = None
 
     @property
     def start(self) -> np.ndarray:
@@ -83,17 +110,22 @@ def serial_motion(
     order = [AXES.index(name) for name in axes]
     nodes, counts = _equations(prepared.path, order, blu, Limits.of(machine), synchronized, period)
     happenings = getattr(program, "happenings", ())
+    speeds = []  # of the spindle: sample, step of the equations, rev/min
     for each in happenings:
+        after = int(prepared.segment[each.sample - 1]) if each.sample else None
         if each.kind == "dwell":
-            _hold(nodes, counts, int(prepared.segment[each.sample - 1]) if each.sample else None, each.value, period)
+            _hold(nodes, counts, after, each.value, period)
+        elif each.kind == "spindle":
+            speeds.append((each.sample, 0 if after is None else sum(counts[: after + 1]), each.value))
     notes = list(prepared.notes)
-    if kinds := sorted({each.kind for each in happenings} - {"end", "dwell"}):
-        notes.append(f"nodes move axes only: {', '.join(kinds)} of the program are not carried out")
+    if kinds := sorted({each.kind for each in happenings} - {"end", "dwell", "spindle"}):
+        notes.append(f"nodes move axes and spindle only; not carried out of the program: {', '.join(kinds)}")
     if motion == "plan":
         assert isinstance(program, Program)
         positions, segment = program.position, prepared.segment
     else:
         positions, segment = by_equations(nodes, blu, counts)
+        speeds = [(step, step, speed) for _, step, speed in speeds]
     return SerialMotion(
         prepared,
         axes,
@@ -106,7 +138,27 @@ def serial_motion(
         tuple(counts),
         tuple(notes),
         period,
+        _spindle(machine, speeds, len(positions) - 1, sum(counts)),
     )
+
+
+def _spindle(
+    machine: Machine, speeds: Sequence[tuple[int, int, float]], samples: int, steps: int
+) -> SpindleTrack | None:
+    """The spindle's voltages by its model; None where nothing turns it. `speeds` are samples, steps, rev/min."""
+    axis = next((axis for axis in machine.axes.values() if axis.is_spindle), None)
+    if axis is None or not any(speed for _, _, speed in speeds):
+        return None
+    shares, ends = np.zeros(samples), [*(step for _, step, _ in speeds[1:]), steps]
+    stretches = [(speeds[0][1], 0.0)]
+    for (sample, step, speed), end in zip(speeds, ends, strict=True):
+        share = max(-1.0, min(1.0, speed / (float(axis.model["K"]) * machine.converter.range)))
+        shares[sample:] = share
+        stretches.append((end - step, share))
+    whole = [
+        (min(steps - done, _MOST_STEPS), share) for steps, share in stretches for done in range(0, steps, _MOST_STEPS)
+    ]
+    return SpindleTrack(axis.name, axis.node, shares, tuple(whole))
 
 
 def _equations(

@@ -16,6 +16,7 @@ from rds.core.atomic import write_files
 from rds.nc.run.serial_methods import MethodRun
 from rds.results.reports.gauges import GAUGES, LINEAR, PATH
 
+SPEED = "spindle_rev_min"
 _DECIMALS = 6  # of mm, s and degrees
 
 
@@ -29,7 +30,8 @@ def write_records(runs: Sequence[MethodRun], folder: Path) -> list[Path]:
     for run in runs:
         if len(run.time):
             place = folder / f"gauges-{run.method}.csv"
-            contents[place], headings[place] = _gauge_rows(run), GAUGES
+            contents[place] = _gauge_rows(run)
+            headings[place] = (*GAUGES, SPEED) if len(run.speed) else GAUGES
     write_files({place: partial(_write, headings[place], rows) for place, rows in contents.items()})
     return list(contents)
 
@@ -45,11 +47,12 @@ def _path_rows(run: MethodRun) -> Iterable[Iterable[float]]:
 
 def _gauge_rows(run: MethodRun) -> Iterable[Iterable[float]]:
     columns: Mapping[str, int] = {name: i for i, name in enumerate(run.motion.axes)}
-    for time, segment, row in zip(run.time, run.segment, run.position, strict=True):
+    for number, (time, segment, row) in enumerate(zip(run.time, run.segment, run.position, strict=True)):
         yield [
             float(time),
             *(float(row[columns[name]]) if name in columns else 0.0 for name in LINEAR),
             int(segment),
+            *(run.speed[number : number + 1].tolist()),
         ]
 
 

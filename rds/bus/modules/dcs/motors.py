@@ -2,7 +2,8 @@
 
 A unit says to its motor: so many steps within so much time, or a voltage; and asks for its counts. A stepper has no
 encoder: its counts are the steps it was sent. A servo motor makes steps by a position loop of the unit: each
-millisecond u = (v + Kp e)/K, with v the speed of the step, e the position error, and K of the axis's own model.
+millisecond u = (v + Kp e)/K, with v the speed of the step, e the position error, and K of the axis's own model. A
+spindle makes no steps: of a step of n BLU it gets n/127 of the output's range.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from math import floor, inf
 from typing import Protocol
 
+from rds.bus.modules.dcs.commands import MOST_STEPS
 from rds.core.errors import InputError
 from rds.machines.machine import Axis
 from rds.models.machine_axis import MachineAxis, MachineParameters
@@ -24,6 +26,7 @@ class Motor(Protocol):
     """What a unit needs of the axis behind it. Instants in s, and positions in axis units."""
 
     kind: str
+    turns: bool  # a spindle: it goes on until something else is said
 
     @property
     def lost(self) -> int:
@@ -52,7 +55,7 @@ class Motor(Protocol):
 class Stepper:
     """A stepper behind its driver."""
 
-    kind = "stepper"
+    kind, turns = "stepper", False
 
     def __init__(self, axis: Axis, start: float):
         self._gain = StepperParameters.from_table(axis.machine, f"[axis.{axis.name}.machine]")
@@ -101,7 +104,7 @@ class Servo:
         self._axis = MachineAxis(
             MachineParameters.from_table(table, f"[axis.{axis.name}.machine]"), start, axis.is_spindle
         )
-        self._is_spindle = axis.is_spindle
+        self.turns = axis.is_spindle
         self._blu = axis.resolution
         self._grain = volts / (_DUTIES if kind == "pwm" else 2048)
         self._volts = volts
@@ -114,9 +117,12 @@ class Servo:
         return self._axis.velocity != 0.0 or self._next < inf
 
     def steps(self, count: int, at: float, time: float) -> None:
-        """As Motor; a spindle turns by voltages alone, and an axis that no step has moved yet is not held."""
+        """As Motor; an axis that no step has moved yet is not held."""
+        if self.turns:
+            self.voltage(count / MOST_STEPS * self._volts, at)
+            return
         self._run(at)
-        if self._is_spindle or (count == 0 and self._next == inf):
+        if count == 0 and self._next == inf:
             return
         if self._next == inf:
             self._target = self._counts()

@@ -27,6 +27,7 @@ GAP = 2e-3  # s of silence after which half a frame is none, on a line whose ins
 SKIP = 0.05  # s of silence after which the data for another unit are over
 JOG_TIME = 0.5  # s without a byte until a jog ends
 STEP_PATIENCE = 1.0  # s without a byte until the steps of a buffer end
+FILLING = 10.0  # s for which a spindle goes on after a buffer's last step, while buffers are filled again
 OLDEST = 2.5  # periods for which a voltage acts, as of the modules on CAN
 HOME_STEPS = 8  # BLU in 10 ms, backward: chosen. The firmware's 80 are 4.8 m/min, four times what the machine can do
 Sent = list[tuple[float, bytes]]
@@ -136,6 +137,8 @@ class Unit:
             target = self.program.step()
             if target is not None:
                 self.motor.steps(target, instant, self._time(BYTE_TIME))
+            elif self.motor.turns:
+                self.motor.stop(instant)
         return sent
 
     def _go_on(self, at: float) -> Sent:
@@ -163,6 +166,8 @@ class Unit:
         sent: Sent = [(at, bytes([self.uid]))] if self._master and self._stepped else []
         self._stepped = False
         if self._index >= BUFFER or at - self._last > STEP_PATIENCE:
+            if self.motor.turns:
+                self._cuts = at + FILLING
             self._index, self._buffer = None, b""
         elif self._asked:
             self._begin_step(at)
@@ -173,6 +178,7 @@ class Unit:
     def _begin_step(self, at: float) -> None:
         assert self._index is not None
         self._asked -= 1
+        self._cuts = inf
         self.motor.steps(steps_of(self._buffer[self._index]), at, self._time(BYTE_TIME))
         self._index += 1
         self._stepped = True
@@ -340,6 +346,8 @@ class Unit:
             self._cuts = at + OLDEST * self._time(self._period)
         else:
             self.motor.steps(frames.decode_words(body)[self.slot], at, self._time(self._period))
+            if self.motor.turns:
+                self._cuts = at + OLDEST * self._time(self._period)
         if not info.answers:
             return []
         answer = frames.encode_answer(frames.Answer(self.number, info.number, status, counts))

@@ -9,6 +9,8 @@ until the next one; T is the sample period, F± the friction of the set point's 
 than the amplifier can put out. Method A is the same, but each
 set point comes in a frame, at whose instant the module takes it.
 
+A spindle has no position to follow: its set point's speed alone makes its voltage, Kv (r' - r)/T.
+
 What keeps voltage off the axis: a second without a word of the host, an axis 2048 counts from its set point, the
 emergency stop; in method A also two and a half periods without a set point, until the next one. A buffer that runs
 empty leaves the axis at its last set point.
@@ -36,13 +38,17 @@ _OLDEST = 2.5  # periods without a set point in method A
 class NodeMotion:
     """The motion of one axis; `drift` is how much too fast the module's clock goes (1e-6: 1 ppm).
 
-    `gauge`, if it is a list, gets the instant and the carriage's true position at each step.
+    `turns` says that it is a spindle. `gauge`, if it is a list, gets the instant and the carriage's true position (of a
+    spindle its speed) at each step.
     """
 
-    def __init__(self, name: str, axis: MachineAxis, resolution: float, highest: float, drift: float = 0.0):
+    def __init__(
+        self, name: str, axis: MachineAxis, resolution: float, highest: float, drift: float = 0.0, turns: bool = False
+    ):
         self.name, self.status = name, MotionStatus.NONE
         self.gauge: list[tuple[float, float]] | None = None
         self._axis, self._resolution, self._highest, self._rate = axis, resolution, highest, 1.0 + drift
+        self._turns = turns
         self._gains = [0.0] * len(codes.Gain)
         self._kind = Buffer.NONE
         self._clear(0.0)
@@ -192,7 +198,7 @@ class NodeMotion:
         true = self._axis.advance(at)
         if self.gauge is not None:
             self.gauge.append((at, true))
-        error = self._position - round(true / self._resolution)
+        error = 0 if self._turns else self._position - round(true / self._resolution)
         if abs(error) > FAR:
             LOG.warning("module %s: %g counts from its set point, zero volts", self.name, error)
             self.stop(at, MotionStatus.FAR)
