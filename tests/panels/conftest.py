@@ -168,8 +168,9 @@ def see(page: Any, selector: str, state: str = "visible", timeout: float = PATIE
 
 @pytest.fixture
 def folders() -> Iterator[set[Path]]:
-    """Those of the pages that a test opens. At its end, and however it ends, no run goes on there, and the machine is
-    free: the next test, or the same one tried again, would find it in use.
+    """Those of the pages that a test opens. At its end, and however it ends, no run goes on there, the machine is
+    free, and nothing is left but the runs: the next test, or the same one tried again, begins as in a new
+    folder.
     """
     from rds.core.errors import InputError
     from rds.panels.session import Session
@@ -189,6 +190,18 @@ def folders() -> Iterator[set[Path]]:
             else:
                 session.give_machine_back(nobody)
                 break
+        _empty(folder)
+
+
+def _empty(folder: Path) -> None:
+    """Take away what a test has left beside its runs, whose reports may still be drawn."""
+    for left in folder.iterdir():
+        if left.name == "runs" or (left.name.startswith(".") and left.suffix != ".draft"):
+            continue
+        if left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
 
 
 @pytest.fixture

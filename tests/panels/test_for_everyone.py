@@ -73,7 +73,7 @@ def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     page.get_by_label("Final time").fill("60")
     page.keyboard.press("Control+Enter")
     page.wait_for_selector('[aria-live=polite] :text("the run begins"):visible')
-    page.wait_for_selector("[data-samples]:visible")
+    page.wait_for_function("Number(document.querySelector('[data-samples]').dataset.samples) > 0")
     page.keyboard.press("Escape")
     page.wait_for_selector('[aria-live=polite] :text("ended early: stopped"):visible')
     assert not page.locator('.rds-notice:has-text("emergency stop")').count()  # the run, and nothing more

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from collections.abc import Callable
@@ -22,6 +23,7 @@ SELECTED = (
     "(({value, selectionStart, selectionEnd}) => value.slice(selectionStart, selectionEnd))(document.activeElement)"
 )
 SAVED = 180_000  # ms until the pictures of a report are drawn, on a busy computer
+SCENE = "document.querySelector('.rds-scene').dataset"
 VALID = '.rds-verdict .rds-notice-good:has-text("the machine can run it")'
 
 
@@ -52,10 +54,14 @@ def stands(page: Any) -> None:
 def test_a_limit_that_is_near_is_said_by_a_sign() -> None:
     machine = load_machine("mini-cnc")
     measured = {"X": 72.0, "Y": 0.0, "Z": -10.0, "spindle": 1500.0}
-    status = Status(1.0, 3, State.RUNS, 1.0, 300.0, 0.5, measured, dict(measured))
+    status = Status(1.0, 3, State.RUNS, 1.0, 300.0, 0.5, measured, dict(measured), to_go={"X": -2.0})
     shown = status_html(status, {2: Modes(("G1", "G54"), 4, 300.0, 1500.0, origin=(2.0, 0.0, 0.0))}, machine, 100.0)
     assert "⚠ 3.0 to high" in shown and shown.count("⚠") == 1
-    assert "<td>72.000</td><td>70.000</td>" in shown and "T4" in shown and "<code>G54</code>" in shown
+    assert (
+        '<td class="rds-dro">70.000</td><td>-2.000</td><td>72.000</td>' in shown
+        and "T4" in shown
+        and "<code>G54</code>" in shown
+    )
     assert "–" in status_html(None, {}, machine, 100.0)
 
 
@@ -148,7 +154,7 @@ def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(open_page: Call
     page.wait_for_selector(VALID)
     page.click('button:text-is("Emulation")')
     page.click('button:text-is("Run")')
-    page.wait_for_selector('.rds-state:has-text("Line 3 stops (M0 or M1)")')
+    page.wait_for_selector('.rds-state:has-text("Line 3 stops (M0, M1")')
     page.click('button:text-is("Resume")')
     page.wait_for_selector('.rds-state:has-text("Line 4 runs")')
     page.click('button:text-is("Home")')
@@ -157,10 +163,62 @@ def test_a_stop_of_the_program_waits_for_resume_and_home_ends_it(open_page: Call
 
 def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], app: App) -> None:
     page = opened(open_page)
-    write(page, lines("G1 X3 F300", "Y3"))
+    write(page, lines("G1 Z-0.5 F300", "X3", "Y3"))
     page.wait_for_selector(VALID)
     page.click('button:text-is("Simulation")')
+    page.click('.lm-TabBar-tab:visible:has-text("Machine")')
+    page.click('button:text-is("Show the machine")')
+    page.locator(".rds-scene select").select_option("20")
+    page.click('.rds-scene button:text-is("Part")')
     page.click('button:text-is("Run")')
+    at_end = f"{SCENE}.tip?.split(' ').slice(0, 2).every((each) => Math.abs(each - 3) < 0.1)"
+    page.wait_for_function(f"{at_end} && {SCENE}.state === 'paused'")  # played
+    gone, over, under = (float(page.evaluate(f"{SCENE}.{name}")) for name in ("cut", "over", "under"))
+    swept = 2 * (3 * 6 + math.pi * 9) - math.pi * 9 - (9 - math.pi * 9 / 4)  # two slots of 6 mm that share a corner
+    assert gone == pytest.approx(0.5 * swept, rel=0.12) and over < 0.06 and under < 0.06
+    page.click('.lm-TabBar-tab:visible:has-text("Result")')
     page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
     found = [each for each in Path(app.folder / "runs").iterdir() if (each / "program.html").is_file()]
     assert found
+
+
+def test_a_line_is_run_by_hand_the_work_is_touched_off_and_a_program_is_run_from_its_cursor(
+    open_page: Callable[..., Any], app: App
+) -> None:
+    page = opened(open_page)
+    write(page, lines("G1 X1 F600", "Y1", "X0"))
+    page.wait_for_selector(VALID)
+    page.click('button:text-is("Simulation")')
+    page.click(EDITOR)
+    page.keyboard.press("Control+Home")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    page.click('button:text-is("Run from line")')
+    page.wait_for_selector('.rds-main button:has-text("Line 3:")')
+    assert not page.locator('.rds-main button:has-text("Line 2:")').count()
+
+    page.click('.lm-TabBar-tab:visible:has-text("MDI")')
+    page.wait_for_selector('button:text-is("Run line"):enabled')
+    for line, said in (
+        ("G1 X2 F600", 'td:text-is("G1 X2 F600")'),
+        ("G91", 'td:text-is("G91")'),
+        ("G1 X", '.rds-notice:has-text("mdi.ngc:3:5")'),
+    ):
+        page.fill('input[placeholder="G0 X10"]', line)
+        page.keyboard.press("Enter")
+        page.click('button:text-is("Run line")')
+        page.wait_for_selector(said)
+        page.wait_for_selector('button:text-is("Run line"):enabled')
+    assert (app.folder / "mdi.ngc").read_text().splitlines()[:2] == ["G1 X2 F600", "G91"]
+
+    page.click('.lm-TabBar-tab:visible:has-text("Touch off")')
+    page.click('button:text-is("Touch off")')
+    page.wait_for_selector('.rds-notice-error:has-text("say what an axis should read")')
+    page.get_by_label("X machine [mm]").fill("70")
+    page.get_by_label("X should read [mm]").fill("-3")
+    page.click('button:text-is("Touch off")')
+    page.wait_for_selector('td:text-is("73.000")')
+    assert "5221\t73.0" in (app.folder / "offsets.var").read_text()
+    page.click('.lm-TabBar-tab:visible:has-text("Preview")')
+    write(page, lines("G1 X3 F600"))  # in the work's coordinates that is beyond the travel now
+    page.wait_for_selector('.rds-verdict .rds-notice-error:has-text("beyond its travel")')

@@ -21,6 +21,8 @@ from rds.modes.loop.program import (
     OPTIONAL_STOP,
     OVERRIDE,
     RESUME,
+    SINGLE_STEP,
+    STEP,
     Happening,
     InterpolatedProgram,
     Program,
@@ -96,6 +98,7 @@ class Execution:
         self._expects = expects
         self._is_made = isinstance(program, InterpolatedProgram)
         self._values = {OVERRIDE: 1.0, HOLD: 0.0, RESUME: 0.0, HOME: 0.0, OPTIONAL_STOP: 1.0, STOP: 0.0}
+        self._values |= {SINGLE_STEP: 1.0} if isinstance(program, Program) and program.steps else {}
         self.state = self._shown = State.RUNS
         self.ending: tuple[Ending, str] | None = None
         self._next = 0  # happening
@@ -232,12 +235,17 @@ class Execution:
         elif kind == "tool" and self._turns:
             self._speed, self._changes_tool = 0.0, True
             self._await_spindle()
-        elif kind == "tool" or (kind == "stop" and not (value and not self._values[OPTIONAL_STOP])):
+        elif kind == "tool" or (kind == "stop" and self._stops(value)):
             self._await_somebody(State.TOOL if kind == "tool" else State.STOP)
         elif kind == "end":
             self._next = len(self._follower.happenings)
             self._end(Ending.DONE, "")
         return self.state is not State.RUNS or self.ending is not None
+
+    def _stops(self, value: float) -> bool:
+        if value == STEP:
+            return bool(self._values[SINGLE_STEP])
+        return not value or bool(self._values[OPTIONAL_STOP])
 
     def _await_spindle(self) -> None:
         if self._spindle_axis is not None:

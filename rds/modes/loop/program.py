@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     import numpy as np
 
 OVERRIDE, HOLD, RESUME, HOME, OPTIONAL_STOP = "override", "hold", "resume", "home", "optional_stop"
+SINGLE_STEP = "single_step"
+STEP = 2.0  # value of a stop after a line, which single step asks for
 COLUMNS = {"program_line": "", "program_sample": "", "program_override": "", "program_state": ""}
 INTERPOLATED_COLUMNS = {"program_segment": "", "program_buffer": ""}
 
@@ -23,8 +25,8 @@ INTERPOLATED_COLUMNS = {"program_segment": "", "program_buffer": ""}
 class Happening(NamedTuple):
     """What happens at a planned sample, by a line of the program.
 
-    Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0) or 1 (M1, optional);
-    "tool" its number; "end".
+    Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0), 1 (M1, optional)
+    or STEP (after a line, in single step); "tool" its number; "end".
     """
 
     sample: int
@@ -54,6 +56,7 @@ class Program:
     limits: np.ndarray
     name: str = ""
     guard: ForceGuard | None = None
+    steps: bool = False  # whether it rests after each line, for single step
     origin: Any = None  # what an experiment's path was planned from (`rds.nc.run.prepare.Prepared`), for the result
 
     @property
@@ -120,8 +123,11 @@ def dwell_samples(seconds: float, T: float) -> int:
     return ceil(seconds / T - 1e-9)
 
 
-def program_channels(fastest: float = FEED_SHARE.high) -> list[Channel]:
-    """What may be changed while a program runs, besides the parameters of controllers; `fastest` feed override."""
+def program_channels(fastest: float = FEED_SHARE.high, steps: bool = False) -> list[Channel]:
+    """What may be changed while a program runs, besides the parameters of controllers.
+
+    `fastest` feed override; `steps`: it rests after each line.
+    """
     switch = partial(Channel, low=0.0, high=1.0, whole=True)
     feed = "feed as a multiple of the programmed one; " + ("rapids only get slower" if fastest > 1.0 else "at most 1")
     return [
@@ -130,4 +136,5 @@ def program_channels(fastest: float = FEED_SHARE.high) -> list[Channel]:
         Channel(RESUME, 0.0, "another number than before goes on after M0, M1 and a tool change", low=0.0, high=1e9),
         switch(HOME, 0.0, "1 ends the program where it is and moves the axes home"),
         switch(OPTIONAL_STOP, 1.0, "1: M1 waits, 0: it does not"),
+        *([switch(SINGLE_STEP, 1.0, "1: waits after each line, 0: it does not")] if steps else []),
     ]

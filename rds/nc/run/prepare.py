@@ -25,6 +25,7 @@ from rds.nc.check import Setup, check_program, compiled_if_current
 from rds.nc.compiled_file import Compiled, open_compiled
 from rds.nc.configuration import configured
 from rds.nc.path_block import PathBlock
+from rds.nc.run.in_part import from_line, stepwise
 from rds.nc.tool_centre import ToolCentre, path_of_tip
 
 SPINDLE_UNIT = "rev/min"
@@ -80,10 +81,13 @@ def prepare(
     progress: Progress | None = None,
     profile: str = "planned",
     last: LastMade | None = None,
+    begin: int = 0,
+    steps: bool = False,
 ) -> Prepared:
     """Check the program in `file` for `machine`, and plan its motion with samples of `T` s (default: the machine's).
 
-    `profile` is one of `rds.interpolators.motion.profiles`.
+    `profile` is one of `rds.interpolators.motion.profiles`. With `begin`, the motion is that from the first move of
+    this line or a later one on, as `rds.nc.run.in_part.from_line` says. With `steps`, it waits after each line.
 
     A current compiled form beside the file is used, and made if there is none. `last` keeps what was planned, and
     nothing is planned again where all is as it was. Raises InputError with all faults if the machine cannot run it,
@@ -98,14 +102,20 @@ def prepare(
             raise InputError(str(validation))
         compiled = open_compiled(place)
     return (last or LastMade()).get(
-        (file, compiled.header, compiled.trailer, machine, T, profile),
-        lambda: _of_compiled(compiled, file, machine, setup, T, profile),
+        (file, compiled.header, compiled.trailer, machine, T, profile, begin, steps),
+        lambda: _of_compiled(compiled, file, machine, setup, T, profile, begin, steps),
     )
 
 
-def _of_compiled(compiled: Compiled, file: Path, machine: Machine, setup: Setup, T: float, profile: str) -> Prepared:
+def _of_compiled(
+    compiled: Compiled, file: Path, machine: Machine, setup: Setup, T: float, profile: str, begin: int, steps: bool
+) -> Prepared:
     require_room(least_seconds(compiled.blocks()), machine, T, file)
-    found = planned(compiled.blocks(), machine, T, file, profile)
+    blocks = from_line(compiled.blocks(), begin, file) if begin else compiled.blocks()
+    found = planned(blocks, machine, T, file, profile)
+    if steps:
+        assert isinstance(found.program, Program)
+        found = replace(found, program=stepwise(found.program))
     if (found.path["tip"] != JOINTS).any():
         own, _ = configured(file, machine, setup.options)
         found = replace(found, tip=tip_path(found.path, own, setup.on(machine, file).correct))

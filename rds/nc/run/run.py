@@ -50,6 +50,7 @@ class Status:
     measured: dict[str, float]
     reference: dict[str, float]
     tip: dict[str, float] = field(default_factory=dict)  # X, Y, Z of the tool's tip on the work, while G43.4 is on
+    to_go: dict[str, float] = field(default_factory=dict)  # to the end of the move, by axis; of moves of the joints
 
 
 class ProgramRun(Run):
@@ -97,7 +98,20 @@ class ProgramRun(Run):
             measured={name: of[f"{name}_measured"] for name in self.plan.names},
             reference={name: of[f"{name}_reference"] for name in self.plan.names},
             tip=tip,
+            to_go=self._to_go(of),
         )
+
+    def _to_go(self, of: dict[str, float]) -> dict[str, float]:
+        """How far each axis is from the end of the move that goes on; nothing on the way home, or if unknown."""
+        prepared, state = self.prepared, int(of["program_state"])
+        if prepared is None or state in (State.HOME, State.OVER) or not len(prepared.segment):
+            return {}
+        row = min(max(ceil(of["program_sample"]), 0), len(prepared.segment) - 1)
+        number = int(prepared.segment[row])
+        if not 0 <= number < len(prepared.path) or prepared.path[number]["tip"] != JOINTS:
+            return {}
+        end = prepared.path[number]["end"]
+        return {name: float(end[AXES.index(name)]) - of[f"{name}_measured"] for name in prepared.program.axes}
 
     def _tip(self, of: dict[str, float]) -> tuple[dict[str, float], float | None]:
         """Where the tip is on the work (mm), and its feed (mm/min) as wanted; nothing where joints are programmed."""
@@ -134,6 +148,11 @@ class PartProgram(Experiment):
     each segment if `exact_stop`. Else `profile` says how the motion is planned: "planned" (within the jerk, blending),
     "trapezoid", "blended" or "point-to-point".
 
+    With `begin` (a line) it is run from there: the axes go up, across and down to where the first move of this line or
+    a later one begins, with the tool, the spindle and the coolant of the lines before. With `steps` it comes to rest
+    and waits after each line (single step) until `resume()`, while its live value `single_step` is 1; its motion is
+    then "point-to-point" unless `profile` says otherwise. Both go with planned motion.
+
     With `cut` (a file, or a `CutFile`) the feed is lowered where the cutting force or a joint's load would exceed the
     limits of the cut, by the plan and by the load cell.
 
@@ -155,6 +174,8 @@ class PartProgram(Experiment):
         acceleration: Any = None,
         exact_stop: bool = False,
         profile: str = "planned",
+        begin: int = 0,
+        steps: bool = False,
         cut: str | Path | CutFile | None = None,
         experiment: str | Path | None = None,
         mode: str | None = None,
@@ -177,17 +198,20 @@ class PartProgram(Experiment):
             for key, value in (("acceleration", acceleration), ("exact_stop", exact_stop)):
                 if value:
                     raise InputError(f"{key} goes with interpolator, which is not given: planned motion needs neither")
+        elif begin or steps:
+            raise InputError("begin and steps go with planned motion, and an interpolator makes it: leave them out")
         elif profile != "planned":
             raise InputError(f"profile = {profile!r} plans the motion, and an interpolator makes it: give one of them")
 
         def prepared(machine: Machine) -> Prepared:
             if interpolator is None:
-                made = prepare(Path(file), machine, setup, T, progress, profile)
+                how = "point-to-point" if steps and profile == "planned" else profile
+                made = prepare(Path(file), machine, setup, T, progress, how, begin=begin, steps=steps)
             else:
-                how = {"interpolator": interpolator} if not isinstance(interpolator, dict) else dict(interpolator)
-                how |= {} if acceleration is None else {"acceleration": acceleration}
-                how |= {"exact_stop": True} if exact_stop else {}
-                method = method_of(TomlTable(how, WORDS), Path.cwd())
+                words = {"interpolator": interpolator} if not isinstance(interpolator, dict) else dict(interpolator)
+                words |= {} if acceleration is None else {"acceleration": acceleration}
+                words |= {"exact_stop": True} if exact_stop else {}
+                method = method_of(TomlTable(words, WORDS), Path.cwd())
                 made = as_prepared(of_part_program(Path(file), machine, setup, T, method, progress), Path(file), T)
             return made if cut is None else _guarded(made, machine, cut)
 

@@ -13,6 +13,7 @@ from rds.panels.equipment.parameters import Parameters
 from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.equipment.taken_up import TakenUpRun
+from rds.panels.scene.scene import MachineScene
 from rds.panels.session.live_values import LiveValues
 from rds.results import Result, html
 
@@ -28,7 +29,7 @@ class LiveView:
 
     def __init__(self, machine: Machine, parameters: Parameters):
         """In `parameters` the values of a run can be changed while it goes on."""
-        self._machine, self._parameters = machine, parameters
+        self._parameters = parameters
         self._run: EquipmentRun | TakenUpRun | None = None
         self._traces: list[tuple[str, str]] = []
         self._is_live = False  # whether the run's values can be changed now
@@ -37,15 +38,11 @@ class LiveView:
         self.strip = StripChart()
         self.strip.layout.display = "none"
         self.hint = widgets.HTML(_HINT)
-        self.show_machine = widgets.ToggleButton(
-            description="Show the machine", tooltip="Axes and spindle in motion, as the strip shows them"
-        )
-        self.show_machine.layout = {"width": "auto", "align_self": "flex-start"}
-        self.show_machine.observe(lambda change: self._toggle(change["new"]), "value")
-        self.picture = widgets.VBox([])
-        self._view: Any = None  # the machine's picture, once somebody wants it
+        self.scene = MachineScene(machine)
         self._changes = widgets.HTML()
-        self.widget = widgets.VBox([self.hint, self.strip, self._changes, self.show_machine, self.picture])
+        beside = widgets.Box([self.strip, self.scene])
+        beside.add_class("rds-live")
+        self.widget = widgets.VBox([self.hint, beside, self._changes])
 
     def follow(self, run: EquipmentRun | TakenUpRun) -> None:
         """Show this run from its beginning."""
@@ -67,16 +64,14 @@ class LiveView:
             self.strip.layout.display = ""
             self.strip.begin(traces)
             self._stand_behind()
-            if self._view is not None:
-                self._view.begin(traces)
+            self.scene.begin(traces, run.real_time)
         if self._traces and len(rows := run.new_rows()):
             self.strip.add(rows)
+            self.scene.add(rows)
         if run.real_time and not self._is_live and run.live_values:
             self._is_live = True
             self._parameters.show_live(LiveValues(run), isinstance(run, EquipmentRun))
         self._list_changes(run)
-        if self._view is not None and self.show_machine.value:
-            self._view.show(self.strip.at(self.strip.shown))
 
     def show_ghost(self, result: Result | None, name: str) -> None:
         """Let an earlier run stand behind the strip, until another one does, or None."""
@@ -110,16 +105,6 @@ class LiveView:
         """Where a run ended early, and why; a fault in red."""
         if run.result is not None:
             self.strip.events = [*self.strip.events, *end_marks(run.result)]
-
-    def _toggle(self, on: bool) -> None:
-        self.strip.tells = on
-        if on and self._view is None:
-            from rds.panels.equipment.machine_view import view_of
-
-            self._view = view_of(self._machine)
-            self._view.begin(self._traces)
-            self.strip.observe(lambda _: self._view.show(self.strip.at(self.strip.shown)), "shown")
-        self.picture.children = [self._view.widget] if on else []
 
 
 def ghost_rows(result: Result, traces: Sequence[tuple[str, str]]) -> np.ndarray:

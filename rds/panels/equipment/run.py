@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rds.core.errors import ContractError, InputError
+from rds.core.errors import ContractError, InputError, RdsError
 from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.experiment import Experiment, FailedRun
 from rds.modes.experiment.experiment_file import PATHS
@@ -96,6 +96,9 @@ class EquipmentRun:
                     )
                 except ContractError as error:  # what there is up to the fault is a result
                     self.result = error.result if isinstance(error, FailedRun) else recorded(self.folder)
+                    raise
+                except RdsError as error:
+                    raise_stopped(task, error)
                     raise
             finally:
                 self.session.give_machine_back(self)
@@ -244,6 +247,12 @@ class EquipmentRun:
     def changes(self) -> list[Any]:
         """The changes that the loop has taken: time in s, name, old value, new value each."""
         return list(self._run.changes) if self._run is not None else []
+
+
+def raise_stopped(task: Task[Any], error: RdsError) -> None:
+    """Raise Stopped in the place of what a loop says that was stopped before its first sample."""
+    if task.stopping and type(error) is RdsError:
+        raise Stopped from error
 
 
 def recorded(folder: Path) -> Result | None:

@@ -17,6 +17,7 @@ import traitlets
 
 from rds.core.colours import BLUE, QUANTITIES
 from rds.core.types import Ending
+from rds.panels.kit.row_stream import RowStream
 from rds.results import Result
 
 _STATIC = Path(__file__).parent / "static"
@@ -24,9 +25,7 @@ DASHES: tuple[list[int], ...] = ([], [9, 4], [3, 3], [9, 3, 3, 3])  # by axis, o
 _LANES = {"error": "error", "voltage": "voltage", "target": "target", "contour error": "contour error"}
 _WEIGHTS = {"position": 1.8, "voltage": 0.9, "target": 0.9}  # how high a lane is, beside 1
 _ORDER = ("position", "error", "contour error", "voltage", "target")  # of the lanes, from the top
-RATE = 100.0  # rows a second that are sent
 MOST_GHOST = 5_000  # rows of an earlier run that are sent, at most twice as many
-KEPT = 200_000  # rows kept for a page that is shown again
 
 
 @cache
@@ -45,13 +44,10 @@ class StripChart(anywidget.AnyWidget):
     height = traitlets.Int(430).tag(sync=True)  # px of all lanes together
     events: Any = traitlets.List([]).tag(sync=True)  # marks: {"time": s, "text": what happened, "fault": red?}
     ghost = traitlets.Unicode("").tag(sync=True)  # the name of an earlier run that stands behind; none: ""
-    tells = traitlets.Bool(False).tag(sync=True)  # whether the page says in `shown` which time it shows
-    shown = traitlets.Float(0.0).tag(sync=True)  # s, the right edge
 
     def __init__(self, **options: Any):
         super().__init__(_esm=_module(), _style=(_STATIC / "uPlot.min.css").read_text(encoding="utf-8"), **options)
-        self._rows = np.empty((0, 1))
-        self._next = -np.inf
+        self._stream = RowStream()
         self._ghost = np.empty((0, 1))
         self.on_msg(self._asked)
 
@@ -59,15 +55,13 @@ class StripChart(anywidget.AnyWidget):
         """Empty, with these traces: (name, unit) each, in lanes by quantity and unit."""
         self.events = []
         self.traces = dressed(traces)
-        self._rows = np.empty((0, len(traces) + 1))
-        self._next = -np.inf
+        self._stream = RowStream(len(traces))
         self.send({"kind": "clear"})
 
     def add(self, rows: np.ndarray) -> None:
-        """More rows, (n, 1 + traces); those that come faster than RATE are thinned."""
-        chosen = self._thinned(np.asarray(rows, dtype=float))
+        """More rows, (n, 1 + traces)."""
+        chosen = self._stream.add(rows)
         if len(chosen):
-            self._rows = np.concatenate((self._rows, chosen))[-KEPT:]
             self._deliver(chosen)
 
     def stand_behind(self, rows: np.ndarray, name: str) -> None:
@@ -75,19 +69,6 @@ class StripChart(anywidget.AnyWidget):
         self._ghost = rows[:: max(1, len(rows) // MOST_GHOST)]
         self.ghost = name if len(rows) else ""
         self._deliver_ghost()
-
-    def at(self, time: float) -> np.ndarray:
-        """The row that was sent last before `time` (s); empty where there is none."""
-        index = int(np.searchsorted(self._rows[:, 0], time + 1e-9)) - 1
-        return self._rows[index] if index >= 0 else np.empty(0)
-
-    def _thinned(self, rows: np.ndarray) -> np.ndarray:
-        keep = []
-        for index, time in enumerate(rows[:, 0]):
-            if time >= self._next - 1e-9:
-                keep.append(index)
-                self._next = time + 1.0 / RATE
-        return rows[keep]
 
     def _deliver(self, rows: np.ndarray) -> None:
         self.send({"kind": "rows", "width": rows.shape[1]}, [np.ascontiguousarray(rows, dtype="<f8").tobytes()])
@@ -100,8 +81,8 @@ class StripChart(anywidget.AnyWidget):
         """A page that has just been shown asks for everything so far."""
         if content == {"kind": "all"}:
             self.send({"kind": "clear"})
-            if len(self._rows):
-                self._deliver(self._rows)
+            if len(self._stream.rows):
+                self._deliver(self._stream.rows)
             if len(self._ghost):
                 self._deliver_ghost()
 

@@ -19,6 +19,7 @@ from rds.panels.kit.ticker import Ticker
 from rds.panels.page.colours import Colours
 from rds.panels.page.emergency import emergency_stop
 from rds.panels.page.keys import Keys
+from rds.panels.page.language import Language
 from rds.panels.page.presence import Presence
 from rds.panels.page.rescue import Rescue
 from rds.panels.registry import PANELS
@@ -61,7 +62,8 @@ class Shell:
         self._rescue = Rescue()
         self.colours = Colours(self._darken)
         self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
-        unseen = [self.presence, self.colours, Keys(), widgets.HTML(_style())]
+        self.language = Language(session)
+        unseen = [self.presence, self.colours, self.language, Keys(), widgets.HTML(_style())]
         self.widget = widgets.VBox([*unseen, self._corner(), self._head(), self._notice, body, self._rescue])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick
@@ -122,7 +124,7 @@ class Shell:
         tip = "Let the modules be used again after an emergency stop"
         release = order(self, "Release", tip, self._release, self)
         guide = button("Help", "The page of the documentation on this panel", self._help, self)
-        head = widgets.HBox([self._title, guide, self.colours.button, release])
+        head = widgets.HBox([self._title, self.language.choice, guide, self.colours.button, release])
         head.add_class("rds-head")
         return head
 

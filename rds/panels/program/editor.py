@@ -29,6 +29,7 @@ class Editor(anywidget.AnyWidget):
     label = traitlets.Unicode("part program").tag(sync=True)
     marks: Any = traitlets.List([]).tag(sync=True)
     running = traitlets.Int(0).tag(sync=True)  # the line that runs; 0: none
+    caret = traitlets.Int(1).tag(sync=True)  # the line that the cursor is in
     locked = traitlets.Bool(False).tag(sync=True)
     height = traitlets.Int(380).tag(sync=True)  # px
 

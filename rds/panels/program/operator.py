@@ -22,20 +22,29 @@ _OVERRIDE = "The override"
 
 
 class Operator:
-    """A row of buttons. `run()` is called for Run; `work` is what they act on, None when nothing runs."""
+    """A row of buttons. `run()` is called for Run, `run_from()` for a run from the line that the cursor is in.
 
-    def __init__(self, shell: Any, choices: Choices, notice: Notice, run: Callable[[], None]):
+    `work` is what they act on, None when nothing runs.
+    """
+
+    def __init__(
+        self, shell: Any, choices: Choices, notice: Notice, run: Callable[[], None], run_from: Callable[[], None]
+    ):
         self._choices, self._notice = choices, notice
         self.work: ProgramWork | None = None
         self.bar = WorkBar(shell.ticker)
         tip = "Save the program and run it in the mode chosen"
         self.run_button = run_order(shell, tip, run, notice, choices)
+        tip = "Run from the line that the cursor is in: up, across and down to where it begins"
+        self.from_button = run_order(shell, tip, run_from, notice, choices, "Run from line")
+        self.from_button.remove_class("rds-run")  # Ctrl+Enter runs all of it
+        self.step = FieldView(choices, "single_step")
         tip = "Come to rest on the path"
         self.hold_button = halt("Hold", tip, partial(self._do, "Hold", ProgramWork.hold), notice)
         self.resume_button, self.home_button = (
             order(shell, text, tip, partial(self._do, text, act), notice)
             for text, tip, act in (
-                ("Resume", "Go on after a hold, M0, M1 or a tool change", ProgramWork.resume),
+                ("Resume", "Go on after a hold, M0, M1, a tool change or a single step", ProgramWork.resume),
                 ("Home", "End the program where it is, go up and move home", ProgramWork.home),
             )
         )
@@ -43,17 +52,18 @@ class Operator:
         self._in_time = shell.presence.in_time
         self.override = OverrideSlider(self._ask, value=choices["override"], tip=tip)
         choices.watch(self._chosen)
-        buttons = [self.run_button, self.hold_button, self.resume_button, self.home_button]
+        buttons = [self.run_button, self.from_button, self.hold_button, self.resume_button, self.home_button]
         self.mode = FieldView(choices, "mode")
         self.mode.add_class("rds-program-mode")
-        self.widget = row(*buttons, self.mode, self.override, self.bar)
+        self.widget = row(*buttons, self.mode, self.step, self.override, self.bar)
         self.enable()
 
     def enable(self) -> None:
         """Only what has a sense now can be pressed."""
         work = self.work
         operable = work is not None and work.operable
-        self.run_button.disabled = work is not None
+        self.run_button.disabled = self.from_button.disabled = work is not None
+        self.step.disabled = work is not None and not work.steps  # a run that was not begun with it rests nowhere
         held = operable and work is not None and work.held
         status = work.status() if operable and work is not None else None
         waits = status is not None and status.state.name in ("STOP", "TOOL")
@@ -71,6 +81,8 @@ class Operator:
     def _chosen(self, name: str) -> None:
         if name == "override":
             self.override.value = self._choices["override"]
+        elif name == "single_step" and self.work is not None and self.work.steps:
+            self._do("Single step", lambda work: work.step(bool(self._choices["single_step"])))
 
     def _ask(self, percent: float, ordered: bool) -> None:
         """So much feed: less at once, more only in time, as it would come unexpected later."""

@@ -10,16 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.errors import ContractError, InputError
+from rds.core.errors import ContractError, InputError, RdsError
 from rds.modes.experiment.experiment import FailedRun
+from rds.modes.loop.program import SINGLE_STEP
 from rds.nc.check import Setup
 from rds.nc.run.report import save_run
 from rds.nc.run.run import PartProgram, ProgramRun, Status
-from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors, recorded
+from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors, raise_stopped, recorded
 from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session
 from rds.panels.session.task import Task
 from rds.results import Result
+
+_MOVED = ("_reference", "_measured", "_modelled")
 
 
 class ProgramWork(EquipmentRun):
@@ -40,7 +43,7 @@ class ProgramWork(EquipmentRun):
         prepare: Callable[[Callable[[], None]], None] | None = None,
         motion: Mapping[str, Any] | None = None,
     ):
-        """`motion` is what `PartProgram` is told of an interpolator; nothing for planned motion."""
+        """`motion` is what `PartProgram` is told of an interpolator, or of a run in part; else nothing."""
         super().__init__(session, {"mode": mode}, f"{file.name}, {mode}", prepare)
         self.file, self.mode = file, mode
         self.folder = session.folder / RUNS / f"{time.strftime('%Y%m%d-%H%M%S')}-{file.stem}-{self.folder.name[-4:]}"
@@ -52,7 +55,7 @@ class ProgramWork(EquipmentRun):
             try:
                 if self._prepare is not None:
                     self._prepare(lambda: self._tell(task, "checking the controller's file"))
-                self._tell(task, "reading the program" if self._motion else "planning the program")
+                self._tell(task, "reading the program" if "interpolator" in self._motion else "planning the program")
                 part = PartProgram(
                     self.file,
                     self.session.machine,
@@ -75,6 +78,9 @@ class ProgramWork(EquipmentRun):
                     )
                 except ContractError as error:  # what there is up to the fault is a result
                     self.result = error.result if isinstance(error, FailedRun) else recorded(self.folder)
+                    raise
+                except RdsError as error:
+                    raise_stopped(task, error)
                     raise
             finally:
                 self.session.give_machine_back(self)
@@ -134,6 +140,15 @@ class ProgramWork(EquipmentRun):
         """Feed as a multiple of the programmed one, 0 to 2."""
         self.program_run.override(share)
 
+    @property
+    def steps(self) -> bool:
+        """Whether it can rest after each line."""
+        return self.operable and SINGLE_STEP in self.program_run.desk
+
+    def step(self, on: bool) -> None:
+        """Rest after each line from now on, or no more."""
+        self.program_run.desk.set(SINGLE_STEP, float(on))
+
     def home(self) -> None:
         """End the program where it is, and move home."""
         self.program_run.home()
@@ -143,7 +158,12 @@ class ProgramWork(EquipmentRun):
         run = self._run
         return run.status() if isinstance(run, ProgramRun) and not run.done else None
 
-    # the strip
+    # the strip, and the machine
+
+    def moved(self) -> list[tuple[str, str]]:
+        """What `new_rows` gives after the traces: the motion of the axes that the program moves, and of the spindle."""
+        columns, units = self._columns()
+        return [(name, units.get(name, "")) for name in columns if name.endswith(_MOVED)]
 
     def traces(self) -> list[tuple[str, str]]:
         """The following error of each axis, and the contour error; none before the loop has begun."""
@@ -155,12 +175,13 @@ class ProgramWork(EquipmentRun):
         return [*found, ("contour_error", "mm")]
 
     def new_rows(self) -> np.ndarray:
-        """Rows recorded since it was last asked: time in s, then one column per trace; thinned to STRIP_RATE."""
+        """Rows since it was last asked, thinned to STRIP_RATE: time in s, the traces, then what has `moved`."""
         columns, _ = self._columns()
         rows = self._new(columns)
         prepared = self.prepared
         if not len(rows) or prepared is None:
-            return np.empty((0, 1 + len(self.traces())))
+            return np.empty((0, 1 + len(self.traces()) + len(self.moved())))
         of = dict(zip(columns, rows[:: max(round(1.0 / (STRIP_RATE * prepared.T)), 1)].T, strict=True))
         errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in prepared.program.axes]
-        return np.column_stack([of["time"], *errors, contour_errors(of, prepared)])
+        moved = [of[name] for name, _ in self.moved()]
+        return np.column_stack([of["time"], *errors, contour_errors(of, prepared), *moved])

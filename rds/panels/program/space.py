@@ -10,12 +10,15 @@ import numpy as np
 
 from rds.machines import Machine
 from rds.nc.trace import CURVED, RAPID, STRAIGHT, Trace
-from rds.panels.equipment.machine_view import box_lines
 from rds.panels.program.path_view import travel_of
 
 _COLORS = {RAPID: 0xD55E00, STRAIGHT: 0x0072B2, CURVED: 0x009E73}
 _TOOL = 0xCC79A7
 _MOST = 20_000  # pieces of a kind that are drawn
+
+
+_FRAME = 0x8A8A8A
+_EDGES = ((0, 1), (2, 3), (4, 5), (6, 7), (0, 2), (1, 3), (4, 6), (5, 7), (0, 4), (1, 5), (2, 6), (3, 7))
 
 
 class SpaceView:
@@ -31,7 +34,7 @@ class SpaceView:
             axes=["X", "Y", "Z"],  # with units they do not fit in the corner
             grid_visible=True,
         )
-        self._plot += box_lines(low, high)
+        self._plot += _box_lines(low, high)
         self._tool = k3d.points(np.zeros((1, 3), np.float32), point_size=0.02 * self._size, color=_TOOL, shader="mesh")
         self._plot += self._tool
         self._lines: list[object] = []
@@ -72,3 +75,10 @@ def _pieces(points: np.ndarray) -> np.ndarray:
     pairs = np.stack((points[:-1][whole], points[1:][whole]), axis=1)
     chosen: np.ndarray = pairs[:: len(pairs) // _MOST + 1].astype(np.float32)
     return chosen
+
+
+def _box_lines(low: np.ndarray, high: np.ndarray) -> object:
+    """The travel of all axes."""
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    edges = np.array(_EDGES, dtype=np.uint32)
+    return k3d.lines(corners.astype(np.float32), edges, indices_type="segment", color=_FRAME, shader="simple")

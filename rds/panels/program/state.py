@@ -46,6 +46,7 @@ def _fields(folder: Path) -> Iterable[Field]:
     yield Text("file", "Program", "the part program that is open", found[0] if found else FIRST, FIRST, 120, check_name)
     yield mode_choice("controller")
     yield _table_field(folder)
+    yield _offsets_field(folder)
     yield Text(
         "controller",
         "Controller of the axes",
@@ -59,20 +60,29 @@ def _fields(folder: Path) -> Iterable[Field]:
     tip = "of the programmed feed, for a run's start and while it runs; rapids only get slower"
     yield Number.of(FEED_OVERRIDE, "override", "Feed override", tooltip=tip)
     yield from motion_fields()
+    tip = "come to rest after each line, and wait for Resume; a run with it takes longer"
+    yield Flag("single_step", "Single step", tip, False)
     yield Flag("optional_stop", "Stop at M1", "whether M1 waits for Resume", True)
     for name, (label, tip) in OPTIONS.items():
         yield Flag(name, label, tip, False)
 
 
 def _table_field(folder: Path) -> Choice:
+    tip = "a .tbl file of your folder, as LinuxCNC keeps it, lengths in mm"
+    return Choice("tools", "Tool table", tip, NO_TABLE, _files(folder, ".tbl"))
+
+
+def _offsets_field(folder: Path) -> Choice:
+    tip = "a .var file of your folder, as LinuxCNC keeps it: where the origins of G54 to G59.3 are"
+    return Choice("parameters", "Parameter file", tip, NO_TABLE, _files(folder, ".var"))
+
+
+def _files(folder: Path, suffix: str) -> dict[str, str]:
     try:
-        found = sorted(each.name for each in folder.iterdir() if each.suffix.lower() == ".tbl" and each.is_file())
+        found = sorted(each.name for each in folder.iterdir() if each.suffix.lower() == suffix and each.is_file())
     except OSError:
         found = []
-    options = {NO_TABLE: "none"} | {name: name for name in found}
-    return Choice(
-        "tools", "Tool table", "a .tbl file of your folder, as LinuxCNC keeps it, lengths in mm", NO_TABLE, options
-    )
+    return {NO_TABLE: "none"} | {name: name for name in found}
 
 
 class Program:
@@ -110,7 +120,7 @@ class Program:
             except InputError as error:
                 self.trouble = str(error)
                 self.choices.set("file", self.text.name)
-        if name in ("file", "tools", *OPTIONS):
+        if name in ("file", "tools", "parameters", *OPTIONS):
             self.look_again()
 
     # the text
@@ -221,22 +231,36 @@ class Program:
         from rds.nc.check import Setup
         from rds.nc.language.dialect import Dialect
 
-        table = str(self.choices["tools"])
-        options = Dialect(**{name: bool(self.choices[name]) for name in OPTIONS})
-        return Setup(self.session.folder / table if table else None, options=options)
+        folder = self.session.folder
+        tools, parameters = (folder / name if name else None for name in map(self._named, ("tools", "parameters")))
+        return Setup(tools, parameters, Dialect(**{name: bool(self.choices[name]) for name in OPTIONS}))
+
+    def _named(self, name: str) -> str:
+        return str(self.choices[name])
 
     def refresh(self) -> None:
-        """Look for tool tables that have come or gone."""
-        self.choices.replace([_table_field(self.session.folder)])
+        """Look for tool tables and parameter files that have come or gone."""
+        folder = self.session.folder
+        found = (_table_field(folder), _offsets_field(folder))
+        self.choices.replace([each for each in found if each != self.choices.fields[each.name]])
 
     # running it
 
-    def run(self) -> ProgramWork:
-        """The run of the program, saved first, to be started; InputError with the reason where it cannot run."""
-        from rds.panels.program.run import ProgramWork
+    def run(self, begin: int = 0) -> ProgramWork:
+        """The run of the program, saved first, to be started, from line `begin` on (0: all of it).
 
+        InputError with the reason where it cannot run.
+        """
         if self.latest is not None and not self.looking and not self.latest.ok:
             raise InputError(f"it cannot run yet: {self.latest.sentence}")
+        if self.text.changed:
+            self.save()
+        return self.work_of(self.text.path, begin)
+
+    def work_of(self, file: Path, begin: int) -> ProgramWork:
+        """The run of a program as the choices say, to be started."""
+        from rds.panels.program.run import ProgramWork
+
         share = float(self.choices["override"]) / 100.0
         if share == 0.0:
             raise InputError("an override of 0 % never moves; begin with more, and hold while it runs")
@@ -250,14 +274,16 @@ class Program:
                 "this page has a bus of its own, which programs are not run on here; `rds nc run --controller "
                 "experiment.toml` with its [bus] does"
             )
-        if self.text.changed:
-            self.save()
+        steps = bool(self.choices["single_step"])
+        if motion and (begin or steps):
+            raise InputError("single step, and a run from a line, go with planned motion; choose it in Settings")
         changes = [(0.0, "override", share)] if share != 1.0 else []
         changes += [] if self.choices["optional_stop"] else [(0.0, "optional_stop", 0.0)]
         T = self.machine.sample_period
         prepare = (lambda pulse: self.builds.require(files, T, pulse)) if files else None
         mode = str(self.choices["mode"])
-        return ProgramWork(self.session, self.text.path, mode, self.setup(), controller, changes, prepare, motion)
+        motion |= {"begin": begin, "steps": steps} if begin or steps else {}
+        return ProgramWork(self.session, file, mode, self.setup(), controller, changes, prepare, motion)
 
     def _motion(self) -> tuple[dict[str, Any], list[tuple[str, Path]]]:
         """What `PartProgram` is told of an interpolator, and the user's file of it; nothing for planned motion."""

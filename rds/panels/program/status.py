@@ -13,7 +13,7 @@ from rds.nc.run.run import Status
 STATES = (
     "runs",
     "held",
-    "stops (M0 or M1): Resume goes on",
+    "stops (M0, M1 or single step): Resume goes on",
     "waits for the tool: change it, then Resume",
     "dwells",
     "waits for the spindle",
@@ -26,17 +26,24 @@ _NEAR = 0.05  # of the travel: nearer to a limit than this is said
 def status_html(status: Status | None, modes: Mapping[int, Modes], machine: Machine, override: float) -> str:
     """The display; dashes where nothing is known. `override` in per cent."""
     now = None if status is None else modes_at(modes, status.line)
-    return _head(status, override) + _positions(status, now, machine) + _modes(now)
+    return _head(status, override, now) + _positions(status, now, machine) + _modes(now)
 
 
-def _head(status: Status | None, override: float) -> str:
+def _head(status: Status | None, override: float, modes: Modes | None) -> str:
     if status is None:
         return '<p class="rds-state" role="status">Nothing runs. Positions show here as soon as a run has begun.</p>'
     return (
         f'<p class="rds-state" role="status"><b>Line {status.line}</b> {STATES[status.state]} · '
         f"{status.time:.1f} s · {status.share:.0%} of the program</p>"
-        f'<p class="rds-state">Feed <b>{status.feed:.0f}</b> mm/min, override {override:.0f} %</p>'
+        f'<p class="rds-state">Feed <b>{status.feed:.0f}</b> mm/min{_wanted(modes)}, override {override:.0f} %</p>'
     )
+
+
+def _wanted(modes: Modes | None) -> str:
+    """The feed as programmed, where it is one by the minute in mm."""
+    if modes is None or not {"G94", "G21"} <= {*modes.words} or not modes.feed:
+        return ""
+    return f" of {modes.feed:g}"
 
 
 def _positions(status: Status | None, modes: Modes | None, machine: Machine) -> str:
@@ -52,15 +59,18 @@ def _positions(status: Status | None, modes: Modes | None, machine: Machine) -> 
         if axis.unit == "rev/min":
             wanted = None if status is None else status.reference.get(name)
             rows.append(
-                f"<tr><td>{escape(name.capitalize())}</td><td>{_number(at, 0)}</td>"
-                f'<td colspan="2">rev/min, {_number(wanted, 0)} wanted</td></tr>'
+                f'<tr><th scope="row">{escape(name.capitalize())}</th><td class="rds-dro">{_number(at, 0)}</td>'
+                f'<td colspan="3">rev/min, {_number(wanted, 0)} wanted</td></tr>'
             )
             continue
         digits = 3 if axis.unit == "mm" else 2
-        cells = [f"{escape(name)} [{escape(axis.unit)}]", _number(at, digits), _number(work.get(name), digits)]
-        cells.append(_bar(at, low, high, axis.unit))
-        rows.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
-    head = "<tr><th>Axis</th><th>Machine</th><th>Work</th><th>Within the travel; to the nearest limit</th></tr>"
+        to_go = None if status is None else status.to_go.get(name)
+        large = f'<td class="rds-dro">{_number(work.get(name, at), digits)}</td>'
+        cells = [_number(to_go, digits), _number(at, digits), _bar(at, low, high, axis.unit)]
+        rest = "".join(f"<td>{cell}</td>" for cell in cells)
+        rows.append(f'<tr><th scope="row">{escape(name)} <small>{escape(axis.unit)}</small></th>{large}{rest}</tr>')
+    heads = ("Axis", "Work", "To go", "Machine", "Within the travel; to the nearest limit")
+    head = f"<tr>{''.join(f'<th scope=col>{each}</th>' for each in heads)}</tr>"
     return f'<table class="rds-positions">{head}{"".join(rows)}</table>'
 
 

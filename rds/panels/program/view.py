@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import ipywidgets as widgets
+import numpy as np
 
+from rds.modes.loop.execution import State
+from rds.nc.run.run import Status
 from rds.panels.equipment.result_view import timing_line
 from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.interpolator.motion import MADE
@@ -15,16 +19,20 @@ from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
 from rds.panels.program.editor import Editor
 from rds.panels.program.files import ProgramFiles
+from rds.panels.program.mdi import Mdi
 from rds.panels.program.operator import Operator
 from rds.panels.program.preview import Preview
 from rds.panels.program.result import ProgramResult
 from rds.panels.program.run import ProgramWork
+from rds.panels.program.setup_view import SetupView
 from rds.panels.program.state import OPTIONS, Program
 from rds.panels.program.status import status_html
+from rds.panels.program.stock import cutting_path, stock_of, tool_of
 from rds.panels.program.tool_view import ToolView
+from rds.panels.scene.scene import MachineScene
 
-TABS = ("Preview", "Run", "Result", "Settings, tools")
-PREVIEW, RUN, RESULT, SETTINGS = range(len(TABS))
+TABS = ("Preview", "Machine", "Result", "Touch off", "MDI", "Settings, tools")
+PREVIEW, MACHINE, RESULT, SETUP, MDI, SETTINGS = range(len(TABS))
 
 
 class ProgramView:
@@ -41,11 +49,16 @@ class ProgramView:
         self.editor.text = self.program.text.text
         self.editor.observe(self._typed, "text")
         self.files = ProgramFiles(self.program, self.notice, self._opened)
-        self.operator = Operator(shell, self.program.choices, self.notice, self.start)
+        self.operator = Operator(shell, self.program.choices, self.notice, self.start, self.start_from_cursor)
         self.preview = Preview(self.program)
         self.status = widgets.HTML()
         self.strip = StripChart(height=170)
         self.strip.layout.display = "none"
+        self.scene = MachineScene(self.program.machine)
+        self._latest: Status | None = None  # of the run that goes on, or of the last one
+        self._at: dict[str, float] = {}  # where the axes were measured last
+        self.setup = SetupView(self.program, lambda: self._at)
+        self.mdi = Mdi(shell, self.program, self._begin, self.notice)
         self.result = ProgramResult(shell, self.editor.go)
         self.tools = ToolView(self.program)
         self.program.choices.watch(self._chosen)
@@ -63,11 +76,13 @@ class ProgramView:
         self._show_motion()
         settings = field_group(choices, ["controller", "coupled", "optional_stop", *OPTIONS])
         more = widgets.VBox([motion, settings, self.tools.widget])
-        run = widgets.VBox([self.status, self.strip])
-        self.tabs = widgets.Tab([self.preview.widget, run, self.result.widget, more], titles=TABS)
+        run = widgets.VBox([self.scene, self.strip])
+        run.add_class("rds-live")
+        pages = [self.preview.widget, run, self.result.widget, self.setup.widget, self.mdi.widget, more]
+        self.tabs = widgets.Tab(pages, titles=TABS)
         self.tabs.add_class("rds-tabs")
         self.tabs.observe(self._turned, "selected_index")
-        left, right = widgets.VBox([self.editor]), widgets.VBox([self.tabs])
+        left, right = widgets.VBox([self.editor]), widgets.VBox([self.status, self.tabs])
         left.add_class("rds-program-left")
         right.add_class("rds-main")
         columns = self._columns = widgets.HBox([left, right])
@@ -115,6 +130,15 @@ class ProgramView:
         (self._columns.add_class if change["new"] == RESULT else self._columns.remove_class)("rds-program-wide")
         if change["new"] == SETTINGS:
             self.tools.refresh()
+        elif change["new"] == SETUP:
+            self.setup.refresh()
+
+    def _lay_stock(self, look: Look) -> None:
+        """Stock about what the program cuts, with room for the tool, and the part that it is meant to become."""
+        self.scene.tool = tool_of(look, self.program)
+        found = stock_of(look, self.program, float(self.scene.tool["diameter"]))
+        self.scene.stock = found
+        self.scene.intend(cutting_path(look) if found else np.empty((0, 3)))
 
     # ten times a second
 
@@ -130,26 +154,39 @@ class ProgramView:
     def _found(self, look: Look) -> None:
         self.editor.mark(look.marks)
         self.preview.show(look)
+        self._lay_stock(look)
 
     # running
 
-    def start(self) -> None:
-        """What the run button does."""
+    def start(self, begin: int = 0) -> None:
+        """What the run button does; from line `begin` on."""
         if self.work is not None:
             return
         self.notice.clear()
         try:
-            work = self.program.run()
-            work.start()
+            work = self.program.run(begin)
         finally:
             self.files.refresh()
+        self._begin(work)
+
+    def start_from_cursor(self) -> None:
+        """Run from the line that the cursor is in."""
+        self.start(self.editor.caret)
+
+    def _begin(self, work: ProgramWork) -> None:
+        if self.work is not None:
+            return
+        self.notice.clear()
+        work.start()
         self.work = self.operator.work = work
+        self._latest = None
         self._ran = self.program.text.text
         self._traced = self._shown = False
         self.editor.locked = True
         self.result.clear()
         self.notice.say("the run begins")
-        self.tabs.selected_index = RUN
+        if self.tabs.selected_index not in (PREVIEW, MACHINE, MDI):
+            self.tabs.selected_index = PREVIEW
         self.operator.enable()
         self.operator.bar.follow(work, lambda: attempt("showing the run", self._ended, self.notice))
 
@@ -161,9 +198,12 @@ class ProgramView:
         if not self._traced and (traces := work.traces()):
             self._traced = True
             self.strip.layout.display = ""
+            self._wide = 1 + len(traces)
             self.strip.begin(traces)
+            self.scene.begin([traces[-1], *work.moved()], work.real_time)
         if self._traced and len(rows := work.new_rows()):
-            self.strip.add(rows)
+            self.strip.add(rows[:, : self._wide])
+            self.scene.add(np.delete(rows, np.s_[1 : self._wide - 1], axis=1))  # time, contour error, the motion
         if work.result is not None and not self._shown:
             self._show(work)
 
@@ -171,13 +211,19 @@ class ProgramView:
         status = self.work.status() if self.work is not None else None
         if status is None and self.work is not None:
             return  # between start and first sample, and after the last one
+        self._display(status)
+        if status is not None:
+            self._latest = status
+            self._at = {name: at for name, at in status.measured.items() if name in "XYZ"}
+            assert self.work is not None
+            self.editor.running = status.line if self.work.file == self.program.text.path else 0
+            self.preview.place([status.measured.get(name, 0.0) for name in "XYZ"])
+
+    def _display(self, status: Status | None) -> None:
         modes = self.program.latest.modes if self.program.latest is not None else {}
         shown = status_html(status, modes, self.program.machine, float(self.program.choices["override"]))
         if shown != self.status.value:
             self.status.value = shown
-        if status is not None:
-            self.editor.running = status.line
-            self.preview.place([status.measured.get(name, 0.0) for name in "XYZ"])
 
     def _show(self, work: ProgramWork) -> None:
         """The loop is over; its files are still being written."""
@@ -195,7 +241,8 @@ class ProgramView:
         else:
             self.notice.say(f"done: {len(result)} samples", "good")
         self.result.show(work)
-        self.tabs.selected_index = RESULT
+        if self.tabs.selected_index == PREVIEW:  # whoever looks at something else is left there
+            self.tabs.selected_index = RESULT
 
     def _ended(self) -> None:
         work = self.work
@@ -206,9 +253,12 @@ class ProgramView:
             self.work = self.operator.work = None
             self.operator.enable()
             self.editor.locked, self.editor.running = False, 0
+        if self._latest is not None:  # where it ended stays in sight
+            self._display(replace(self._latest, state=State.OVER))
         if work.stopped_early:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif work.error is not None:
             say_error("the run", work.error, self.notice)
         self.result.saved(work)
+        self.mdi.ended(work)
         self.files.refresh()

@@ -99,13 +99,14 @@ class Session:
                 self.say(f"choices are not kept: {error}", "warning")
 
     def refresh(self) -> None:
-        """Take over the choices that another page of this folder has kept since."""
+        """Take over the choices that another page of this folder has kept since, and defaults where none is kept."""
         kept = self._read_kept()
         if kept == self._kept:
             return
         self._kept = kept
         for panel, choices in self._choices.items():
-            choices.load(kept.get(panel, {}))
+            defaults = {name: field.default for name, field in choices.fields.items() if "." not in name}
+            choices.load(defaults | kept.get(panel, {}))
 
     def _read_kept(self) -> dict[str, dict[str, Any]]:
         path = self.folder / KEPT

@@ -49,7 +49,7 @@ function render({ model, el }) {
     return made;
   };
   const hold = () => { if (follows) { follows = false; speed = 0; } };
-  const scrub = slider("time shown", () => { follows = false; speed = 0; end = first() + (last() - first()) * scrub.value / 1000; dirty = true; });
+  const scrub = slider("time shown", () => { follows = false; speed = 0; end = first() + (last() - first()) * scrub.value / 1000; place().dispatchEvent(new CustomEvent("rds-time", { detail: { from: "strip", time: end } })); dirty = true; });
   const clock = document.createElement("span");
   clock.className = "rds-strip-clock";
   bar.append(
@@ -105,7 +105,7 @@ function render({ model, el }) {
     lanes.forEach((lane, i) => {
       const of = traces.flatMap((trace, k) => (trace.scale === lane ? [k] : []));
       const isLast = i === lanes.length - 1;
-      const axes = [{ stroke: text, grid, label: isLast ? "time [s]" : undefined, labelSize: isLast ? 18 : 0, size: isLast ? AXIS - 2 : 4, values: isLast ? undefined : (u, shown) => shown.map(() => "") },
+      const axes = [{ stroke: text, grid, label: isLast ? say("time [s]") : undefined, labelSize: isLast ? 18 : 0, size: isLast ? AXIS - 2 : 4, values: isLast ? undefined : (u, shown) => shown.map(() => "") },
         { scale: "y", stroke: text, grid, size: 58, labelSize: 18, label: axisLabel(of.map((k) => traces[k])), space: 22 }];
       const series = [{ label: "time [s]", value: (u, v) => (v == null ? "–" : v.toFixed(3)) }];
       of.forEach((k) => series.push({
@@ -139,16 +139,21 @@ function render({ model, el }) {
     });
   }
   const sync = `rds-strip-${Math.random()}`;
+  // what the machine beside it shows is marked, and it shows what is scrubbed to
+  const place = () => el.closest(".rds-live") || el;
+  let beside = null;
+  const heard = ({ detail }) => { if (detail.from === "scene") { beside = detail.time; dirty = true; } };
   let moved = 0, downAt = 0;
   box.addEventListener("mousedown", (event) => { downAt = event.clientX; }, true);
   box.addEventListener("mouseup", (event) => { moved = Math.abs(event.clientX - downAt); }, true);
 
   const laneName = (traces, lane) => traces.find((trace) => trace.scale === lane).lane || lane;
+  const say = (text) => (window.rdsText ? window.rdsText(text) : text); // in the page's language, where it is drawn
   // the legend names each trace; an axis names the quantity, and its unit
   function axisLabel(traces) {
     const of = new Set(traces.map((trace) => trace.name.split(" ")[0]));
     const lane = traces[0].lane || traces[0].name;
-    return `${of.size === 1 && lane !== traces[0].name ? `${[...of][0]} ` : ""}${lane} [${traces[0].unit}]`;
+    return say(`${of.size === 1 && lane !== traces[0].name ? `${[...of][0]} ` : ""}${lane} [${traces[0].unit}]`);
   }
 
   // marks of what happened, and the cursors
@@ -168,6 +173,7 @@ function render({ model, el }) {
       ctx.restore();
     };
     for (const event of model.get("events")) line(event.time, event.fault ? ink("--rds-error", "#a4001d") : ink("--rds-warning", "#8a4b00"), event.fault ? [] : [3, 3], event.text);
+    if (beside !== null) line(beside, ink("--rds-quiet", "#57606a"), [], "");
     if (marks) marks.forEach((time, i) => line(time, ink("--rds-accent", "#00598c"), [], "AB"[i]));
   }
 
@@ -230,7 +236,6 @@ function render({ model, el }) {
     el.dataset.from = left().toFixed(3);
     el.dataset.ghost = ghost ? ghost.name : "";
     tell();
-    if (model.get("tells") && model.get("shown") !== end) { model.set("shown", end); model.save_changes(); }
   }
 
   function tell() {
@@ -302,7 +307,7 @@ function render({ model, el }) {
     return found;
   }
   function receive(message, buffers) {
-    if (message.kind === "clear") { columns = [[], ...model.get("traces").map(() => [])]; follows = true; speed = 1; end = 0; wide = model.get("window"); }
+    if (message.kind === "clear") { columns = [[], ...model.get("traces").map(() => [])]; beside = null; el.dataset.samples = 0; follows = true; speed = 1; end = 0; wide = model.get("window"); }
     if (message.kind === "rows") {
       const more = unpacked(buffers[0], message.width);
       if (columns.length !== message.width) columns = more;
@@ -321,13 +326,14 @@ function render({ model, el }) {
   model.on("msg:custom", receive);
   model.on("change:traces", () => { hidden = new Set(); rebuild(); });
   model.on("change:window", () => { wide = model.get("window"); dirty = true; });
-  model.on("change:tells change:events", () => { dirty = true; });
+  model.on("change:events", () => { dirty = true; });
   const themed = new MutationObserver(rebuild);
   themed.observe(document.body, { attributes: true, attributeFilter: ["class", "data-jp-theme-light"] });
   const app = document.querySelector(".rds-app");
-  if (app) themed.observe(app, { attributes: true, attributeFilter: ["class"] });
-  requestAnimationFrame(() => { build(); model.send({ kind: "all" }); });
-  return () => { clearInterval(timer); themed.disconnect(); model.off("msg:custom", receive); plots.forEach(({ plot }) => plot.destroy()); };
+  if (app) themed.observe(app, { attributes: true, attributeFilter: ["class", "lang"] });
+  let around = null;
+  requestAnimationFrame(() => { around = place(); around.addEventListener("rds-time", heard); build(); model.send({ kind: "all" }); });
+  return () => { clearInterval(timer); around?.removeEventListener("rds-time", heard); themed.disconnect(); model.off("msg:custom", receive); plots.forEach(({ plot }) => plot.destroy()); };
 }
 
 export default { render };

@@ -119,6 +119,11 @@ function render({ model, el }) {
     timer = setTimeout(send, QUIET_MS);
     redraw();
   });
+  const caret = () => {
+    const line = area.value.slice(0, area.selectionStart).split("\n").length;
+    if (line !== model.get("caret")) { model.set("caret", line); model.save_changes(); }
+  };
+  for (const each of ["keyup", "click"]) area.addEventListener(each, caret);
   area.addEventListener("blur", send);
   area.addEventListener("scroll", redraw);
   area.addEventListener("keydown", (event) => {

@@ -1,0 +1,79 @@
+"""The machine in motion as a widget: what it looks like goes to the page once, rows of a run as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import anywidget
+import numpy as np
+import traitlets
+
+from rds.machines import Machine
+from rds.panels.kit.row_stream import RowStream
+from rds.panels.scene.bodies import scene_of
+
+_STATIC = Path(__file__).parent / "static"
+_PARTS = ("frames.js", "draw.js", "stock.js", "scene.js")
+TOOL = 6.0  # mm, the diameter of a tool that no table names
+
+
+@cache
+def _module() -> str:
+    return "\n".join((_STATIC / name).read_text(encoding="utf-8") for name in _PARTS)
+
+
+class MachineScene(anywidget.AnyWidget):
+    """`begin(traces, live)`, then `add(rows)` as they come: time (s) and one value per trace.
+
+    A run that goes on is shown as it comes (`live`), another one is played. Nothing is sent before somebody looks.
+    """
+
+    _esm = traitlets.Unicode().tag(sync=True)
+    _css = traitlets.Unicode().tag(sync=True)
+    scene: Any = traitlets.Dict().tag(sync=True)
+    columns: Any = traitlets.List([]).tag(sync=True)  # of the rows, after the time
+    live = traitlets.Bool(False).tag(sync=True)
+    shows = traitlets.Bool(False).tag(sync=True)
+    stock: Any = traitlets.Dict().tag(sync=True)  # {"low": [x, y, z], "high": [x, y, z]}, mm, in the work's frame
+    tool: Any = traitlets.Dict({"diameter": TOOL, "ball": False}).tag(sync=True)
+
+    def __init__(self, machine: Machine, **options: Any):
+        css = (_STATIC / "scene.css").read_text(encoding="utf-8")
+        super().__init__(_esm=_module(), _css=css, scene=scene_of(machine), **options)
+        self._stream = RowStream()
+        self._intended = np.empty((0, 3), dtype="<f4")
+        self.on_msg(self._asked)
+
+    def begin(self, traces: Sequence[tuple[str, str]], live: bool) -> None:
+        """Empty, with these traces: (name, unit) each."""
+        self.live = live
+        self.columns = [name for name, _ in traces]
+        self._stream = RowStream(len(traces))
+        self.send({"kind": "clear"})
+
+    def add(self, rows: np.ndarray) -> None:
+        """More rows, (n, 1 + traces)."""
+        chosen = self._stream.add(rows)
+        if len(chosen) and self.shows:
+            self._deliver(chosen)
+
+    def intend(self, points: np.ndarray) -> None:
+        """The path that the part is meant to be cut along: points (n, 3), mm, nan rows between polylines."""
+        self._intended = np.ascontiguousarray(points, dtype="<f4")
+        if self.shows:
+            self.send({"kind": "intended"}, [self._intended.tobytes()])
+
+    def _deliver(self, rows: np.ndarray) -> None:
+        self.send({"kind": "rows", "width": rows.shape[1]}, [np.ascontiguousarray(rows, dtype="<f8").tobytes()])
+
+    def _asked(self, _: Any, content: Any, __: Any) -> None:
+        """A page that begins to look asks for everything so far."""
+        if content == {"kind": "all"}:
+            self.send({"kind": "clear"})
+            if len(self._stream.rows):
+                self._deliver(self._stream.rows)
+            if len(self._intended):
+                self.send({"kind": "intended"}, [self._intended.tobytes()])

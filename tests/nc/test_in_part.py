@@ -1,0 +1,50 @@
+"""A program begun at one of its lines, and one that waits after each of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rds.core.errors import InputError
+from rds.modes.loop.program import STEP
+from rds.nc.run.run import PartProgram
+
+PROGRAM = "G21 G90 G94\nM3 S1000\nG0 Z5\nG1 Z-1 F300\nG1 X10\nY10\n(a remark)\nX0\nG0 Z8\nM2\n"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "part.ngc"
+    path.write_text(PROGRAM)
+    return path
+
+
+def test_a_run_from_a_line_goes_up_across_and_down_and_cuts_the_rest(file: Path) -> None:
+    whole, part = PartProgram(file), PartProgram(file, begin=7)
+    rest = whole.prepared.path[whole.prepared.path["line"] >= 8]
+    path = part.prepared.path
+    ends = [[0, 0, 5], [10, 10, 5], [10, 10, -1]]  # up to the highest point of the lines before, not of those after
+    assert path["end"][:3, :3].tolist() == ends
+    assert path["rapid"][:3].tolist() == [True, True, False] and path["rate"][2] == 5.0  # down by feed, mm/s
+    assert np.array_equal(path[3:], rest)
+    assert [(each.kind, each.value) for each in part.prepared.program.happenings[:1]] == [("spindle", 1000.0)]
+    result = part.run()
+    assert set(result["program_line"]) == {2.0, 8.0, 9.0} and result["X_measured"][-1] == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_line_after_the_last_move_and_an_interpolator_are_refused(file: Path) -> None:
+    with pytest.raises(InputError, match="nothing moves from line 10 on; the last line that moves is 9"):
+        PartProgram(file, begin=10)
+    with pytest.raises(InputError, match="go with planned motion"):
+        PartProgram(file, steps=True, interpolator="constant-velocity")
+
+
+def test_single_step_rests_after_each_line_that_moves(file: Path) -> None:
+    program = PartProgram(file, steps=True).prepared.program
+    stops = [each for each in program.happenings if each.value == STEP]
+    assert [each.line for each in stops] == [3, 4, 5, 6, 8]  # the last move is followed by the end
+    for each in stops:
+        assert not program.velocity[each.sample].any()
+    assert [each.sample for each in program.happenings] == sorted(each.sample for each in program.happenings)

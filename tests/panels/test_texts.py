@@ -1,0 +1,125 @@
+"""The panels in other languages: every text of theirs is in the file, and the page is in the chosen language."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import ipywidgets as widgets
+import pytest
+
+from rds.machines import machine_names
+from rds.machines.library import library
+from rds.panels.page import language
+from rds.panels.page.shell import Shell
+from rds.panels.registry import PANELS
+from rds.panels.session import Session
+from rds.panels.texts import languages, texts
+
+SCRIPT = Path(language.__file__).parent / "static" / "texts.js"
+APART = ("style", "code", "pre", "svg", "math")
+# names of files, machines, modules and examples are the same in every language, and so are words of G-code
+NAME = re.compile(
+    r"[\w./-]+\.(?:py|csv|ngc|toml|tbl|var)|G\d.*|[A-Z]|[-\d.]+( to [-\d.]+)? ?\S{0,8}|\S+@\S+|g[₁₂]|– \S+"
+)
+
+
+class Words(HTMLParser):
+    """The texts of some HTML, and those of its titles."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self._apart = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._apart += tag in APART
+        self.found += [value for name, value in attrs if name in ("title", "aria-label") and value]
+
+    def handle_endtag(self, tag: str) -> None:
+        self._apart -= tag in APART
+
+    def handle_data(self, data: str) -> None:
+        if not self._apart:
+            self.found.append(data)
+
+
+def said_by(widget: Any) -> Iterator[str]:
+    """What a widget and those in it say."""
+    names = ("description", "tooltip", "placeholder", "tip", "label")
+    found = [value for name in names if isinstance(value := getattr(widget, name, None), str)]
+    for name in ("tooltips", "_options_labels", "titles"):
+        found += map(str, getattr(widget, name, None) or ())
+    if isinstance(widget, widgets.HTML):
+        words = Words()
+        words.feed(widget.value)
+        found += words.found
+    yield from found
+    for child in getattr(widget, "children", ()) or ():
+        yield from said_by(child)
+
+
+@pytest.fixture
+def exchange(new_page: Callable[..., Any]) -> Callable[[str, list[str]], list[str | None]]:
+    """What the page makes of some texts in a language."""
+    page = new_page(400, 300)
+    page.set_content("<html></html>")
+    script = SCRIPT.read_text(encoding="utf-8").replace("export default", "window.made =")
+    page.add_script_tag(content=f"{script}\nwindow.exchanger = exchanger;")
+    run = "([table, all]) => { const one = exchanger(table); return all.map(one); }"
+    return lambda code, all_of: list(page.evaluate(run, [texts(code), all_of]))
+
+
+@pytest.mark.parametrize("code", list(languages()))
+def test_every_text_of_every_panel_is_in_the_file(code: str, exchange: Callable[..., Any], tmp_path: Path) -> None:
+    shell = Shell(Session(tmp_path))
+    for name in PANELS.names():
+        if name != "help":  # the documents are in English
+            shell.open(name)
+    said = {" ".join(text.split()) for each in (shell.widget, *shell.panels.values()) for text in said_by(each)}
+    known = {*machine_names(), *library(), shell.session.machine, str(tmp_path), "English", *languages().values()}
+    said = {text for text in said if re.search(r"[^\W\d_]{2}", text) and text not in known and not NAME.fullmatch(text)}
+    found = dict(zip(sorted(said), exchange(code, sorted(said)), strict=True))
+    assert not [text for text, put in found.items() if put is None]
+    assert len(said) > 600
+
+
+def test_values_and_parts_are_put_where_they_belong(exchange: Callable[..., Any]) -> None:
+    said = [
+        "Amplitude [mm]",
+        "middle to peak (from 0 to 75 mm)",
+        " done: 250 samples ",
+        "12.5",
+        "my_file.py",
+        "X error [mm]:",
+    ]
+    assert exchange("de", said) == [
+        "Amplitude [mm]",
+        "von der Mitte bis zum Scheitel (von 0 bis 75 mm)",
+        " fertig: 250 Abtastschritte ",
+        None,
+        None,
+        "X Fehler [mm]:",
+    ]
+
+
+def test_the_page_is_in_the_language_that_is_chosen_and_back_again(
+    second_app: Any, open_page: Callable[..., Any]
+) -> None:
+    (second_app.folder / "session.json").write_text(json.dumps({"page": {"language": "de"}}))
+    page = open_page(on=second_app)
+    page.wait_for_selector('.rds-nav button:text-is("Regelung")')
+    page.click('.rds-nav button:text-is("Regelung")')
+    page.wait_for_selector('.rds-title h1:text-is("Regelung")')
+    page.get_by_label("Endzeit").fill("0.25")
+    page.keyboard.press("Control+Enter")
+    page.wait_for_selector('.rds-notice:has-text("fertig: 250 Abtastschritte"):visible')
+    assert page.get_attribute("html", "lang") == "de"
+    page.select_option(".rds-language select", label="English")
+    page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
+    page.wait_for_selector('button:visible:text-is("Run")')
+    assert page.get_attribute("html", "lang") == "en"
