@@ -45,6 +45,27 @@ def self_(
 
 
 @app.command()
+@writes_files
+def new(
+    folder: Annotated[Path, typer.Argument(help="The new folder of the assignment.")],
+    kind: Annotated[str, typer.Option(help="controller, model, interpolator or functions.")] = "controller",
+    title: Annotated[str, typer.Option(help="Its title; by default the folder's name.")] = "",
+    json: Json = False,
+) -> None:
+    """Start an assignment that passes its check, to be changed into your own."""
+    with refusals():
+        from rds.grading.assignment.new import new_assignment
+
+        files = new_assignment(folder, kind, title)
+    if json:
+        print_json({"files": [str(path) for path in files]})
+    else:
+        for path in files:
+            typer.echo(f"wrote {path}")
+        typer.echo(f"change it, then: rds grade check {folder}")
+
+
+@app.command()
 def check(
     assignment: Folder,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="Students whose plants the solution is tried on.")] = 20,

@@ -13,13 +13,18 @@ from rds.cli.common import Json, print_json, refusals, writes_files
 @writes_files
 def export(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder that `rds grade run -o` made.")],
-    to: Annotated[str, typer.Option(help="nbgrader, moodle, canvas, gradescope or prairielearn.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            help="nbgrader, moodle, moodle-feedback, canvas, brightspace, blackboard, gradescope or prairielearn."
+        ),
+    ],
     file: Annotated[
         Path | None, typer.Option("--out", "-o", help="The file, or folder, to write; by default a new one in OUT.")
     ] = None,
     gradebook: Annotated[
         Path | None,
-        typer.Option(help="Your gradebook: as downloaded from Canvas or Moodle, or nbgrader's gradebook.db."),
+        typer.Option(help="Your gradebook: as your platform exports it, or nbgrader's gradebook.db."),
     ] = None,
     column: Annotated[str | None, typer.Option(help="Its column; by default the assignment's title.")] = None,
     points: Annotated[float | None, typer.Option(min=0.0, help="What full marks are to be there.")] = None,

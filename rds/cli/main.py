@@ -28,6 +28,7 @@ from rds.cli import (
     forces,
     grade,
     grade_export,
+    grade_lti,
     grade_review,
     grade_run,
     interpolate,
@@ -107,6 +108,7 @@ app.add_typer(design.app, name="design")
 app.add_typer(grade.app, name="grade")
 grade.app.command()(grade_run.run)
 grade.app.command()(grade_export.export)
+grade.app.command()(grade_lti.lti)
 grade.app.command()(grade_review.review)
 grade.app.command()(grade_review.regrade)
 grade.app.command()(grade_review.best)

@@ -26,6 +26,8 @@ _PACKAGES = {
     "dask": ("cluster", "dask"),
     "pyseccomp": ("grading", "pyseccomp"),
     "nbformat": ("grading", "nbformat"),
+    "pylti1p3": ("lti", "pylti1p3next"),
+    "cryptography": ("lti", "pylti1p3next"),
     "yaml": ("grading", "pyyaml"),
     **{name: ("lab", name) for name in ("ipywidgets", "jupyterlab", "voila", "ipympl", "anywidget", "k3d")},
     **{name: ("lab", name) for name in ("sphinx", "furo")},

@@ -18,10 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_ORDERS = (1, 2, 3, 4, 6, 8)
+# 0 first: of a law without memory that rounds, any pole would fit that a zero beside it takes back, unstable ones too
+_ORDERS = (0, 1, 2, 3, 4, 6, 8)
 _EXACT = 1e-6  # of the answer: what departs less is the law itself
 _ROUNDS = 4  # of the iteration
-_FEW = 4  # orders that are tried for an exact law
+_FEW = 5  # orders that are tried for an exact law
 _PER_UNKNOWN = 4  # samples, at least
 _BEFORE = 16  # samples before a part
 _BETTER, _ENOUGH = 0.9, 2  # higher orders are tried until so many in a row do not depart less by a tenth

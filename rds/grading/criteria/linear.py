@@ -198,7 +198,7 @@ def _answers(fit: LawFit, model: Model, T: float, samples: int) -> tuple[np.ndar
         y = motion.read()
         last_y = [y, *last_y[:-1]]
         u = _dot(b, last_y) - _dot(a, last_u)
-        last_u = [u, *last_u[:-1]]
+        last_u = [u, *last_u][: len(a)]
         if not abs(y) < _FAR:
             break
         voltages.append(u)

@@ -18,8 +18,12 @@ GRADEBOOKS = Registry(
         {
             "nbgrader": "rds.grading.exports.nbgrader",
             "moodle": "rds.grading.exports.moodle",
+            "moodle-feedback": "rds.grading.exports.moodle_feedback",
             "canvas": "rds.grading.exports.canvas",
+            "brightspace": "rds.grading.exports.brightspace",
+            "blackboard": "rds.grading.exports.blackboard",
             "gradescope": "rds.grading.exports.gradescope",
+            "lti": "rds.grading.exports.lti",
             "prairielearn": "rds.grading.exports.prairielearn",
         }
     ),

@@ -18,6 +18,7 @@ USES = ("gradebook", "column", "points")
 STUDENT = ("Student", "ID", "SIS User ID", "SIS Login ID", "Integration ID", "Root Account", "Section")
 _NEEDED = ("Student", "ID", "Section")
 _POINTS = "points possible"
+_EXCUSED = "EX"  # Canvas's own word for a student who needs no grade
 _KEYS = (
     Key("ID", lambda grade: platform(grade, "canvas", "id")),
     Key("SIS User ID", lambda grade: [grade.student, *source(grade, "sid")]),
@@ -48,7 +49,10 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     kept = [place for name in STUDENT if (place := sheet.at(name)) is not None]
     heading = sheet.columns[at] if at is not None else wanted.column or finished.title
     rows = [[*(row[k] for k in kept), _head_cell(row, at, finished, factor)] for row in head]
-    rows += [[*(people.rows[number][k] for k in kept), scaled(found[number].score, factor)] for number in sorted(found)]
+    points = {number: scaled(grade.score, factor) for number, grade in found.items()}
+    excused, _ = find(finished.excused, people, _KEYS)
+    points |= dict.fromkeys(excused, _EXCUSED)
+    rows += [[*(people.rows[number][k] for k in kept), points[number]] for number in sorted(points)]
     made = Sheet([*(sheet.columns[k] for k in kept), heading], rows, sheet.has_mark)
     notes = () if at is not None else (f"the gradebook has no column {heading!r}: Canvas will ask what it is",)
     return Exported({FILE: made.to_bytes()}, unmatched, notes, len(found))

@@ -18,7 +18,7 @@ from rds.grading.grade import Grade
 FILE = "moodle.csv"
 USES = ("gradebook", "column", "points")
 _WORKSHEET = ("Identifier", "Grade", "Last modified (grade)")
-_KEYS = (
+KEYS = (
     Key("Identifier", lambda grade: platform(grade, "moodle", "id"), lambda cell: cell.rpartition(" ")[2]),
     Key("ID number", lambda grade: [grade.student, *source(grade, "sid", "id")]),
     Key("Email address", lambda grade: [*source(grade, "email"), grade.student]),
@@ -41,7 +41,7 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
         )
     at = _column(sheet, finished, wanted, is_worksheet)
     factor = scale(finished, wanted.points)
-    found, unmatched = find(finished.to_hand_on, sheet, _KEYS)
+    found, unmatched = find(finished.to_hand_on, sheet, KEYS)
     comments = sheet.at("Feedback comments")
     for number, grade in found.items():
         row = sheet.rows[number]

@@ -13,6 +13,7 @@ from rds.core.errors import InputError
 from rds.grading.grade import Grade
 
 _LARGEST = 64 << 20  # bytes
+_MARK = "\ufeff"  # byte order mark
 Row = list[str]
 
 
@@ -23,6 +24,7 @@ class Sheet:
     columns: Row
     rows: list[Row]
     has_mark: bool  # whether it begins with a byte order mark
+    form: tuple[str, str] = ("utf-8", ",")  # its encoding, and what stands between cells
 
     def at(self, column: str) -> int | None:
         """The place of a column, whatever its capitals; None if there is none."""
@@ -31,10 +33,11 @@ class Sheet:
         return names.index(wanted) if wanted in names else None
 
     def to_bytes(self) -> bytes:
-        """As CSV, every cell as it is: it is the platform's own."""
+        """As it came, every cell as it is: it is the platform's own."""
         stream = io.StringIO()
-        csv.writer(stream, lineterminator="\r\n").writerows([self.columns, *self.rows])
-        return stream.getvalue().encode("utf-8-sig" if self.has_mark else "utf-8")
+        encoding, delimiter = self.form
+        csv.writer(stream, delimiter=delimiter, lineterminator="\r\n").writerows([self.columns, *self.rows])
+        return (_MARK if self.has_mark else "").encode(encoding) + stream.getvalue().encode(encoding)
 
 
 def read_sheet(path: Path) -> Sheet:
@@ -43,8 +46,12 @@ def read_sheet(path: Path) -> Sheet:
         if path.stat().st_size > _LARGEST:
             raise InputError(f"has more than {_LARGEST} bytes; name the gradebook as it was downloaded", str(path))
         data = path.read_bytes()
-        text = data.decode("utf-8-sig")
-        rows = [row for row in csv.reader(io.StringIO(text, newline=""), strict=True) if any(row)]
+        encoding = "utf-16-le" if data.startswith(_MARK.encode("utf-16-le")) else "utf-8"
+        text = data.decode(encoding)
+        has_mark, text = text.startswith(_MARK), text.removeprefix(_MARK)
+        head = text.partition("\n")[0]
+        delimiter = "\t" if head.count("\t") > head.count(",") else ","
+        rows = [row for row in csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=delimiter) if any(row)]
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}; name the gradebook's CSV file", str(path)) from error
     except (UnicodeDecodeError, csv.Error) as error:
@@ -54,7 +61,7 @@ def read_sheet(path: Path) -> Sheet:
     width = len(rows[0])
     if any(len(row) > width and any(row[width:]) for row in rows):
         raise InputError("has rows that are longer than its headings; download it once more", str(path))
-    return Sheet(rows[0], [(row + [""] * width)[:width] for row in rows[1:]], data.startswith(b"\xef\xbb\xbf"))
+    return Sheet(rows[0], [(row + [""] * width)[:width] for row in rows[1:]], has_mark, (encoding, delimiter))
 
 
 @dataclass(frozen=True)

@@ -237,7 +237,8 @@ def _said(words: list[str], pulse: Callable[[], None]) -> str:
 
 
 def _gradebooks() -> dict[str, str]:
-    return labels(GRADEBOOKS.names(), {"nbgrader": "nbgrader", "prairielearn": "PrairieLearn"})
+    own = {"nbgrader": "nbgrader", "prairielearn": "PrairieLearn", "lti": "LTI 1.3"}
+    return labels(GRADEBOOKS.names(), own | {"moodle-feedback": "Moodle: feedback files"})
 
 
 def _fields() -> Iterable[Field]:

@@ -1,0 +1,79 @@
+"""Brightspace: a file to import (Grades, Enter Grades, Import), with the points of one grade item.
+
+Its columns are those of Brightspace's own sample: OrgDefinedId and Username, the item's name followed by "Points
+Grade", and the end-of-line indicator. From an exported gradebook only the students' own columns and the item's are
+taken, so that no other grade can change.
+"""
+
+from __future__ import annotations
+
+import re
+
+from rds.core.errors import InputError
+from rds.grading.batch.finished import Finished
+from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source
+
+FILE = "brightspace.csv"
+USES = ("gradebook", "column", "points")
+_END, _MARK = "End-of-Line Indicator", "#"
+_IDS = ("OrgDefinedId", "Username")
+_ITEM = re.compile(r"(?P<name>.*) Points Grade(?: <(?P<about>.*)>)?\s*", re.IGNORECASE)
+_MOST = re.compile(r"MaxPoints:([0-9.]+)", re.IGNORECASE)
+
+
+def _bare(cell: str) -> str:
+    return cell.strip().removeprefix(_MARK)  # Brightspace writes it before every OrgDefinedId and Username
+
+
+_KEYS = (
+    Key("OrgDefinedId", lambda grade: [*source(grade, "sid"), grade.student], _bare),
+    Key("Username", lambda grade: [grade.student, *source(grade, "email", "sid")], _bare),
+    Key("Email", lambda grade: [*source(grade, "email"), grade.student]),
+)
+
+
+def export(finished: Finished, wanted: Wanted) -> Exported:
+    """The file. InputError for a gradebook that is none of Brightspace's, or whose item has other points."""
+    wanted.refuse_all_but(USES, "brightspace")
+    factor, item = scale(finished, wanted.points), wanted.column or finished.title
+    if wanted.gradebook is None:
+        heads = ["Username", f"{item} Points Grade", _END]
+        rows = [[_text(grade.student), scaled(grade.score, factor), _MARK] for grade in finished.to_hand_on]
+        note = "students are known by Username; with --gradebook FILE they are found in your own export"
+        return Exported({FILE: Sheet(heads, rows, False).to_bytes()}, notes=(note,), students=len(rows))
+    sheet = read_sheet(wanted.gradebook)
+    kept = [at for name in _IDS if (at := sheet.at(name)) is not None]
+    if not kept:
+        raise InputError(f"has neither {_IDS[0]} nor {_IDS[1]}; export the grades with both", str(wanted.gradebook))
+    heading = _heading(sheet, item, finished, factor, wanted)
+    found, unmatched = find(finished.to_hand_on, sheet, _KEYS)
+    rows = [[*(sheet.rows[row][at] for at in kept), scaled(found[row].score, factor), _MARK] for row in sorted(found)]
+    made = Sheet([*(sheet.columns[at] for at in kept), heading, _END], rows, sheet.has_mark)
+    known = any(_ITEM.fullmatch(name) and heading == name for name in sheet.columns)
+    notes = () if known else (f"the gradebook has no item {item!r}: Brightspace will offer to create it",)
+    return Exported({FILE: made.to_bytes()}, unmatched, notes, len(found))
+
+
+def _heading(sheet: Sheet, item: str, finished: Finished, factor: float, wanted: Wanted) -> str:
+    """The item's column as Brightspace wrote it, if it is there and its points are ours."""
+    for name in sheet.columns:
+        found = _ITEM.fullmatch(name)
+        if found is None or found["name"].strip().casefold() != item.strip().casefold():
+            continue
+        most = _MOST.search(found["about"] or "")
+        if most and abs(float(most[1]) - finished.max_score * factor) > 1e-6 * max(1.0, float(most[1])):
+            raise InputError(
+                f"MaxPoints of {item!r} are {most[1]}, and full marks are {finished.max_score * factor:g}; give "
+                "--points "
+                f"{most[1]} to have them scaled",
+                str(wanted.gradebook),
+            )
+        return name
+    if wanted.column is not None:
+        raise InputError(f"has no item {item!r}; there are {', '.join(sheet.columns)}", str(wanted.gradebook))
+    return f"{item} Points Grade"
+
+
+def _text(name: str) -> str:
+    return f"{_MARK}{name}"
