@@ -452,7 +452,7 @@ PARTS = {
             """),
             "rds/cli/main.py": [
                 Line("    grade_run,", "    hello,"),
-                Line("app.command()(modules.scan)", "app.command()(hello.hello)"),
+                Line("app.command()(scan.scan)", "app.command()(hello.hello)"),
             ],
         },
         command(["hello"], "done.output"),

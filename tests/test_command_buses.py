@@ -45,6 +45,16 @@ def test_the_bit_rate_of_an_adapter_reaches_the_command(
     done = CliRunner().invoke(app, [*words, "--experiment", str(experiment(tmp_path, ADAPTER))])
     assert done.exit_code == code, done.output
     assert told(opened) == {("virtual", 0, 250_000)}
+    opened.clear()
+    (tmp_path / "log.asc").unlink(missing_ok=True)
+    done = CliRunner().invoke(app, [*words, "--interface", "virtual", "--channel", "0", "--bitrate", "250000"])
+    assert done.exit_code == code, done.output
+    assert told(opened) == {("virtual", "0", 250_000)}
+
+
+def test_a_bit_rate_is_no_serial_lines() -> None:
+    done = CliRunner().invoke(app, ["scan", "--interface", "serial", "--bitrate", "250000"])
+    assert done.exit_code == 2 and "--bitrate is for CAN" in done.stderr
 
 
 def test_a_monitor_reckons_the_load_by_the_bit_rate_of_the_table(opened: list[Any], tmp_path: Path) -> None:

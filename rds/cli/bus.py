@@ -168,11 +168,13 @@ def replay(
                 progress=lambda so_far: show(so_far.sent),
             )
     if json:
-        print_json({**vars(result), "path": str(file), "skipped_lines": log.skipped})
+        print_json({**vars(result), "path": str(file), "skipped_lines": log.skipped, "impossible": log.impossible})
     else:
         typer.echo(f"{result.sent} frames in {result.seconds:.1f} s, at most {result.latest * 1e3:.1f} ms late")
     for reason, number in result.skipped.items():
         _say(f"{number} frame{' was' if number == 1 else 's were'} left out: {reason}")
+    if log.impossible:
+        _say(f"{log.impossible} frames of the log were left out: no bus could carry them (identifier, or length)")
     if log.skipped:
         _say(f"{log.skipped} lines of the log describe no frame and were passed over")
     raise typer.Exit(0)

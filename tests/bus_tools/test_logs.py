@@ -222,8 +222,6 @@ CSV_HEAD = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
     [
         ("a.log", "(1.5) can0 123#11\n(2.5) can0 123#1\n", 2),
         ("a.log", "(1.5) can0 123#11\n(2.5) can0 12", 2),
-        ("a.log", "(1.5) can0 123#112233445566778899\n", 1),
-        ("a.log", "(1.5) can0 FFF#11\n", 1),
         ("a.log", "  can0  123   [2]  11 22\n", 1),
         ("a.log", "(1.5) can0 12345678#1G\n", 1),
         ("a.log", "\x89PNG\x00\xff", 1),
@@ -255,6 +253,14 @@ def test_a_damaged_line_is_named(name: str, text: str, line: int, tmp_path: Path
     with pytest.raises(InputError) as caught:
         list(LogFile(Path(f"{path}.gz")))
     assert str(caught.value).startswith(f"{path}.gz:{line}: ")
+
+
+@pytest.mark.parametrize("impossible", ["123#112233445566778899", "FFF#11"])
+def test_a_frame_that_no_bus_could_carry_is_left_out_and_counted(impossible: str, tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text(f"(1.5) can0 123#11\n(1.6) can0 {impossible}\n(1.7) can0 124#22\n")
+    log = LogFile(tmp_path / "a.log")
+    assert [message.arbitration_id for message in log] == [0x123, 0x124]
+    assert log.impossible == 1 and log.skipped == 0
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +11,9 @@ from pathlib import Path
 
 import can
 import pytest
+from typer.testing import CliRunner
 
+from rds import Experiment
 from rds.bus.modules.cia402 import first_motion
 from rds.bus.modules.cia402.commissioned import experiment_text
 from rds.bus.modules.cia402.commissioning import Commissioned, Declined, Wishes, commission
@@ -20,8 +23,9 @@ from rds.bus.modules.cia402.lss import give_node_id
 from rds.bus.modules.cia402.node import DriveNode
 from rds.bus.modules.cia402.scan import scan
 from rds.bus.modules.cia402.settings import read_settings
+from rds.cli.main import app
 from rds.core.errors import InputError, MachineError
-from rds.machines import Machine
+from rds.machines import Machine, load_machine
 
 from .conftest import Abort, Rig
 
@@ -198,3 +202,22 @@ def test_parameters_are_kept_until_they_are_restored(rig: Rig) -> None:
 def test_the_mapping_of_a_table_is_one_of_two_words(machine: Machine) -> None:
     with pytest.raises(InputError, match='must be "dynamic" or "fixed"'):
         read_settings({"axis": {"X": {"mapping": "static"}}}, machine)
+
+
+@pytest.mark.realtime
+def test_the_command_writes_a_machine_and_an_experiment_that_can_be_read(
+    served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    channel, _ = served("X")
+    words = ["drive", "setup", "-o", str(tmp_path / "mill.toml"), "--yes", "--json", "--direction", "-1", "--lead", "2"]
+    words += ["--interface", "virtual", "--channel", channel, "--sample-period", str(T), "--distance", "20"]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["choices"]["counts"] == 500.0
+    machine = load_machine(str(tmp_path / "mill.toml"))
+    assert machine.axis("X").resolution == pytest.approx(0.002)
+    sine = tomllib.loads((tmp_path / "mill-sine.toml").read_text())
+    assert sine["bus"]["cia402"]["axis"]["X"]["direction"] == -1 and sine["machine"] == "mill.toml"
+    assert Experiment.from_toml(tmp_path / "mill-sine.toml").run("simulation").meta["ending"] == "done"
+    assert CliRunner().invoke(app, words).exit_code == 2  # nothing is overwritten unasked

@@ -101,3 +101,12 @@ def test_cyclic_position_with_the_librarys_sync(drive: tuple[BaseNode402, DriveN
     assert len(set(seen)) > 10, "along the positions, not in one leap"
     wait_for(lambda: abs(measured(780) - 780) <= 12)
     assert ours.drive.state == "OPERATION ENABLED"
+
+
+def test_the_librarys_block_transfer_reads_and_writes(drive: tuple[BaseNode402, DriveNode]) -> None:
+    node, _ = drive
+    with node.sdo.open(0x1008, mode="rb", block_transfer=True) as name:
+        assert name.read() == b"RDS simulated axis"
+    with node.sdo.open(0x6065, mode="wb", size=4, block_transfer=True) as window:
+        window.write((4321).to_bytes(4, "little"))
+    assert node.sdo[0x6065].raw == 4321

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from binascii import crc_hqx
 
 import pytest
 from hypothesis import given, settings
@@ -112,3 +113,75 @@ def test_no_frame_breaks_the_drive(frames: list[tuple[int, bytes, float]]) -> No
         rig.send(identifier, data)
     rig.send(0x000, b"\x81\x00")
     assert rig.read(0x1018, 2) == 0x402
+
+
+NAME = b"RDS simulated axis"
+
+
+def upload_block(rig: Rig, block: int, lost: int | None = None) -> bytes:
+    """The name by block transfer, with `block` segments at once; segment number `lost` of the first block is lost."""
+    begun = rig.sdo(struct.pack("<BHBBB2x", 0xA4, 0x1008, 0, block, 0))
+    assert begun[0] == 0xC6 and int.from_bytes(begun[4:8], "little") == len(NAME)
+    request, data = bytes([0xA3]) + bytes(7), b""
+    while True:
+        heard, last = [], False
+        for _, answer in rig.send(0x600 + rig.node, request):
+            if answer[0] & 0xC3 == 0xC1 and not answer[0] & 0x20 and not heard and last is False and request[0] == 0xA2:
+                assert int.from_bytes(answer[1:3], "little") == crc_hqx(data[: len(NAME)], 0)
+                assert not rig.send(0x600 + rig.node, bytes([0xA1]) + bytes(7))
+                return data[: len(data) - (answer[0] >> 2 & 7)]
+            if lost == answer[0] & 0x7F:
+                lost = None
+                break
+            heard.append(answer[1:])
+            last = bool(answer[0] & 0x80)
+        data += b"".join(heard)
+        request = bytes([0xA2, len(heard), block]) + bytes(5)
+
+
+@pytest.mark.parametrize("block, lost", [(127, None), (2, None), (1, None), (127, 2), (2, 1), (127, 3)])
+def test_a_name_comes_in_a_block_whatever_is_lost_of_it(rig: Rig, block: int, lost: int | None) -> None:
+    assert upload_block(rig, block, lost) == NAME
+
+
+def download_block(rig: Rig, index: int, data: bytes, crc: int | None = None) -> None:
+    begun = rig.sdo(struct.pack("<BHBI", 0xC6, index, 0, len(data)))
+    assert begun[0] == 0xA4 and begun[4] == 127
+    assert rig.sdo(bytes([0x81]) + data.ljust(7, b"\0"))[:3] == bytes([0xA2, 1, 127])
+    code = crc_hqx(data, 0) if crc is None else crc
+    assert rig.sdo(bytes([0xC1 | (7 - len(data)) << 2]) + code.to_bytes(2, "little") + bytes(5))[0] == 0xA1
+
+
+def test_a_value_goes_in_a_block(rig: Rig) -> None:
+    download_block(rig, 0x6065, (1234).to_bytes(4, "little"))
+    assert rig.read(0x6065) == 1234
+
+
+@pytest.mark.parametrize(
+    "index, data, crc, code",
+    [
+        (0x6065, b"\1\2\3\4", 0x1234, 0x05040004),  # a wrong CRC
+        (0x6065, b"\1\2", None, 0x06070013),  # too short
+        (0x1018, b"\1\2\3\4", None, 0x06090011),  # no sub-index 0 that can be written, or read only
+    ],
+)
+def test_a_block_that_cannot_be_is_refused(rig: Rig, index: int, data: bytes, crc: int | None, code: int) -> None:
+    before = rig.read(0x6065)
+    with pytest.raises(Abort) as refused:
+        download_block(rig, index, data, crc)
+    assert refused.value.code in (code, 0x06010002) and rig.read(0x6065) == before
+
+
+@pytest.mark.parametrize("request_", [b"\xa4\x08\x10\x00\x00", b"\xa3", b"\xa2\x01\x7f", b"\xa1", b"\xc1"])
+def test_a_block_out_of_its_order_is_refused(rig: Rig, request_: bytes) -> None:
+    with pytest.raises(Abort) as refused:
+        rig.sdo(request_.ljust(8, b"\0"))
+    assert refused.value.code in (0x05040001, 0x05040002)
+    assert rig.read(0x1000) == 0x20192
+
+
+def test_an_ordinary_request_ends_a_block(rig: Rig) -> None:
+    rig.sdo(struct.pack("<BHBBB2x", 0xA4, 0x1008, 0, 127, 0))
+    assert rig.read(0x1000) == 0x20192
+    with pytest.raises(Abort):
+        rig.sdo(bytes([0xA3]) + bytes(7))

@@ -18,7 +18,7 @@ _FEW = 1 << 28  # characters that a compressed log may hold in any case
 
 _CANDUMP = re.compile(
     r"\(\d+\.\d+\)\s+\S+\s+([0-9A-F]{3}|[0-9A-F]{8})#"
-    r"(R\d*|#[0-9A-F]([0-9A-F]{2}){0,64}|([0-9A-F]{2}){0,8})(\s+[RT])?",
+    r"(R\d*|#[0-9A-F]([0-9A-F]{2}){0,64}|([0-9A-F]{2}){0,64})(\s+[RT])?",
     re.IGNORECASE,
 )
 # time, channel, identifier and, if it was not cut off there, the direction: an event has a word for an identifier

@@ -11,6 +11,9 @@
 | .mf4     | ASAM MDF 4    | all                                           | nothing                       |
 | .asc.gz… | gzip of text  | as the text                                   | what `zcat` can read          |
 
+Read besides, whatever they are called: SavvyCAN's and GVRET's CSV, BusMaster's .log, CRTD (.txt, .crtd) and the .can
+of Microchip's CAN BUS Analyzer (other_logs.py).
+
 It is readable up to the last `flush()`, at most a second before. Times are exact to 1 µs in all; .asc keeps them from
 its first frame on. An error frame of .asc, too, is one and no more.
 """
@@ -35,9 +38,11 @@ from rds.bus.tools import log_lock, log_writers
 from rds.bus.tools.log_bombs import check_mf4, check_table
 from rds.bus.tools.log_lines import TEXT, Lines
 from rds.bus.tools.mf4 import asammdf_missing, bring_asammdf, close_unopened
+from rds.bus.tools.other_logs import kind_of, read_other
 from rds.core.errors import InputError
 from rds.core.private_files import open_private
 
+_OTHERS = (".txt", ".crtd", ".can")  # read only
 ENDINGS = (".asc", ".blf", ".log", ".trc", ".csv", ".db", ".mf4")
 _READERS = {".asc": can.ASCReader, ".log": can.CanutilsLogReader, ".trc": can.TRCReader, ".csv": can.CSVReader}
 _DAMAGE = (
@@ -74,23 +79,48 @@ def ending(path: Path) -> tuple[str, bool]:
 class LogFile:
     """A log to iterate over, again and again. `skipped` counts lines of the last pass that describe no frame.
 
+    `impossible` counts frames that no bus could carry, which are left out: identifiers too large, too many bytes.
+
     Raises InputError at once if there is no such file or format, and while iterating, with the line or the offset,
     where the log is damaged.
     """
 
     def __init__(self, path: str | Path):
         self.path = path = Path(path)
-        self._ending, self._packed = ending(path)
-        self.skipped = 0
+        self.skipped = self.impossible = 0
+        if path.suffix.lower() in _OTHERS and path.is_file():
+            self._ending, self._packed = path.suffix.lower(), False
+        else:
+            self._ending, self._packed = ending(path)
         if not path.is_file():
             raise InputError("there is no such log; check the name", str(path))
 
     def __iter__(self) -> Iterator[can.Message]:
         try:
-            frames = self._lines() if self._ending in TEXT else self._records()
-            yield from frames
+            self.impossible = 0
+            is_text = self._ending in TEXT or self._ending in _OTHERS
+            for message in self._texts() if is_text else self._records():
+                if _is_impossible(message):
+                    self.impossible += 1
+                else:
+                    yield message
         except OSError as error:
             raise InputError(f"it can't be read: {error.strerror or error}", str(self.path)) from error
+
+    def _texts(self) -> Iterator[can.Message]:
+        """The frames of a text, by the tool that wrote it."""
+        with self._open() as file:
+            kind = None if self._packed else kind_of(file)
+            if kind is None and self._ending in _OTHERS:
+                raise InputError("it is no log of CRTD or Microchip's CAN BUS Analyzer; is it a log?", str(self.path))
+            if kind is not None:
+                self.skipped = 0
+                yield from read_other(file, kind, str(self.path), self._skip)
+                return
+        yield from self._lines()
+
+    def _skip(self) -> None:
+        self.skipped += 1
 
     def _lines(self) -> Iterator[can.Message]:
         with self._open() as file:
@@ -163,13 +193,19 @@ def _problem(message: can.Message) -> str | None:
         message.dlc = 8  # codes 9 to 15 mean 8 too, and were taken for those of CAN FD
     if not math.isfinite(message.timestamp):
         return f"its time {message.timestamp} is no number of seconds"
-    if message.is_error_frame:
+    if message.is_error_frame or _is_impossible(message):
         return None
-    if not 0 <= message.arbitration_id <= (0x1FFFFFFF if message.is_extended_id else 0x7FF):
-        return f"identifier {message.arbitration_id:#x} is too large for {29 if message.is_extended_id else 11} bits"
     if not message.is_remote_frame and size != message.dlc:
         return f"the frame has {size} bytes of data, and its length says {message.dlc}"
     return None
+
+
+def _is_impossible(message: can.Message) -> bool:
+    """Whether no bus could carry it."""
+    if message.is_error_frame:
+        return False
+    highest = 0x1FFFFFFF if message.is_extended_id else 0x7FF
+    return not 0 <= message.arbitration_id <= highest or len(message.data) > (64 if message.is_fd else 8)
 
 
 # --- writing

@@ -99,6 +99,9 @@ def read_can(path: Path, dbc: Sequence[Path] = (), progress: Progress | None = N
     if misfits:
         what = f"{misfits} frames do not fit the description of their message, and were left out{_first(misfit)}"
         findings.append(Finding("frames", what, Gravity.WARNING))
+    if log.impossible:
+        what = f"{log.impossible} frames that no bus could carry (identifier, or length) were left out"
+        findings.append(Finding("frames", what, Gravity.WARNING))
     if log.skipped:
         findings.append(Finding("frames", f"{log.skipped} lines describe no frame"))
     columns = {

@@ -8,10 +8,17 @@ from collections.abc import Callable
 from typing import Any
 
 from canopen.sdo import SdoAbortedError, SdoServer
-from canopen.sdo.constants import EXPEDITED, NO_MORE_DATA, SDO_STRUCT
+from canopen.sdo.constants import (
+    EXPEDITED,
+    NO_MORE_DATA,
+    REQUEST_BLOCK_DOWNLOAD,
+    REQUEST_BLOCK_UPLOAD,
+    SDO_STRUCT,
+)
 
 from rds.bus.modules.cia402.codes import Abort
 from rds.bus.modules.cia402.dictionary import Dictionary
+from rds.bus.modules.cia402.sdo_block import BlockTransfers
 
 _LONGEST = 1 << 10  # bytes in a segmented download; no object of ours is longer
 
@@ -37,11 +44,22 @@ class Server(SdoServer):
         self.network = _Out(send)
         self._dictionary = dictionary
         self._index = self._subindex = 0
+        self._blocks = BlockTransfers(dictionary, lambda answer: send(0x580 + node, answer))
 
     def on_request(self, can_id: int, data: bytes, timestamp: float) -> None:
         """Answer a request. A frame of a wrong length is none."""
-        if len(data) == 8:
-            super().on_request(can_id, bytearray(data), timestamp)
+        if len(data) != 8:
+            return
+        if self._blocks.busy or data[0] & 0xE0 in (REQUEST_BLOCK_UPLOAD, REQUEST_BLOCK_DOWNLOAD):
+            self._index, self._subindex = int.from_bytes(data[1:3], "little"), data[3]
+            try:
+                if self._blocks.take(bytes(data)):
+                    return
+            except SdoAbortedError as error:
+                self.abort(error.code)
+                return
+            self._blocks.end()  # another request ends it
+        super().on_request(can_id, bytearray(data), timestamp)
 
     def init_download(self, request: bytearray) -> None:
         """As canopen's, but what can't be written is refused before its segments come."""
@@ -75,6 +93,7 @@ class Server(SdoServer):
     def abort(self, abort_code: int = Abort.GENERAL) -> None:
         """Say why not, and forget the transfer."""
         self._buffer = None
+        self._blocks.end()
         super().abort(abort_code)
 
     def _check_transfer(self) -> None:

@@ -1,0 +1,150 @@
+"""Text logs that python-can does not read: SavvyCAN's and GVRET's CSV, BusMaster, CRTD, Microchip's CAN BUS Analyzer.
+
+They are recognized by their first lines, not by their names: .csv, .log and .txt are used by several tools.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import TextIO
+
+import can
+
+from rds.core.errors import InputError
+
+_HEAD = 2048  # characters that are looked at
+_STANDARD = 0x7FF
+Parse = Callable[[str], can.Message | None]  # a line; None: it describes no frame. ValueError, IndexError: damaged
+
+_CRTD = re.compile(r"\d+\.\d+\s+\d*(?:[RT](?:11|29)|C[A-Z]{2})\b")
+_MICROCHIP = re.compile(r"\s*(?://-{3,}|Microchip Technology)")
+_BUSMASTER = re.compile(r"\*{3}BUSMASTER")
+_GVRET = re.compile(r"Time ?Stamp,\s*ID,\s*Extended,", re.IGNORECASE)
+
+
+def kind_of(file: TextIO) -> str | None:
+    """The tool that wrote a text, by its beginning, from which it is read again; None for none of these."""
+    head = file.read(_HEAD)
+    file.seek(0)
+    first = head.lstrip("\ufeff")
+    for kind, pattern in (("GVRET", _GVRET), ("BusMaster", _BUSMASTER), ("Microchip", _MICROCHIP), ("CRTD", _CRTD)):
+        if pattern.match(first):
+            return kind
+    return None
+
+
+def parser(kind: str) -> Parse:
+    """What makes a frame of a line of this kind; it keeps what headings say."""
+    parsers: dict[str, Callable[[], Parse]] = {
+        "GVRET": _Gvret,
+        "BusMaster": _BusMaster,
+        "Microchip": _Microchip,
+        "CRTD": _Crtd,
+    }
+    return parsers[kind]()
+
+
+def read_other(file: TextIO, kind: str, path: str, skip: Callable[[], None]) -> Iterator[can.Message]:
+    """The frames of a log; `skip` is called for each line that is something else. InputError at a damaged line."""
+    parse = parser(kind)
+    for number, line in enumerate(file, 1):
+        text = line.strip().lstrip("\ufeff")
+        if not text:
+            continue
+        try:
+            message = parse(text)
+        except (ValueError, IndexError, KeyError) as error:
+            raise InputError(
+                f"it can't be read as a line of {kind} ({error}): {text[:60]!r}; correct the line, or take it out",
+                f"{path}:{number}",
+            ) from error
+        if message is None:
+            skip()
+        else:
+            yield message
+
+
+def _message(
+    stamp: float, identifier: int, extended: bool, data: bytes, size: int, is_rx: bool = True, remote: bool = False
+) -> can.Message:
+    if not remote and len(data) < size:
+        raise ValueError(f"{len(data)} bytes of data, and its length says {size}")
+    return can.Message(
+        timestamp=stamp,
+        arbitration_id=identifier,
+        is_extended_id=extended,
+        is_remote_frame=remote,
+        dlc=size,
+        data=b"" if remote else data[:size],
+        is_rx=is_rx,
+    )
+
+
+class _Gvret:
+    """Time in µs, identifier in hexadecimal, with or without a direction; bus, length, bytes."""
+
+    def __init__(self) -> None:
+        self._columns: list[str] = []
+
+    def __call__(self, line: str) -> can.Message | None:
+        words = [word.strip() for word in line.split(",")]
+        if not self._columns:
+            self._columns = [word.lower().replace(" ", "") for word in words]
+            return None
+        row = dict(zip(self._columns, words, strict=False))
+        size = int(row["len"])
+        first = self._columns.index("len") + 1
+        data = bytes(int(word, 16) for word in words[first : first + size])
+        extended = row["extended"].lower() in ("true", "1")
+        stamp = int(row["timestamp"]) * 1e-6
+        return _message(stamp, int(row["id"], 16), extended, data, size, row.get("dir", "Rx").lower() != "tx")
+
+
+class _BusMaster:
+    """Time of day to 0.1 ms, direction, channel, identifier, kind (s, x, sr, xr), length, bytes; HEX or DEC."""
+
+    def __init__(self) -> None:
+        self._base = 16
+
+    def __call__(self, line: str) -> can.Message | None:
+        if line.startswith("***"):
+            if "***DEC***" in line:
+                self._base = 10
+            return None
+        words = line.split()
+        if len(words) < 6 or ":" not in words[0]:
+            return None
+        hours, minutes, seconds, parts = words[0].split(":")
+        stamp = int(hours) * 3600.0 + int(minutes) * 60.0 + int(seconds) + int(parts) * 10.0 ** -len(parts)
+        kind, size = words[4].lower(), int(words[5])
+        if kind not in ("s", "x", "sr", "xr"):
+            return None
+        data = bytes(int(word, self._base) for word in words[6 : 6 + size])
+        identifier = int(words[3], self._base)
+        return _message(stamp, identifier, kind[0] == "x", data, size, words[1].lower() != "tx", kind.endswith("r"))
+
+
+class _Crtd:
+    """Time in s, kind (R11, T29, ... with a bus before it), identifier and bytes in hexadecimal."""
+
+    def __call__(self, line: str) -> can.Message | None:
+        words = line.split()
+        kind = words[1].lstrip("0123456789").upper()
+        if kind not in ("R11", "R29", "T11", "T29"):
+            return None
+        data = bytes(int(word, 16) for word in words[3:])
+        return _message(float(words[0]), int(words[2], 16), kind.endswith("29"), data, len(data), kind[0] == "R")
+
+
+class _Microchip:
+    """Time in ms, RX or TX, identifier, length, bytes; between semicolons."""
+
+    def __call__(self, line: str) -> can.Message | None:
+        words = [word.strip() for word in line.split(";")]
+        if len(words) < 4 or not words[0].replace(".", "", 1).isdigit():
+            return None
+        identifier, size = int(words[2], 16), int(words[3])
+        data = bytes(int(word, 16) for word in words[4 : 4 + size] if word)
+        stamp = float(words[0]) * 1e-3
+        return _message(stamp, identifier, identifier > _STANDARD, data, size, words[1].upper() != "TX")

@@ -1,0 +1,94 @@
+"""Logs of tools that python-can does not know: written by hand as the tools write them, read frame by frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rds.bus import LogFile
+from rds.core.errors import InputError
+
+GVRET = """Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8
+166064000,0000021A,false,Rx,0,8,FE,36,12,FE,69,05,07,AD,
+166065500,18FEF1FE,true,Tx,0,2,01,FF,
+166066000,00000900,false,Rx,0,1,00,
+"""
+OLD_GVRET = "Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n1000,0000021A,false,0,1,FE,\n"
+BUSMASTER = """***BUSMASTER Ver 2.4.0***
+***PROTOCOL CAN***
+***[START LOGGING SESSION]***
+***START DATE AND TIME 8:8:2014 10:18:59:187***
+***HEX***
+***SYSTEM MODE***
+***<Time><Tx/Rx><Channel><CAN ID><Type><DLC><DataBytes>***
+10:18:59:2050 Rx 1 0x21A s 8 FE 36 12 FE 69 05 07 AD
+10:18:59:2065 Tx 1 0x18FEF1FE x 2 01 FF
+10:18:59:2070 Rx 1 0x7FF sr 4
+***END DATE AND TIME 8:8:2014 10:19:00:187***
+***[STOP LOGGING SESSION]***
+"""
+CRTD = """1320745424.000 CXX OVMS Tesla Roadster cando2crtd converted log
+1320745424.002 R11 21A FE 36 12 FE 69 05 07 AD
+1320745424.0035 2T29 18FEF1FE 01 FF
+1320745424.100 CEV Drive begin
+"""
+MICROCHIP = """//---------------------------------
+Microchip Technology Inc.
+CAN BUS Analyzer
+SavvyCAN Exporter
+Logging Started: 6/3/2016 13:24:56
+//---------------------------------
+6224;RX;0x0000021A;8;0xFE;0x36;0x12;0xFE;0x69;0x05;0x07;0xAD;
+6225.5;TX;0x18FEF1FE;2;0x01;0xFF;;;;;;;
+"""
+FIRST = (0x21A, False, bytes.fromhex("FE3612FE690507AD"), True)
+SECOND = (0x18FEF1FE, True, b"\x01\xff", False)
+
+
+@pytest.mark.parametrize(
+    "name, text, skipped, impossible",
+    [
+        ("a.csv", GVRET, 1, 1),
+        ("b.log", BUSMASTER, 9, 0),
+        ("c.txt", CRTD, 2, 0),
+        ("c.crtd", CRTD, 2, 0),
+        ("d.can", MICROCHIP, 6, 0),
+    ],
+)
+def test_frames_are_what_the_tool_wrote(name: str, text: str, skipped: int, impossible: int, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text.replace("\n", "\r\n"))
+    log = LogFile(tmp_path / name)
+    frames = list(log)
+    assert [(m.arbitration_id, m.is_extended_id, bytes(m.data), m.is_rx) for m in frames[:2]] == [FIRST, SECOND]
+    assert frames[1].timestamp - frames[0].timestamp == pytest.approx(0.0015, abs=1e-6)
+    assert (log.skipped, log.impossible) == (skipped, impossible)
+    assert len(frames) == (3 if name == "b.log" else 2) and all(m.is_remote_frame for m in frames[2:])
+
+
+def test_the_older_form_of_gvret_has_no_direction(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(OLD_GVRET)
+    assert [(m.arbitration_id, bytes(m.data), m.is_rx) for m in LogFile(tmp_path / "a.csv")] == [(0x21A, b"\xfe", True)]
+
+
+@pytest.mark.parametrize(
+    "name, text, line",
+    [
+        ("a.csv", GVRET + "x,0000021A,false,Rx,0,1,FE,\n", 5),
+        ("a.csv", GVRET + "5,0000021A,false,Rx,0,2,FE\n", 5),
+        ("a.log", BUSMASTER + "10:18:59:2065 Tx 1 0x18FEF1FE x 2 01\n", 13),
+        ("a.txt", CRTD + "1320745425.0 R11 XYZ FF", 5),
+        ("a.can", MICROCHIP + "6226;RX;0x21A;2;0x01;\n", 9),
+    ],
+)
+def test_a_damaged_line_is_named(name: str, text: str, line: int, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError) as caught:
+        list(LogFile(tmp_path / name))
+    assert str(caught.value).startswith(f"{tmp_path / name}:{line}: ")
+
+
+def test_a_text_that_is_no_log_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("Dear diary\n")
+    with pytest.raises(InputError, match="no log of CRTD"):
+        list(LogFile(tmp_path / "a.txt"))
