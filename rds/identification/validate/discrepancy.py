@@ -197,8 +197,8 @@ def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
     from rds.identification.structures.structures import structure
 
     made, values = candidate.structure, dict(candidate.values)
-    options = made.options
-    if made.name == "axis-mass" and made.as_model is not None:
+    options, signals = made.options, (made.output_unit, made.command_unit)
+    if made.name in ("axis-mass", "axis-inertia") and made.as_model is not None:
         try:
             values = dict(made.as_model(values))
         except InputError:
@@ -210,7 +210,8 @@ def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
         return None
     elif made.name != "axis":
         options = ()
-    return structure("axis", tuple({*options, "delay"})), {name: float(value) for name, value in values.items()}
+    own = structure("axis", tuple({*options, "delay"}), *signals)
+    return own, {name: float(value) for name, value in values.items()}
 
 
 def _advanced(log: Log, samples: int) -> Log:

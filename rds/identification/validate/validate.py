@@ -15,6 +15,7 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.identification.logs.log import Log
+from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import Assessment, assess
 from rds.identification.validate.candidate import Candidate, as_candidate
 from rds.identification.validate.conclusion import overall
@@ -95,7 +96,9 @@ def validate(
     assessments = {
         name: assess(candidate, log, initial_samples, bands.bandwidth) for name, log in zip(names, logs, strict=True)
     }
-    verdicts = {name: judge(candidate, a, bands) for name, a in assessments.items()}
+    verdicts = {
+        name: with_alternatives(candidate, a, judge(candidate, a, bands), bands) for name, a in assessments.items()
+    }
     rankings = {name: _ranking(candidate, a, others, bands, initial_samples) for name, a in assessments.items()}
     return Validation(candidate, assessments, verdicts, bands, others, rankings if others else {})
 
