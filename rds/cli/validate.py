@@ -11,9 +11,12 @@ from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kep
 from rds.cli.logs import read_logs
 
 if TYPE_CHECKING:
+    from rds.core.types import Model
     from rds.identification.logs.log import Log
     from rds.identification.validate.cross_test import Crossed
+    from rds.identification.validate.in_loop import Loop
     from rds.identification.validate.validate import Validation
+    from rds.results import Result
 
 
 @writes_files
@@ -31,6 +34,9 @@ def validate(
     initial_samples: Annotated[
         int | None, typer.Option("--initial-samples", help="Samples from which the initial state is estimated.")
     ] = None,
+    loop: Annotated[
+        Path | None, typer.Option("--loop", help="The experiment that was logged: simulated with the model, too.")
+    ] = None,
     forces: Annotated[
         bool, typer.Option("--forces", help="The cross-test by inverse dynamics: the model's force error on each log.")
     ] = False,
@@ -45,7 +51,14 @@ def validate(
         bands = Bands.read(_bands(band or []))
         with progress_bars() as bar:
             found = read_logs(logs, map_, axis, bar)
-        made = validate_model(model, found, against=against or (), bands=bands, initial_samples=initial_samples)
+        made = validate_model(
+            model,
+            found,
+            against=against or (),
+            bands=bands,
+            initial_samples=initial_samples,
+            loop=_loop(loop) if loop else None,
+        )
         crossed = _crossed(made, found) if forces else []
         files = made.write(report) if report is not None else []
     if json:
@@ -57,6 +70,20 @@ def validate(
         if files:
             typer.echo(f"report: {files[0]}")
     raise typer.Exit(made.exit_code)
+
+
+def _loop(path: Path) -> Loop:
+    """Runs the experiment in simulation, with another model."""
+    from rds.core.toml_file import read_toml
+    from rds.modes.experiment.experiment import Experiment
+
+    words, _ = read_toml(path)
+
+    def simulate(model: Model) -> Result:
+        table = words | {"mode": "simulation", "model": model}
+        return Experiment.from_table(table, path.resolve().parent).run()
+
+    return simulate
 
 
 def _crossed(made: Validation, logs: list[Log]) -> list[Crossed]:

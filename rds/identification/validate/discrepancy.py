@@ -285,12 +285,20 @@ def as_motion(
 
     return Discrepancy(
         frequency=f,
-        gain=_gain(*rates),
+        gain=min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
         phase=Off(phase(found), _error_of(phase, found, covariance), "°"),
         lag=Off(-float(found[1]), sqrt(max(float(covariance[1, 1]), 0.0)), "s"),
         rmse=float(np.sqrt(np.mean((residual - A[:, 0]) ** 2))),
         reached=float(np.sqrt(np.mean(error**2))),
     )
+
+
+def _gain_of_way(found: np.ndarray, covariance: np.ndarray) -> Off:
+    """The same by the positions themselves, which tell more where noise hides the velocity."""
+    if not found[0] > 0.0:
+        return Off(0.0, float("inf"), "%")
+    spread = sqrt(max(float(covariance[0, 0]), 0.0))
+    return Off(100.0 * (1.0 / float(found[0]) - 1.0), 100.0 * spread / float(found[0]) ** 2, "%")
 
 
 def _gain(measured: np.ndarray, modelled: np.ndarray) -> Off:

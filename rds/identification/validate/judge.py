@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import sqrt
 
 from rds.identification.fit.estimate import said_of_guesses
@@ -39,8 +39,8 @@ _FEW = 0.1  # share of lags beyond the plain band that is still called white
 _NEGLIGIBLE = 99.8  # %: of a free run's fit, for what a structure lacks
 
 
-def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
-    """The verdict on `candidate` by its assessment on one log."""
+def judge(candidate: Candidate, a: Assessment, bands: Bands, more: Iterable[Reason] = ()) -> Verdict:
+    """The verdict on `candidate` by its assessment on one log, and by `more` reasons."""
     reasons = [
         *of_data(a, bands),
         *_unstable(candidate, a),
@@ -56,6 +56,7 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
         *_overfit(candidate, a, bands),
         *of_extent(a, bands),
         *of_upsets(a),
+        *more,
     ]
     word, purpose = conclude(a, reasons, bands)
     if word is Word.UNTOLD and all(reason.side is not Side.UNTOLD for reason in reasons):
