@@ -1,4 +1,4 @@
-"""`rds data`: what a file of logged data holds, before anything is estimated from it."""
+"""`rds data`: what a file of logged data holds, before anything is estimated from it; the friction curve of an axis."""
 
 from __future__ import annotations
 
@@ -10,14 +10,10 @@ import typer
 from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 
 if TYPE_CHECKING:
+    from rds.identification.fit.friction_curve import FrictionCurve
     from rds.identification.logs.describe import Description
 
 app = typer.Typer(no_args_is_help=True, help="Logged data: what a file holds, and whether it can be believed.")
-
-
-@app.callback()
-def _data() -> None:
-    """Keeps `describe` a command of its own, beside those to come."""
 
 
 @app.command()
@@ -57,6 +53,58 @@ def describe(
         for path in written:
             typer.echo(f"wrote {path}")
     raise typer.Exit(0 if found.usable else 1)
+
+
+@app.command()
+@writes_files
+def friction(
+    logs: Annotated[list[Path], typer.Argument(help="Logs of runs at constant speed, taken together.")],
+    map_: Annotated[Path | None, typer.Option("--map", help="What the logs' columns mean, a TOML file.")] = None,
+    axis: Annotated[str | None, typer.Option("--axis", help="The axis, where a log holds several.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Save points and curve as a PNG file.")] = None,
+    json: Json = False,
+) -> None:
+    """The friction curve (Coulomb, viscous, Stribeck) of each direction, from stretches of constant speed."""
+    with refusals(), stdout_kept(json):
+        from rds.cli.logs import read_logs
+        from rds.core.atomic import write_whole
+        from rds.core.errors import InputError
+        from rds.identification.fit.friction_curve import friction_curve
+
+        if plot is not None and plot.suffix.lower() != ".png":
+            raise InputError(f"--plot {str(plot)!r} must end in .png")
+        with progress_bars() as bar:
+            found = friction_curve(read_logs(logs, map_, axis, bar))
+        written = []
+        if plot is not None:
+            from rds.identification.fit.friction_plot import friction_picture
+
+            written.append(write_whole(plot, friction_picture(found).png()))
+    if json:
+        print_json(found.to_json() | {"files": [str(path) for path in written]})
+        return
+    _show_friction(found)
+    for path in written:
+        typer.echo(f"wrote {path}")
+
+
+def _show_friction(found: FrictionCurve) -> None:
+    from rds.cli.console import cell, show_table
+
+    rows = [
+        [p.log, cell(p.begin), cell(p.seconds), cell(p.speed), cell(p.force), cell(p.error)]
+        for p in sorted(found.points, key=lambda p: p.speed)
+    ]
+    heads = ["log", "begin s", "length s", f"speed {found.speed_unit}", f"friction {found.force_unit}", "std error"]
+    show_table("Stretches of constant speed", heads, rows)
+    numbers = [
+        [way, name, cell(told.value), cell(told.std_error), told.unit]
+        for way, of_way in found.directions.items()
+        for name, told in of_way.items()
+    ]
+    show_table("Friction", ["direction", "", "value", "std error", "unit"], numbers)
+    for sentence in found.untold:
+        typer.echo(f"- not told: {sentence}")
 
 
 def _write_map(file: Path) -> Path:

@@ -131,21 +131,41 @@ def machine_from(
     model: Model,
     axis: Annotated[str, typer.Option(help="Which axis it is a model of.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The machine's file, FILE.toml.")],
-    base: Annotated[str, typer.Option(help="The machine that it is an axis of: a name or a file.")] = "mini-cnc",
+    base: Annotated[
+        str | None, typer.Option(help="The machine that it is an axis of: a name or a file (default mini-cnc).")
+    ] = None,
+    alone: Annotated[bool, typer.Option("--alone", help="A machine of this axis alone, as the logs tell it.")] = False,
+    measured: Annotated[
+        bool, typer.Option("--measured", help="Travel, speed and resolution of the logs that were fitted.")
+    ] = False,
+    per_volt: Annotated[
+        float | None, typer.Option(help="Of a model commanded in A, N, Nm or %: how much the drive makes of 1 V.")
+    ] = None,
     json: Json = False,
 ) -> None:
-    """A machine file whose axis is what was estimated; the rest is that of a known machine."""
+    """A machine file whose axis is what was estimated; the rest is that of a known machine, and is said."""
     with refusals():
+        from rds.core.errors import InputError
         from rds.identification.fit.machine_file import write_machine
         from rds.identification.fit.model_file import read_model
         from rds.machines import load_machine
 
         file = read_model(model)
-        write_machine(out, file, base, axis)
+        if alone and base is not None:
+            raise InputError("--alone is a machine without --base; leave one of them out")
+        if per_volt is not None and not 0.0 < abs(per_volt) < inf:
+            raise InputError(f"--per-volt {per_volt:g} must be a finite number other than 0")
+        known = None if alone else base or "mini-cnc"
+        said = write_machine(out, file, known, axis, measured=measured, per_volt=per_volt).said
         made = load_machine(str(out)).axis(axis)
     doubts = file.doubts()
     _warn(model, doubts)
     if json:
-        print_json({"file": str(out), "axis": axis, "model": made.model, "machine": made.machine, "warnings": doubts})
+        print_json(
+            {"file": str(out), "axis": axis, "model": made.model, "machine": made.machine, "warnings": doubts}
+            | {"notes": said}
+        )
     else:
-        typer.echo(f"wrote {out}: axis {axis} as in {model}, the rest of {base}")
+        typer.echo(f"wrote {out}: axis {axis} as in {model}" + (f", the rest of {known}" if known else ""))
+        for sentence in said:
+            typer.echo(f"note: {sentence}")

@@ -9,7 +9,7 @@ import typer
 
 from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.logs import read_logs
-from rds.identification.structures import SIMULATION_ERROR
+from rds.identification.structures import INVERSE_DYNAMICS, SIMULATION_ERROR
 
 if TYPE_CHECKING:
     from rds.identification.fit.estimate import Estimate
@@ -24,7 +24,10 @@ FITTED_SHARE = 0.6  # of each log, with --split; the rest validates
 def fit(
     logs: Annotated[list[Path], typer.Argument(help="Logs, fitted together: CSV, MAT, Parquet, bus logs, results.")],
     structure: Annotated[
-        str, typer.Option("--structure", "-s", help="axis, axis-mass, spindle, or a model of your own: FILE.py.")
+        str,
+        typer.Option(
+            "--structure", "-s", help="axis, axis-mass, axis-inertia, spindle, or a model of your own: FILE.py."
+        ),
     ],
     method: Annotated[
         str | None, typer.Option("--method", "-m", help="simulation, inverse-dynamics, step or frequency.")
@@ -113,11 +116,13 @@ def _options(
         fixed |= _others(made, free, fixed)
     options: dict[str, Any] = dict(_values(set_, "--set"))
     begun = _values(start, "--start")
-    if (method or made.default_method) != SIMULATION_ERROR:
-        for word, given in (("--fix or --free", fixed), ("--start", begun)):
-            if given:
-                raise InputError(f"{word} is for --method simulation; the others estimate every parameter at once")
-        return options
+    chosen = method or made.default_method
+    if chosen != SIMULATION_ERROR:
+        for word, given, of in (("--fix or --free", fixed, (INVERSE_DYNAMICS,)), ("--start", begun, ())):
+            if given and chosen not in of:
+                those = " and ".join((SIMULATION_ERROR, *of))
+                raise InputError(f"{word} is for --method {those}; the others estimate every parameter at once")
+        return options | ({"fixed": fixed} if fixed else {})
     return options | ({"fixed": fixed} if fixed else {}) | ({"start": begun} if begun else {})
 
 

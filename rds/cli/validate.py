@@ -11,7 +11,12 @@ from rds.cli.common import Json, print_json, progress_bars, refusals, stdout_kep
 from rds.cli.logs import read_logs
 
 if TYPE_CHECKING:
+    from rds.core.types import Model
+    from rds.identification.logs.log import Log
+    from rds.identification.validate.cross_test import Crossed
+    from rds.identification.validate.in_loop import Loop
     from rds.identification.validate.validate import Validation
+    from rds.results import Result
 
 
 @writes_files
@@ -29,6 +34,12 @@ def validate(
     initial_samples: Annotated[
         int | None, typer.Option("--initial-samples", help="Samples from which the initial state is estimated.")
     ] = None,
+    loop: Annotated[
+        Path | None, typer.Option("--loop", help="The experiment that was logged: simulated with the model, too.")
+    ] = None,
+    forces: Annotated[
+        bool, typer.Option("--forces", help="The cross-test by inverse dynamics: the model's force error on each log.")
+    ] = False,
     report: Annotated[Path | None, typer.Option("--report", help="Folder for the page, its pictures and JSON.")] = None,
     json: Json = False,
 ) -> None:
@@ -40,15 +51,64 @@ def validate(
         bands = Bands.read(_bands(band or []))
         with progress_bars() as bar:
             found = read_logs(logs, map_, axis, bar)
-        made = validate_model(model, found, against=against or (), bands=bands, initial_samples=initial_samples)
+        made = validate_model(
+            model,
+            found,
+            against=against or (),
+            bands=bands,
+            initial_samples=initial_samples,
+            loop=_loop(loop) if loop else None,
+        )
+        crossed = _crossed(made, found) if forces else []
         files = made.write(report) if report is not None else []
     if json:
-        print_json(made.to_json() | {"files": [str(path) for path in files]})
+        said = {"cross_test": [each.to_json() for each in crossed]} if forces else {}
+        print_json(made.to_json() | said | {"files": [str(path) for path in files]})
     else:
+        _show_crossed(crossed)
         _show(made)
         if files:
             typer.echo(f"report: {files[0]}")
     raise typer.Exit(made.exit_code)
+
+
+def _loop(path: Path) -> Loop:
+    """Runs the experiment in simulation, with another model."""
+    from rds.core.toml_file import read_toml
+    from rds.modes.experiment.experiment import Experiment
+
+    words, _ = read_toml(path)
+
+    def simulate(model: Model) -> Result:
+        table = words | {"mode": "simulation", "model": model}
+        return Experiment.from_table(table, path.resolve().parent).run()
+
+    return simulate
+
+
+def _crossed(made: Validation, logs: list[Log]) -> list[Crossed]:
+    from rds.identification.validate.cross_test import cross_test
+
+    return cross_test(made.candidate, logs)
+
+
+def _show_crossed(crossed: list[Crossed]) -> None:
+    from rds.cli.console import show_table
+
+    if not crossed:
+        return
+    rows = [
+        [
+            each.log,
+            f"{each.percent:.4f}",
+            f"{each.fitted_percent:.4f}",
+            "" if each.published_percent is None else f"{each.published_percent:.4f} ({each.published_by})",
+        ]
+        for each in crossed
+    ]
+    heads = ["log", "force error %", "of a fit to this log %", "published fit to this log %"]
+    note = "Inverse dynamics with the model's parameters, none of them estimated here: 100 |force - model| / |force|."
+    show_table("Cross-test", heads, rows, note)
 
 
 def _bands(given: list[str]) -> dict[str, float]:

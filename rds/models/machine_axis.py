@@ -3,9 +3,9 @@
 Motor and carriage, with the velocity v in mm/s (rev/min for a spindle), the voltage u in V:
 
     τ v' + v = K u - F(v)                                                      (linear axis of the paper)
-    F(v) = F± (1 + s exp(-(v/v_s)²)) + b v,      F+ for v > 0, F- (negative) for v < 0
+    F(v) = F± (1 + s exp(-(v/v_s)²)) + b± v,     F+, b+ for v > 0, F- (negative), b- for v < 0
 
-F± is Coulomb friction per direction, s the Stribeck part, b the viscous part. At rest the axis sticks while
+F± is Coulomb friction per direction, s the Stribeck part, b± the viscous part. At rest the axis sticks while
 F-(1+s) <= K u <= F+(1+s). The amplifier may add an offset to its voltage, and have a dead zone. Between motor and
 encoder is a dead zone of play (backlash), and a voltage acts a stated delay after its command arrived.
 
@@ -33,6 +33,9 @@ PARAMETERS = {
     "friction_plus": Quantity("Coulomb friction forward, at high speed", "mm/s", low=0.0),
     "friction_minus": Quantity("Coulomb friction backward, at high speed", "mm/s", high=0.0),
     "viscous": Quantity("speed lost to viscous friction", "(mm/s) per mm/s", low=0.0),
+    "viscous_difference": Quantity(
+        "how much more speed viscous friction takes while moving backward", "(mm/s) per mm/s"
+    ),
     "stribeck": Quantity("extra friction at standstill, as a fraction of that at high speed", low=0.0),
     "stribeck_velocity": Quantity("speed at which it has gone", "mm/s", above=0.0),
     "backlash": Quantity("play between motor and encoder, its whole width", "mm", low=0.0),
@@ -57,10 +60,16 @@ class MachineParameters:
     delay: float = 0.0  # s, from the command to the amplifier's output
     offset: float = 0.0  # V, of the amplifier: added to the command
     dead_zone: float = 0.0  # V, half width: what is smaller is no voltage, what is larger is so much less
+    viscous_difference: float = 0.0  # (mm/s) per mm/s: viscous friction backward less that forward
 
     def __post_init__(self) -> None:
         for name, declared in PARAMETERS.items():
             declared.check(getattr(self, name), name, "machine parameter")
+        if self.viscous + self.viscous_difference < 0.0:
+            raise InputError(
+                f"machine parameter viscous_difference = {self.viscous_difference:g} must be at least "
+                f"-{self.viscous:g} (minus viscous): friction would drive the axis backward"
+            )
 
     def motion(self) -> tuple[float, ...]:
         """What `machine_motion.moved` needs after its first five arguments."""
@@ -72,6 +81,7 @@ class MachineParameters:
             self.stribeck,
             self.stribeck_velocity,
             0.5 * self.backlash,
+            self.viscous_difference,
         )
 
     @classmethod

@@ -26,9 +26,9 @@ _ROUNDING = 1e-9  # of a sample: a delay that is so near to whole samples is who
 def linear_part(params: Mapping[str, Any]) -> dict[str, float]:
     """τ and K of the axis without Coulomb friction, play and delay: what controllers are designed for.
 
-    Viscous friction b is part of it: τ/(1 + b) and K/(1 + b).
+    Viscous friction b is part of it: τ/(1 + b) and K/(1 + b), with the mean of both directions.
     """
-    damping = 1.0 + params["viscous"]
+    damping = 1.0 + params["viscous"] + 0.5 * params.get("viscous_difference", 0.0)
     return {"tau": params["tau"] / damping, "K": params["K"] / damping}
 
 
@@ -47,17 +47,34 @@ def coefficients(params: Mapping[str, Any], T: float) -> tuple[float, ...]:
 
 
 def sampled(
-    carriage, velocity, position, before, now, T, left, K, offset, dead_zone, tau, damping, plus, minus, s, slow, half
+    carriage,
+    velocity,
+    position,
+    before,
+    now,
+    T,
+    left,
+    K,
+    offset,
+    dead_zone,
+    tau,
+    damping,
+    plus,
+    minus,
+    s,
+    slow,
+    half,
+    back,
 ):
     """Carriage, velocity and position after one sample: the voltage `before` acts for `left` s, `now` for the rest."""
     if left > 0.0:
         pull = pull_of(before, K, offset, dead_zone)
         position, velocity, carriage = moved(
-            position, velocity, carriage, pull, left, tau, damping, plus, minus, s, slow, half
+            position, velocity, carriage, pull, left, tau, damping, plus, minus, s, slow, half, back
         )
     pull = pull_of(now, K, offset, dead_zone)
     position, velocity, carriage = moved(
-        position, velocity, carriage, pull, T - left, tau, damping, plus, minus, s, slow, half
+        position, velocity, carriage, pull, T - left, tau, damping, plus, minus, s, slow, half, back
     )
     return carriage, velocity, position
 

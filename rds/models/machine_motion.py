@@ -25,16 +25,15 @@ def pull_of(u, K, offset, dead_zone):
     return K * w
 
 
-def moved(position, velocity, carriage, pull, time, tau, damping, plus, minus, stribeck, slow, half_play):
+def moved(position, velocity, carriage, pull, time, tau, damping, plus, minus, stribeck, slow, half_play, back):
     """Position (mm, of the motor), velocity (mm/s) and carriage (mm, behind the play) `time` s later.
 
     `pull` (mm/s) is constant over that time. `damping` = 1 + viscous; `plus` and `minus` are Coulomb friction
     (mm/s), `stribeck` what it grows by at standstill, as a share, and `slow` (mm/s) the velocity at which that has
-    gone; `half_play` (mm) is half the backlash.
+    gone; `half_play` (mm) is half the backlash; `back` is what `damping` is more while the axis moves backward.
     """
     if time <= 0.0:
         return position, velocity, carriage
-    rate = damping / tau
     low, high = minus * (1.0 + stribeck), plus * (1.0 + stribeck)
     steps = max(ceil(time / SUBSTEP - 1e-9), 1) if stribeck > 0.0 else 1
     step = time / steps
@@ -43,16 +42,19 @@ def moved(position, velocity, carriage, pull, time, tau, damping, plus, minus, s
         while left > 0.0:
             if velocity == 0.0 and low <= pull <= high:
                 return position, velocity, carriage  # and stays so as long as the voltage does
-            friction = plus if velocity > 0.0 or (velocity == 0.0 and pull > 0.0) else minus
+            forward = velocity > 0.0 or (velocity == 0.0 and pull > 0.0)
+            friction = plus if forward else minus
+            damped = damping if forward else damping + back
+            rate = damped / tau
             level = friction
             if stribeck > 0.0:  # its level is frozen at the speed predicted for the middle
                 share = velocity / slow
                 level = friction * (1.0 + stribeck * exp(-share * share))
-                final = (pull - level) / damping
+                final = (pull - level) / damped
                 middle = final + (velocity - final) * exp(-0.5 * rate * left)
                 share = middle / slow if middle * velocity >= 0.0 else 0.0
                 level = friction * (1.0 + stribeck * exp(-share * share))
-            final = (pull - level) / damping
+            final = (pull - level) / damped
             # the velocity is zero where (v - final) exp(-rate t) = -final
             crossing = log1p(-velocity / final) / rate if final * velocity < 0.0 else inf
             part = min(left, crossing)

@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.identification.fit.fit import fit
 from rds.identification.logs.log import Log
 from rds.identification.structures.axis_structure import make
+from rds.identification.validate.validate import validate
 from tests.identification.fit_logs import axis_log, mini_cnc
 
 X = mini_cnc("X")
@@ -175,5 +176,55 @@ def test_too_few_samples_and_no_log_are_refused() -> None:
 
 
 def test_a_unit_that_the_structure_does_not_take_is_refused() -> None:
-    with pytest.raises(InputError, match="position is in rev/min"):
-        fit([replace(axis_log(X), units={"position": "rev/min"})], make())
+    with pytest.raises(InputError, match="position is in counts, and structure axis takes mm or deg"):
+        fit([replace(axis_log(X), units={"position": "counts"})], make())
+
+
+def test_a_log_sampled_too_slowly_gives_no_model_and_says_which_period_would_do() -> None:
+    t = np.arange(300) * 0.1
+    u = 4.0 * np.sin(2.0 * np.pi * 0.31 * t) + 2.0 * np.sign(np.sin(2.0 * np.pi * 0.13 * t))
+    fine = np.arange(30000) * 1e-3
+    y = make().respond(fine, np.repeat(u, 100), (0.0, 0.0), X)[::100]
+    found = fit([Log("slow", t, u, np.round(y, 3), resolution=0.001)], make())
+    said = " ".join(found.unusable())
+    assert "sampled too slowly" in said and "a period of 12 ms" in said.lower()
+    assert "in seconds" not in " ".join(found.warnings)
+
+
+def test_logs_of_different_axes_contradict_each_other() -> None:
+    logs = [axis_log(X, seed=1, seconds=4.0), axis_log(X, seed=2, seconds=4.0)]
+    assert not any("contradict" in warning for warning in fit(logs, make()).warnings)
+    other = axis_log(X | {"K": 1.1 * X["K"]}, seed=3, seconds=4.0)
+    (said,) = [w for w in fit([logs[0], other], make()).warnings if "contradict each other about K" in w]
+    assert f"{logs[0].name} 1.7" in said and f"{other.name} 1.9" in said
+
+
+def test_a_slip_of_the_encoder_is_pointed_at_in_time() -> None:
+    log = axis_log(X, seconds=4.0)
+    slipped = replace(log, position=log.position + 0.08 * (log.time >= 2.345))
+    (said,) = [w for w in fit([slipped], make()).warnings if "leaps by" in w]
+    assert "at 2.345 s the measurement leaps by +0.0" in said
+    assert not any("leaps by" in w or "another regime" in w for w in fit([log], make()).warnings)
+
+
+def test_a_fit_s_free_run_is_measured_as_a_validation_measures_it() -> None:
+    log = axis_log(X, seconds=4.0)
+    found = fit([log], make())
+    a = validate(found, log).assessments[log.name]
+    assert a.free_run == found.free_run[log.name] and a.ahead == found.ahead[log.name]
+
+
+def test_a_stretch_of_another_regime_is_pointed_at_in_time() -> None:
+    log = axis_log(X)
+    t, u, axis = log.time, log.command, make()
+    rubbing = X | {"friction_plus": 1.5, "friction_minus": -1.0}
+    y, state = np.empty(len(t)), (0.0, 0.0)
+    for values, first, end in ((X, 0, 4000), (rubbing, 4000, 5500), (X, 5500, 10000)):
+        part = axis.respond(t[first : end + 1], u[first : end + 1], state, values)
+        y[first:end] = part[: end - first]
+        state = (float(part[-1]), 0.0)
+    noise = 0.001 * np.random.default_rng(0).standard_normal(len(y))
+    found = fit([replace(log, position=np.round(y + noise, 3))], axis)
+    (said,) = [w for w in found.warnings if "another regime" in w]
+    begin, end = (float(word) for word in said.split(" s the log")[0].split("from ")[1].split(" to "))
+    assert 3.8 <= begin <= 4.2 and 5.1 <= end <= 5.7

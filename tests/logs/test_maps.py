@@ -191,8 +191,31 @@ def test_two_axes_are_told_apart_by_how_their_names_begin(tmp_path: Path) -> Non
     assert [log.name for log in read_log(write(tmp_path / "two.csv", columns))] == ["two:X", "two:Y"]
 
 
-def test_a_velocity_alone_is_no_position(tmp_path: Path) -> None:
+def test_a_log_without_position_is_one_of_its_speed(tmp_path: Path) -> None:
     made = axis(1000)
-    columns = {"time [s]": made["time"], "voltage [V]": made["voltage"], "speed [mm/s]": made["position"]}
-    with pytest.raises(InputError, match="speed is a velocity, which alone does not do: log the position"):
-        read_log(write(tmp_path / "log.csv", columns))
+    columns = {"time [s]": made["time"], "force [kN]": made["voltage"], "speed [m/s]": made["position"]}
+    (found,) = read_log(write(tmp_path / "log.csv", columns))
+    assert found.is_rate and found.units["position"] == "mm/s" and found.units["command"] == "N"
+    assert found.position == pytest.approx(1e3 * made["position"])
+    assert found.command == pytest.approx(1e3 * made["voltage"])
+    assert any("no position was logged" in finding.what for finding in found.findings)
+
+
+def test_a_csp_log_has_its_reference_or_position_by_the_following_error(tmp_path: Path) -> None:
+    """A drive in cyclic synchronous position mode logs two of the three, and its torque in thousandths."""
+    made = axis(1000)
+    off = 0.01 * np.sin(made["time"])  # mm
+    text = '[time]\ncolumn = "time"\nunit = "s"\n[axis.X]\ncommand = { column = "torque", unit = "‰" }\n'
+    error = 'following_error = { column = "error", unit = "mm" }\ntorque_gain = 0.0127\n'
+    columns = {"time": made["time"], "torque": made["voltage"], "error": off, "p": made["position"]}
+    data = write(tmp_path / "log.csv", columns)
+    logs = {}
+    for has, other, sign in (("reference", "position", -1.0), ("position", "reference", 1.0)):
+        given = f'{has} = {{ column = "p", unit = "mm" }}\n'
+        (logs[has],) = read_log(data, saved(tmp_path, text + given + error))
+        values = logs[has].position if other == "position" else logs[has].extra["reference"]
+        assert values == pytest.approx(made["position"] + sign * off)
+        assert logs[has].closed_loop and logs[has].force_gain == 0.0127 and logs[has].units["force"] == "Nm"
+        assert logs[has].units["command"] == "%" and logs[has].command == pytest.approx(0.1 * made["voltage"])
+    with pytest.raises(InputError, match=r"needs position .* or velocity; or reference and following_error"):
+        LogMap.read(saved(tmp_path, text + error))

@@ -48,9 +48,9 @@ def test_a_column_that_is_not_used_for_its_unit_is_said(tmp_path: Path) -> None:
     assert any("'speed' is not used, as its unit 'knots' is unknown" in f.what for f in describe(path).findings)
 
 
-def test_a_drive_s_torque_may_stand_for_the_voltage(tmp_path: Path) -> None:
+def test_a_drive_s_torque_in_per_cent_may_be_the_command(tmp_path: Path) -> None:
     (fault,) = [f.what for f in described(tmp_path, "time [s],torque [%],x [mm]").findings if f.gravity == "fault"]
-    assert "a drive's torque [%] stands for the voltage, say so in a map" in fault
+    assert "where torque [%] is the command, say so in a map" in fault
 
 
 def test_spellings_that_mean_one_thing_are_known() -> None:

@@ -216,12 +216,13 @@ def test_a_sign_or_unit_that_model_and_log_share_is_not_valid(tmp_path: Path) ->
     assert found.verdict.word is not Word.VALID and "data-units" in kinds(found, "against")
 
 
-def test_a_command_that_is_no_voltage_is_refused_with_a_remedy() -> None:
+def test_a_command_in_another_unit_than_the_model_s_is_refused_with_a_remedy() -> None:
     drive = log(FRESH, units={"position": "mm", "command": "A"})
-    with pytest.raises(InputError, match=r'command is in A, and the model model takes V.*unit = "V"'):
+    with pytest.raises(InputError, match=r'command is in A and the model model takes V.*unit = "V"'):
         validate(candidate(), drive)
-    with pytest.raises(InputError, match=r"command is in A, and structure axis takes V"):
-        fit([drive], structure("axis"))
+    estimate = fit([drive], structure("axis"))
+    assert estimate.parameters["K"].unit == "(mm/s)/A"
+    assert validate(estimate, replace(drive, name="again")).candidate.structure.command_unit == "A"
 
 
 def test_a_longer_log_is_not_overfitting() -> None:

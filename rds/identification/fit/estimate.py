@@ -77,6 +77,8 @@ class Estimate:
     relative_error_percent: float | None = None  # |force or voltage - its model| / |it|
     warnings: tuple[str, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)  # of the method: iterations, noise, decimation, ...
+    output_unit: str = "mm"  # of what the structure answers
+    command_unit: str = "V"  # of what commands it
 
     @property
     def correlation(self) -> np.ndarray:

@@ -14,7 +14,8 @@ from rds.core.registry import Registry
 from rds.identification.fit.estimate import Estimate
 from rds.identification.logs.log import Log
 from rds.identification.structures import SIMULATION_ERROR
-from rds.identification.structures.structure import SPEED, Structure
+from rds.identification.structures.structure import Structure
+from rds.identification.structures.structures import for_logs
 
 METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Estimate`
     "method",
@@ -38,7 +39,7 @@ def fit(
     if not logs:
         raise InputError("there is no log to fit; name at least one")
     named = _names_apart(logs)
-    _check_units(named, structure)
+    structure = for_logs(structure, named)
     structure = structure.prepare(named) if structure.prepare else structure
     estimated: Estimate = METHODS.module(method or structure.default_method).estimate(
         named, structure, dict(options or {})
@@ -56,7 +57,7 @@ def voltage_error_percent(logs: Sequence[Log], structure: Structure, estimate: E
     from rds.identification.fit.needed_voltage import needed_voltage, smoothed_velocity
     from rds.identification.fit.residuals import bandwidth, block_length
 
-    values, is_rate = estimate.values(), structure.output_unit == SPEED
+    values, is_rate = estimate.values(), structure.is_rate
     extra = given = 0.0
     for log in logs:
         with np.errstate(all="ignore"):
@@ -81,28 +82,3 @@ def _names_apart(logs: Sequence[Log]) -> list[Log]:
         replace(log, name=f"{log.name} ({names[: i + 1].count(log.name)})") if names.count(log.name) > 1 else log
         for i, log in enumerate(logs)
     ]
-
-
-def check_command(log: Log, model: str) -> None:
-    """InputError where the command is no voltage, which `model` takes."""
-    if (has := log.units.get("command") or "V") != "V":
-        raise InputError(
-            f"command is in {'per cent or a pure number' if has == '1' else has}, and {model} takes V. Where a drive's "
-            'current, torque or per cent stands for the voltage, say so in the map: unit = "V" for the command takes '
-            f"each of its numbers as 1 V (with scale = ... as so many), and K is then per that number. Say the same of "
-            "every log of this axis",
-            log.source or log.name,
-        )
-
-
-def _check_units(logs: Sequence[Log], structure: Structure) -> None:
-    for log in logs:
-        check_command(log, f"structure {structure.name}")
-        unit = structure.output_unit
-        has = log.units.get("position", unit)
-        if unit and has and has != unit:
-            raise InputError(
-                f"position is in {has}, and structure {structure.name} takes {unit}; state the unit in a map beside "
-                "the data, or choose the structure for it (spindle for a speed)",
-                log.source or log.name,
-            )

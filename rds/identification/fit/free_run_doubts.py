@@ -11,8 +11,9 @@ import numpy as np
 from rds.identification.fit.estimate import UNUSABLE, Errors
 from rds.identification.fit.kstep import over_noise
 from rds.identification.fit.smoothing import Motion, motion_of
+from rds.identification.logs.log import RATES
 from rds.identification.logs.motion import travel
-from rds.identification.structures.structure import SPEED, Structure
+from rds.identification.structures.structure import Structure
 
 if TYPE_CHECKING:
     from rds.identification.logs.log import Log
@@ -89,7 +90,7 @@ def _little(log: Log, motion: Motion, unit: str, so: str) -> list[str]:
     said = []
     for way, word in ((1.0, "forward "), (-1.0, "backward ")):
         reach = travel(log.position, way)
-        if unit != SPEED and _NONE * noise < reach < _LITTLE * noise:
+        if unit not in RATES and _NONE * noise < reach < _LITTLE * noise:
             said.append(_too_small(log, word, reach, "at most", noise, unit) + so)
     return said
 

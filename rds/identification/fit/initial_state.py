@@ -8,11 +8,18 @@ import numpy as np
 
 from rds.identification.structures.structure import Structure
 
+INITIAL_SAMPLES = 50  # from which the initial state is estimated, and which no error counts
+LEAST = 10
 _ROUNDS = 8
 _STEP = 1e-4  # of a state's scale, for finite differences
 _ENOUGH = 1e-9  # relative gain below which the search ends
 _FEW = 8  # samples of a first slope
 _SLACK = 0.1  # by which the first velocity may leave those that the samples show
+
+
+def initial_samples(length: int) -> int:
+    """From how many of its first samples the initial state of a log with so many is estimated."""
+    return max(min(INITIAL_SAMPLES, length // 10), LEAST)
 
 
 def estimate_start(

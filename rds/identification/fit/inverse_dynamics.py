@@ -11,7 +11,7 @@ voltage. And the residuals' correlation counts in the standard errors (`regressi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,6 +28,7 @@ from rds.identification.logs.log import Log
 from rds.identification.structures.motion_form import MotionForm, motion_form
 from rds.identification.structures.structure import Structure
 
+FIXED = "fixed"  # {name: value}: parameters that are held, beside those of OPTIONS
 OPTIONS = {
     "cutoff": Quantity(
         "cut-off of the zero-phase filter; a tenth of the sampling frequency if not given", "Hz", above=0.0
@@ -68,10 +69,13 @@ class Found:
     rows: int
     still: int  # rows left out because the axis stood
     held: tuple[str, ...]  # friction that came out with the wrong sign, and was held at zero
+    absent: tuple[str, ...] = ()  # what no row holds
+    fixed: tuple[str, ...] = ()
 
 
 def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Estimate:
-    """The parameters of `structure` by inverse dynamics; `options` are those of `OPTIONS`.
+    """The parameters of `structure` by inverse dynamics; `options` are those of `OPTIONS`, and `fixed` {name: value},
+    parameters that are held.
 
     A central difference at a sample sees the time around it, in which a held command was half the last one and half
     this one: `hold` is 0.5. The default of axis-mass is 0, as the EMPS's authors have it. InputError where the data
@@ -84,11 +88,13 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     covariance = np.zeros((len(order), len(order)))
     places = [order.index(name) for name in names]
     covariance[np.ix_(places, places)] = found.covariance
-    untold = [
-        f"{name}: no row of the data holds it (the axis never moves that way, or not at all differently)"
-        for name in names
-        if not np.isfinite(found.covariance[names.index(name), names.index(name)])
-    ]
+    open_ended = [name for name in names if not np.isfinite(found.covariance[names.index(name), names.index(name)])]
+    untold = [f"{name}: no row of the data holds it (the axis never moves that way)" for name in found.absent]
+    if together := [name for name in open_ended if name not in found.absent]:
+        untold.append(
+            f"{' and '.join(together)} come only together: the motion is the same at all times, or at one speed each "
+            "way, so the data cannot tell them apart; log other speeds, or hold one of them (--fix)"
+        )
     freedom = max(found.rows / (1 + 2 * regression.lag) - len(names), 1.0)
     return made_estimate(
         structure,
@@ -101,6 +107,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         warnings=_warnings(found),
         relative_error_percent=regression.relative_percent,
         details={
+            FIXED: dict(options.get(FIXED) or {}),
             "explains": found.form.target,
             "cutoff_hz": found.settings.cutoff,
             "order": found.settings.order,
@@ -120,8 +127,9 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
 def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Found:
     """The regression alone, over all logs together."""
     form = motion_form(structure)
-    settings = _settings(logs, structure, options)
-    gain = structure.given(logs)["force_gain"] if structure.given else 1.0
+    fixed = _fixed(options.get(FIXED) or {}, form, structure)
+    settings = _settings(logs, structure, {name: value for name, value in options.items() if name != FIXED})
+    gain = next(iter(structure.given(logs).values())) if structure.given else 1.0
     blocks, still = [], 0
     for log in logs:
         rows, at_rest = _rows(log, form, settings, gain)
@@ -131,25 +139,63 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
     if len(table) < _LEAST * len(form.names):
         raise InputError(
             f"of {len(table) + still} rows after decimation, {still} are at rest: {len(table)} are left for "
-            f"{len(form.names)} parameters, too few; log a longer or livelier motion, or keep more rows, as with "
-            "--set decimation=1",
+            f"{len(form.names) - len(fixed)} parameters, too few; log a longer or livelier motion, or keep more rows, "
+            "as with --set decimation=1",
             ", ".join(log.name for log in logs),
         )
     lengths = [len(block) for block in blocks]
-    regression, held = _with_signs(table[:, 1:], table[:, 0], lengths, form)
+    regression, held = _with_signs(table[:, 1:], table[:, 0], lengths, form, fixed)
     theta = regression.values
-    if form.target == "voltage" and theta[1] == 0.0:
-        raise InputError("the velocity is nowhere in the voltage: there is no gain to estimate", logs[0].name)
+    if form.gain is not None and theta[form.gain] == 0.0:
+        alone = not table[:, 1 + form.gain].any() or form.gain not in regression.untold
+        why = (
+            f"the velocity is nowhere in the {form.target}: there is no gain to estimate"
+            if alone
+            else "gain and friction come only together: the motion is at one speed; log other speeds, or hold K (--fix)"
+        )
+        raise InputError(why, logs[0].name)
     return Found(
         values=dict(zip(form.names, form.values(theta).tolist(), strict=True)),
-        covariance=form.covariance(theta, regression.covariance),
+        covariance=_held_out(form.covariance(theta, regression.covariance), form, fixed),
         regression=regression,
         form=form,
         settings=settings,
         rows=len(table),
         still=still,
         held=tuple(form.names[column] for column in held),
+        absent=tuple(name for name, column in zip(form.names, table[:, 1:].T, strict=True) if not column.any()),
+        fixed=tuple(fixed),
     )
+
+
+def _held_out(covariance: np.ndarray, form: MotionForm, fixed: Iterable[str]) -> np.ndarray:
+    """The covariance with no uncertainty of what is held, where rounding leaves some."""
+    for name in fixed:
+        at = form.names.index(name)
+        covariance[at, :] = covariance[:, at] = 0.0
+    return covariance
+
+
+def force_error(
+    log: Log, structure: Structure, values: Mapping[str, float], options: Mapping[str, Any]
+) -> tuple[float, int]:
+    """100 |force - its model| / |force| with these `values`, and the rows that it was taken over: those that move."""
+    form = motion_form(structure)
+    gain = next(iter(structure.given([log]).values())) if structure.given else 1.0
+    rows, at_rest = _rows(log, form, _settings([log], structure, options), gain)
+    table = rows[~at_rest]
+    _, theta, _ = form.held({name: values[name] for name in form.names})
+    miss = table[:, 0] - table[:, 1:] @ theta
+    size = float(np.linalg.norm(table[:, 0]))
+    return 100.0 * float(np.linalg.norm(miss)) / size if size > 0.0 else np.inf, len(table)
+
+
+def _fixed(given: Mapping[str, Any], form: MotionForm, structure: Structure) -> dict[str, float]:
+    owner = f"structure {structure.name} by inverse dynamics"
+    check_known(given, form.names, owner)
+    if len(given) == len(form.names):
+        raise InputError(f"{owner}: every parameter is held, so nothing is left to estimate")
+    return {name: structure.parameters[name].check(value, name, owner) for name, value in given.items()}
 
 
 def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, Any]) -> Settings:
@@ -159,7 +205,7 @@ def _settings(logs: Sequence[Log], structure: Structure, options: Mapping[str, A
         for name, value in options.items()
         if value is not None
     }
-    hold = numbers.get("hold", 0.0 if structure.name == "axis-mass" else 0.5)
+    hold = numbers.get("hold", 0.0 if structure.given else 0.5)
     if hold > 1.0:
         raise InputError(f"inverse-dynamics: hold = {hold:g} must be at most 1 ({OPTIONS['hold'].meaning})")
     rate = 1.0 / float(np.mean([log.sample_period for log in logs]))
@@ -226,28 +272,50 @@ def _at_rest(log: Log, settings: Settings) -> np.ndarray:
     return np.asarray(reach <= 1.01 * (log.resolution or 0.0))
 
 
-def _with_signs(X: np.ndarray, y: np.ndarray, lengths: Sequence[int], form: MotionForm) -> tuple[Regression, list[int]]:
-    """The regression; friction that would drive the axis is held at zero, the worst first, and the rest done again."""
-    kept = list(range(X.shape[1]))
+def _with_signs(
+    X: np.ndarray, y: np.ndarray, lengths: Sequence[int], form: MotionForm, fixed: Mapping[str, float]
+) -> tuple[Regression, list[int]]:
+    """The regression with `fixed` parameters held; friction that would drive the axis is held at zero, the worst first,
+    and the rest done again.
+    """
+    A, b, free = form.held(fixed)
+    reduced, target = X @ A, y - X @ b
+    kept = list(range(len(free)))
     while True:
-        found = regress(X[:, kept], y, lengths)
-        way = np.sign(found.values[kept.index(1)]) if form.target == "voltage" and 1 in kept else 1.0
+        found = regress(reduced[:, kept], target, lengths)
+        theta = A[:, kept] @ found.values + b
+        way = np.sign(theta[form.gain]) if form.gain is not None else 1.0
         wrong = {
-            column: size
-            for column, sign in form.friction.items()
-            if column in kept and (size := -sign * way * found.values[kept.index(column)]) > 0.0
+            at: size
+            for at in kept
+            if free[at] in form.friction and (size := -form.friction[free[at]] * way * theta[free[at]]) > 0.0
         }
-        if not wrong:
+        if not wrong or len(kept) == 1:
             break
-        kept.remove(max(wrong, key=lambda column: wrong[column] * float(np.linalg.norm(X[:, column]))))
-    held = [column for column in range(X.shape[1]) if column not in kept]
-    if not held:
+        kept.remove(max(wrong, key=lambda at: wrong[at] * float(np.linalg.norm(reduced[:, at]))))
+    held = [free[at] for at in range(len(free)) if at not in kept]
+    if not held and not fixed:
         return found, held
-    values, covariance = np.zeros(X.shape[1]), np.zeros((X.shape[1], X.shape[1]))
-    ordinary = np.zeros(X.shape[1])
-    values[kept], covariance[np.ix_(kept, kept)], ordinary[kept] = found.values, found.covariance, found.ordinary
-    untold = tuple(kept[column] for column in found.untold)
-    return replace(found, values=values, covariance=covariance, ordinary=ordinary, untold=untold), held
+    part = A[:, kept]
+    hidden = np.isinf(np.diag(found.covariance))
+    untold = (part[:, hidden] != 0.0).any(axis=1)
+    covariance = part @ np.where(np.isfinite(found.covariance), found.covariance, 0.0) @ part.T
+    covariance[untold, :] = covariance[:, untold] = 0.0
+    covariance[untold, untold] = np.inf
+    ordinary = np.sqrt((part**2) @ np.where(np.isfinite(found.ordinary), found.ordinary, 0.0) ** 2)
+    ordinary[untold] = np.inf
+    size = float(np.linalg.norm(y))
+    return (
+        replace(
+            found,
+            values=theta,
+            covariance=covariance,
+            ordinary=ordinary,
+            untold=tuple(np.flatnonzero(untold).tolist()),
+            relative_percent=100.0 * float(np.linalg.norm(found.residual)) / size if size > 0.0 else np.inf,
+        ),
+        held,
+    )
 
 
 def _ordinary(found: Found) -> np.ndarray:
@@ -259,7 +327,8 @@ def _ordinary(found: Found) -> np.ndarray:
         correlation = np.where(np.isfinite(full), full / np.outer(scale, scale), 0.0)
     ordinary = np.sqrt(np.diag(spread))
     finite = np.where(np.isfinite(ordinary), ordinary, 0.0)
-    return np.sqrt(np.diag(found.form.covariance(found.regression.values, correlation * np.outer(finite, finite))))
+    covariance = found.form.covariance(found.regression.values, correlation * np.outer(finite, finite))
+    return np.sqrt(np.diag(_held_out(covariance, found.form, found.fixed)))
 
 
 def _warnings(found: Found) -> list[str]:
@@ -270,7 +339,7 @@ def _warnings(found: Found) -> list[str]:
             f"{', '.join(found.held)} came out driving the axis, not braking it, and was held at 0: friction is too "
             "small for these data to tell, the form is wrong, or the sign of the command is reversed"
         )
-    if found.form.target == "voltage" and found.values["K"] < 0.0:
+    if found.form.gain is not None and found.values["K"] < 0.0:
         said.append(
             f"K = {found.values['K']:.4g} is negative: a positive command moves the axis backward. Is the sign of the "
             "command or of the position reversed?"

@@ -14,7 +14,7 @@ from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
 from rds.identification.fit.free_run_doubts import held_doubts, other_doubts
-from rds.identification.fit.initial_state import estimate_start
+from rds.identification.fit.initial_state import estimate_start, initial_samples
 from rds.identification.fit.kstep import ahead, errors_of
 from rds.identification.logs.fingerprint import fingerprint
 from rds.identification.logs.log import Gravity, Log
@@ -22,6 +22,9 @@ from rds.identification.logs.trace import trace
 from rds.identification.structures.structure import Structure
 
 _START = 1000  # samples from which a log's initial state is estimated
+_PERIODS = 2.0  # of the sample period: a time constant that is shorter is sampled too slowly
+_TOLD_BY = 0.6  # of the sample period: below it nothing is told
+_ROUND = 0.2  # of the time constant: a sample period that would do
 _UNTOLD = 0.5  # standard error over value from which a parameter that cannot be zero is not told
 
 
@@ -73,7 +76,7 @@ def made_estimate(
     said += [
         f"{log.name}: {finding.what}" for log in logs for finding in log.findings if finding.gravity is Gravity.WARNING
     ]
-    said += [*said_of_guesses(parameters), *warnings]
+    said += [*said_of_guesses(parameters), *_too_slow(logs, parameters), *warnings]
     if _none_told(parameters) and not any(UNUSABLE in sentence for sentence in said):
         said.append(
             f"{UNUSABLE}: not one of them is told by these data (every interval is wider than its value, or has no "
@@ -82,7 +85,7 @@ def made_estimate(
     for number, log in enumerate(logs):
         state = None if states is None else states[number]
         begun[log.name], modelled = _run(structure, log, values, state)
-        free_run[log.name], predictions[log.name] = _errors(structure, log, modelled)
+        free_run[log.name], predictions[log.name] = _errors(structure, log, values, modelled)
         if judged and states is None and not log.closed_loop:
             said += other_doubts(structure, log, log.position - modelled, method)
         if log.closed_loop:
@@ -105,7 +108,31 @@ def made_estimate(
         relative_error_percent=relative_error_percent,
         warnings=tuple(dict.fromkeys(said)),
         details=dict(details or {}),
+        output_unit=structure.output_unit,
+        command_unit=structure.command_unit,
     )
+
+
+def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter]) -> list[str]:
+    """A sentence where the samples are too far apart for the time constant, with the period that would do."""
+    made = parameters.get("tau")
+    if made is None or made.std_error == 0.0:
+        return []
+    period = max(log.sample_period for log in logs)
+    if made.value > _PERIODS * period:
+        return []
+    enough = _ROUND * made.value
+    if made.value > _TOLD_BY * period and made.told and not made.wide:
+        return [
+            f"sampled too slowly: a sample period of {1e3 * period:.3g} ms for a time constant of "
+            f"{1e3 * made.value:.3g} ms; {1e3 * enough:.2g} ms would do"
+        ]
+    most = _TOLD_BY * period
+    return [
+        f"{UNUSABLE}: sampled too slowly. Within a sample period of {1e3 * period:.3g} ms the axis is at its speed: "
+        f"the log tells that tau is below {1e3 * most:.3g} ms, and no more. A period of {1e3 * _ROUND * most:.2g} ms "
+        f"tells a time constant of {1e3 * most:.3g} ms; for a shorter one, sample by as much faster (a fifth of it)"
+    ]
 
 
 def _none_told(parameters: Mapping[str, Parameter]) -> bool:
@@ -143,12 +170,24 @@ def _run(
         return state, np.asarray(structure.respond(log.time, log.command, state, values), dtype=float)
 
 
-def _errors(structure: Structure, log: Log, modelled: np.ndarray) -> tuple[Errors, Mapping[int, Errors]]:
-    """Of the free run, and of predictions ahead with it."""
+def _errors(
+    structure: Structure, log: Log, values: Mapping[str, float], modelled: np.ndarray
+) -> tuple[Errors, Mapping[int, Errors]]:
+    """Of the free run, and of predictions ahead with it, as a validation measures them: from an initial state of the
+    first samples, which no error counts. Of a log that is too short for that, of the run that was fitted.
+    """
+    first = initial_samples(len(log))
+    if len(log) >= 2 * first and np.isfinite(modelled).all():
+        t, u, y = log.time, log.command, log.position
+        start = estimate_start(structure, values, t[:first], u[:first], y[:first])
+        with np.errstate(all="ignore"):
+            modelled = np.asarray(structure.respond(t, u, start, values), dtype=float)
+    else:
+        first = 0
     if not np.isfinite(modelled).all():
         return Errors(-np.inf, np.inf, np.inf, structure.output_unit), {}
-    free_run = errors_of(log.position, modelled, structure.output_unit)
-    return free_run, ahead(log.position, modelled, structure.output_unit)
+    measured, modelled = log.position[first:], modelled[first:]
+    return errors_of(measured, modelled, structure.output_unit), ahead(measured, modelled, structure.output_unit)
 
 
 _SMOOTH = 0.01  # s over which velocities are taken: an encoder's step in one sample is no speed
@@ -157,11 +196,12 @@ _SMOOTH = 0.01  # s over which velocities are taken: an encoder's step in one sa
 def fitted_stretch(log: Log) -> dict[str, Any]:
     """What an estimate, and the model file made of it, say of a log that was fitted: `Estimate.logs` holds these.
 
-    Beside file and rows, the lowest and highest command (V) and velocity (mm/s), beyond which the model is a guess,
-    and the fingerprint and the trace by which the data are known again under another name, or with noise.
+    Beside file and rows, the lowest and highest command (V) and velocity (mm/s), beyond which the model is a guess, and
+    position (mm) with the encoder's resolution, where one was logged; the fingerprint and the trace by which the data
+    are known again under another name, or with noise.
     """
     step = max(round(_SMOOTH / log.sample_period), 1)
-    rate = log.position if log.units.get("position") == "rev/min" else _slopes(log, min(step, len(log) - 1))
+    rate = log.position if log.is_rate else _slopes(log, min(step, len(log) - 1))
     found: dict[str, Any] = {
         "name": log.name,
         "source": log.source,
@@ -171,6 +211,9 @@ def fitted_stretch(log: Log) -> dict[str, Any]:
         "command": (float(log.command.min()), float(log.command.max())),
         "velocity": (float(rate.min()), float(rate.max())),
     }
+    if not log.is_rate:
+        found["position"] = (float(log.position.min()), float(log.position.max()))
+        found |= {"resolution": float(log.resolution)} if log.resolution else {}
     found |= {"fingerprint": hashes} if (hashes := fingerprint(log)) else {}
     return found | ({"trace": places} if (places := trace(log)) else {})
 

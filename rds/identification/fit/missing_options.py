@@ -16,7 +16,7 @@ from rds.identification.fit.free_run_doubts import MISSED
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.smoothing import motion_of
 from rds.identification.fit.solve import least_squares
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import RATES, Log
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import LIBRARY, structure
@@ -48,20 +48,22 @@ def missing_option(estimate: Estimate, logs: Sequence[Log]) -> str | None:
         return None
     if all(estimate.free_run[log.name].rmse <= MISSED * motion_of(log).noise for log in logs):
         return None
+    untellable = (*_UNTELLABLE, "backlash") if estimate.output_unit in RATES else _UNTELLABLE
     others = [
         option
         for option in LIBRARY.module(estimate.structure).OPTIONS
-        if option not in estimate.options and option not in _UNTELLABLE
+        if option not in estimate.options and option not in untellable
     ]
     if not others:
         return None
     parts = [log.part(0, max(_LONGEST // len(logs), _FEW)) for log in logs]
-    least = _left(parts, structure(estimate.structure, estimate.options), estimate)
+    signals = (estimate.output_unit, estimate.command_unit)
+    least = _left(parts, structure(estimate.structure, estimate.options, *signals), estimate)
     if least is None:
         return None
     found = {}
     for option in others:
-        left = _left(parts, structure(estimate.structure, (*estimate.options, option)), estimate, least)
+        left = _left(parts, structure(estimate.structure, (*estimate.options, option), *signals), estimate, least)
         if left is not None and left < _LESS * least:
             found[option] = left
     unit = next(iter(estimate.free_run.values())).unit

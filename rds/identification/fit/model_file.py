@@ -28,12 +28,14 @@ from rds.core.quantities import Anything, Declaration, Items, Quantity, Table, T
 from rds.core.toml_table import TomlTable
 from rds.core.toml_text import toml_text
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
+from rds.identification.structures.signals import VOLTS
+from rds.identification.structures.structures import LIBRARY
 
 FORMAT = 1
 _SPREAD = ("std_error", "low", "high")
 _ERRORS = ("fit_percent", "rmse", "maximum")
 _LOG_TEXTS = ("name", "source", "sha256", "fingerprint", "trace")
-_LOG_RANGES = ("command", "velocity")  # lowest and highest that occurred
+_LOG_RANGES = ("command", "velocity", "position")  # lowest and highest that occurred
 _HEADER = (
     "A model of an axis and how far to trust it, estimated from logged data.\n"
     'An experiment takes it with `[model]` and `file = "..."` (the name of this file).'
@@ -57,6 +59,8 @@ class ModelFile:
     path: str = ""
     sha256: str = ""  # of the model file itself
     text: str = ""
+    output_unit: str = "mm"  # of what it answers
+    command_unit: str = "V"
 
     @property
     def is_student(self) -> bool:
@@ -106,6 +110,8 @@ def model_text(estimate: Estimate, path: Path) -> str:
     table: dict[str, Any] = {"format": FORMAT, "structure": structure}
     if sha256:
         table["structure_sha256"] = sha256
+    if (estimate.output_unit, estimate.command_unit) != _usual_units(estimate.structure):
+        table |= {"output_unit": estimate.output_unit, "command_unit": estimate.command_unit}
     table |= {
         "options": list(estimate.options),
         "method": estimate.method,
@@ -122,11 +128,18 @@ def model_text(estimate: Estimate, path: Path) -> str:
     return toml_text(table, _HEADER)
 
 
+def _usual_units(name: str) -> tuple[str, str]:
+    """What a file that states no units means by the structure."""
+    return ("mm" if name.endswith(".py") else LIBRARY.module(name).OUTPUTS[0], VOLTS)
+
+
 def _log_table(log: Mapping[str, Any], estimate: Estimate) -> dict[str, Any]:
     name = str(log.get("name", ""))
     table: dict[str, Any] = {key: str(log[key]) for key in _LOG_TEXTS if log.get(key)}
     table |= {key: int(log[key]) for key in ("first", "end") if key in log}
     table |= {key: [float(value) for value in log[key]] for key in _LOG_RANGES if log.get(key) is not None}
+    if "resolution" in log:
+        table["resolution"] = float(log["resolution"])
     if name in estimate.initial_state:
         table["initial_state"] = [float(value) for value in estimate.initial_state[name]]
     if name in estimate.free_run:
@@ -161,7 +174,8 @@ _LOG = Table(
         **{key: Text(f"{key} of the log") for key in _LOG_TEXTS},
         "first": _SAMPLE,
         "end": _SAMPLE,
-        **{key: Anything(f"{key} of the log, numbers") for key in ("command", "velocity", "initial_state")},
+        **{key: Anything(f"{key} of the log, numbers") for key in (*_LOG_RANGES, "initial_state")},
+        "resolution": Quantity("step of the encoder, in the unit of the position", "", above=0.0),
         "free_run": Table("errors of a free run", _FIGURES),
         "ahead": Table("errors so many samples ahead", others=Table("errors", _FIGURES)),
     },
@@ -175,6 +189,8 @@ MODEL_FILE = Table(
         "structure": Text("structure of the model, or a student's .py file"),
         "structure_sha256": Text("SHA-256 of the student's file", ""),
         "options": Items("options of the structure", Text("name"), "a list of texts"),
+        "output_unit": Text("unit of its position, or of its speed", ""),
+        "command_unit": Text("unit of what commands it", "V"),
         "method": Text("how it was fitted", ""),
         "warnings": Items("what was noticed", Text("sentence"), "a list of texts"),
         "untold": Items("parameters that the data do not determine", Text("name"), "a list of texts"),
@@ -227,6 +243,8 @@ def read_model(path: str | Path) -> ModelFile:
         path=str(path),
         sha256=file_sha256(Path(path)),
         text=words.source,
+        output_unit=words.read("output_unit") or _usual_units(structure)[0],
+        command_unit=words.read("command_unit"),
     )
     words.done()
     return read
@@ -300,7 +318,9 @@ def _read_log(table: TomlTable) -> dict[str, Any]:
     for key in ("first", "end"):
         if (sample := table.read(key)) is not None:
             log[key] = sample
-    for key, count in (("command", 2), ("velocity", 2), ("initial_state", None)):
+    if (step := table.read("resolution")) is not None:
+        log["resolution"] = step
+    for key, count in (*((key, 2) for key in _LOG_RANGES), ("initial_state", None)):
         if key in table:
             log[key] = _numbers(table, key, count)
     if (errors := table.inner("free_run")) is not None:

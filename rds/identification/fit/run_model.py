@@ -12,6 +12,7 @@ from rds.core.integrate import SUBSTEPS
 from rds.core.load import StudentFile, load_student
 from rds.core.types import Model, Source
 from rds.identification.fit.model_file import ModelFile, file_sha256, read_model
+from rds.identification.structures.signals import POSITIONS, VOLTS
 from rds.identification.structures.structure import Structure
 from rds.identification.structures.structures import structure
 from rds.models import library_model
@@ -25,22 +26,28 @@ if TYPE_CHECKING:
 SPINDLE_UNIT = "rev/min"
 
 
-def run_model(file: ModelFile, values: Mapping[str, float] | None = None, unit: str | None = None) -> Model:
+def run_model(
+    file: ModelFile,
+    values: Mapping[str, float] | None = None,
+    unit: str | None = None,
+    per_volt: float | None = None,
+) -> Model:
     """The model of a model file, exact for every option of its structure, with `values` over those of the file.
 
-    `unit` is that of the axis's position, where it is known: a spindle's model is for "rev/min" and no other.
-    Raises InputError where names or units are not those of the structure, a value will not do, or a student's file
-    is not the one that was fitted.
+    `unit` is that of the axis's position, where it is known: a spindle's model is for "rev/min", one that turns for
+    "deg". `per_volt` is how many units of its command the drive makes of a volt, for a model that is commanded in
+    another unit. Raises InputError where names or units are not those of the structure, a value will not do, or a
+    student's file is not the one that was fitted.
     """
-    if unit is not None and not file.is_student and (file.structure == "spindle") != (unit == SPINDLE_UNIT):
-        what = "a spindle" if file.structure == "spindle" else "a linear axis"
-        raise InputError(f"it is a model of {what}, and this axis is measured in {unit}", file.path)
+    if not file.is_student:
+        _check_unit(file, unit)
+        _check_command(file, per_volt)
     merged = file.values() | dict(values or {})
     try:
         if file.is_student:
             model = student_model(student_structure(file), merged, SUBSTEPS)
         else:
-            table = library_table(checked_structure(file), merged)
+            table = library_table(checked_structure(file), merged, per_volt or 1.0)
             model = library_model(table.pop("name"), **table)
     except InputError as error:
         raise error if error.where else InputError(str(error), file.path) from error
@@ -64,7 +71,7 @@ def check_model_file(path: str | Path, sample_period: float = 0.001) -> FileRepo
 
 def checked_structure(file: ModelFile) -> Structure:
     """The structure of a model file, if its parameters have that structure's names and units; else InputError."""
-    made = structure(file.structure, file.options)
+    made = structure(file.structure, file.options, file.output_unit, file.command_unit)
     given, wanted = file.units(), dict(made.units)
     for name in made.parameters:
         if name not in given:
@@ -77,11 +84,20 @@ def checked_structure(file: ModelFile) -> Structure:
     return made
 
 
-def library_table(made: Structure, values: Mapping[str, float]) -> dict[str, Any]:
+def library_table(made: Structure, values: Mapping[str, float], per_volt: float = 1.0) -> dict[str, Any]:
     """The `[model]` table of the library model that moves as the structure does, `name` included.
 
     The plain linear axis where that is enough, as it is what compiles; else the machine's own axis, with all options.
+    Its numbers are for a position in mm or degrees (a spindle's speed in rev/min) and a command in V, of which the
+    drive makes `per_volt` of the structure's command each.
     """
+    table = _table(made, values)
+    if "K" in table:
+        table["K"] = table["K"] * per_volt
+    return table | {name: table[name] / per_volt for name in ("offset", "dead_zone") if name in table}
+
+
+def _table(made: Structure, values: Mapping[str, float]) -> dict[str, Any]:
     if made.as_model is not None:
         table = made.as_model(values)
         if table["name"] != "linear-axis" or table["friction_plus"] >= 0.0 >= table["friction_minus"]:
@@ -90,7 +106,29 @@ def library_table(made: Structure, values: Mapping[str, float]) -> dict[str, Any
     if "friction" in table:
         table["friction_plus"] = table.pop("friction")
         table["friction_minus"] = -table["friction_plus"]
-    return {"name": "machine-axis", **table}
+    times = POSITIONS[made.output_unit][1]
+    speeds = ("K", "friction_plus", "friction_minus", "stribeck_velocity")
+    return {"name": "machine-axis", **table, **{name: times * table[name] for name in speeds if name in table}}
+
+
+def _check_unit(file: ModelFile, unit: str | None) -> None:
+    """InputError where the axis is measured in another unit than the model's."""
+    is_spindle = file.structure == "spindle"
+    own = SPINDLE_UNIT if is_spindle else POSITIONS[file.output_unit][0] if file.output_unit in POSITIONS else None
+    if unit is None or ((own or unit) == unit and is_spindle == (unit == SPINDLE_UNIT)):
+        return
+    what = "a spindle" if is_spindle else "an axis that turns" if own == "deg" else "a linear axis"
+    raise InputError(f"it is a model of {what}, and this axis is measured in {unit}", file.path)
+
+
+def _check_command(file: ModelFile, per_volt: float | None) -> None:
+    if file.command_unit == VOLTS or per_volt is not None:
+        return
+    raise InputError(
+        f"its command is in {file.command_unit}, and a machine's converter gives V: nothing says what the drive makes "
+        f"of a volt; make a machine of it (`rds machine from ... --per-volt 0.5`, for 0.5 {file.command_unit} per V)",
+        file.path,
+    )
 
 
 def _named(made: Structure) -> str:

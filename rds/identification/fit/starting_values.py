@@ -12,6 +12,7 @@ where noise or quantization makes an acceleration worthless.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import chain
 from math import exp, expm1
 
@@ -51,6 +52,23 @@ def axis_starts(
     first, *rest = ((found[i][1], found[i][2]) for i in minima[:2])
     for solved, tau in chain([first], stick_starts(parts), rest):
         yield _values(solved, tau, names, parts, motions), begins
+
+
+def rate_starts(
+    logs: Sequence[Log], names: Sequence[str]
+) -> Iterator[tuple[dict[str, float], list[tuple[float, ...]]]]:
+    """The same for logs of a speed: those of the way that it makes, which has no step of an encoder."""
+    ways = [_way(log) for log in logs]
+    motions = [motion_of(way) for way in ways]
+    begins: list[tuple[float, ...]] = [(_initial_state(way, m, 2)[1],) for way, m in zip(ways, motions, strict=True)]
+    for values, _ in axis_starts(ways, names, 2):
+        yield values, begins
+
+
+def _way(log: Log) -> Log:
+    steps = np.diff(log.time) * 0.5 * (log.position[1:] + log.position[:-1])
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    return replace(log, position=way, resolution=None, units={**log.units, "position": ""})
 
 
 def _check_excitation(logs: Sequence[Log], motions: Sequence[Motion]) -> None:

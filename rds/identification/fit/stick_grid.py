@@ -102,7 +102,7 @@ def _line(parts: Sequence[Log], sign: float, tau: float, plus: float, minus: flo
     zz = zy = yy = 0.0
     for part in parts:
         z, y = np.empty(len(part)), part.position - part.position.mean()
-        move(part.time, sign * part.command, rest, p, columns, z, np.empty((len(z), 0)))
+        move(part.time, sign * part.command, rest, p, columns, z, np.empty((len(z), 0)), False)
         z -= z.mean()
         # not by BLAS, whose threads wait for each other longer than so short a sum takes
         zz, zy, yy = zz + float((z * z).sum()), zy + float((z * y).sum()), yy + float((y * y).sum())

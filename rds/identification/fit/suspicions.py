@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rds.identification.fit.contradiction import contradictions
 from rds.identification.fit.estimate import UNUSABLE
 from rds.identification.fit.free_run_doubts import fitted_doubts
 from rds.identification.fit.smoothing import motion_of
+from rds.identification.fit.upsets import upsets
 
 if TYPE_CHECKING:
     from rds.identification.fit.problem import Problem
     from rds.identification.fit.solve import Solution
     from rds.identification.fit.uncertainty import Uncertainty
 
+_OF_TAU = 0.5  # of the sample period: a time constant that is shorter is told by no log
 _TWINS = 0.99  # correlation from which two parameters are told together rather than each
 _TIMES = (1e-4, 10.0)  # s: time constants of the axes of machine tools
 _SPEEDS = (0.05, 5000.0)  # mm/s: the highest speed of a log
@@ -24,9 +27,12 @@ _SPEEDS = (0.05, 5000.0)  # mm/s: the highest speed of a log
 def suspicions(problem: Problem, solution: Solution, uncertainty: Uncertainty) -> list[str]:
     """Sentences with numbers, units and what to look at."""
     values = problem.values(solution.point)
-    said = [*_search(problem, solution), *_implausible(problem, values)]
+    said = [*_search(problem, solution), *_implausible(problem, values), *contradictions(problem, solution)]
     for number, log in enumerate(problem.logs):
-        said += fitted_doubts(problem.structure, log, problem.residuals(solution.point, number)[0])
+        error = problem.residuals(solution.point, number)[0]
+        said += fitted_doubts(problem.structure, log, error)
+        found = upsets(log.time, error, motion_of(log).noise, problem.structure.output_unit)
+        said += [f"{log.name}: {sentence}" for sentence in found]
     return said + _twins(problem.names, uncertainty)
 
 
@@ -59,7 +65,8 @@ def _implausible(problem: Problem, values: Mapping[str, float]) -> list[str]:
             f"K = {K:.4g} {problem.structure.units['K']} is negative: a positive command moves the axis backward. Is "
             "the sign of the command or of the position reversed?"
         )
-    if tau is not None and not _TIMES[0] <= tau <= _TIMES[1]:
+    slow = max(log.sample_period for log in problem.logs) > _TIMES[0] / _OF_TAU
+    if tau is not None and (tau > _TIMES[1] or (tau < _TIMES[0] and not slow)):
         said.append(
             f"tau = {tau:.3g} s is no time constant of an axis ({_TIMES[0]:g} to {_TIMES[1]:g} s): {UNUSABLE}. Is the "
             "time in seconds, are the columns the right ones, and does the structure have what the axis does?"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,13 +11,14 @@ from rds.identification.logs.clocks import hold, resample
 from rds.identification.logs.columns import column_time, quantity
 from rds.identification.logs.csv_table import missing_samples
 from rds.identification.logs.findings import with_findings
-from rds.identification.logs.log import Clock, Finding, Gravity, Log
-from rds.identification.logs.map import AxisMap, ColumnMap, LogMap
+from rds.identification.logs.log import QUANTITIES, RATES, Clock, Finding, Gravity, Log
+from rds.identification.logs.map import GAINS, AxisMap, ColumnMap, LogMap
 from rds.identification.logs.second_file import Second
 from rds.identification.logs.table import Table
 from rds.identification.logs.time_base import TimeBase, time_base
 from rds.machines.machine import Axis
 
+_ORDER = ("position", *(quantity for quantity in ("reference", *QUANTITIES) if quantity != "position"))
 _HELD = ("command",)  # between its samples a command stays what it was
 
 
@@ -40,6 +41,8 @@ def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | No
     findings = [*table.findings, *(second.findings if second else ())]
     findings += [Finding("map", f"guessed: {sentence}") for sentence in mapping.said]
     parts = _parts(table, about, second, machine_axis, resolution, findings)
+    if parts["position"].unit in RATES and "position" not in about.columns:
+        resolution = None  # of a position, which was not logged
     time, arrays = _on_one_time(table, mapping, parts, second, findings)
     arrays, time = _without_blanks(arrays, time, mapping, table, findings)
     if mapping.samples is not None and mapping.samples > len(time):
@@ -50,6 +53,8 @@ def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | No
         time, arrays = time[base.keep], {name: values[base.keep] for name, values in arrays.items()}
     gain, reach = _gain(table, about), about.voltage_range
     units = {"time": "s"} | {name: part.unit for name, part in parts.items()}
+    if gain is not None:
+        units["force"] = about.force_unit
     if reach is None and mapping.machine is not None and units["command"] == "V":
         reach = (-mapping.machine.converter.range, mapping.machine.converter.range)
     name = table.path.stem if len(mapping.axes) == 1 else f"{table.path.stem}:{about.name}"
@@ -64,7 +69,7 @@ def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | No
             units=units,
             resolution=resolution,
             voltage_range=reach,
-            closed_loop=about.closed_loop,
+            closed_loop=about.closed_loop if about.closed_loop is not None else _held(about),
             force_gain=gain,
             source=str(table.path),
             sha256=table.sha256,
@@ -85,18 +90,44 @@ def _parts(
 ) -> dict[str, _Part]:
     target = machine_axis.unit if machine_axis else None
     parts: dict[str, _Part] = {}
-    for name, column_map in sorted(about.columns.items(), key=lambda item: item[0] != "position"):
+    for name, column_map in sorted(about.columns.items(), key=lambda item: _ORDER.index(item[0])):
         source = second.table if column_map.second and second is not None else table
         column = source.column(column_map.column, column_map.place)
         values, unit, found = quantity(column, column_map, name, resolution, target)
         findings += found
-        if name == "position":
+        if name == "position" or (name == "reference" and "position" not in parts):
             target = unit
-        elif name == "reference" and unit != target:
-            raise InputError(
-                f"reference is in {unit}, and position in {target}; one of the units is wrong", about.place
-            )
+        elif name in ("reference", "following_error") and unit != target:
+            other = "position" if "position" in parts else "reference"
+            raise InputError(f"{name} is in {unit}, and {other} in {target}; one of the units is wrong", about.place)
         parts[name] = _Part(values, unit, _own_time(column.time, column_map, second), column_map.second)
+    return _completed(parts, about, findings)
+
+
+def _completed(parts: dict[str, _Part], about: AxisMap, findings: list[Finding]) -> dict[str, _Part]:
+    """With the position that reference and following error tell, or the reference; a log of a speed has it as position.
+
+    A drive's following error (CiA 402, object 60F4h) is the position demanded less the actual one.
+    """
+    error = parts.pop("following_error", None)
+    if error is not None:
+        has, other, sign = ("position", "reference", 1.0) if "position" in parts else ("reference", "position", -1.0)
+        if other in parts:
+            findings.append(Finding("map", "following_error is not used: position and reference are both there"))
+        else:
+            known = parts[has]
+            if (known.second, known.time is None) != (error.second, error.time is None) or (
+                known.time is not None and error.time is not None and not np.array_equal(known.time, error.time)
+            ):
+                raise InputError(f"following_error has other times than {has}; map the {other} itself", about.place)
+            parts[other] = replace(known, values=known.values + sign * error.values)
+            made = "position and following error" if other == "reference" else "reference less following error"
+            findings.append(Finding("map", f"the {other} is {made}"))
+    if "position" not in parts:
+        parts["position"] = parts.pop("velocity")
+        parts.pop("reference", None)
+        what = f"no position was logged: the axis is known by its speed ({parts['position'].unit}) alone"
+        findings.append(Finding("map", f"{what}; what depends on where it is (play, travel) cannot be told"))
     return parts
 
 
@@ -209,14 +240,23 @@ def _without_blanks(
     return {name: values[good] for name, values in arrays.items()}, time[good]
 
 
+def _held(about: AxisMap) -> bool | None:
+    """True where a following error was logged, which only a controller has."""
+    return True if "following_error" in about.columns else None
+
+
+def _gain_key(about: AxisMap) -> str:
+    return next(key for key, unit in GAINS.items() if unit == about.force_unit)
+
+
 def _gain(table: Table, about: AxisMap) -> float | None:
     if not isinstance(about.force_gain, str):
         return about.force_gain
     if about.force_gain not in table.constants:
         known = ", ".join(table.constants) or "none"
         raise InputError(
-            f"force_gain = {about.force_gain!r} is no single number of {table.path.name} (it has {known}); give it in "
-            "N/V, as in force_gain = 35.15",
+            f"{_gain_key(about)} = {about.force_gain!r} is no single number of {table.path.name} (it has {known}); "
+            f"give it in {about.force_unit} per unit of the command, as in {_gain_key(about)} = 35.15",
             about.place,
         )
     return table.constants[about.force_gain]

@@ -30,6 +30,7 @@ _WORDS: Mapping[str, frozenset[str]] = {
     ).union(("istposition", "lageistwert", "lage")),
 }
 _OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration"))  # never what was measured
+_ACTING = (("voltage",), ("force", "torque"), ("current",))
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
 _TOLD = 5  # columns that a sentence names
@@ -105,7 +106,9 @@ def draft(table: Table) -> str:
         if any(c is not None and dimension(c.unit or "") == "counts" for c in parts.values()):
             chosen["resolution"] = UNKNOWN
             notes.append(f"resolution: give mm (or degrees) per encoder count for {UNKNOWN!r}, or name a machine.")
-        if {"command", "position"} & {q for q, c in parts.items() if c is not None}:
+        if parts["position"] is None and parts["velocity"] is not None:
+            del chosen["position"]  # the speed alone will do
+        if {"command", "position", "velocity"} & {q for q, c in parts.items() if c is not None}:
             axes[name] = chosen
     if not axes:
         axes["X"] = {q: {"column": UNKNOWN, "unit": UNKNOWN} for q in ("command", "position")}
@@ -224,23 +227,23 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
     found: dict[str, Column] = {}
     for quantity in ("command", "position"):
         fits = _fitting(measured, quantity)
+        if not fits and quantity == "position" and len(speeds := _fitting(measured, "velocity")) == 1:
+            found["velocity"] = speeds[0]  # of an axis that is known by its speed alone
+            continue
         if not fits:
             bare = [c.name for c in measured if c.unit is None]
             doubt = f"no column tells by its unit that it is the {quantity}"
-            if quantity == "position" and (speeds := _fitting(measured, "velocity")):
-                doubt += (
-                    f"; {speeds[0].name} is a velocity, which alone does not do: log the position, or add the "
-                    "velocity's integral over time as a column"
-                )
             strange = [c for c in measured if _is_strange(c) and _role(c.name) in (quantity, None)]
             doubt += "".join(f"; {c.name!r}: {_unknown(c, quantity)}" for c in strange[:_TOLD])
-            doubt += _may_stand_for(measured) if quantity == "command" else ""
+            if quantity == "command" and (parts := [c for c in measured if dimension(c.unit or "") == "ratio"]):
+                told = " or ".join(f"{c.name} [{c.unit}]" for c in parts[:_TOLD])
+                doubt += f"; where {told} is the command, say so in a map"
             return {}, doubt + (f" (no unit: {', '.join(bare[:_TOLD])})" if bare else "")
         if len(fits) > 1:
             names = ", ".join(f"{c.name} [{c.unit}]" for c in fits)
             return {}, f"{names} could each be the {quantity}"
         found[quantity] = fits[0]
-    if dimension(found["position"].unit or "") == "counts":
+    if "position" in found and dimension(found["position"].unit or "") == "counts":
         return {}, f"{found['position'].name!r} is in encoder counts; give the resolution (mm per count) or the machine"
     for quantity in ("velocity", "current", "reference"):
         fits = [c for c in _fitting(measured, quantity) if c not in found.values()]
@@ -261,19 +264,12 @@ def _unknown(column: Column, quantity: str) -> str:
     )
 
 
-def _may_stand_for(columns: Sequence[Column]) -> str:
-    """That a current, torque or percentage may be the command, which nobody but the user knows."""
-    of = [d for d in DIMENSIONS["command"] if d != "voltage"]
-    drives = [f"{c.name} [{c.unit}]" for c in columns if dimension(c.unit or "") in of]
-    if not drives:
-        return ""
-    return f"; where a drive's {' or '.join(drives[:_TOLD])} stands for the voltage, say so in a map"
-
-
 def _fitting(columns: Sequence[Column], quantity: str) -> list[Column]:
     """The columns whose unit admits the quantity, and of those the ones that have its name, if any do."""
-    dimensions = ("voltage",) if quantity == "command" else DIMENSIONS[quantity]
+    dimensions = DIMENSIONS[quantity]
     fits = [c for c in columns if dimension(c.unit or "") in dimensions]
+    if quantity == "command":  # a voltage where there is one, else the torque or force of a drive, else its current
+        fits = next((of for d in _ACTING if (of := [c for c in fits if dimension(c.unit or "") in d])), [])
     if quantity == "reference":
         return [c for c in fits if _role(c.name) == "reference"]
     fits = [c for c in fits if _role(c.name) != "reference" or quantity == "command"]

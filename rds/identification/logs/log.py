@@ -10,7 +10,9 @@ import numpy as np
 
 from rds.core.errors import InputError
 
-QUANTITIES = ("command", "position", "velocity", "current", "reference")  # that a column can be, beside time
+# what a column can be, beside time
+QUANTITIES = ("command", "position", "velocity", "current", "reference", "following_error")
+RATES = ("rev/min", "mm/s")  # units of a position that is a speed: of a spindle, or of a log without a position
 
 
 class Gravity(StrEnum):
@@ -55,7 +57,8 @@ class Log:
     """One axis over time. All arrays are float64, one-dimensional, of one length, and finite.
 
     The command is held from its sample to the next (zero-order hold). `sample_period` is the mean step; the times
-    themselves are used where they are not exactly regular. A spindle's position is its speed, rev/min.
+    themselves are used where they are not exactly regular. A spindle's position is its speed, rev/min; so is that of a
+    log in which no position was logged (mm/s or rev/min): `is_rate`.
 
     InputError for arrays of different lengths, that are not finite, or a time that does not increase.
     """
@@ -63,13 +66,13 @@ class Log:
     name: str
     time: np.ndarray  # s
     command: np.ndarray  # V (or what `units` says)
-    position: np.ndarray  # mm
+    position: np.ndarray  # mm, deg, rev/min or mm/s, as `units` says
     extra: Mapping[str, np.ndarray] = field(default_factory=dict)  # velocity, current, reference, where logged
     units: Mapping[str, str] = field(default_factory=dict)  # of each quantity
     resolution: float | None = None  # mm, one step of the encoder: stated, or found in the data
     voltage_range: tuple[float, float] | None = None  # V, of the converter, where known
     closed_loop: bool | None = None  # None: not known
-    force_gain: float | None = None  # N/V (gtau): the force that the command makes
+    force_gain: float | None = None  # N or Nm (`units["force"]`) that one unit of the command makes
     source: str = ""  # the file that it was read from
     sha256: str = ""  # of that file
     findings: tuple[Finding, ...] = ()
@@ -94,6 +97,11 @@ class Log:
     def sample_period(self) -> float:
         """The mean step of the time, s."""
         return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether the position is a speed."""
+        return self.units.get("position") in RATES
 
     def part(self, first: int, end: int) -> Log:
         """The samples from `first` to before `end`; its times stay what they are."""

@@ -28,7 +28,10 @@ DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "velocity": ("speed", "angular speed", "count speed"),
     "current": ("current",),
     "reference": ("length", "angle", "angular speed", "counts"),
+    "following_error": ("length", "angle", "counts"),
 }
+# gains from the command to what moves the axis: the key of a map, and the unit of what is moved by
+GAINS = {"force_gain": "N", "torque_gain": "Nm"}
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ class AxisMap:
     machine_axis: str | None = None
     resolution: float | None = None  # mm (or the axis's unit) per count
     closed_loop: bool | None = None
-    force_gain: float | str | None = None  # N/V; a text names a constant of the file
+    force_gain: float | str | None = None  # per unit of the command; a text names a constant of the file
+    force_unit: str = "N"  # or Nm: of what the command makes
     voltage_range: tuple[float, float] | None = None  # V
     place: str = ""
 
@@ -241,14 +245,7 @@ def _axes(words: TomlTable, machine: Machine | None) -> dict[str, AxisMap]:
 
 def _axis(name: str, words: TomlTable, machine: Machine | None) -> AxisMap:
     columns = {q: _column(words, q) for q in QUANTITIES if q in words}
-    for needed in ("command", "position"):
-        if needed not in columns:
-            raise InputError(f"axis {name} needs {needed} = {{ column = ..., unit = ... }}", words.place())
-    command, position = columns["command"], columns["position"]
-    if (command.column, command.second) == (position.column, position.second):
-        raise InputError(
-            f"command and position are both {command.column!r}; one of them is another column", command.place
-        )
+    _check_columns(name, columns, words)
     of = words.read("machine_axis")
     if of is not None and machine is None:
         raise words.fault("machine_axis", 'names an axis of no machine; add machine = "mini-cnc" at the top')
@@ -258,18 +255,37 @@ def _axis(name: str, words: TomlTable, machine: Machine | None) -> AxisMap:
         if of is not None and of not in machine.axes:
             raise words.fault("machine_axis", f"is no axis of {machine.name}; it has {', '.join(machine.axes)}")
     closed = words.read("closed_loop")
+    gain, force = _gain(words)
     made = AxisMap(
         name=name,
         columns=columns,
         machine_axis=of,
         resolution=_resolution(words),
         closed_loop=closed,
-        force_gain=_gain(words),
+        force_gain=gain,
+        force_unit=force,
         voltage_range=_range(words),
         place=words.place(),
     )
     words.done()
     return made
+
+
+def _check_columns(name: str, columns: Mapping[str, ColumnMap], words: TomlTable) -> None:
+    """InputError where a command is missing, or all that tells a motion."""
+    if "command" not in columns:
+        raise InputError(f"axis {name} needs command = {{ column = ..., unit = ... }}", words.place())
+    told = {"position", "velocity"} & set(columns) or {"reference", "following_error"} <= set(columns)
+    if not told:
+        raise InputError(
+            f"axis {name} needs position = {{ column = ..., unit = ... }}; or velocity; or reference and "
+            "following_error, of which the position follows",
+            words.place(),
+        )
+    command = columns["command"]
+    for q, other in columns.items():
+        if q in ("position", "velocity") and (command.column, command.second) == (other.column, other.second):
+            raise InputError(f"command and {q} are both {command.column!r}; one is another column", command.place)
 
 
 def _column(axis: TomlTable, quantity: str) -> ColumnMap:
@@ -310,16 +326,23 @@ def _resolution(words: TomlTable) -> float | None:
     return resolution
 
 
-def _gain(words: TomlTable) -> float | str | None:
-    value = words.any("force_gain")
-    if value is None or isinstance(value, str):
-        return value
+def _gain(words: TomlTable) -> tuple[float | str | None, str]:
+    """What one unit of the command makes, and its unit."""
+    given = [key for key in GAINS if key in words]
+    if not given:
+        return None, "N"
+    key = given[0]
+    if len(given) > 1:
+        raise words.fault(given[1], f"and {key} are both given; a command makes a force or a torque: give one")
+    value = words.any(key)
+    if isinstance(value, str):
+        return value, GAINS[key]
     if (fault := FORCE_GAIN.fault(value)) is not None:
-        raise words.fault("force_gain", fault)
+        raise words.fault(key, fault)
     gain = float(value)
     if gain == 0.0:
-        raise words.fault("force_gain", "must not be 0: the command would make no force")
-    return gain
+        raise words.fault(key, "must not be 0: the command would make no force")
+    return gain, GAINS[key]
 
 
 def _range(words: TomlTable) -> tuple[float, float] | None:

@@ -13,7 +13,7 @@ JITTER_LIMIT = 0.1  # of the sample period: how far a step of the time may be fr
 _SCALE = Quantity("the column's unit per number of the column; not 0", "", -1e15, 1e15, default=1.0)
 _OFFSET = Quantity("what is added, in the column's unit", "", -1e15, 1e15, default=0.0)
 _WRAP = Quantity("number at which the column's counter begins again", "", 1e-9, 1e15)
-FORCE_GAIN = Quantity("force that the command makes", "N/V", -1e9, 1e9)
+FORCE_GAIN = Quantity("force (N) or torque (Nm) that the command makes", "per unit of the command", -1e9, 1e9)
 _LAYOUT: Mapping[str, Declaration] = {
     "delimiter": Choice("what stands between two cells", ("find", *DELIMITERS), "find"),
     "decimal": Choice("decimal mark", ("find", "point", "comma"), "find"),
@@ -51,10 +51,13 @@ _AXIS = Table(
         "resolution": Quantity("of the encoder", "mm (or the axis's unit) per count", 1e-12, 1e9),
         "counts_per_unit": Quantity("of the encoder", "counts per mm (or the axis's unit)", 1e-9, 1e12),
         "closed_loop": Flag("a controller was at work"),
-        "force_gain": Anything(
-            "force that the command makes; a text names a constant of the file",
-            (FORCE_GAIN, Text("a constant of the file")),
-        ),
+        **{
+            key: Anything(
+                f"{what} that the command makes, per unit of it; a text names a constant of the file",
+                (FORCE_GAIN, Text("a constant of the file")),
+            )
+            for key, what in (("force_gain", "force, N,"), ("torque_gain", "torque, Nm,"))
+        },
         "voltage_range": Anything(
             "range of the command, V: one number for both directions, or two",
             (
@@ -63,7 +66,7 @@ _AXIS = Table(
             ),
         ),
     },
-    needed=("command", "position"),
+    needed=("command",),
 )
 _SECOND = Table(
     "a second recorder's file of the same motion",

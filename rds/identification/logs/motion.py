@@ -38,13 +38,13 @@ def motion(log: Log) -> Motion:
     command[-1:] = log.command[ends[-2] : ends[-1]].sum()
     command = command / width
     spans = log.time[ends[1:]] - log.time[ends[:-1]]
-    if log.units.get("position") == "rev/min":
+    if log.is_rate:
         speed = np.add.reduceat(log.position, ends[:-1])[:count]
         speed[-1:] = log.position[ends[-2] : ends[-1]].sum()
         speed = speed / width
     else:
         speed = np.diff(log.position[ends]) / spans
-    noise = (log.resolution or 0.0) / (1.0 if log.units.get("position") == "rev/min" else float(np.median(spans)))
+    noise = (log.resolution or 0.0) / (1.0 if log.is_rate else float(np.median(spans)))
     return Motion(width, command, speed, noise)
 
 

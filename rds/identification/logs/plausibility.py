@@ -12,6 +12,7 @@ from rds.machines.machine import Axis
 
 _LAGS = 10  # windows by which a motion may follow its command
 _CLEAR, _FAINT = 0.5, 0.15  # correlations
+_BRAKED = 0.1  # of the energy that a force could give: what noise, gravity and the ends of a log may take
 _NEAR = 0.7  # of the largest correlation: a peak as good as it
 _JUMP, _SMOOTH = 0.3, 0.1  # of the range, in one sample: what a command may do, and a position does not
 _LEAP = 0.8  # of the range of a position, in one sample: no axis does that
@@ -33,13 +34,15 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
     if around := _wraps(log):
         return [around]
     jump = {name: float(np.abs(np.diff(v)).max() / np.ptp(v)) for name, v in _both(log).items()}
-    if log.units.get("position") != "rev/min" and jump["position"] > _JUMP and jump["command"] < _SMOOTH:
+    if not log.is_rate and jump["position"] > _JUMP and jump["command"] < _SMOOTH:
         what = (
             f"the position jumps by {100 * jump['position']:.0f} % of its range in a sample, and the command by "
             f"{100 * jump['command']:.2g} %: they are swapped, as it seems"
         )
         return [Finding("columns", what, Gravity.FAULT)]
     seen = motion(log)
+    if log.units.get("command", "V") != "V":
+        return _driven(seen)
     follows = _follows(seen)
     if follows < -_CLEAR:
         what = (
@@ -54,6 +57,22 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
         )
         return [Finding("columns", what, Gravity.WARNING)]
     return []
+
+
+def _driven(seen: Motion) -> list[Finding]:
+    """Whether a force, torque or current drives the axis: over a log it gives what friction takes, and never less.
+
+    An inertia stores what it was given and gives it back; so the speed need not follow the command.
+    """
+    size = float(np.sqrt((seen.command @ seen.command) * (seen.speed @ seen.speed)))
+    share = float(seen.command @ seen.speed) / size if size > 0.0 else 0.0
+    if share >= -_BRAKED:
+        return []
+    what = (
+        f"the command takes more energy out of the axis than it gives ({100.0 * share:.0f} % of what it could give): "
+        "give command or position sign = -1 in the map, or one of them is another column"
+    )
+    return [Finding("sign", what, Gravity.FAULT)]
 
 
 def magnitudes(log: Log, axis: Axis | None) -> list[Finding]:
@@ -117,7 +136,7 @@ def _wraps(log: Log) -> Finding | None:
     steps = np.diff(log.position)
     leaps = np.flatnonzero(np.abs(steps) > _LEAP * np.ptp(log.position))
     others = np.delete(np.abs(steps), leaps)
-    if log.units.get("position") == "rev/min" or not len(leaps) or not len(others) or others.max() == 0.0:
+    if log.is_rate or not len(leaps) or not len(others) or others.max() == 0.0:
         return None
     size = np.abs(steps[leaps])
     if np.ptp(size) > 2.0 * others.max() or others.max() > _SMOOTH * size.min():

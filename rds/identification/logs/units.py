@@ -33,7 +33,7 @@ _DIMENSIONS: Mapping[str, tuple[str, Mapping[str, float]]] = MappingProxyType(
         "current": ("A", {"A": 1.0, "mA": 1e-3, "uA": 1e-6}),
         "force": ("N", {"N": 1.0, "kN": 1e3, "mN": 1e-3}),
         "torque": ("Nm", {"Nm": 1.0, "mNm": 1e-3}),
-        "ratio": ("1", {"1": 1.0, "%": 1e-2}),
+        "ratio": ("%", {"1": 100.0, "%": 1.0, "permille": 0.1}),
     }
 )
 # other spellings, after `plain` has made them so
@@ -59,6 +59,7 @@ _SPELLINGS: Mapping[str, str] = MappingProxyType(
         **dict.fromkeys(("ampere", "amperes", "amp", "amps"), "A"),
         **dict.fromkeys(("N.m", "N*m", "N·m"), "Nm"),
         **dict.fromkeys(("percent", "pct"), "%"),
+        **dict.fromkeys(("‰", "per mille", "0.1%", "0,1%"), "permille"),
     }
 )
 _BY_UNIT = MappingProxyType(

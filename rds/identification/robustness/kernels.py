@@ -46,7 +46,7 @@ def sweep(law: Callable[..., Any], motion: str) -> Callable[..., None]:
         @njit
         def move(x, w, z, before, now, c):
             return step_machine(
-                x, w, z, before, now, c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10], c[11]
+                x, w, z, before, now, c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10], c[11], c[12]
             )
 
     @njit(nogil=True)

@@ -205,8 +205,10 @@ def _begin(x0, p, where, state, tangent):
 
 
 @kernel
-def move(t, u, x0, p, where, y, by):
+def move(t, u, x0, p, where, y, by, rate_out):
     """Fill `y` (N) with the output at the times `t` (N), and `by` (N, n) with its derivatives by the columns `where`.
+
+    The output is the position; with `rate_out` the velocity.
 
     `u` (N), V, is held from each time to the next, and acts p[DELAY] later; before the first command has arrived, it
     is taken to have been there already. With an empty `where`, `by` is not touched.
@@ -219,7 +221,7 @@ def move(t, u, x0, p, where, y, by):
     rate = (1.0 + p[VISCOUS]) / p[TAU]
     period, decay, reach = -1.0, 1.0, 0.0  # of the last step that was whole
     acting = 0  # the command that acts now
-    out = 2 if p[BACKLASH] > 0.0 else 0
+    out = 1 if rate_out else 2 if p[BACKLASH] > 0.0 else 0
     for k in range(len(t)):
         y[k] = state[out]
         for i in range(n):

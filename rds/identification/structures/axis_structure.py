@@ -10,14 +10,18 @@ free per direction would take it up, so with it friction is one number, the same
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from rds.core.errors import InputError
 from rds.core.quantities import Quantity
-from rds.identification.logs.log import Log
+from rds.identification.logs.log import RATES, Log
+from rds.identification.structures.signals import POSITIONS, follow, followed
 from rds.identification.structures.structure import PLAY, Idle, Start, Structure
 
+OUTPUTS = ("mm", "deg", "mm/s", "rev/min")
 OPTIONS = ("viscous", "stribeck", "offset", "dead-zone", "delay", "backlash")
 
 PLAIN = {
@@ -83,23 +87,31 @@ _FIRST_STATE = 11
 HARDLY = 30.0  # times the noise: friction of a direction in which the axis moves less may not be told
 
 
-def make(options: Sequence[str] = ()) -> Structure:
-    """The structure with the given options of `OPTIONS`."""
+def make(options: Sequence[str] = (), output: str = "mm", command: str = "V") -> Structure:
+    """The structure with the given options of `OPTIONS`, for an output and a command in these units.
+
+    Where the output is a speed, its initial value is the only state. InputError for play there: it moves the position.
+    """
+    rate = output in RATES
+    if rate and "backlash" in options:
+        raise InputError("play shows in a position, and the log has a speed only; leave --option backlash out")
     table = dict(SYMMETRIC if "offset" in options else PLAIN)
     for option in options:
         table |= ADDED[option]
     names = tuple(table)
-    states = 3 if "backlash" in options else 2
+    table = followed(table, output, command)
+    states = 1 if rate else 3 if "backlash" in options else 2
+    first = _FIRST_STATE + 1 if rate else _FIRST_STATE
     places = [place for name in names for place, _ in _PLACES[name]]
-    where = np.array([*places, *range(_FIRST_STATE, _FIRST_STATE + states)], dtype=np.int64)
+    where = np.array([*places, *range(first, first + states)], dtype=np.int64)
 
     def respond(t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]) -> np.ndarray:
-        return _moved(t, u, x0, values, where[:0])[0]
+        return _moved(t, u, x0, values, where[:0], rate)[0]
 
     def sensitivities(
         t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]
     ) -> tuple[np.ndarray, np.ndarray]:
-        y, by = _moved(t, u, x0, values, where)
+        y, by = _moved(t, u, x0, values, where, rate)
         if "friction" not in table:
             return y, by
         both = names.index("friction")
@@ -107,22 +119,24 @@ def make(options: Sequence[str] = ()) -> Structure:
         return y, np.delete(by, both + 1, axis=1)
 
     def start(logs: Sequence[Log]) -> Iterator[Start]:
-        from rds.identification.fit.starting_values import axis_starts
+        from rds.identification.fit.starting_values import axis_starts, rate_starts
 
-        return axis_starts(logs, names, states)
+        return rate_starts(logs, names) if rate else axis_starts(logs, names, states)
 
     return Structure(
         name="axis",
         parameters=table,
-        units={name: UNITS[name] for name in names},
+        units={name: follow(UNITS[name], output, command) for name in names},
         states=states,
         respond=respond,
         options=tuple(options),
         sensitivities=sensitivities,
-        as_model=_as_model if set(options) <= {"viscous", "offset"} else None,
+        as_model=partial(_as_model, POSITIONS[output][1]) if set(options) <= {"viscous", "offset"} else None,
         at_most={"friction_minus": 0.0} if "friction_minus" in table else {},
-        state_names=("position", "velocity", PLAY)[:states],
+        state_names=("velocity",) if rate else ("position", "velocity", PLAY)[:states],
         state_bounds=((-np.inf, np.inf), (-np.inf, np.inf), (-1.0, 1.0))[:states],
+        output_unit=output,
+        command_unit=command,
         start=start,
         neutral={name: value for name, value in NEUTRAL.items() if name in table},
         idle=_idle if "friction_minus" in table else None,
@@ -142,14 +156,15 @@ def place(values: Mapping[str, float]) -> np.ndarray:
 
 
 def _moved(
-    t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float], where: np.ndarray
+    t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float], where: np.ndarray, rate: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     from rds.identification.structures.axis_motion import move
 
     start = np.zeros(3)
-    start[: len(x0)] = x0
+    first = 1 if rate else 0
+    start[first : first + len(x0)] = x0
     y, by = np.empty(len(t)), np.empty((len(t), len(where)))
-    move(t, u, start, place(values), where, y, by)
+    move(t, u, start, place(values), where, y, by, rate)
     return y, by
 
 
@@ -188,15 +203,15 @@ def _held(fixed: frozenset[str]) -> dict[str, tuple[float, str]]:
     return {"viscous": (0.0, why)}
 
 
-def _as_model(values: Mapping[str, float]) -> dict[str, Any]:
-    """The library's linear axis that moves in the same way."""
-    scale = 1.0 + values.get("viscous", 0.0)
+def _as_model(times: float, values: Mapping[str, float]) -> dict[str, Any]:
+    """The library's linear axis that moves in the same way; `times` makes the speed's unit that of a position per s."""
+    scale = (1.0 + values.get("viscous", 0.0)) / times
     shift = values["K"] * values.get("offset", 0.0)
     plus = values["friction"] if "friction" in values else values["friction_plus"]
     minus = -values["friction"] if "friction" in values else values["friction_minus"]
     return {
         "name": "linear-axis",
-        "tau": values["tau"] / scale,
+        "tau": values["tau"] / scale / times,
         "K": values["K"] / scale,
         "friction_plus": (plus - shift) / scale,
         "friction_minus": (minus - shift) / scale,

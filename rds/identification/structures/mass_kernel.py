@@ -64,11 +64,11 @@ def _direction(v, force, plus, minus):
 
 
 @kernel
-def positions(t, u, x, v, b, plus, minus, r_plus, r_minus):
-    """The position at each of the times `t`, of voltages `u` held from each to the next."""
+def positions(t, u, x, v, b, plus, minus, r_plus, r_minus, rate=False):
+    """The position at each of the times `t`, of commands `u` held from each to the next; with `rate` the velocity."""
     out = np.empty(len(t))
     for k in range(len(t)):
-        out[k] = x
+        out[k] = v if rate else x
         if k + 1 == len(t):
             break
         left, force = t[k + 1] - t[k], b * u[k]
@@ -88,14 +88,14 @@ def positions(t, u, x, v, b, plus, minus, r_plus, r_minus):
 
 
 @kernel
-def sensitivities(t, u, x, v, b, plus, minus, r_plus, r_minus):
-    """The positions as `positions` gives them, and their derivatives: arrays of (samples,) and (samples, 7)."""
+def sensitivities(t, u, x, v, b, plus, minus, r_plus, r_minus, rate=False):
+    """The outputs as `positions` gives them, and their derivatives: arrays of (samples,) and (samples, 7)."""
     out, slopes = np.empty(len(t)), np.zeros((len(t), 7))
     dx, dv, dp, dv_next = np.zeros(7), np.zeros(7), np.zeros(7), np.zeros(7)
     dx[5], dv[6] = 1.0, 1.0
     for k in range(len(t)):
-        out[k] = x
-        slopes[k] = dx
+        out[k] = v if rate else x
+        slopes[k] = dv if rate else dx
         if k + 1 == len(t):
             break
         left, force = t[k + 1] - t[k], b * u[k]

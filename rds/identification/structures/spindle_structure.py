@@ -17,8 +17,10 @@ from rds.core.errors import InputError
 from rds.core.quantities import Quantity
 from rds.identification.logs.log import Log
 from rds.identification.structures import spindle_kernel
+from rds.identification.structures.signals import follow, followed
 from rds.identification.structures.structure import Structure
 
+OUTPUTS = ("rev/min",)
 OPTIONS = ("offset", "delay")
 
 PARAMETERS = {
@@ -30,13 +32,13 @@ PARAMETERS = {
 UNITS = {"tau": "s", "K": "(rev/min)/V", "offset": "V", "delay": "s"}
 
 
-def make(options: Sequence[str] = ()) -> Structure:
-    """The structure `spindle`, with what `options` free."""
+def make(options: Sequence[str] = (), output: str = "rev/min", command: str = "V") -> Structure:
+    """The structure `spindle`, with what `options` free, for a command in this unit."""
     names = [name for name in PARAMETERS if name in ("tau", "K") or name in options]
     return Structure(
         name="spindle",
-        parameters={name: PARAMETERS[name] for name in names},
-        units={name: UNITS[name] for name in names},
+        parameters=followed({name: PARAMETERS[name] for name in names}, output, command),
+        units={name: follow(UNITS[name], output, command) for name in names},
         states=1,
         respond=respond,
         options=tuple(options),
@@ -44,7 +46,8 @@ def make(options: Sequence[str] = ()) -> Structure:
         as_model=as_model,
         state_names=("speed",),
         start=_Start(tuple(options)),
-        output_unit="rev/min",
+        output_unit=output,
+        command_unit=command,
     )
 
 

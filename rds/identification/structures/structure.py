@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from rds.core.quantities import Quantity
+from rds.identification.logs.log import RATES
 from rds.identification.structures import SIMULATION_ERROR
 
 if TYPE_CHECKING:
     from rds.identification.logs.log import Log
 
-SPEED = "rev/min"  # of a structure whose output is a speed
 PLAY = "place in the play"  # the state that says where in a backlash the motor is, from -1 to 1
 
 
 class Response(Protocol):
-    """A structure's answer to the commands `u` (V) held from each of the times `t` (s) to the next.
+    """A structure's answer to the commands `u` held from each of the times `t` (s) to the next.
 
-    Returns the output at each time (mm; a spindle's speed in rev/min), from the initial state `x0`.
+    Returns the output at each time, in `output_unit` for commands in `command_unit`, from the initial state `x0`.
     """
 
     def __call__(self, t: np.ndarray, u: np.ndarray, x0: Sequence[float], values: Mapping[str, float]) -> np.ndarray:
@@ -61,6 +61,7 @@ class Structure:
     # values to begin a fit with, best first, and an initial state for each log; InputError where the data hold none
     start: Callable[[Sequence[Log]], Iterable[Start]] | None = None
     output_unit: str = "mm"
+    command_unit: str = "V"
     # parameters that only make sense held at a value unless another is held, with the sentence that says so
     held: Callable[[frozenset[str]], Mapping[str, tuple[float, str]]] | None = None
     # parameters that the logs state and no fit can tell (a force per volt), held at these values, with 0 std error
@@ -73,6 +74,11 @@ class Structure:
     # the same structure in a form that answers these logs sooner, as exactly as their noise asks
     prepare: Callable[[Sequence[Log]], Structure] | None = None
     no_effect: Mapping[str, str] = field(default_factory=dict)  # what it means that a parameter changes nothing
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether the output is a speed."""
+        return self.output_unit in RATES
 
     def bounds(self, name: str) -> tuple[float, float]:
         """The lowest and the highest value that the parameter may take."""

@@ -11,7 +11,8 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.identification.fit.estimate import Errors
-from rds.identification.fit.initial_state import estimate_start
+from rds.identification.fit.initial_state import LEAST, estimate_start
+from rds.identification.fit.initial_state import initial_samples as usual_samples
 from rds.identification.fit.kstep import STEPS, ahead, errors_of
 from rds.identification.fit.needed_voltage import NeededVoltage, needed_voltage, smoothed_velocity
 from rds.identification.fit.residuals import LONGEST, ResidualTest, bandwidth, block_length, block_means, residual_tests
@@ -22,8 +23,6 @@ from rds.identification.validate.candidate import Candidate, check_units
 from rds.identification.validate.discrepancy import Discrepancy, as_axis, as_motion
 from rds.identification.validate.same_data import Overlap, overlap
 
-INITIAL_SAMPLES = 50  # from which the initial state is estimated, and which no error counts
-LEAST = 10
 _MOVES = 1e-3  # of the measured motion
 _SLOPE = 1e-3  # of a standard error, for sensitivities
 
@@ -184,7 +183,7 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None, b
 
 def _first(log: Log, initial_samples: int | None) -> int:
     if initial_samples is None:
-        initial_samples = max(min(INITIAL_SAMPLES, len(log) // 10), LEAST)
+        initial_samples = usual_samples(len(log))
     if initial_samples < LEAST:
         raise InputError(f"initial_samples = {initial_samples} must be at least {LEAST}")
     if len(log) < 2 * initial_samples:

@@ -13,7 +13,6 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.types import Model
 from rds.identification.fit.estimate import Errors, Estimate, Parameter
-from rds.identification.fit.fit import check_command
 from rds.identification.logs.log import Log
 from rds.identification.structures.model_structure import structure_of_model
 from rds.identification.structures.structure import Structure
@@ -39,7 +38,7 @@ class Candidate:
     @property
     def is_rate(self) -> bool:
         """Whether the output is a speed (a spindle) and not a position."""
-        return "position" not in self.structure.state_names or self.structure.states == 1
+        return self.structure.is_rate or "position" not in self.structure.state_names or self.structure.states == 1
 
     @property
     def estimated(self) -> tuple[str, ...]:
@@ -98,7 +97,7 @@ def _of_estimate(estimate: Estimate, name: str) -> Candidate:
     logs = tuple({**log, "ahead": estimate.ahead.get(str(log.get("name", "")), {})} for log in estimate.logs)
     return Candidate(
         name=name or estimate.structure,
-        structure=structure(estimate.structure, estimate.options),
+        structure=structure(estimate.structure, estimate.options, estimate.output_unit, estimate.command_unit),
         values=estimate.values(),
         parameters=dict(estimate.parameters),
         covariance=estimate.covariance,
@@ -150,8 +149,15 @@ def _of_file(file: Any, name: str) -> Candidate:
 
 
 def check_units(candidate: Candidate, log: Log) -> None:
-    """InputError where the log's command is no voltage, or its position not in the unit of the model's output."""
-    check_command(log, f"the model {candidate.name}")
+    """InputError where the log's command or position is in another unit than the model's."""
+    takes, given = candidate.structure.command_unit, log.units.get("command") or candidate.structure.command_unit
+    if given != takes:
+        raise InputError(
+            f"the command is in {given} and the model {candidate.name} takes {takes}: they cannot be compared. Where "
+            f'a drive\'s {given} stands for its {takes}, say so in the map: unit = "{takes}" for the command, with '
+            f"scale = ... as so many {takes} per {given}",
+            log.source or log.name,
+        )
     unit, has = candidate.structure.output_unit, log.units.get("position", "")
     if has and unit and has != unit:
         raise InputError(

@@ -197,8 +197,8 @@ def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
     from rds.identification.structures.structures import structure
 
     made, values = candidate.structure, dict(candidate.values)
-    options = made.options
-    if made.name == "axis-mass" and made.as_model is not None:
+    options, signals = made.options, (made.output_unit, made.command_unit)
+    if made.name in ("axis-mass", "axis-inertia") and made.as_model is not None:
         try:
             values = dict(made.as_model(values))
         except InputError:
@@ -210,7 +210,8 @@ def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
         return None
     elif made.name != "axis":
         options = ()
-    return structure("axis", tuple({*options, "delay"})), {name: float(value) for name, value in values.items()}
+    own = structure("axis", tuple({*options, "delay"}), *signals)
+    return own, {name: float(value) for name, value in values.items()}
 
 
 def _advanced(log: Log, samples: int) -> Log:
@@ -284,12 +285,20 @@ def as_motion(
 
     return Discrepancy(
         frequency=f,
-        gain=_gain(*rates),
+        gain=min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
         phase=Off(phase(found), _error_of(phase, found, covariance), "°"),
         lag=Off(-float(found[1]), sqrt(max(float(covariance[1, 1]), 0.0)), "s"),
         rmse=float(np.sqrt(np.mean((residual - A[:, 0]) ** 2))),
         reached=float(np.sqrt(np.mean(error**2))),
     )
+
+
+def _gain_of_way(found: np.ndarray, covariance: np.ndarray) -> Off:
+    """The same by the positions themselves, which tell more where noise hides the velocity."""
+    if not found[0] > 0.0:
+        return Off(0.0, float("inf"), "%")
+    spread = sqrt(max(float(covariance[0, 0]), 0.0))
+    return Off(100.0 * (1.0 / float(found[0]) - 1.0), 100.0 * spread / float(found[0]) ** 2, "%")
 
 
 def _gain(measured: np.ndarray, modelled: np.ndarray) -> Off:

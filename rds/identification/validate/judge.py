@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import sqrt
 
 from rds.identification.fit.estimate import said_of_guesses
 from rds.identification.fit.kstep import over_noise
-from rds.identification.logs.log import Finding, Gravity
 from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.candidate import Candidate
-from rds.identification.validate.conclusion import DATA, conclude, sentence_of
+from rds.identification.validate.conclusion import conclude, sentence_of
+from rds.identification.validate.judge_data import of_data, of_extent, of_upsets
 from rds.identification.validate.verdict import Bands, Reason, Side, Verdict, Word
 from rds.identification.validate.within import (
     Measure,
@@ -32,18 +32,17 @@ _FACTORS = {  # of measured over modelled, and what makes it
     60.0: "the speed is per minute where it is stated per second",
     1.0 / 60.0: "the speed is per second where it is stated per minute",
 }
-_MISLEADING = ("sign", "units", "columns", "wrap")  # findings of a log after which a good fit proves nothing
+NEAR_FIT = 0.25  # of what the band leaves to 100 %: so near, a fit is borderline
 _BLOCKS = 50  # with fewer, the residual tests find nothing
 _NEAR = 0.15  # how near to such a factor is suspicious
 _FEW = 0.1  # share of lags beyond the plain band that is still called white
 _NEGLIGIBLE = 99.8  # %: of a free run's fit, for what a structure lacks
-_IDENTICAL = 1e-9  # RMSE over the motion: only the model's own output comes so near
 
 
-def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
-    """The verdict on `candidate` by its assessment on one log."""
+def judge(candidate: Candidate, a: Assessment, bands: Bands, more: Iterable[Reason] = ()) -> Verdict:
+    """The verdict on `candidate` by its assessment on one log, and by `more` reasons."""
     reasons = [
-        *_data(a, bands),
+        *of_data(a, bands),
         *_unstable(candidate, a),
         *_discrepancy(a, bands),
         *_free_run(a, bands),
@@ -55,7 +54,9 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
         *_structure(a, bands),
         *_guesses(candidate),
         *_overfit(candidate, a, bands),
-        *_extent(a, bands),
+        *of_extent(a, bands),
+        *of_upsets(a),
+        *more,
     ]
     word, purpose = conclude(a, reasons, bands)
     if word is Word.UNTOLD and all(reason.side is not Side.UNTOLD for reason in reasons):
@@ -68,73 +69,6 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands) -> Verdict:
             )
         )
     return Verdict(word, sentence_of(candidate, a, word, purpose, reasons), tuple(reasons), purpose)
-
-
-def _data(a: Assessment, bands: Bands) -> Iterator[Reason]:
-    log, resolution = a.log, a.log.resolution or 0.0
-    if a.overlap.share > bands.seen:
-        yield Reason(
-            Side.UNTOLD,
-            "same-data",
-            f"{100 * a.overlap.share:.0f} % of the log was seen by the fit ({a.overlap.how}): how well the model "
-            "repeats it says nothing of other data; validate on another log",
-        )
-    elif not a.overlap.known:
-        yield Reason(Side.NOTE, "provenance", f"{a.overlap.how}; make sure that they are others")
-    if a.motion == 0.0:
-        yield Reason(Side.UNTOLD, "no-motion", f"the axis never moves ({a.measured[0]:.6g} {a.unit} throughout)")
-    elif a.motion < bands.least_steps * resolution:
-        steps = a.motion / resolution
-        yield Reason(
-            Side.UNTOLD,
-            "no-motion",
-            f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of its encoder; {bands.least_steps:.0f} are "
-            "needed to tell a model from none",
-        )
-    elif a.changes < bands.least_changes:
-        yield Reason(
-            Side.UNTOLD,
-            "short",
-            f"in {a.time[-1] - a.time[0]:.3g} s the velocity changes between fast and slow, or forward and back, "
-            f"{a.changes} times; {bands.least_changes:.0f} are needed to see any dynamics",
-        )
-    if float(log.command.min()) == float(log.command.max()):
-        yield Reason(
-            Side.UNTOLD, "no-excitation", f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics"
-        )
-    for finding in log.findings:
-        if finding.gravity is not Gravity.NOTE:
-            yield Reason(_side_of(finding), f"{DATA}{finding.kind}", finding.what)
-    yield from _too_good(a, bands)
-
-
-def _side_of(finding: Finding) -> Side:
-    """What speaks against a log speaks against what a model shows there: both may share a sign or a unit that is wrong.
-
-    That samples are missing at its end, and what only the excitation lacks, takes nothing from the rest.
-    """
-    if finding.kind not in _MISLEADING:
-        return Side.NOTE
-    return Side.UNTOLD if finding.gravity is Gravity.FAULT else Side.AGAINST
-
-
-def _too_good(a: Assessment, bands: Bands) -> Iterator[Reason]:
-    if a.free_run is None or a.motion == 0.0:
-        return
-    if a.free_run.rmse <= _IDENTICAL * a.motion:
-        yield Reason(
-            Side.UNTOLD,
-            "own-output",
-            f"the model repeats the log to {a.free_run.rmse:.1g} {a.unit}: the log is this model's own output",
-        )
-    elif a.log.resolution and a.free_run.rmse < bands.floor * a.log.resolution / sqrt(12.0):
-        yield Reason(
-            Side.UNTOLD,
-            "too-good",
-            f"the RMSE of {a.free_run.rmse:.2g} {a.unit} is below the encoder's own rounding "
-            f"({a.log.resolution / sqrt(12.0):.2g} {a.unit}): the log is not what this encoder measured, or the "
-            "stated resolution is wrong",
-        )
 
 
 def _unstable(candidate: Candidate, a: Assessment) -> Iterator[Reason]:
@@ -170,7 +104,8 @@ def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
     yield Reason(
         Side.FOR if position else Side.AGAINST,
         "free-run",
-        f"free run, {what}: fit {e.fit_percent:.2f} %, RMSE {e.rmse:.4g} {e.unit}, at most {e.maximum:.4g} {e.unit}",
+        f"free run, {what}: fit {e.fit_percent:.2f} % ({_band(e.fit_percent, bands.fit_percent)}), RMSE {e.rmse:.4g} "
+        f"{e.unit}, at most {e.maximum:.4g} {e.unit}",
     )
     if a.velocity is None:
         return
@@ -178,7 +113,8 @@ def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
     yield Reason(
         Side.FOR if velocity else Side.AGAINST,
         "free-run-velocity",
-        f"free run, velocity: fit {v.fit_percent:.2f} %, RMSE {v.rmse:.4g} {v.unit}, at most {v.maximum:.4g} {v.unit}",
+        f"free run, velocity: fit {v.fit_percent:.2f} % ({_band(v.fit_percent, bands.fit_percent)}), RMSE {v.rmse:.4g} "
+        f"{v.unit}, at most {v.maximum:.4g} {v.unit}",
     )
     if velocity and not position and a.drift is not None:
         yield Reason(
@@ -186,6 +122,12 @@ def _free_run(a: Assessment, bands: Bands) -> Iterator[Reason]:
             "drift",
             f"the position drifts from the model's by {a.drift:.3g} {a.unit}/s: the error of the velocity adds up",
         )
+
+
+def _band(percent: float, least: float) -> str:
+    """The band of a fit, and that it is near."""
+    near = abs(percent - least) <= NEAR_FIT * (100.0 - least)
+    return f"band {least:g} %{', borderline' if near else ''}"
 
 
 def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
@@ -270,7 +212,7 @@ def _voltage(a: Assessment, bands: Bands) -> Iterator[Reason]:
         Side.FOR if percent <= bands.voltage_percent else beyond,
         "voltage",
         f"the voltage that the model needs for the measured motion differs by {percent:.2f} % "
-        f"(RMS {a.voltage.rmse:.3g} {unit}) from the one given",
+        f"(RMS {a.voltage.rmse:.3g} {unit}) from the one given; band {bands.voltage_percent:g} %",
     )
 
 
@@ -407,17 +349,3 @@ def _overfit(candidate: Candidate, a: Assessment, bands: Bands) -> Iterator[Reas
             f"({own:.3g} {a.unit}): the fit followed what was particular to them, the model lacks what shows here, or "
             "the axis has changed",
         )
-
-
-def _extent(a: Assessment, bands: Bands) -> Iterator[Reason]:
-    for name, found in a.ranges.items():
-        if found.fitted is None:
-            continue
-        here, fitted = largest(found.here), largest(found.fitted)
-        if here > bands.beyond * fitted:
-            yield Reason(
-                Side.NOTE,
-                "extrapolation",
-                f"{name} up to {here:.3g} {found.unit} here, and up to {fitted:.3g} {found.unit} in the fit's data: "
-                "beyond that the model extrapolates",
-            )

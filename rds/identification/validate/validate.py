@@ -15,10 +15,13 @@ from typing import Any
 
 from rds.core.errors import InputError
 from rds.identification.logs.log import Log
+from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import Assessment, assess
 from rds.identification.validate.candidate import Candidate, as_candidate
 from rds.identification.validate.conclusion import overall
 from rds.identification.validate.criterion import Ranking, Rival, rank
+from rds.identification.validate.in_loop import Loop, in_loop
+from rds.identification.validate.in_loop import reasons as loop_reasons
 from rds.identification.validate.judge import judge
 from rds.identification.validate.verdict import Bands, Verdict
 
@@ -78,12 +81,15 @@ def validate(
     against: Sequence[Any] = (),
     bands: Bands | None = None,
     initial_samples: int | None = None,
+    loop: Loop | None = None,
 ) -> Validation:
     """Validate `model` on `logs`, and compare it with the models `against` on the same samples.
 
     `model` may be the path of a model file (.toml) or a student's file (.py), an `Estimate`, a `ModelFile`, an
     `rds.Model` or a `Candidate`. The initial state of each log is estimated from its first `initial_samples` (default
-    50, of a short log a tenth), which no error counts. Raises InputError for a model or log that will not do.
+    50, of a short log a tenth), which no error counts. `loop` runs the experiment that was logged, whose controller
+    and reference are known, with the model that it is given: `lambda model: rds.Experiment(..., model=model).run()`.
+    Raises InputError for a model or log that will not do.
     """
     candidate = as_candidate(model)
     logs = [logs] if isinstance(logs, Log) else list(logs)
@@ -95,7 +101,10 @@ def validate(
     assessments = {
         name: assess(candidate, log, initial_samples, bands.bandwidth) for name, log in zip(names, logs, strict=True)
     }
-    verdicts = {name: judge(candidate, a, bands) for name, a in assessments.items()}
+    verdicts = {}
+    for name, a in assessments.items():
+        more = () if loop is None else tuple(loop_reasons(in_loop(candidate, a.log, loop), bands))
+        verdicts[name] = with_alternatives(candidate, a, judge(candidate, a, bands, more), bands)
     rankings = {name: _ranking(candidate, a, others, bands, initial_samples) for name, a in assessments.items()}
     return Validation(candidate, assessments, verdicts, bands, others, rankings if others else {})
 

@@ -1,0 +1,79 @@
+"""Where in time a log does something else than before and after: a slip of the encoder, a leap, another regime.
+
+What a model leaves of a log is smooth noise, or drifts by what the model is wrong in. At a slip it steps, within a
+block of samples, by far more than from any other block to the next; over a stretch of another regime (another load, a
+rub, a drive that is off) it wanders several times as much as elsewhere. Both are found by robust measures, which a
+model that is wrong throughout does not set off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_BLOCKS = 200  # that a log is cut into, at most
+_LEAST = 20  # blocks; samples of one
+_STEP = 12.0  # robust standard deviations of the steps between blocks, and times the noise
+_OTHER = 3.0  # times the usual size of steps
+_RUN = 4  # blocks of a regime, at least
+_MOST = 0.4  # of the log: a regime is the exception
+_TOLD = 3  # of each kind
+
+
+def upsets(time: np.ndarray, error: np.ndarray, noise: float, unit: str) -> list[str]:
+    """Sentences on where `error` (samples,), measured minus modelled, steps or wanders; `noise` is its floor."""
+    width = max(len(error) // _BLOCKS, _LEAST)
+    count = len(error) // width
+    if count < _LEAST or not np.isfinite(error).all():
+        return []
+    blocks = error[: count * width].reshape(count, width)
+    means = np.median(blocks, axis=1)
+    starts = time[: count * width : width]
+    steps = np.diff(means)
+    usual = max(1.4826 * float(np.median(np.abs(steps - np.median(steps)))), noise / np.sqrt(width))
+    if usual == 0.0:
+        return []
+    size = np.abs(steps - np.median(steps))
+    found = _regimes(size, usual, starts, unit)
+    inside = np.zeros(len(steps), dtype=bool)
+    for first, end, _ in found:
+        inside[first:end] = True
+    leaps = np.flatnonzero((size > _STEP * usual) & (np.abs(steps) > _STEP * noise) & ~inside)
+    leaps = leaps[leaps > 1]  # at the begin, the initial state makes up for what it can
+    leaps = leaps[np.diff(leaps, prepend=-9) > 1]  # a step in a block's middle counts once
+    said = [_leap(time, error, int(k), width, unit) for k in leaps[:_TOLD]] if len(leaps) <= count // 20 else []
+    return [*said, *(sentence for _, _, sentence in found[:_TOLD])]
+
+
+def _leap(time: np.ndarray, error: np.ndarray, block: int, width: int, unit: str) -> str:
+    part = slice(block * width, min((block + 2) * width, len(error)))
+    jumps = np.abs(np.diff(error[part]))
+    at = part.start + 1 + int(np.argmax(jumps))
+    before, after = error[max(at - width, 0) : at], error[at : at + width]
+    return (
+        f"at {time[at]:.4g} s the measurement leaps by {np.median(after) - np.median(before):+.3g} {unit} beside the "
+        "model: did the encoder slip, or something jolt the axis?"
+    )
+
+
+def _regimes(size: np.ndarray, usual: float, starts: np.ndarray, unit: str) -> list[tuple[int, int, str]]:
+    """Stretches whose steps are several times as large as usual: first and end as numbers of steps, and a sentence."""
+    wide = np.convolve(size, np.ones(_RUN) / _RUN, "same") > _OTHER * usual
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
+    for calm_from, calm_to in zip(edges[1:-1:2].tolist(), edges[2::2].tolist(), strict=True):
+        if calm_to - calm_from <= 3 * _RUN:  # a pause of one regime, as where the axis rests
+            wide[calm_from:calm_to] = True
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
+    found = []
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        large = size[first:end] > _OTHER * usual
+        if int(large.sum()) < _RUN or end - first > _MOST * len(size):
+            continue
+        where = first + np.flatnonzero(large)
+        begin, stop = float(starts[where[0]]), float(starts[min(where[-1] + 1, len(starts) - 1)])
+        what = (
+            f"from {begin:.4g} to {stop:.4g} s the log is of another regime: there, measured minus modelled changes "
+            f"{float(np.median(size[where])) / usual:.2g} times as much as elsewhere ({unit}); leave that stretch out, "
+            "or find what was different (load, friction, a drive that was off)"
+        )
+        found.append((int(where[0]), int(where[-1]) + 1, what))
+    return found
