@@ -16,7 +16,7 @@ def export(
     to: Annotated[
         str,
         typer.Option(
-            help="nbgrader, moodle, moodle-feedback, canvas, brightspace, blackboard, gradescope or prairielearn."
+            help="nbgrader, moodle, moodle-feedback, canvas, brightspace, blackboard, gradescope, lti or prairielearn."
         ),
     ],
     file: Annotated[

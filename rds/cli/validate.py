@@ -75,12 +75,13 @@ def validate(
 def _loop(path: Path) -> Loop:
     """Runs the experiment in simulation, with another model."""
     from rds.core.toml_file import read_toml
+    from rds.modes import SIMULATION
     from rds.modes.experiment.experiment import Experiment
 
     words, _ = read_toml(path)
 
     def simulate(model: Model) -> Result:
-        table = words | {"mode": "simulation", "model": model}
+        table = words | {"mode": SIMULATION, "model": model}
         return Experiment.from_table(table, path.resolve().parent).run()
 
     return simulate
