@@ -19,6 +19,8 @@ from hypothesis import settings
 
 from rds.bus.tools.mf4 import put_off_asammdf
 
+# Tests run side by side, and so do their many processes: numpy's threads would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 put_off_asammdf()  # as our programs do: seconds of each worker
 # ... and of each process that a test starts; see there
 os.environ["PYTHONPATH"] = os.pathsep.join(
