@@ -6,7 +6,7 @@ from math import inf, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis.strategies import floats
 
 import rds
@@ -33,6 +33,7 @@ def test_the_integrator_without_delay() -> None:
     assert found.cost == pytest.approx(found.y * (1 + K + K**2 / 3) + 0.5, rel=1e-12)
 
 
+@settings(max_examples=40)
 @given(gain=floats(0.1, 0.9), delay=floats(0.0, 1.0))
 def test_the_integrator_with_a_constant_delay(gain: float, delay: float) -> None:
     """x⁺ = x - (1 - τ) L x - τ L x₋ + v is an AR(2) process, whose variance Yule and Walker give."""

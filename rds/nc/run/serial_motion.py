@@ -149,6 +149,12 @@ def _spindle(
     axis = next((axis for axis in machine.axes.values() if axis.is_spindle), None)
     if axis is None or not any(speed for _, _, speed in speeds):
         return None
+    if "K" not in axis.model:
+        raise InputError(
+            f"axis {axis.name}: methods A, B and C need a model with K, from which its voltage follows; model "
+            f"{axis.model.get('name')!r} has none: take spindle, or a program without M3 and M4",
+            machine.path,
+        )
     shares, ends = np.zeros(samples), [*(step for _, step, _ in speeds[1:]), steps]
     stretches = [(speeds[0][1], 0.0)]
     for (sample, step, speed), end in zip(speeds, ends, strict=True):
