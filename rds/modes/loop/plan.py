@@ -108,8 +108,7 @@ class Plan:
 
     def channels(self) -> list[Channel]:
         """What may be changed while it runs: the parameters of controllers, the override of a program, the stop."""
-        made = isinstance(self.program, InterpolatedProgram)
-        own = [] if self.program is None else program_channels(1.0 if made else 2.0)
+        own = [] if self.program is None else program_channels()
         return [channel for tuning in self._tunings() for channel in tuning.channels] + own + [stop_channel()]
 
     def with_changes(self, changes: Iterable[Any]) -> Plan:
