@@ -310,11 +310,6 @@ def test_a_path_beyond_the_travel_is_refused_before_it_moves(here: Path) -> None
         follow(file="far.toml")
 
 
-def test_the_override_is_at_most_the_programmed_feed(here: Path) -> None:
-    with pytest.raises(InputError, match="override"):
-        follow().run(changes=[(0.1, "override", 1.5)])
-
-
 @pytest.mark.parametrize(
     "words", [["--look-ahead", "5"], ["--option", "a=1"], ["--acceleration", "linear"], ["--acceleration-time", "0.1"]]
 )

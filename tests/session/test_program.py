@@ -260,19 +260,18 @@ def test_a_run_saves_the_program_and_has_its_results_in_a_folder(
 
 def test_an_interpolator_makes_the_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rds.panels.equipment.run.made_beside", lambda save, result, prepared, folder: None)
-    made = program(tmp_path, "G21 G90", "G1 X2 F600", "G2 X0 Y0 I-1 J0", "M2")
+    made = program(tmp_path, "G21 G90", "G1 X6 F600", "G2 X0 Y0 I-3 J0", "M2")
     assert looked(made).ok and set(MADE) <= made.idle()
     made.choices.set("interpolator", "tustin")
     assert made.idle() == {"interpolator_file"}
+    made.choices.set("override", 110.0)
     work = made.run().start()
     assert work.wait(PATIENCE) and work.error is None and work.result is not None
     assert work.result.meta["program"]["interpolator"] == "tustin"
     assert work.result.meta["program"]["acceleration"]["name"] == "s-shape"
     kept = work.result["contour_error"][:: round(0.01 / work.result.sample_period)]
     assert work.new_rows()[:, -1] == pytest.approx(kept)
-    made.choices.set("override", 150.0)
-    with pytest.raises(InputError, match="above 100 % goes with planned motion"):
-        made.run()
+    assert work.result["program_override"].max() == pytest.approx(1.1)
     made.choices.set("override", 100.0)
     made.choices.set("interpolator", "user")
     assert "interpolator_file" not in made.idle()

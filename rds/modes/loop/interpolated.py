@@ -3,16 +3,17 @@
 At a rate of 1 each row of the interpolator is sent as it is, and one more is made at each sample. At another rate the
 path between two rows is the cubic through their positions and velocities, with no slope steeper than three times the
 straight line's, so that it never turns back between them. What comes is not known, so the rate changes only as fast as
-the largest feed of the path would allow with a share of each axis's acceleration and jerk; for the same reason it is
-never above 1. A ramp to 1 ends at a row, and from there on the rows are sent.
+the largest feed of the path would allow with a share of each axis's acceleration and jerk. A ramp to 1 ends at a row,
+and from there on the rows are sent. Above 1 the rate goes only along rows that are made already: as many as are passed
+until it can be back at 1, and each leaves room for it in the velocity and the acceleration of every axis.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from itertools import repeat
-from math import ceil
+from itertools import islice, repeat
+from math import ceil, floor
 
 import numpy as np
 
@@ -33,6 +34,10 @@ from rds.modes.loop.ramp import (
 LEAST_AHEAD = 3  # rows: a ramp that ends at a row may pass more than one of them in a sample
 _SHARE = 0.5  # of an axis's acceleration and jerk for a change of the rate; the path's own motion has the rest
 _LANDS_WITH = 0.25  # of them for ending at a row
+_MOST = 2.0  # the rate
+_WORTH = 1.02  # times the rate now, that a higher one must be
+_ROUND = 100.0  # a rate above 1 that is not the wanted one is a whole number of per cent
+_FILLS = 2  # rows that are made at a sample beside those that are passed, for a rate above 1
 _FASTEST = 1.5  # times an axis's velocity that a row may ask for: the drive would follow, and nobody meant it
 _ROUNDED = 0.02  # mm or degrees that rounding to BLU may add to a row
 _BEYOND = 1e-6  # mm that the last digits of a path may lie beyond the travel
@@ -52,6 +57,10 @@ class Interpolated(Paced):
         self._lines = program.line
         velocity, acceleration, jerk = np.asarray(program.limits, dtype=float)
         self._velocity = velocity.tolist()
+        self._step, self._bend = (velocity * T).tolist(), (_SHARE * acceleration * T * T).tolist()
+        self._ahead = program.ahead
+        self._bounds: deque[float] | None = None  # of the rows: what the rate may be; kept while more than 1 is wanted
+        self._ways: dict[tuple[float, float], tuple[Ramp, int]] = {}
         self._longest = (_FASTEST * velocity * T + _ROUNDED).tolist()
         self._travel = [(low - _BEYOND, high + _BEYOND) for low, high in program.travel.tolist()]
         # s and s² that a change of the rate by 1 takes at the largest feed, of the weakest axis
@@ -83,8 +92,12 @@ class Interpolated(Paced):
 
     def advance(self, wanted: float, until: int) -> None:
         """One sample period towards the rate `wanted`, and along the path at most to the sample `until`."""
+        if wanted > 1.0 or self.rate > 1.0:
+            wanted = self._faster(wanted)
+        elif self._bounds is not None:
+            self._bounds, self._ahead = None, self._program.ahead
         if self._ramp is None and wanted != self.rate:
-            self._begin(min(wanted, 1.0))
+            self._go_along(self._towards(self.rate, wanted))
         place, slope = self._next_place()
         self.place = min(place, until)
         self._fill()
@@ -99,13 +112,65 @@ class Interpolated(Paced):
 
     # --- the rate -------------------------------------------------------------------------------------------------
 
-    def _begin(self, wanted: float) -> None:
-        """Begin a ramp from the rate now towards `wanted`, as long as the weakest axis needs."""
+    def _towards(self, rate: float, wanted: float) -> Ramp:
+        """A ramp from a rate towards `wanted`, as long as the weakest axis needs."""
         change, samples = in_steps(
-            wanted - self.rate, lambda size: max(SHORTEST, self._slow * size, (self._sharp * size) ** 0.5), self._T
+            wanted - rate, lambda size: max(SHORTEST, self._slow * size, (self._sharp * size) ** 0.5), self._T
         )
-        end = wanted if change == wanted - self.rate else self.rate + change
-        self._go_along(Ramp(self.rate, end, max(samples, self._landing) if end == 1.0 else samples))
+        end = wanted if change == wanted - rate else rate + change
+        return Ramp(rate, end, max(samples, self._landing) if end == 1.0 else samples)
+
+    def _faster(self, wanted: float) -> float:
+        """The rate to go for where a rate above 1 is wanted, or is left: one that the rows ahead bear."""
+        if self._bounds is None:
+            kept = list(self._rows)
+            self._bounds = deque([_MOST] * min(len(kept), 2))
+            self._bounds.extend(self._bound(*kept[k - 2 : k + 1]) for k in range(2, len(kept)))
+        rate = self.rate
+        if self._ramp is not None:
+            return rate
+        if rate < 1.0:
+            return min(wanted, 1.0)
+        if rate > 1.0 and (wanted < rate or self._lowest(self._way(rate, rate)[1]) < rate):
+            return 1.0  # any slower one by way of it
+        ramp, rows = self._way(rate, min(wanted, _MOST))
+        self._ahead = max(self._program.ahead, min(self._ahead + _FILLS, rows))
+        made = self._first + len(self._rows) - 1 - int(self.place)
+        if self.last == _UNKNOWN and made < rows:
+            return rate
+        low = self._lowest(rows)
+        if low < ramp.end:
+            low = floor(low * _ROUND) / _ROUND
+            return low if low > _WORTH * rate else rate
+        return ramp.end
+
+    def _way(self, rate: float, wanted: float) -> tuple[Ramp, int]:
+        """The ramp from `rate` towards `wanted`, and how many rows are passed until the rate is back at 1 after it."""
+        if (rate, wanted) not in self._ways:
+            ramp = first = self._towards(rate, wanted) if wanted != rate else Ramp(rate, rate, 1)
+            rows = first.passed(first.samples)
+            while ramp.end > 1.0:
+                ramp = self._towards(ramp.end, 1.0)
+                rows += ramp.passed(ramp.samples)
+            self._ways[rate, wanted] = first, ceil(rows) + LEAST_AHEAD + 1
+        return self._ways[rate, wanted]
+
+    def _lowest(self, rows: int) -> float:
+        """What the rate may be along the next rows."""
+        assert self._bounds is not None
+        at = int(self.place) - self._first
+        return min(islice(self._bounds, at, at + rows), default=_MOST)
+
+    def _bound(self, before: Row, last: Row, row: Row) -> float:
+        """The highest rate at which this row, and the bend of the path before it, leave room for a change of rate."""
+        bound = _MOST
+        for a, b, c, step, bend in zip(before[0], last[0], row[0], self._step, self._bend, strict=True):
+            way, turn = abs(c - b), abs(c - 2.0 * b + a)
+            if way * bound > step:
+                bound = step / way
+            if turn * bound * bound > bend:
+                bound = (bend / turn) ** 0.5
+        return bound
 
     # --- the rows -------------------------------------------------------------------------------------------------
 
@@ -118,7 +183,9 @@ class Interpolated(Paced):
         while self._first < at and len(rows) > 1:
             rows.popleft()
             self._first += 1
-        while self._first + len(rows) - 1 < at + self._program.ahead and self.last == _UNKNOWN:
+            if self._bounds is not None:
+                self._bounds.popleft()
+        while self._first + len(rows) - 1 < at + self._ahead and self.last == _UNKNOWN:
             self._make()
 
     def _make(self) -> None:
@@ -136,17 +203,25 @@ class Interpolated(Paced):
         else:
             self._check(row)
             self._rows.append(row)
+            if self._bounds is not None:
+                k = len(self._rows)
+                known = k > 2  # else the bend is not
+                self._bounds.append(self._bound(*(self._rows[k - n] for n in (3, 2, 1))) if known else _MOST)
 
     def _rests(self) -> None:
         """What is due where the rows have come to; a dwell has rows of its own."""
         position, _, _, segment = self._rows[-1]
         sample = self._first + len(self._rows) - 1
         zero = [0.0] * len(position)
+        if self._bounds and len(self._rows) > 1:  # it comes to rest here, from whatever speed
+            self._bounds[-1] = min(self._bounds[-1], self._bound(self._rows[-2], self._rows[-1], self._rows[-1]))
         for happening in self._due:
             self.happenings.append(happening._replace(sample=sample))
             if happening.kind == "dwell":
                 count = dwell_samples(happening.value, self._T)
                 self._rows.extend(repeat((position, zero, zero, segment), count))
+                if self._bounds is not None:
+                    self._bounds.extend(repeat(_MOST, count))
                 sample += count
         self._due = ()
 

@@ -109,9 +109,8 @@ class Plan:
 
     def channels(self) -> list[Channel]:
         """What may be changed while it runs: the parameters of controllers, the override of a program, the stop."""
-        made = isinstance(self.program, InterpolatedProgram)
         steps = isinstance(self.program, Program) and self.program.steps
-        own = [] if self.program is None else program_channels(1.0 if made else 2.0, steps)
+        own = [] if self.program is None else program_channels(steps)
         return [channel for tuning in self._tunings() for channel in tuning.channels] + own + [stop_channel()]
 
     def with_changes(self, changes: Iterable[Any]) -> Plan:

@@ -123,15 +123,12 @@ def dwell_samples(seconds: float, T: float) -> int:
     return ceil(seconds / T - 1e-9)
 
 
-def program_channels(fastest: float = FEED_SHARE.high, steps: bool = False) -> list[Channel]:
-    """What may be changed while a program runs, besides the parameters of controllers.
-
-    `fastest` feed override; `steps`: it rests after each line.
-    """
+def program_channels(steps: bool = False) -> list[Channel]:
+    """What may be changed while a program runs, besides the parameters of controllers; `steps`: it rests after each line."""
     switch = partial(Channel, low=0.0, high=1.0, whole=True)
-    feed = "feed as a multiple of the programmed one; " + ("rapids only get slower" if fastest > 1.0 else "at most 1")
+    feed = "feed as a multiple of the programmed one; rapids only get slower"
     return [
-        Channel(OVERRIDE, 1.0, feed, low=0.0, high=fastest),
+        Channel(OVERRIDE, 1.0, feed, low=0.0, high=FEED_SHARE.high),
         switch(HOLD, 0.0, "1 brings the motion to rest on its path until it is 0 again"),
         Channel(RESUME, 0.0, "another number than before goes on after M0, M1 and a tool change", low=0.0, high=1e9),
         switch(HOME, 0.0, "1 ends the program where it is and moves the axes home"),

@@ -266,8 +266,6 @@ class Program:
             raise InputError("an override of 0 % never moves; begin with more, and hold while it runs")
         controller, files = self._controller()
         motion, own = self._motion()
-        if motion and share > 1.0:
-            raise InputError("an override above 100 % goes with planned motion: an interpolator knows no faster rows")
         files += own
         if self.session.bus:
             raise InputError(
