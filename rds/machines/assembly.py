@@ -6,7 +6,7 @@ beds, columns and tables have no board, and so no number: they stand in the orde
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import chain
 from typing import Any
@@ -18,7 +18,7 @@ from rds.machines.configuration import Check, Verdict, verdict
 from rds.machines.library import LibraryModule, by_type_text, library_module, told_module
 from rds.machines.link_modules import said_by_link
 from rds.machines.link_table import BED, path_to
-from rds.machines.machine import MACHINE, Machine, load_machine, machine_from, machine_names
+from rds.machines.machine import MACHINE, Axis, Machine, load_machine, machine_from, machine_names
 from rds.machines.module_table import CARRIES_ON, MOUNTED_BY
 from rds.machines.mounting import SPEED, chosen_motion, chosen_spindle, mounted, with_zero
 
@@ -113,23 +113,31 @@ def machine_text(name: str, order: Order, data: Mapping[int, Data], before: Mach
     if before is not None:
         table["sample_period"] = before.sample_period
         table["converter"] = asdict(before.converter)
-    known = []
+    known, machines = [], _with_such_modules(table["axis"].values())
     for letter, axis in table["axis"].items():
-        kept, source = _kept(axis, before)
+        kept, source = _kept(axis, before, machines)
         axis.update(kept or _chosen(axis, table["converter"]["range"]))
         known.append(f"those of {letter} are {f'from {source}' if kept else 'chosen'}")
     return toml_text(table, _ABOUT.format(order=told, known=", ".join(known)))
 
 
-def _kept(axis: Mapping[str, Any], before: Machine | None) -> tuple[dict[str, Any], str]:
+def _with_such_modules(axes: Iterable[Mapping[str, Any]]) -> list[Machine]:
+    """The machines of the package, those with the most modules of these types first."""
+    said = {axis["module"]["type_text"] for axis in axes}
+    packaged = [load_machine(name) for name in machine_names()]
+    return sorted(packaged, key=lambda machine: -len(said & {_type_text(machine, a) for a in machine.axes.values()}))
+
+
+def _type_text(machine: Machine, axis: Axis) -> str:
+    return str(axis.module.get("type_text") or said_by_link(machine, axis).get("type_text", ""))
+
+
+def _kept(axis: Mapping[str, Any], before: Machine | None, packaged: Sequence[Machine]) -> tuple[dict[str, Any], str]:
     """Model, limits, power and physics of an axis with such a module, and the machine that it is of."""
-    said = axis["module"]["type_text"]
-    packaged = (load_machine(name) for name in machine_names())
     for machine in chain([] if before is None else [before], packaged):
         for known in machine.axes.values():
             same = machine is not before or known.node == axis["node"]
-            own = known.module.get("type_text") or said_by_link(machine, known).get("type_text")
-            if same and own == said:
+            if same and _type_text(machine, known) == axis["module"]["type_text"]:
                 tables = {"model": known.model, "machine": known.machine}
                 limits = {"limits": asdict(known.limits)} if known.limits is not None else {}
                 power = {"power": known.power} if known.power is not None else {}

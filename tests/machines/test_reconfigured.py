@@ -49,6 +49,7 @@ def test_a_machine_from_what_its_modules_say(name: str, tmp_path: Path) -> None:
     assert order_of(own, data) == ORDERS[name]
     assert judged(ORDERS[name], data).ok
     path.write_text(machine_text("mine", ORDERS[name], data))
+    assert path.read_text().count(f" are from {name}") == len(own.axes)
     made = load_machine(str(path))
     nodes = [own.axes[joint].node for joint in own.kinematics.joints]
     columns = [nodes.index(made.axes[joint].node) for joint in made.kinematics.joints]
