@@ -124,7 +124,10 @@ def dwell_samples(seconds: float, T: float) -> int:
 
 
 def program_channels(steps: bool = False) -> list[Channel]:
-    """What may be changed while a program runs, besides the parameters of controllers; `steps`: it rests after each line."""
+    """What may be changed while a program runs, besides the parameters of controllers.
+
+    With `steps` it rests after each line.
+    """
     switch = partial(Channel, low=0.0, high=1.0, whole=True)
     feed = "feed as a multiple of the programmed one; rapids only get slower"
     return [
