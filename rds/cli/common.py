@@ -33,6 +33,21 @@ def declared(quantity: Quantity, help: str = "") -> Any:
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print exactly one JSON object on stdout.")]
+
+
+def results_folder(out: Path | None) -> Path | None:
+    """The folder that --out means: one that is named like a file of results means the folder of that name without it.
+
+    Told on stderr, since the user may look for the file.
+    """
+    if out is None or out.is_dir() or out.suffix.lower() not in RESULT_FILES:
+        return out
+    folder = out.with_suffix("")
+    typer.echo(f"rds: note: results are a folder of files, and go to {folder}; {out.name} is none of them", err=True)
+    return folder
+
+
+RESULT_FILES = (".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf", ".svg", ".xlsx", ".txt", ".dat")
 _Shared = Annotated[bool, typer.Option("--shared", help="Let your group read what is written; else only you can.")]
 
 

@@ -55,6 +55,7 @@ from rds.cli.common import (
     print_json,
     progress_bars,
     refusals,
+    results_folder,
     say_notices,
     say_what_is_replaced,
     stdout_kept,
@@ -120,7 +121,9 @@ for command in (machines.new, machines.show, machines.pose, machines.joints, mac
 machine_app.command("modules")(machines.modules)
 machine_app.command("watch")(machine_watch.watch)
 
-Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results (made if missing).")]
+Out = Annotated[
+    Path | None, typer.Option("--out", "-o", callback=results_folder, help="Folder for the results (made if missing).")
+]
 
 
 @app.command()

@@ -13,19 +13,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli import nc_bundled, nc_cut, nc_job, nc_make, nc_methods, nc_run
+from rds.cli import nc_bundled, nc_cut, nc_job, nc_make, nc_methods, nc_run, nc_step
 from rds.cli.common import Json, declared, print_json, progress_bars, refusals, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
 from rds.core.shared_quantities import SAMPLE_PERIOD
 
 if TYPE_CHECKING:
+    from rds.machines import Machine
     from rds.nc.check import Setup
     from rds.nc.compensation.proof import Proof
 
 app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
 nc_make.app.command()(nc_job.job)
 app.add_typer(nc_make.app, name="make")
-for _command in (*nc_run.COMMANDS, nc_methods.methods, nc_bundled.bundled, nc_cut.cut):
+for _command in (*nc_run.COMMANDS, nc_methods.methods, nc_bundled.bundled, nc_cut.cut, nc_step.step):
     app.command()(_command)
 
 PICTURES = ("png", "svg", "pdf")
@@ -217,6 +218,7 @@ def save_picture(figure: Any, path: Path) -> None:
 
 
 @app.command()
+@writes_files
 def time(
     file: Program,
     machine: MachineName = "mini-cnc",
@@ -226,6 +228,10 @@ def time(
     max_jumps: MaxJumps = None,
     sample_period: Annotated[float | None, declared(SAMPLE_PERIOD, "by default the machine's")] = None,
     profile: ProfileName = "planned",
+    why: Annotated[
+        bool,
+        typer.Option("--why", help="Also what holds the planned motion back, with a picture, FILE's name -speed.png."),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Predict a program's cycle time, with the planner that runs it: at feed, in rapids, in dwells, for each tool.
@@ -241,8 +247,12 @@ def time(
         notes: list[str] = []
         with progress_bars() as bar:
             found = cycle_time(motion(file, of, what, bar("plan"), notes), of, sample_period, profile)
+        held, picture = _why(file, of, what, found.T) if why else ([], None)
     if json:
-        print_json({"program": str(file), "machine": of.name, "profile": profile, **found.to_json(), "notes": notes})
+        print_json(
+            {"program": str(file), "machine": of.name, "profile": profile, **found.to_json(), "notes": notes}
+            | ({"held_back_by": held, "picture": str(picture)} if why else {})
+        )
         raise typer.Exit(0 if found.certificate.ok else 1)
     from rds.cli.console import show_table
 
@@ -254,9 +264,30 @@ def time(
     title = f"{file}: {_clock(found.total)} on {of.name}{how}, {found.samples} samples of {found.T:g} s"
     show_table(title, ["tool", "cutting [s]", "rapid [s]", "dwell [s]", "total [s]"], rows)
     typer.echo(found.certificate.sentence())
+    for row in held:
+        lines = ", ".join(map(str, row["lines"]))
+        typer.echo(f"{row['cause']}: {row['seconds']:.3f} s, most in line{'s' * (len(row['lines']) > 1)} {lines}")
+        if "limit" in row:
+            more = row["to_save_a_second"]
+            said = "no more of it saves a second" if more is None else f"a second less takes {more:.4g} {row['unit']}"
+            typer.echo(f"   it is {row['limit']:g} {row['unit']}: {said}")
+    if picture is not None:
+        typer.echo(f"picture: {picture}")
     for note in notes:
         typer.echo(f"note: {note}")
     raise typer.Exit(0 if found.certificate.ok else 1)
+
+
+def _why(file: Path, of: Machine, what: Setup, T: float) -> tuple[list[dict[str, Any]], Path]:
+    """What holds the planned motion back, row by row, and the picture of its speed."""
+    from rds.interpolators.motion.limits import Limits
+    from rds.nc.check import motion
+    from rds.nc.limiting import explained
+
+    found, rows = explained(list(motion(file, of, what)), Limits.of(of), T)
+    path = file.with_name(f"{file.stem}-speed.png")
+    save_picture(found.plot(file.name), path)
+    return rows, path
 
 
 def _clock(seconds: float) -> str:

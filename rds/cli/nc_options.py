@@ -20,7 +20,8 @@ With = Annotated[
         "--with",
         metavar="OPTION",
         help="Of the dialect: block-delete, gr, program-numbers, default-feed, open-end, ncc, inch-machine, any-exit, "
-        "tcp; or correction: of the assembly errors in the machine's links.",
+        "tcp; probe-surface=Z: where probing moves touch, mm; or correction: of the assembly errors in the machine's "
+        "links.",
     ),
 ]
 ProfileName = Annotated[
@@ -36,6 +37,7 @@ DIALECT = (
     *("block-delete", "gr", "program-numbers", "default-feed", "open-end", "ncc", "inch-machine", "any-exit", "tcp"),
 )
 CORRECTION = "correction"
+PROBE = "probe-surface="
 
 
 def setup(
@@ -47,12 +49,19 @@ def setup(
     from rds.nc.language.dialect import Dialect
 
     correct = CORRECTION in (options or ())
-    options = [name for name in options or () if name != CORRECTION]
+    given: dict[str, Any] = {}
+    for name in options or ():
+        if name.startswith(PROBE):
+            try:
+                given["probe_surface"] = float(name.removeprefix(PROBE))
+            except ValueError:
+                raise InputError(f"--with {name!r}: {PROBE} wants a height in mm, as in {PROBE}-3.5") from None
+    options = [name for name in options or () if name != CORRECTION and not name.startswith(PROBE)]
     for name in options:
         if name not in DIALECT:
-            known = ", ".join((*DIALECT, CORRECTION))
+            known = ", ".join((*DIALECT, f"{PROBE}Z", CORRECTION))
             raise InputError(f"--with {name!r} is no option of the dialect; there are {known}")
-    given: dict[str, Any] = {name.replace("-", "_"): True for name in options}
+    given |= {name.replace("-", "_"): True for name in options}
     if max_jumps is not None:
         given["max_jumps"] = max_jumps
     return Setup(tools, parameters, Dialect(**given), correct)

@@ -17,6 +17,7 @@ from rds.cli.common import (
     print_json,
     progress_bars,
     refusals,
+    results_folder,
     say_what_is_replaced,
     stdout_kept,
     writes_files,
@@ -108,7 +109,10 @@ def run(
     ] = None,
     optional_stop: Annotated[bool, typer.Option("--optional-stop/--no-optional-stop", help="Whether M1 stops.")] = True,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder for the results (default: a new one under runs/).")
+        Path | None,
+        typer.Option(
+            "--out", "-o", callback=results_folder, help="Folder for the results (default: a new one under runs/)."
+        ),
     ] = None,
     exchange: Exchange = None,
     yes: Yes = False,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
-from rds.core.quantities import Items, Quantity, Table, Text
+from rds.core.quantities import Flag, Items, Quantity, Table, Text
 from rds.core.shared_quantities import NODE, SAMPLE_PERIOD
 from rds.core.toml_table import TomlTable
 from rds.machines.link_table import LINKS, TOOL, WORK, ChainEnd, Link, read_links
@@ -72,6 +72,9 @@ POWER = Table(
     {"voltage": Quantity("its voltage", "V", above=0.0), "current": Quantity("what it bears", "A", above=0.0)},
     needed=("voltage", "current"),
 )
+_NAMES = Items("names of outputs, from number 0 on", Text("name"), "a list of names", default=())
+OUTPUTS = Table("outputs that part programs switch", {"digital": _NAMES, "analog": _NAMES})
+LIMIT_FEED = Flag("feeds above an axis's speed are limited, with a note; otherwise they are faults", default=False)
 MACHINE = Table(
     "A machine: its axes, its converter and its sample period.",
     {
@@ -79,6 +82,8 @@ MACHINE = Table(
         "title": Text("heading of reports", ""),
         "sample_period": SAMPLE_PERIOD,
         "default_feed": DEFAULT_FEED,
+        "limit_feed": LIMIT_FEED,
+        "outputs": OUTPUTS,
         "converter": Table("digital-to-analogue converter", {"range": VOLTAGE_RANGE, "bits": BITS}),
         "power": POWER,
         "axis": Table("axes by name, in the order of their voltages in the command frame", others=AXIS),
@@ -148,7 +153,8 @@ class Machine:
 
     `default_feed` (mm/min) is that of part programs that give none; None: what the slowest linear axis can do.
     `links`, `tool` and `work` say how the axes move the tool relative to the work; without links it is a machine whose
-    axes are all that is known.
+    axes are all that is known. `limit_feed`: part programs' feeds above an axis's speed are limited to it, with a note.
+    `digital` and `analog` name its outputs by their numbers (P of M62 to M65, E of M67 and M68).
     """
 
     name: str
@@ -162,6 +168,9 @@ class Machine:
     links: tuple[Link, ...] = ()
     tool: ChainEnd | None = None
     work: ChainEnd | None = None
+    limit_feed: bool = False
+    digital: tuple[str, ...] = ()
+    analog: tuple[str, ...] = ()
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -220,6 +229,7 @@ def machine_from(table: TomlTable) -> Machine:
     if len(set(nodes)) != len(nodes):
         raise InputError(f"two axes share a node; nodes are {nodes}", table.path)
     converter = table.inner_or_empty("converter")
+    outputs = table.inner_or_empty("outputs")
     links, tool, work = read_links(table, axes)
     made = Machine(
         name=table.read("name", Path(table.path).stem),
@@ -233,8 +243,11 @@ def machine_from(table: TomlTable) -> Machine:
         links=links,
         tool=tool,
         work=work,
+        limit_feed=table.read("limit_feed"),
+        digital=outputs.read("digital"),
+        analog=outputs.read("analog"),
     )
-    for each in (converter, table):
+    for each in (converter, outputs, table):
         each.done()
     slots = made.slots
     if len(set(slots.values())) != len(slots):

@@ -31,5 +31,6 @@ __getattr__, __dir__ = face(
         "program_time": "cycle_time:cycle_time",
         "proof": "compensation.proof",
         "read_drawing": "paths.drawing",
+        "steps": "stepping",
     },
 )

@@ -12,7 +12,8 @@ class Event(NamedTuple):
     """What happens after the segment `after` of its block (−1: before the first), by the program's line `line`.
 
     Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0, M60) or 1 (M1, optional);
-    "tool" its number; "coolant" "flood on", "flood off", "mist on" or "mist off"; "end" 0 (M2, M30, or the last line).
+    "tool" its number; "coolant" "flood on", "flood off", "mist on" or "mist off"; "output" as "digital 0 1" (kind,
+    number, value); "end" 0 (M2, M30, or the last line).
     """
 
     after: int

@@ -56,13 +56,6 @@ OVERRIDES_OFF = {"ENABLE_FEED_OVERRIDE": "DISABLE_FEED_OVERRIDE", "ENABLE_SPEED_
 BEYOND = {
     "ORIENT_SPINDLE": "the spindle here cannot stop at an angle (M19, G87); leave it out, or bore with G85 or G86",
     "RIGID_TAP": "the axes here do not follow the spindle back (G33.1); tap with G84, or cut the thread with G33",
-    **dict.fromkeys(
-        (
-            *("SET_MOTION_OUTPUT_BIT", "CLEAR_MOTION_OUTPUT_BIT", "SET_AUX_OUTPUT_BIT", "CLEAR_AUX_OUTPUT_BIT"),
-            *("SET_MOTION_OUTPUT_VALUE", "SET_AUX_OUTPUT_VALUE"),
-        ),
-        "the machine has no such output (M62 to M68); leave the word out, or switch coolant (M7, M8, M9)",
-    ),
 }
 CURVE_ERROR = 0.001  # mm: a spline becomes chords that are no further from it
 MOST_CHORDS = 4096  # of one spline
@@ -479,6 +472,11 @@ class _Converter:
     def _coolant(self, call: Call) -> None:
         self._event("coolant", call.name.replace("_", " ").lower(), call.line)
 
+    def _output(self, call: Call) -> None:
+        number, kind = int(call.args[0]), "digital" if call.name.endswith("BIT") else "analog"
+        value = float(call.args[1]) if kind == "analog" else float(call.name.startswith("SET"))
+        self._event("output", f"{kind} {number} {value:g}", call.line)
+
     def _end(self, call: Call) -> None:
         self._event("end", 0.0, call.line)
         self._ended = True
@@ -514,4 +512,11 @@ _ACTIONS: dict[str, Callable[[_Converter, Call], Any]] = {
     "MIST_ON": _Converter._coolant,
     "MIST_OFF": _Converter._coolant,
     "PROGRAM_END": _Converter._end,
+    **dict.fromkeys(
+        (
+            *("SET_MOTION_OUTPUT_BIT", "CLEAR_MOTION_OUTPUT_BIT", "SET_AUX_OUTPUT_BIT", "CLEAR_AUX_OUTPUT_BIT"),
+            *("SET_MOTION_OUTPUT_VALUE", "SET_AUX_OUTPUT_VALUE"),
+        ),
+        _Converter._output,
+    ),
 }

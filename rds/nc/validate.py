@@ -207,6 +207,8 @@ class Validator:
             elif event.kind == "dwell" and float(event.value) > LONGEST_DWELL:
                 message = f"a dwell of {event.value:g} s is longer than {LONGEST_DWELL:g}; P is in seconds here"
                 self._fault(block, event.line, message, "dwell", float(event.value), "P G4")
+            elif event.kind == "output":
+                self._look_at_output(event, block)
             elif event.kind == "tool" and event.value:
                 self._used.setdefault(int(event.value))
         segments = block.segments
@@ -314,8 +316,23 @@ class Validator:
         at_line = np.where(given > 0, given, block.segments["line"][too_fast])
         for line in np.unique(at_line):
             fastest = float(rate[too_fast[at_line == line]].max())
-            message = f"a feed of {plain(fastest * 60)} {unit} is more than {who} ({plain(limit * 60)}); lower it"
-            self._fault(block, line, message, f"feed {kind} {unit}", fastest / limit, "F G1 G2 G3")
+            said = f"a feed of {plain(fastest * 60)} {unit} is more than {who} ({plain(limit * 60)})"
+            if self._machine.limit_feed and kind != "tool":
+                found = ProgramError(f"{said}, and is limited to it", file=block.file or self._name, line=int(line))
+                self.warn(found, "F G1 G2 G3")
+            else:
+                self._fault(block, line, f"{said}; lower it", f"feed {kind} {unit}", fastest / limit, "F G1 G2 G3")
+
+    def _look_at_output(self, event: Event, block: PathBlock) -> None:
+        kind, number, _ = str(event.value).split()
+        names = self._machine.digital if kind == "digital" else self._machine.analog
+        if int(number) >= len(names):
+            has = ", ".join(f"{k} {name}" for k, name in enumerate(names)) or "none"
+            message = (
+                f"{self._machine.name} names no {kind} output {number} (it has {has}); name it in the machine's file "
+                f"([outputs] {kind}), or leave the word out"
+            )
+            self._fault(block, event.line, message, f"output {kind} {number}", 0.0, "M62 M63 M64 M65 M67 M68 P E")
 
     def _look_at_spindle(self, event: Event, block: PathBlock, limits: ToolLimits) -> None:
         speed = float(event.value)

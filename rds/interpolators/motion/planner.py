@@ -17,7 +17,7 @@ from rds.interpolators.motion.segments import SEGMENT
 TOLERANCE = 0.05  # mm (degrees), of G64 without P; chosen
 LONGEST_RAMP = 1000.0  # s, acceleration over jerk of an axis, over which the motion is averaged
 MARGIN = 1e-3  # relative, kept off the limits for rounding
-PASSING = ("coolant",)  # kinds of events for which the motion does not come to rest
+PASSING = ("coolant", "output")  # kinds of events for which the motion does not come to rest
 NOT_BUILT = ("line", "rapid", "tip", "tool_length")  # columns of the segments that the pieces do not need
 ENOUGH = 2048  # segments, or samples, that are gathered before they are handed on
 
@@ -34,8 +34,8 @@ def plan(
 
     blocks: arrays of dtype SEGMENT, or objects with `.segments` and `.events` (each with `after`, `kind`, `value`,
     `line`: what happens after segment `after` of the block, −1 before the first). The motion comes to rest for each
-    event but coolant, and stays there for the `value` s of a "dwell". tolerance: mm or degrees, of mode BLEND without
-    one. start: where the axes are if events come before motion (6); default the first segment's start.
+    event but coolant and outputs, and stays there for the `value` s of a "dwell". tolerance: mm or degrees, of mode
+    BLEND without one. start: where the axes are if events come before motion (6); default the first segment's start.
 
     Each finite difference of the samples keeps to the velocity, acceleration and jerk of each axis; the speed along the
     path to the programmed rate. On exact paths all samples are on the path, and the motion slows down where direction

@@ -54,6 +54,7 @@ def judged(result: Result, prepared: Prepared) -> Result:
         "contour_error": worst(error, line, on_path, "mm") if len(prepared.path) and linear else None,
         **({"path_error": worst(columns["path_error"], line, on_path, "mm")} if is_reference and linear else {}),
         **prepared.about,
+        **({"outputs": list(prepared.outputs)} if prepared.outputs else {}),
         **_force(result, worst, moves),
         "following_error": {
             name: found

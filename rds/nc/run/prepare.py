@@ -66,6 +66,7 @@ class Prepared:
     certificate: Certificate | None = None  # of the planned samples
     tip: TipPath | None = None  # of a program with moves for the tool's tip
     about: dict[str, Any] = field(default_factory=dict)  # of a path as reference: what made its samples, for the result
+    outputs: tuple[dict[str, Any], ...] = ()  # that are switched: name, value, planned sample, line
 
     @property
     def seconds(self) -> float:
@@ -169,8 +170,14 @@ def planned(
     notes = (
         [f"{machine.name} has no coolant to switch: M7, M8 and M9 do nothing ({_lines(coolant)})"] if coolant else []
     )
+    outputs = []
+    for sample, event in rows.events:
+        if event.kind == "output":
+            kind, number, value = str(event.value).split()
+            name = (machine.digital if kind == "digital" else machine.analog)[int(number)]
+            outputs.append({"output": name, "value": float(value), "sample": sample, "line": event.line})
     whole = np.concatenate(path) if path else np.zeros(0, SEGMENT)
-    return Prepared(file, program, whole, segment, T, tuple(notes), certificate)
+    return Prepared(file, program, whole, segment, T, tuple(notes), certificate, outputs=tuple(outputs))
 
 
 def tip_path(path: np.ndarray, machine: Machine, correct: bool) -> TipPath:

@@ -1,0 +1,158 @@
+"""What holds a program's motion back: the feed, or which limit of which axis, where; and what would save a second."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.planner import plan
+from rds.interpolators.motion.segments import AXES
+from rds.nc.path_block import PathBlock
+
+if TYPE_CHECKING:
+    from rds.core.figure import Picture
+
+KINDS = ("velocity", "acceleration", "jerk")
+UNITS = ("mm/s", "mm/s²", "mm/s³")
+FEED, PATH, REST = "programmed feed", "corners and ends ahead", "at rest"
+NEAR = 0.95  # of a limit: it holds the motion back
+SAVED = 1.0  # s
+MOST_TIMES = 16.0  # that a limit is raised to, when a second is looked for
+_ROUNDS = 10
+
+
+@dataclass(frozen=True)
+class Limiting:
+    """Of each planned sample: time (s), way along the programmed path (mm), programmed and planned speed (mm/s; nan
+    and the planned one in rapids), the highest speed that the axes allow in its direction (mm/s), its line, and what
+    holds it back (index into `causes`)."""
+
+    time: np.ndarray
+    way: np.ndarray
+    programmed: np.ndarray
+    planned: np.ndarray
+    allowed: np.ndarray
+    line: np.ndarray
+    cause: np.ndarray
+    causes: tuple[str, ...]
+    T: float
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """How long each cause holds the motion back, the longest first."""
+        count = np.bincount(self.cause, minlength=len(self.causes)) * self.T
+        pairs = sorted(zip(self.causes, count.tolist(), strict=True), key=lambda pair: -pair[1])
+        return {name: seconds for name, seconds in pairs if seconds > 0.0}
+
+    def lines_of(self, cause: str, most: int = 3) -> list[int]:
+        """The lines that a cause holds back for longest."""
+        rows = self.cause == self.causes.index(cause)
+        lines, count = np.unique(self.line[rows], return_counts=True)
+        return [int(line) for line in lines[np.argsort(-count, kind="stable")][:most]]
+
+    def plot(self, title: str) -> Picture:
+        """Programmed, allowed and planned speed along the path, and below them what holds the motion back."""
+        from rds.core.figure import BLUE, GREY, ORANGE, Picture, dress, legend
+
+        shown = Picture(7.0)
+        top, below = shown.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+        every = max(len(self.time) // 20000, 1)
+        way = self.way[::every]
+        top.plot(
+            way, self.allowed[::every], color=GREY, linewidth=1.0, linestyle=(0, (4, 2)), label="allowed by the axes"
+        )
+        top.plot(way, self.programmed[::every], color=ORANGE, linewidth=2.0, alpha=0.6, label="programmed")
+        top.plot(way, self.planned[::every], color=BLUE, linewidth=1.2, label="planned")
+        dress(top, "speed [mm/s]", None)
+        legend(top)
+        names = list(self.seconds)
+        rank = np.array([names.index(name) if name in names else len(names) for name in self.causes])
+        below.plot(way, rank[self.cause][::every], "|", color=BLUE, markersize=7)
+        below.set_yticks(range(len(names)), names)
+        below.invert_yaxis()
+        dress(below, "held back by", "way along the program [mm]")
+        shown.suptitle(title, fontsize="medium")
+        return shown
+
+
+def limiting(blocks: Sequence[PathBlock], limits: Limits, T: float) -> Limiting:
+    """Plan the motion, and tell for each sample what holds it back. All samples are kept: some 200 bytes each."""
+    samples = list(plan(blocks, limits, T, start=np.zeros(6)))
+    path = np.concatenate([block.segments for block in blocks])
+    position = np.concatenate([block.position for block in samples])
+    segment = np.concatenate([block.segment for block in samples]).clip(0, len(path) - 1)
+    padded = np.concatenate((np.repeat(position[:1], 3, axis=0), position))
+    velocity = np.diff(padded, axis=0)[2:] / T
+    shares, names = [], []
+    for order, kind in enumerate(KINDS, 1):
+        values = np.abs(np.diff(padded, order, axis=0)[3 - order :]) / T**order
+        limit = getattr(limits, kind)
+        for i in np.flatnonzero(limits.present):
+            shares.append(values[:, i] / limit[i])
+            names.append(f"{kind} of {AXES[i]}")
+    table = np.column_stack(shares)
+    planned = np.linalg.norm(velocity[:, :3], axis=1)
+    rate = np.where(path["rapid"], np.nan, path["rate"])[segment]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        most = np.where(np.abs(velocity) > 0.0, limits.velocity / np.abs(velocity), np.inf)[:, :3].min(axis=1)
+        allowed = np.where(planned > 0.0, planned * most, np.nan)
+    causes = (FEED, PATH, REST, *names)
+    cause = np.where(table.max(axis=1) >= NEAR, 3 + table.argmax(axis=1), 1)
+    cause = np.where(planned >= 0.98 * np.nan_to_num(rate, nan=np.inf), 0, cause)
+    cause = np.where(planned == 0.0, 2, cause)
+    return Limiting(
+        time=np.arange(len(position)) * T,
+        way=np.concatenate([block.distance for block in samples]),
+        programmed=rate,
+        planned=planned,
+        allowed=allowed,
+        line=np.concatenate([block.line for block in samples]),
+        cause=cause,
+        causes=causes,
+        T=T,
+    )
+
+
+def to_save(blocks: Sequence[PathBlock], limits: Limits, T: float, kind: str, axis: str) -> float | None:
+    """How many times a limit of an axis would have to be what it is to save a second; None where it never does."""
+    i = AXES.index(axis)
+
+    def lasts(times: float) -> float:
+        raised = getattr(limits, kind).copy()
+        raised[i] *= times
+        return T * sum(map(len, plan(blocks, replace(limits, **{kind: raised}), T, start=np.zeros(6))))
+
+    goal = lasts(1.0) - SAVED
+    if lasts(MOST_TIMES) > goal:
+        return None
+    low, high = 1.0, MOST_TIMES
+    for _ in range(_ROUNDS):
+        middle = (low * high) ** 0.5
+        low, high = (low, middle) if lasts(middle) <= goal else (middle, high)
+    return high
+
+
+def explained(blocks: Sequence[PathBlock], limits: Limits, T: float) -> tuple[Limiting, list[dict[str, Any]]]:
+    """What holds the motion back, and a row for each cause: seconds, lines, and for the largest limit of an axis what
+    it would have to be to save a second."""
+    found = limiting(blocks, limits, T)
+    rows: list[dict[str, Any]] = []
+    asked = False
+    for cause, seconds in found.seconds.items():
+        row: dict[str, Any] = {"cause": cause, "seconds": seconds, "lines": found.lines_of(cause)}
+        kind, _, axis = cause.partition(" of ")
+        if kind in KINDS and not asked:
+            asked = True
+            now = float(getattr(limits, kind)[AXES.index(axis)])
+            times = to_save(blocks, limits, T, kind, axis)
+            row |= {
+                "limit": now,
+                "to_save_a_second": None if times is None else times * now,
+                "unit": UNITS[KINDS.index(kind)],
+            }
+        rows.append(row)
+    return found, rows

@@ -1,0 +1,142 @@
+"""What a machine's file says of part programs: outputs, feeds that are limited; a lathe; and programs step by step."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rds.cli.main import app
+from rds.core.errors import InputError
+from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.planner import plan
+from rds.machines import load_machine
+from rds.machines.machine import Machine
+from rds.nc import ProgramError, steps
+from rds.nc.check import Setup, check_program, motion
+from rds.nc.limiting import explained
+from rds.nc.run.prepare import prepare
+
+SHIPPED = Path(load_machine("mini-cnc").path)
+
+
+def machine_with(folder: Path, top: str, end: str = "") -> Machine:
+    path = folder / "own.toml"
+    path.write_text(f"{top}\n{SHIPPED.read_text()}\n{end}")
+    return load_machine(str(path))
+
+
+def program(folder: Path, text: str) -> Path:
+    path = folder / "part.ngc"
+    path.write_text(text)
+    return path
+
+
+def test_outputs_that_a_machine_names_are_switched_where_the_program_says(tmp_path: Path) -> None:
+    machine = machine_with(tmp_path, "", '[outputs]\ndigital = ["air", "clamp"]\nanalog = ["laser"]\n')
+    part = program(
+        tmp_path, "G21 G90 G94 F300\nM64 P1\nG1 X5\nM62 P0\nG1 X10\nM68 E0 Q0.25\nM63 P0\nM65 P1\nG1 X0\nM2\n"
+    )
+    result, _ = check_program(part, machine, Setup())
+    assert result.ok, result.faults
+    prepared = prepare(part, machine)
+    switched = [(row["output"], row["value"], row["line"]) for row in prepared.outputs]
+    assert switched == [("clamp", 1, 2), ("air", 1, 4), ("laser", 0.25, 6), ("air", 0, 7), ("clamp", 0, 8)]
+    at = [row["sample"] for row in prepared.outputs]
+    assert at == sorted(at) and at[0] < at[1] < at[2]
+    x = prepared.program.position[at[1], 0]
+    assert x == pytest.approx(5.0, abs=0.1)  # where the first move ends
+
+
+def test_an_output_without_a_name_is_refused_by_line(tmp_path: Path) -> None:
+    part = program(tmp_path, "G21 G90 F300\nG1 X1\nM64 P3\nM2\n")
+    result, _ = check_program(part, load_machine("mini-cnc"), Setup())
+    assert [fault.line for fault in result.faults] == [3]
+    assert "names no digital output 3" in str(result.faults[0])
+
+
+def test_a_feed_above_an_axis_is_limited_with_a_note_where_the_machine_says_so(tmp_path: Path) -> None:
+    part = program(tmp_path, "G21 G90 G94\nG1 X20 F5000\nM2\n")
+    refused, _ = check_program(part, load_machine("mini-cnc"), Setup())
+    assert not refused.ok
+    machine = machine_with(tmp_path, "limit_feed = true")
+    result, _ = check_program(part, machine, Setup())
+    assert result.ok
+    assert any("is limited to it" in warning.reason and warning.line == 2 for warning in result.warnings)
+    limits = machine.axes["X"].limits
+    assert limits is not None
+    speed = abs(prepare(part, machine).program.velocity[:, 0]).max()
+    assert speed == pytest.approx(limits.velocity, rel=0.002)
+
+
+def test_a_thread_is_cut_on_the_lathe_by_the_turns_of_its_spindle(tmp_path: Path) -> None:
+    part = program(
+        tmp_path,
+        "G18 G21 G90 G7 G94\nS600 M3\nG0 X12 Z4\nG76 P1.5 Z-15 I-1 J0.2 K1.84 R1.5 Q29.5 H1 E0\nG0 X20 Z10\nM5\nM2\n",
+    )
+    machine = load_machine("lathe")
+    result, _ = check_program(part, machine, Setup())
+    assert result.ok, result.faults
+    planned = prepare(part, machine).program
+    z, x = (planned.velocity[:, planned.axes.index("Z")], planned.position[:, planned.axes.index("X")])
+    threads = np.abs(z + 1.5 * 600 / 60) < 0.01  # mm/s: the pitch in each turn
+    assert threads.sum() * 0.001 > 5.0
+    assert x.max() <= 10.0 + 1e-9  # radii of the diameters programmed
+
+
+def test_steps_tell_the_words_in_force_after_each_line() -> None:
+    text = (
+        "G21 G90 F300\n#1=3\no1 sub\nG1 X[#1]\no1 endsub\no2 if [#1 EQ 3]\no1 call [4]\no2 else\nG0 X9\no2 endif\nM2\n"
+    )
+    found = list(steps(text))
+    assert [step.line for step in found] == [1, 2, 3, 4, 5, 6, 7, 3, 4, 5, 8, 9, 10, 11]
+    assert [step.line for step in found if step.skipped] == [4, 9]
+    moved = found[8]
+    assert moved.position[0] == 4.0 and moved.depth == 1 and "G1" in moved.modes.words
+    assert found[1].changed == {"#1": 3.0}
+    with pytest.raises(ProgramError, match="G12"):
+        list(steps("G21\nG12 X1\nM2\n"))
+
+
+def test_what_holds_a_motion_back_adds_up_and_a_raised_limit_saves_a_second(tmp_path: Path) -> None:
+    part = program(tmp_path, "G21 G90 G94\nG0 X60\nX-60\nX60\nX-60\nG1 X-50 F600\nM2\n")
+    machine = load_machine("mini-cnc")
+    blocks = list(motion(part, machine, Setup()))
+    limits = Limits.of(machine)
+    found, rows = explained(blocks, limits, 0.001)
+    assert sum(found.seconds.values()) == pytest.approx(len(found.time) * 0.001)
+    assert rows[0]["cause"] == "velocity of X"
+    assert found.seconds["programmed feed"] == pytest.approx(1.0, abs=0.1)  # 10 mm at 600 mm/min
+    raised = limits.velocity.copy()
+    raised[0] = rows[0]["to_save_a_second"]
+    faster = sum(map(len, plan(blocks, replace(limits, velocity=raised), 0.001, start=np.zeros(6))))
+    assert 1.0 <= (len(found.time) - faster) * 0.001 < 1.2
+
+
+def test_step_and_probe_surface_on_the_command_line(tmp_path: Path) -> None:
+    part = program(tmp_path, "G21 G90 G94\nG38.2 Z-10 F60\n#1 = #5063\nM2\n")
+    words = ["nc", "step", str(part), "--with", "probe-surface=-3.5", "--json"]
+    found = json.loads(CliRunner().invoke(app, words).stdout)["steps"]
+    assert found[1]["position"][2] == pytest.approx(-3.5)
+    assert found[2]["changed"]["#1"] == pytest.approx(-3.5)
+    refused = CliRunner().invoke(app, ["nc", "step", str(part), "--with", "probe-surface=low"])
+    assert refused.exit_code == 2 and "height in mm" in refused.output
+
+
+def test_an_out_that_is_named_like_a_file_means_its_folder(tmp_path: Path) -> None:
+    from rds.cli.common import results_folder
+
+    assert results_folder(tmp_path / "fast.csv") == tmp_path / "fast"
+    assert results_folder(tmp_path / "fast.v2") == tmp_path / "fast.v2"
+    (tmp_path / "kept.csv").mkdir()
+    assert results_folder(tmp_path / "kept.csv") == tmp_path / "kept.csv"
+    assert results_folder(None) is None
+
+
+def test_outputs_need_names_that_are_texts(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="digital"):
+        machine_with(tmp_path, "", "[outputs]\ndigital = [1]\n")
