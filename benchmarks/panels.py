@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -211,7 +212,10 @@ def _bare_page(browser: Any) -> float:
         notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(_BARE)])
         nbformat.write(notebook, Path(folder, "bare.ipynb"))
         began = time.perf_counter()
-        command = [sys.executable, "-m", "voila", "bare.ipynb", "--no-browser", "--port=0"]
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        command = [sys.executable, "-m", "voila", "bare.ipynb", "--no-browser", f"--port={port}"]
         server = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
         assert server.stderr is not None
         try:
