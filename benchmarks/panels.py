@@ -153,9 +153,10 @@ def _animated(page: Any, server: int, folder: Path) -> tuple[Result, float, floa
 
     Its result, ms from a picture to the next, and shares of a core, %: the kernel's, and the main thread's of the page.
     """
-    if page.locator('button:visible:text-is("Show the machine")').count():
-        page.click('button:visible:text-is("Show the machine")')
     page.click('button:visible:text-is("Run")')
+    page.wait_for_selector(".rds-scene:visible", timeout=60_000)
+    if page.evaluate(f"{_SCENE}.open") != "true":
+        page.click('button:visible:text-is("Show the machine")')
     page.wait_for_function(f"{_SCENE}.state === 'live' && Number({_SCENE}.now) > 1", timeout=60_000)
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable")
