@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -26,17 +27,11 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 SECONDS = 20.0  # of each emulation
 ROUNDS = 3
 _TICKS = os.sysconf("SC_CLK_TCK")
-# counts the pictures of the machine that WebGL draws of a position that it had not drawn before
-_COUNT_PICTURES = """
-window.pictures = 0;
-let said = '';
-const clear = WebGL2RenderingContext.prototype.clear;
-WebGL2RenderingContext.prototype.clear = function (...what) {
-    const words = [...document.querySelectorAll('.rds-app p')].find((each) => each.innerText.startsWith('at '));
-    if (words && words.innerText !== said) { said = words.innerText; window.pictures += 1; }
-    return clear.apply(this, what);
-};
-"""
+_SCENE = "document.querySelector('.rds-scene').dataset"
+_RUNS = 100  # short simulations one after the other, to see whether anything grows
+_SETTLED = 20  # of them, before it is looked at first
+_BARE = """import ipywidgets
+ipywidgets.IntSlider(description="bare")"""
 
 
 def run() -> list[Figure]:
@@ -45,7 +40,8 @@ def run() -> list[Figure]:
         return [Figure("the page in a browser", note="no Chromium: apt-get install chromium")]
     from playwright.sync_api import sync_playwright
 
-    opened, first, answered, there, pictures, costs, beside, moving, alone = [], [], [], [], [], [], [], [], []
+    opened, bare, first, answered, there, pictures, costs, in_motion = [], [], [], [], [], [], [], []
+    main_thread, beside, moving, alone, grown = [], [], [], [], []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for attempt in range(-1, ROUNDS):  # the first start only brings the files into memory
@@ -54,13 +50,13 @@ def run() -> list[Figure]:
                 Path(folder, "session.json").write_text(json.dumps(kept))
                 with _app(folder) as (url, server, began):
                     page = browser.new_page(viewport={"width": 1280, "height": 800})
-                    page.add_init_script(_COUNT_PICTURES)
                     page.goto(url)
                     page.wait_for_selector(".rds-nav button")
                     taken = time.perf_counter() - began
                     if attempt < 0:
                         continue
                     opened.append(taken)
+                    bare.append(_bare_page(browser))
                     for title in ("Equipment control", "Program", "Design"):  # none of them has been opened yet
                         at_once, whole = _answer(page, title)
                         first.append(at_once)
@@ -70,19 +66,28 @@ def run() -> list[Figure]:
                     result, cost = _live(page, server, Path(folder))
                     costs.append(cost)
                     beside.append(_p99(result))
-                    result, passed = _animated(page, Path(folder))
+                    result, passed, cost, busy = _animated(page, server, Path(folder))
                     pictures.append(passed)
+                    in_motion.append(cost)
+                    main_thread.append(busy)
                     moving.append(_p99(result))
+                    if attempt == ROUNDS - 1:
+                        grown = _growth(page, server)
                     page.close()
             alone.append(_p99(experiment(SECONDS).run("emulation")))
         browser.close()
     return [
         Figure("from `rds app` to the first panel", "s", tuple(opened), 6.0),
+        Figure("from `voila` to a bare page with one slider, in the same rounds", "s", tuple(bare)),
         Figure("a press that opens a panel for the first time, to its title", "ms", tuple(first), 100.0),
         Figure("the same, to the panel", "ms", tuple(there)),
         Figure("a press that goes to a panel that is open, to the panel", "ms", tuple(answered), 100.0),
         Figure("from one picture of the machine in motion to the next", "ms", tuple(pictures), 100.0),
         Figure("kernel, live strip of a run at 10 Hz", "% of a core", tuple(costs), 3.0),
+        Figure("kernel, with the machine in motion too", "% of a core", tuple(in_motion), 3.0),
+        Figure("main thread of the browser, with the machine in motion too", "% of a core", tuple(main_thread), 30.0),
+        Figure(f"memory of the kernel that {_RUNS - _SETTLED} runs leave, after {_SETTLED}", "kB a run", grown[:1]),
+        Figure(f"memory of the page that {_RUNS - _SETTLED} runs leave, after {_SETTLED}", "kB a run", grown[1:]),
         Figure("lateness of the loop at 99 %, with the page", "µs", tuple(beside)),
         Figure("lateness of the loop at 99 %, with the machine in motion too", "µs", tuple(moving)),
         Figure("lateness of the loop at 99 %, without", "µs", tuple(alone)),
@@ -143,15 +148,89 @@ def _live(page: Any, server: int, folder: Path) -> tuple[Result, float]:
     return _saved(page, folder), cost
 
 
-def _animated(page: Any, folder: Path) -> tuple[Result, float]:
-    """Another run of SECONDS with the machine in motion beside it, and the time from one picture to the next, ms."""
+def _animated(page: Any, server: int, folder: Path) -> tuple[Result, float, float, float]:
+    """Another run of SECONDS with the machine in motion beside it.
+
+    Its result, ms from a picture to the next, and shares of a core, %: the kernel's, and the main thread's of the page.
+    """
     page.click('button:visible:text-is("Run")')
-    page.click('button:visible:text-is("Show the machine")')
-    page.wait_for_function("window.pictures > 3", timeout=60_000)
-    before, began = page.evaluate("[window.pictures, performance.now()]")
+    page.wait_for_selector(".rds-scene:visible", timeout=60_000)
+    if page.evaluate(f"{_SCENE}.open") != "true":
+        page.click('button:visible:text-is("Show the machine")')
+    page.wait_for_function(f"{_SCENE}.state === 'live' && Number({_SCENE}.now) > 1", timeout=60_000)
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable")
+
+    def state() -> tuple[float, float, float, dict[int, float]]:
+        found = {each["name"]: each["value"] for each in session.send("Performance.getMetrics")["metrics"]}
+        drawn = float(page.evaluate(f"{_SCENE}.pictures"))
+        return time.perf_counter(), drawn, found["TaskDuration"], {each: _cpu(each) for each in _kernels(server)}
+
+    before = state()
     time.sleep(SECONDS * 0.5)
-    after, ended = page.evaluate("[window.pictures, performance.now()]")
-    return _saved(page, folder), (ended - began) / max(after - before, 1)
+    after = state()
+    passed = after[0] - before[0]
+    kernel = max(after[3].get(each, seconds) - seconds for each, seconds in before[3].items())
+    busy = (after[2] - before[2]) / passed * 100.0
+    per_picture = 1e3 * passed / max(after[1] - before[1], 1.0)
+    return _saved(page, folder), per_picture, kernel / passed * 100.0, busy
+
+
+def _growth(page: Any, server: int) -> tuple[float, float]:
+    """kB of the kernel's memory and of the page's heap that one more run leaves, over some of _RUNS simulations."""
+    page.select_option('.rds-field:has(label:text-is("Mode")) select', label="Simulation")
+    page.get_by_label("Final time").fill("0.2")
+    page.keyboard.press("Enter")
+    session = page.context.new_cdp_session(page)
+
+    def memory() -> tuple[float, float]:
+        session.send("HeapProfiler.collectGarbage")
+        used = float(session.send("Runtime.getHeapUsage")["usedSize"])
+        return max(_resident(each) for each in _kernels(server)), used / 1e3
+
+    for number in range(_RUNS):
+        page.wait_for_selector("button.rds-run:visible:enabled", timeout=60_000)
+        page.click("button.rds-run:visible")
+        page.wait_for_function("document.querySelector('button.rds-run').disabled", timeout=60_000)
+        if number == _SETTLED - 1:
+            before = memory()
+    page.wait_for_selector("button.rds-run:visible:enabled", timeout=60_000)
+    after = memory()
+    return tuple((b - a) / (_RUNS - _SETTLED) for a, b in zip(before, after, strict=True))  # type: ignore[return-value]
+
+
+def _resident(process: int) -> float:
+    """kB."""
+    found = re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process}/status").read_text())
+    return float(found[1]) if found else 0.0
+
+
+def _bare_page(browser: Any) -> float:
+    """s from the command to a page with one slider, served by Voilà as it comes."""
+    import nbformat
+
+    with tempfile.TemporaryDirectory() as folder:
+        notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(_BARE)])
+        nbformat.write(notebook, Path(folder, "bare.ipynb"))
+        began = time.perf_counter()
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        command = [sys.executable, "-m", "voila", "bare.ipynb", "--no-browser", f"--port={port}"]
+        server = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
+        assert server.stderr is not None
+        try:
+            for line in server.stderr:
+                if found := re.search(r"http://localhost:\d+/\S*|http://127\.0\.0\.1:\d+/\S*", line):
+                    page = browser.new_page()
+                    page.goto(found.group(0))
+                    page.wait_for_selector(".widget-slider", timeout=120_000)
+                    page.close()
+                    return time.perf_counter() - began
+            raise RuntimeError("voila did not start")
+        finally:
+            os.killpg(server.pid, signal.SIGTERM)
+            server.wait(20)
 
 
 def _saved(page: Any, folder: Path) -> Result:

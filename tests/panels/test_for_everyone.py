@@ -70,7 +70,7 @@ def test_the_keyboard_runs_and_stops_and_what_comes_of_it_is_read_out(
     page.keyboard.press("Control+Enter")  # what was typed holds
     page.wait_for_selector('.rds-notice[aria-live=polite] [role=status]:has-text("done: 250 samples"):visible')
     page.get_by_label("Mode", exact=True).select_option(label="Emulation")
-    page.get_by_label("Final time").fill("60")
+    page.get_by_label("Final time").fill("600")
     page.keyboard.press("Control+Enter")
     page.wait_for_selector('[aria-live=polite] :text("the run begins"):visible')
     page.wait_for_function("Number(document.querySelector('[data-samples]').dataset.samples) > 0")

@@ -200,8 +200,8 @@ def test_a_line_is_run_by_hand_the_work_is_touched_off_and_a_program_is_run_from
     page.click('.lm-TabBar-tab:visible:has-text("MDI")')
     page.wait_for_selector('button:text-is("Run line"):enabled')
     for line, said in (
-        ("G1 X2 F600", 'td:text-is("G1 X2 F600")'),
-        ("G91", 'td:text-is("G91")'),
+        ("G1 X2 F600", 'td:text-is("G1 X2 F600"):visible'),
+        ("G91", 'td:text-is("G91"):visible'),
         ("G1 X", '.rds-notice:has-text("mdi.ngc:3:5")'),
     ):
         page.fill('input[placeholder="G0 X10"]', line)

@@ -80,11 +80,14 @@ def test_every_text_of_every_panel_is_in_the_file(code: str, exchange: Callable[
     for name in PANELS.names():
         if name != "help":  # the documents are in English
             shell.open(name)
+    assert shell.on_code is not None
+    shell.on_code()  # what is made once somebody looks at it
     said = {" ".join(text.split()) for each in (shell.widget, *shell.panels.values()) for text in said_by(each)}
     known = {*machine_names(), *library(), shell.session.machine, str(tmp_path), "English", *languages().values()}
     said = {text for text in said if re.search(r"[^\W\d_]{2}", text) and text not in known and not NAME.fullmatch(text)}
     found = dict(zip(sorted(said), exchange(code, sorted(said)), strict=True))
-    assert not [text for text, put in found.items() if put is None]
+    missing = [text for text, put in found.items() if put is None]
+    assert not missing, "\n".join(missing)
     assert len(said) > 600
 
 

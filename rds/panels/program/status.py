@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from html import escape
 
+from rds.core.types import Ending
 from rds.machines import Machine
+from rds.modes.loop.execution import State
 from rds.nc.active import Modes, modes_at
 from rds.nc.run.run import Status
+from rds.results import Result
 
 STATES = (
     "runs",
@@ -27,6 +30,14 @@ def status_html(status: Status | None, modes: Mapping[int, Modes], machine: Mach
     """The display; dashes where nothing is known. `override` in per cent."""
     now = None if status is None else modes_at(modes, status.line)
     return _head(status, override, now) + _positions(status, now, machine) + _modes(now)
+
+
+def at_the_end(status: Status, result: Result) -> Status:
+    """Where a run came to its end, by its last row; `status` is any of before."""
+    measured = {name: float(result[f"{name}_measured"][-1]) for name in status.measured}
+    line, time = int(result["program_line"][-1]), float(result["time"][-1])
+    share = 1.0 if result.meta.get("ending") == Ending.DONE else status.share
+    return replace(status, time=time, line=line, state=State.OVER, feed=0.0, share=share, measured=measured, to_go={})
 
 
 def _head(status: Status | None, override: float, modes: Modes | None) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import ipywidgets as widgets
 import numpy as np
 
-from rds.modes.loop.execution import State
+from rds.core.errors import InputError
 from rds.nc.run.run import Status
 from rds.panels.equipment.result_view import timing_line
 from rds.panels.equipment.strip import StripChart, end_marks
@@ -26,7 +25,7 @@ from rds.panels.program.result import ProgramResult
 from rds.panels.program.run import ProgramWork
 from rds.panels.program.setup_view import SetupView
 from rds.panels.program.state import OPTIONS, Program
-from rds.panels.program.status import status_html
+from rds.panels.program.status import at_the_end, status_html
 from rds.panels.program.stock import cutting_path, stock_of, tool_of
 from rds.panels.program.tool_view import ToolView
 from rds.panels.scene.scene import MachineScene
@@ -175,10 +174,11 @@ class ProgramView:
 
     def _begin(self, work: ProgramWork) -> None:
         if self.work is not None:
-            return
+            raise InputError("wait until the run is over, or stop it first")
         self.notice.clear()
         work.start()
         self.work = self.operator.work = work
+        self.mdi.button.disabled = True
         self._latest = None
         self._ran = self.program.text.text
         self._traced = self._shown = False
@@ -251,10 +251,13 @@ class ProgramView:
             self._look()
         finally:  # whatever its result does to the page, the next one can be run
             self.work = self.operator.work = None
+            self.mdi.button.disabled = False
             self.operator.enable()
             self.editor.locked, self.editor.running = False, 0
-        if self._latest is not None:  # where it ended stays in sight
-            self._display(replace(self._latest, state=State.OVER))
+        if self._latest is not None and work.result is not None:  # where it ended stays in sight
+            self._latest = at_the_end(self._latest, work.result)
+            self._at = {name: at for name, at in self._latest.measured.items() if name in "XYZ"}
+            self._display(self._latest)
         if work.stopped_early:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif work.error is not None:

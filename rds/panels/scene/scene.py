@@ -37,6 +37,7 @@ class MachineScene(anywidget.AnyWidget):
     columns: Any = traitlets.List([]).tag(sync=True)  # of the rows, after the time
     live = traitlets.Bool(False).tag(sync=True)
     shows = traitlets.Bool(False).tag(sync=True)
+    asked = traitlets.Bool(False).tag(sync=True)  # whether a page has seen what draws there
     stock: Any = traitlets.Dict().tag(sync=True)  # {"low": [x, y, z], "high": [x, y, z]}, mm, in the work's frame
     tool: Any = traitlets.Dict({"diameter": TOOL, "ball": False}).tag(sync=True)
 

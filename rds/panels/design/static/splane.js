@@ -22,7 +22,7 @@ function render({ model, el }) {
   for (const [text, tip, act] of buttons) {
     const button = make("button");
     Object.assign(button, { textContent: text, title: tip, type: "button", onclick: () => { act(); draw(); } });
-    button.setAttribute("aria-label", tip);
+    if (text.length === 1) button.setAttribute("aria-label", tip); // a sign
     bar.append(button);
   }
   const hint = make("span", "rds-splane-hint");

@@ -1,5 +1,7 @@
 // What WebGL draws: solids lit from the camera's side, a height field, and lines whose points have colours.
 
+const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i; // no graphics card
+
 const SOLID_VERTEX = `#version 300 es
 layout(location=0) in vec3 place; layout(location=1) in vec3 tint;
 uniform mat4 view, model; uniform vec3 color; uniform float tinted; out vec3 world, shade;
@@ -20,7 +22,7 @@ class Painter {
     this.gl = gl;
     this.canvas = canvas;
     const about = gl.getExtension("WEBGL_debug_renderer_info");
-    this.soft = /swiftshader|llvmpipe|software/i.test(about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "");
+    this.soft = SOFTWARE.test(about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "");
     this.solids = this.program(SOLID_VERTEX, SOLID_FRAGMENT);
     this.strokes = this.program(SOLID_VERTEX, LINE_FRAGMENT);
     gl.enable(gl.DEPTH_TEST);

@@ -259,8 +259,18 @@ function render({ model, el }) {
   const themed = new MutationObserver(() => { stale = true; wake(); });
   const app = document.querySelector(".rds-app");
   if (app) themed.observe(app, { attributes: true, attributeFilter: ["class"] });
+  // shown from the start where a graphics card draws it, once
+  function greet() {
+    if (model.get("asked")) return;
+    model.set("asked", true);
+    const gl = document.createElement("canvas").getContext("webgl2"), about = gl?.getExtension("WEBGL_debug_renderer_info");
+    const drawnBy = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "";
+    gl?.getExtension("WEBGL_lose_context")?.loseContext();
+    if (drawnBy && !SOFTWARE.test(drawnBy)) setOpen(true);
+    else model.save_changes();
+  }
   let place = null;
-  const begun = requestAnimationFrame(() => { place = home(); place.addEventListener("rds-time", heard); restock(); shown(); if (model.get("shows")) model.send({ kind: "all" }); });
+  const begun = requestAnimationFrame(() => { place = home(); place.addEventListener("rds-time", heard); restock(); greet(); shown(); if (model.get("shows")) model.send({ kind: "all" }); });
   return () => { cancelAnimationFrame(begun); cancelAnimationFrame(due); sized.disconnect(); themed.disconnect(); model.off("msg:custom", receive); place?.removeEventListener("rds-time", heard); painter?.gl.getExtension("WEBGL_lose_context")?.loseContext(); };
 }
 
