@@ -15,7 +15,7 @@ IDLE = "def control(t, r, y, state, params):\n    return 0.0, state\n"
 
 
 def fill(page: Any, label: str, value: str) -> None:
-    page.fill(f'.rds-field:has(.rds-label span:text-is("{label}")) input', value)
+    page.fill(f'.rds-field:has(.rds-label label:text-is("{label}")) input', value)
     page.keyboard.press("Tab")
 
 

@@ -258,6 +258,10 @@ def _gradebooks() -> dict[str, str]:
     return labels(GRADEBOOKS.names(), own | {"moodle-feedback": "Moodle: feedback files"})
 
 
+def _any(text: str) -> None:
+    """Words, and no name of a file; what is wrong with them is told when they are kept."""
+
+
 def _fields() -> Iterable[Field]:
     yield Text("assignment", "Assignment", "its folder, with assignment.toml", "", "e.g. assignments/tracking")
     yield Text(
@@ -268,11 +272,11 @@ def _fields() -> Iterable[Field]:
     )
     yield Number("jobs", "Jobs", "processes side by side", None, low=1, high=256, whole=True, optional=True)
     yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tls://host:8786")
-    yield Text("student", "Student", "whom it is about: an identifier of the table", "", "")
-    yield Text("criterion", "Criterion", "by its name in the assignment; empty for a comment on the whole", "", "")
+    yield Text("student", "Student", "whom it is about: an identifier of the table", "", "", refuse=_any)
+    yield Text("criterion", "Criterion", "its name in the assignment; empty for the whole", "", "", refuse=_any)
     yield Number("points", "Points", "of the criterion, instead of those measured", None, low=0.0, optional=True)
-    yield Text("comment", "Comment", "the student reads it", "", "")
-    yield Text("by", "Your name", "who says it, in the audit trail", "", "")
+    yield Text("comment", "Comment", "the student reads it", "", "", refuse=_any)
+    yield Text("by", "Your name", "who says it, in the audit trail", "", "", refuse=_any)
     yield Choice("to", "Gradebook", "what grades are exported to", "nbgrader", _gradebooks())
     yield Text(
         "gradebook", "Your gradebook", "as the platform exports it; nbgrader's gradebook.db; LTI's folder", "", ""
