@@ -10,6 +10,7 @@ import typer
 from rds.cli import cluster_options
 from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, stdout_kept, writes_files
 from rds.cli.grade import needs_sandbox
+from rds.core.errors import InputError
 
 if TYPE_CHECKING:
     from rds.grading.batch.outcome import BatchOutcome
@@ -34,6 +35,9 @@ def run(
     against: Annotated[
         list[Path] | None, typer.Option(help="Earlier batches, or submissions and solutions, to compare with.")
     ] = None,
+    container: Annotated[
+        bool, typer.Option("--container", help="In a Linux container, by Docker or Podman: on Windows and macOS.")
+    ] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the batch in that folder.")] = False,
     json: Json = False,
 ) -> None:
@@ -42,6 +46,11 @@ def run(
     The exit code is 1 if a submission could not be graded by the grader's fault, and 130 after Ctrl-C.
     """
     try:
+        if container:
+            with refusals():
+                if scheduler is not None:
+                    raise InputError("--container grades on this computer alone; leave out --scheduler")
+                raise typer.Exit(_in_container(assignment, submissions, out, jobs, class_list, against, resume, json))
         with refusals(), stdout_kept(json), ends_as_ctrl_c():
             needs_sandbox()
             from rds.grading.batch.run import run_batch
@@ -72,6 +81,25 @@ def run(
     else:
         _show(found)
     raise typer.Exit(1 if found.grader_errors else 0)
+
+
+def _in_container(
+    assignment: Path,
+    submissions: Path,
+    out: Path,
+    jobs: int | None,
+    class_list: Path | None,
+    against: list[Path] | None,
+    resume: bool,
+    json: bool,
+) -> int:
+    from rds.grading.container.container import run_in_container
+
+    options = [*([] if jobs is None else ["--jobs", str(jobs)]), *["--resume"] * resume, *["--json"] * json]
+    mounted = [("--class", class_list)] if class_list is not None else []
+    return run_in_container(
+        assignment, submissions, out, options, mounted + [("--against", path) for path in against or ()]
+    )
 
 
 def _show(found: BatchOutcome) -> None:

@@ -14,6 +14,7 @@ from rds.core.errors import InputError
 from rds.grading.grade import Grade, Status
 from rds.panels.grading.state import GradingDesk, _said, progress, rows
 from rds.panels.session import Session
+from tests.grading.grades import batch_in, grade
 
 
 def test_progress_is_what_the_journal_has(tmp_path: Path) -> None:
@@ -115,3 +116,18 @@ def test_a_check_of_an_assignment_is_stopped(slow_grading: Path, tmp_path: Path)
     until(slow_grading.exists)
     task.stop()
     assert task.wait(20) and task.stopped
+
+
+def test_words_of_a_grader_are_kept_with_their_name(tmp_path: Path) -> None:
+    desk = GradingDesk(Session(tmp_path))
+    batch_in(tmp_path / "out", [grade("ada")])
+    desk.choices.set("out", "out")
+    with pytest.raises(InputError, match="name the student"):
+        desk.review()
+    for name, value in {"student": "ada", "by": "ann"}.items():
+        desk.choices.set(name, value)
+    with pytest.raises(InputError, match="points of a criterion, or a comment"):
+        desk.review()
+    desk.choices.set("comment", "See me, please.")
+    with pytest.raises(InputError, match="cannot be read any more"):  # this batch has no assignment to make pages by
+        desk.review()

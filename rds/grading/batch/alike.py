@@ -79,11 +79,13 @@ def alike(
     others = earlier_files(assignment, against)
     parsed = {name: code for name, code in own.items() if name.endswith(".py")}
     codes = [code for _, code in given] + list(parsed.values()) + list(others.values())
+    if len(given) + len(others) < 2:  # no pair: a process less to start, which is what one submission's time goes into
+        codes = []
     done = [outcome.value or {} for outcome in spread(fingerprints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)]
     found = {student: prints for (student, _), prints in zip(given, done, strict=False)}
     sources = dict(zip(parsed, done[len(given) :], strict=False))
     template = sources.pop(assignment.template or "", {})
-    earlier = dict(zip(others, done[len(given) + len(parsed) :], strict=True))
+    earlier = dict(zip(others, done[len(given) + len(parsed) :], strict=False))
     behaviours = {student: _behaviour(grade) for student, grade in grades.items()}
     return Alike(
         similar_pairs(found, [template], sources, earlier),

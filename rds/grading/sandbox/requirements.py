@@ -35,7 +35,10 @@ def available() -> str | None:
 def missing() -> str | None:
     """What is not installed, with the command that installs it; None if nothing is missing."""
     if sys.platform != "linux":
-        return f"the sandbox is made of Linux's namespaces, and this is {sys.platform}; grade on a Linux computer"
+        return (
+            f"the sandbox is made of Linux's namespaces, and this is {sys.platform}; grade in a container "
+            "(`rds grade run --container`), or on a Linux computer"
+        )
     if shutil.which("bwrap") is None:
         return (
             "bubblewrap is missing, and submissions are run in nothing else; install it, as in "

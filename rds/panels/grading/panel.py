@@ -49,9 +49,11 @@ class GradingView:
         self._run = runs(button("Grade", tip, self.grade, say, primary=True))
         check = button("Check assignment", "Its solution gets full marks, an empty one none", self.check, say)
         export = button("Export", "Write the gradebook into the folder of the grades", self.export, say)
+        words = button("Keep", "Points by hand, or a comment: an entry of the audit trail", self.review, say)
         batch = self._fields("assignment", "submissions", "out", "jobs", "scheduler")
         side = [
             group("Batch", *batch, row(check, self._run)),
+            group("Review", *self._fields("student", "criterion", "points", "comment", "by"), row(words)),
             group("Export", *self._fields("to", "gradebook"), row(export)),
         ]
         self.widget = columns(side, [self.bar, self.notice, self._said, self.table])
@@ -91,6 +93,12 @@ class GradingView:
         self.table.value = about + html.table(["student", "status", "score", "why"], rows(finished.grades)) + links
         self._name_button()
         return left
+
+    def review(self) -> None:
+        """Keep what a grader says, and show the class with it."""
+        said = self.desk.review()
+        self.show()
+        self.notice.say(said, "good")
 
     def export(self) -> None:
         """Write the chosen gradebook."""

@@ -91,6 +91,23 @@ class GradingDesk:
 
         return read_finished(self.out)
 
+    def review(self) -> str:
+        """Add what a grader says of one student, and write all out again; what was said, in a sentence."""
+        from rds.grading.review.entries import Entry, Kind
+        from rds.grading.review.say import say
+
+        said = {name: str(self.choices[name] or "") for name in ("student", "criterion", "comment", "by")}
+        points = self.choices["points"]
+        if not said["student"] or not said["by"]:
+            raise InputError("name the student, and yourself")
+        if points is None and not said["comment"]:
+            raise InputError("give points of a criterion, or a comment")
+        kind = Kind.COMMENT if points is None else Kind.POINTS
+        words = (said["student"], "", said["criterion"], points, said["comment"])
+        (entry,), finished = say(self.out, [Entry(kind, said["by"], *words)])
+        score = next((f": {g.score:g} points now" for g in finished.grades if g.student == entry.student), "")
+        return f"entry {entry.number} is kept; {entry.student}{score}"
+
     def export(self, to: str) -> Written:
         """Write a gradebook; see `rds grade export`."""
         from rds.grading.exports.export import export
@@ -241,6 +258,10 @@ def _gradebooks() -> dict[str, str]:
     return labels(GRADEBOOKS.names(), own | {"moodle-feedback": "Moodle: feedback files"})
 
 
+def _any(text: str) -> None:
+    """Words, and no name of a file; what is wrong with them is told when they are kept."""
+
+
 def _fields() -> Iterable[Field]:
     yield Text("assignment", "Assignment", "its folder, with assignment.toml", "", "e.g. assignments/tracking")
     yield Text(
@@ -251,8 +272,15 @@ def _fields() -> Iterable[Field]:
     )
     yield Number("jobs", "Jobs", "processes side by side", None, low=1, high=256, whole=True, optional=True)
     yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tls://host:8786")
+    yield Text("student", "Student", "whom it is about: an identifier of the table", "", "", refuse=_any)
+    yield Text("criterion", "Criterion", "its name in the assignment; empty for the whole", "", "", refuse=_any)
+    yield Number("points", "Points", "of the criterion, instead of those measured", None, low=0.0, optional=True)
+    yield Text("comment", "Comment", "the student reads it", "", "", refuse=_any)
+    yield Text("by", "Your name", "who says it, in the audit trail", "", "", refuse=_any)
     yield Choice("to", "Gradebook", "what grades are exported to", "nbgrader", _gradebooks())
-    yield Text("gradebook", "Your gradebook", "as downloaded from Canvas or Moodle; nbgrader's gradebook.db", "", "")
+    yield Text(
+        "gradebook", "Your gradebook", "as the platform exports it; nbgrader's gradebook.db; LTI's folder", "", ""
+    )
 
 
 def rows(grades: Iterable[Any]) -> list[list[Any]]:

@@ -1,0 +1,87 @@
+"""Grading in a container, and the self-check on systems without the sandbox. The container's program is asked, not "
+"run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rds.core.errors import InputError
+from rds.grading.container import container
+from tests.grading.made import HEAD, RMS, SINE, assignment_in
+
+WITHOUT_UNIX = """
+import os, sys
+import rds.__main__
+for name in ("fcntl", "resource", "pwd", "grp", "termios"):
+    sys.modules[name] = None
+for name in ("O_NOFOLLOW", "O_DIRECTORY", "O_NONBLOCK", "geteuid", "getuid", "pidfd_open", "fchmod"):
+    delattr(os, name)
+if sys.argv[1] == "platform":
+    import types
+    import rds.grading.sandbox.requirements
+    rds.grading.sandbox.requirements.sys = types.SimpleNamespace(platform="win32")
+sys.argv = ["rds", "grade", *sys.argv[2:]]
+rds.__main__.main()
+"""
+
+
+def without_unix(*words: str) -> subprocess.CompletedProcess[str]:
+    """`rds grade` in a Python that has nothing of Unix which Windows lacks."""
+    return subprocess.run([sys.executable, "-c", WITHOUT_UNIX, *words], capture_output=True, text=True, check=False)
+
+
+def test_ones_own_file_is_tried_where_there_is_no_unix(tmp_path: Path) -> None:
+    task = assignment_in(tmp_path / "task", HEAD + SINE + RMS)
+    done = without_unix("", "self", str(task), str(task / "solution.py"), "--trust-my-file")
+    assert done.returncode == 0 and "pass" in done.stdout, done.stderr
+    done = without_unix("", "self", str(task), str(task / "solution.py"))
+    assert done.returncode == 2 and "--trust-my-file" in done.stderr and "Traceback" not in done.stderr
+    done = without_unix("platform", "run", str(task), str(task), "-o", str(tmp_path / "out"))
+    assert done.returncode == 2 and "--container" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_the_container_reads_what_it_grades_and_writes_one_folder(tmp_path: Path) -> None:
+    places = (tmp_path / "ps1", tmp_path / "submitted", tmp_path / "out")
+    words = container.command("docker", "rds-grader:1", *places, ["--jobs", "2"], [("--class", tmp_path / "class.csv")])
+    volumes = [word.partition("=")[2].rsplit(":", 2) for word in words if word.startswith("--volume=")]
+    assert {(inside, mode) for _, inside, mode in volumes} == {
+        ("/assignment/ps1", "ro"),
+        ("/submissions/submitted", "ro"),
+        ("/out", "rw"),
+        ("/more/0/class.csv", "ro"),
+    }
+    behind = words[words.index("rds-grader:1") + 1 :]
+    assert behind == [
+        "/assignment/ps1",
+        "/submissions/submitted",
+        "-o",
+        "/out",
+        "--jobs",
+        "2",
+        "--class",
+        "/more/0/class.csv",
+    ]
+    assert "--network=none" in words and "--privileged" not in words
+
+
+def test_the_image_is_made_of_this_copy_and_what_grading_requires(tmp_path: Path) -> None:
+    container.write_context(tmp_path)
+    assert (tmp_path / "rds/grading/assignment/starters/model/assignment.toml").is_file()
+    assert not list(tmp_path.rglob("__pycache__"))
+    names = {line.partition(">")[0].partition("[")[0] for line in (tmp_path / "requirements.txt").read_text().split()}
+    assert {"numpy", "scipy", "control", "pyarrow", "pyseccomp", "nbformat"} <= names
+    assert not {"jupyterlab", "pytest", "mini-cnc-rds"} & names
+
+
+def test_without_a_program_for_containers_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(container.shutil, "which", lambda name: None)
+    (tmp_path / "in").mkdir()
+    with pytest.raises(InputError, match="neither docker nor podman"):
+        container.run_in_container(tmp_path, tmp_path / "in", tmp_path / "out", [])
+    with pytest.raises(InputError, match="no such file"):
+        container.run_in_container(tmp_path / "nowhere", tmp_path / "in", tmp_path / "out", [])
+    assert not (tmp_path / "out").exists()
