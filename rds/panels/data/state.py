@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 STRUCTURES = {
     "axis": "Axis (τ, K, friction)",
     "axis-mass": "Axis in mass form (M, F_v, F_c)",
+    "axis-inertia": "Axis that turns, by its inertia (J, B, T_c)",
     "spindle": "Spindle (first order)",
     "user": "Own file",
 }
