@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import exp, log
 from typing import Any
 
@@ -22,7 +23,8 @@ from rds.identification.structures.structures import structure
 from rds.identification.validate.candidate import Candidate, as_candidate
 
 FULL = 10.0  # V
-_FAR = 30.0  # times the noise, summed over the log: beyond doubt, though friction and delay may make up for some of it
+_FAR = 5.0  # standard errors: beyond doubt
+_STRETCHES = 5  # of a closed loop
 _SUBSTEP = 5e-5  # s, at most
 _SIGNALS = ("square", "sine", "multisine", "chirp", "steps")
 
@@ -195,18 +197,38 @@ def _own(made: Machine, values: Mapping[str, float]) -> Candidate:
 
 
 def _suffices(made: Machine, data: Log) -> bool:
-    """Whether models with a gain 5 % and a time constant 30 % off leave this log by far more than noise does."""
-    axis = structure("axis", made.options)
-    state = (0.0,) * axis.states
+    """Whether the log tells a model from one whose gain is 5 %, or whose time constant is 30 % off, by five standard
+    errors of the best estimate that there can be (Cramér and Rao's bound) while friction, play, delay and the initial
+    state are not known either. In a closed loop each stretch has a state of its own, as disturbances that the
+    controller makes up for do not let a free run add up.
+    """
+    axis = structure("axis", tuple({*made.options, "delay"}))
+    values = {"delay": 0.0, **made.values}
+    names = list(axis.parameters)
     noise = np.hypot(made.noise, made.resolution / np.sqrt(12.0))
-    t = data.time - data.time[0]
-    true = axis.respond(data.time, data.command, state, made.values)
-    for name, factor in (("tau", 1.3), ("K", 1.05)):
-        off = axis.respond(data.time, data.command, state, {**made.values, name: made.values[name] * factor}) - true
-        off -= np.polyval(np.polyfit(t, off, 1), t)
-        if np.sqrt(np.sum(off**2)) < _FAR * noise:
-            return False
-    return True
+    stretches = max(int(made.seconds / max(1.0, 40.0 * made.values["tau"])), 1) if made.closed_loop else 1
+    ends = np.linspace(0, len(data), min(stretches, _STRETCHES) + 1).astype(int)
+    assert axis.sensitivities is not None
+    state = (0.0,) * axis.states
+    _, by = axis.sensitivities(data.time, data.command, state, values)
+    information = np.zeros((len(names), len(names)))
+    for first, end in pairwise(ends):
+        t = data.time[first:end] - data.time[first]
+        decay = np.exp(-t / made.values["tau"])
+        own = np.column_stack([np.ones_like(t), decay])
+        J = by[first:end, : len(names)]
+        J = J - own @ np.linalg.lstsq(own, J, rcond=None)[0]
+        information += J.T @ J
+    scale = np.sqrt(np.diag(information))
+    used = scale > 0.0
+    bound = np.zeros_like(information)
+    part = np.ix_(used, used)
+    bound[part] = noise**2 * np.linalg.pinv(information[part] / np.outer(scale[used], scale[used]), rcond=1e-12)
+    bound[part] /= np.outer(scale[used], scale[used])
+    gain = np.array([float(name == "K") for name in names])
+    lag = np.array([float(name in ("tau", "delay")) for name in names])
+    gain_error, lag_error = (float(np.sqrt(max(row @ bound @ row, 0.0))) for row in (gain, lag))
+    return gain_error <= 0.05 / _FAR * made.values["K"] and lag_error <= 0.3 / _FAR * made.values["tau"]
 
 
 def _wrong_in(truth: Mapping[str, float], values: Mapping[str, float]) -> tuple[str, float]:

@@ -77,7 +77,11 @@ def _task(machine: Machine, axis: str, model: Path | None, duration: float, nois
         read = read_model(model)
         for sentence in read.doubts():
             typer.echo(f"warning: {model}: {sentence}", err=True)
-        made, values = structure(read.structure, read.options), read.values()
+        made = structure(read.structure, read.options, read.output_unit, read.command_unit)
+        if made.command_unit != "V" or (made.is_rate and read.structure != "spindle"):
+            what = "no position" if made.is_rate else f"a command in {made.command_unit}"
+            raise InputError(f"it is a model with {what}, and a voltage is designed for an axis's position", str(model))
+        values = read.values()
         for name in made.parameters:
             if name not in values:
                 raise InputError(f"it has no {name}, which structure {made.name} needs", str(model))

@@ -67,6 +67,7 @@ def fit(
         from rds.core.errors import InputError
         from rds.identification.fit.fit import fit as fit_model
         from rds.identification.fit.missing_options import with_hint
+        from rds.identification.structures.structures import for_logs
         from rds.identification.structures.structures import structure as structure_of
 
         if out is not None and out.suffix != ".toml":
@@ -76,6 +77,7 @@ def fit(
         with progress_bars() as bar:
             found = read_logs(logs, map_, axis, bar)
             fitted, rest = _split(found) if split else (found, [])
+            made = for_logs(made, fitted)
             if (method or made.default_method) == SIMULATION_ERROR:
                 options["progress"] = bar("fitting")
                 _say_if_slow(made)

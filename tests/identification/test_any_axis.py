@@ -211,3 +211,20 @@ def test_a_torque_against_the_motion_is_a_fault() -> None:
     assert not any(f.kind == "sign" for f in with_findings(log).findings)
     against = with_findings(replace(log, command=-log.command))
     assert any(f.kind == "sign" and "takes more energy" in f.what for f in against.findings)
+
+
+def test_a_log_of_a_speed_is_fitted_with_friction_of_each_direction_and_refused_where_a_position_is_needed() -> None:
+    truth = mini_cnc("X")
+    t = np.arange(5000) * T
+    u = 4.0 * np.sin(2 * np.pi * 0.9 * t) + 2.0 * np.sin(2 * np.pi * 4.1 * t)
+    made = structure("axis", (), "mm/s")
+    v = np.round(made.respond(t, u, (0.0,), truth) + 0.01 * np.random.default_rng(0).standard_normal(len(t)), 2)
+    log = Log("speed", t, u, v, units={"position": "mm/s"}, resolution=0.01, closed_loop=False)
+    found = fit([log], structure("axis"))
+    for name, value in truth.items():
+        assert found.parameters[name].value == pytest.approx(value, rel=0.01), name
+        assert abs(found.parameters[name].value - value) < 4.0 * found.parameters[name].std_error
+    with pytest.raises(InputError, match="takes positions, and the log has a speed alone"):
+        fit([log], structure("axis"), "step")
+    with pytest.raises(InputError, match="play shows in a position"):
+        fit([log], structure("axis", ("backlash",)))

@@ -27,6 +27,7 @@ METHODS = Registry(  # each module has `estimate(logs, structure, options) -> Es
     },
     own=False,
 )
+_OF_POSITIONS = ("step", "frequency")  # methods that take a speed of the structure spindle only
 
 
 def fit(
@@ -40,6 +41,12 @@ def fit(
         raise InputError("there is no log to fit; name at least one")
     named = _names_apart(logs)
     structure = for_logs(structure, named)
+    if method in _OF_POSITIONS and structure.is_rate and structure.name != "spindle":
+        raise InputError(
+            f"--method {method} of structure {structure.name} takes positions, and the log has a speed alone; take "
+            "--method simulation or inverse-dynamics, or --structure spindle",
+            named[0].source or named[0].name,
+        )
     structure = structure.prepare(named) if structure.prepare else structure
     estimated: Estimate = METHODS.module(method or structure.default_method).estimate(
         named, structure, dict(options or {})

@@ -51,7 +51,7 @@ def _bode(estimate: Estimate, log: Log, structure: Structure) -> Picture:
     from rds.identification.fit.frequency_plot import bode_picture
     from rds.identification.fit.frequency_response import frequency_response
 
-    is_rate = structure.output_unit == "rev/min"
+    is_rate = structure.is_rate
     response = frequency_response(log, is_rate, estimate.details["period"])
     return bode_picture(response, estimate.values(), is_rate)
 
@@ -71,7 +71,7 @@ def free_run_picture(estimate: Estimate, log: Log, structure: Structure) -> Pict
     response, error, command = picture.subplots(3, 1, sharex=True, height_ratios=(2.2, 1.2, 1.0))
     response.plot(t, log.position[every], label="measured", **RESPONSES["measured"])
     response.plot(t, modelled[every], label="free run of the fitted model", **RESPONSES["modelled"])
-    dress(response, f"{'speed' if unit == 'rev/min' else 'position'} [{unit}]", None)
+    dress(response, f"{'speed' if structure.is_rate else 'position'} [{unit}]", None)
     legend(response)
     error.plot(t, (log.position - modelled)[every], color=VERMILLION, linewidth=0.8)
     dress(error, f"measured - model [{unit}]", None)

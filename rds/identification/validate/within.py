@@ -106,6 +106,13 @@ def measures(a: Assessment, bands: Bands) -> list[Measure]:
     if found is None:
         return []
     listed = [Measure("gain", found.gain, bands.gain_percent), Measure("phase", found.phase, bands.phase_degrees)]
+    if (motion := a.as_motion) is not None and found is not motion and motion.rmse <= _AS_NOISE * a.noise:
+        # the model leaves noise alone: what the parameters of an axis leave open, the motion itself may tell
+        beside = (
+            Measure("gain", motion.gain, bands.gain_percent),
+            Measure("phase", motion.phase, bands.phase_degrees),
+        )
+        listed = [b if not m.told and b.told and not b.wrong else m for m, b in zip(listed, beside, strict=True)]
     if found.delay is not None:
         listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period)))
     if found.friction is not None:
@@ -118,8 +125,7 @@ def frequency_told(a: Assessment, bands: Bands) -> float | None:
     found = judged_by(a, bands)
     if found is None:
         return None
-    phase = Measure("phase", found.phase, bands.phase_degrees)
-    if phase.told:
+    if next(measure for measure in measures(a, bands) if measure.kind == "phase").told:
         return None
     lag = abs(found.lag.value) + _LIKELY * found.lag.error
     return bands.phase_degrees / 360.0 / lag if isfinite(lag) and lag > 0.0 else 0.0

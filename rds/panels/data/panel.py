@@ -154,7 +154,7 @@ class DataView:
 
     def _show_estimate(self, estimate: Any) -> None:
         from rds.identification.fit.fit_report import fragment, free_run_picture
-        from rds.identification.structures.structures import structure
+        from rds.identification.structures.structures import for_logs, structure
 
         self.text.value = fragment(estimate)
         kind = "warning" if estimate.warnings or estimate.untold else "good"
@@ -162,7 +162,7 @@ class DataView:
         said = "fitted" if kind == "good" else f"fitted, with {count} warning{'s' * (count != 1)}: read them first"
         self.notice.say(said, kind)
         if self.desk.fitted:
-            made = structure(estimate.structure, estimate.options)
+            made = for_logs(structure(estimate.structure, estimate.options), self.desk.fitted)
             self.figure.show(free_run_picture(estimate, self.desk.fitted[0], made))
 
     def _show_validation(self, validation: Any) -> None:
