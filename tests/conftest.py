@@ -142,8 +142,8 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
 
 
 def _rings() -> list[str]:
-    """What runs share with their hosts: rings, and desks beside them."""
-    return [str(path) for path in Path("/dev/shm").glob("rds-*.*") if path.suffix in (".ring", ".desk")]
+    """What runs share with their hosts: rings, and live values beside them."""
+    return [str(path) for path in Path("/dev/shm").glob("rds-*.*") if path.suffix in (".ring", ".live")]
 
 
 def _forgotten(before: set[str]) -> list[str]:

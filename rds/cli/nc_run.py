@@ -297,12 +297,12 @@ def _press(key: str, running: ProgramRun) -> None:
         if key == " ":
             status = running.status()
             stands = status is not None and _STATES[status.state] in ("held", "stops", "waits for the tool")
-            if stands or running.desk["hold"]:
+            if stands or running.live_values["hold"]:
                 running.resume()
             else:
                 running.hold()
         elif key in "+=-_":
-            share = running.desk["override"] + (_STEP if key in "+=" else -_STEP)
+            share = running.live_values["override"] + (_STEP if key in "+=" else -_STEP)
             running.override(min(max(round(share, 2), 0.0), 2.0))
         elif key in "hH":
             running.home()
@@ -322,7 +322,7 @@ def _line(status: Status, running: ProgramRun) -> str:
         axes += "  tip " + " ".join(f"{name}{value:.3f}" for name, value in status.tip.items())
     predicted = running.plan.samples * running.plan.T
     try:
-        override = f"{running.desk['override']:.0%}"
+        override = f"{running.live_values['override']:.0%}"
     except Exception:  # it has just ended
         override = "–"
     return (
@@ -382,19 +382,19 @@ def operate(
     """
     with refusals():
         from rds.core.errors import InputError
-        from rds.modes.loop.live_values_of_run import desk_of
+        from rds.modes.loop.live_values_of_run import live_values_of
 
         if hold + resume + home + stop > 1:
             raise InputError("--hold, --resume, --home and --stop exclude each other; give one of them")
-        with desk_of(folder) as desk:
+        with live_values_of(folder) as live_values:
             wanted = dict(map(_pair, set_ or ()))
             wanted |= {} if override is None else {"override": override / 100.0}
             if resume:
-                wanted |= {"hold": 0.0, "resume": desk["resume"] + 1.0}
+                wanted |= {"hold": 0.0, "resume": live_values["resume"] + 1.0}
             wanted |= {"home": 1.0, "hold": 0.0} if home else {}
             wanted |= {name: 1.0 for name, on in (("hold", hold), ("stop", stop)) if on}
-            desk.set_all(wanted)
-            values, units = desk.values(), {name: channel.unit for name, channel in desk.channels.items()}
+            live_values.set_all(wanted)
+            values, units = live_values.values(), {name: channel.unit for name, channel in live_values.channels.items()}
     if json:
         print_json(values)
     elif wanted:

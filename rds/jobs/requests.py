@@ -135,7 +135,7 @@ def _override(jobs: Jobs, job: int, share: float) -> dict[str, Any]:
 
 
 def _set(jobs: Jobs, job: int, name: str, value: float) -> dict[str, Any]:
-    jobs.job(job).active().desk.set(name, value)
+    jobs.job(job).active().live_values.set(name, value)
     return {"job": job}
 
 

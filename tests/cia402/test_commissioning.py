@@ -34,7 +34,7 @@ VENDOR, PRODUCT = 0x1234, 0x77
 Served = Callable[..., tuple[str, list[DriveNode]]]
 
 
-class Desk:
+class Operator:
     """Agrees to all but what has a word in it; notes what is said."""
 
     def __init__(self, refused: str = "\0", direction: int = 1):
@@ -64,16 +64,16 @@ def opened(channel: str) -> Iterator[can.BusABC]:
         yield bus
 
 
-def made(channel: str, folder: Path, desk: Desk | None = None, **wishes: object) -> Commissioned:
+def made(channel: str, folder: Path, operator: Operator | None = None, **wishes: object) -> Commissioned:
     with opened(channel) as bus:
-        return commission(bus, Wishes(node=2, period=T, **wishes), "bench", desk or Desk(), folder)  # type: ignore[arg-type]
+        return commission(bus, Wishes(node=2, period=T, **wishes), "bench", operator or Operator(), folder)  # type: ignore[arg-type]
 
 
 @pytest.mark.realtime
 def test_a_drive_out_of_the_box_is_made_ready(served: Served, tmp_path: Path) -> None:
     channel, nodes = served("X")
-    desk = Desk(direction=-1)
-    found = made(channel, tmp_path, desk, distance=20)
+    operator = Operator(direction=-1)
+    found = made(channel, tmp_path, operator, distance=20)
     assert (found.choices.mode, found.choices.counts, found.choices.direction) == ("csp", 1000.0, -1)
     assert 20 <= found.motion.moved < 200 and found.motion.agrees and 1 <= (found.motion.torque or 0) <= 100
     assert found.motion.increments == found.motion.moved
@@ -125,7 +125,7 @@ def test_a_no_ends_it_and_takes_back_what_was_changed(served: Served, tmp_path: 
     channel, nodes = served("X", quirks="zero-limits")
     for step in ("take 1000 counts", "map statusword", "software limits", "switch the power on"):
         with pytest.raises(Declined):
-            made(channel, tmp_path, Desk(refused=step))
+            made(channel, tmp_path, Operator(refused=step))
     values = nodes[0].drive.objects.values
     assert (values[0x6072, 0], values[0x607D, 1], values[0x607D, 2]) == (0, 0, 0)
 
@@ -144,12 +144,12 @@ def others_eds(folder: Path, vendor: int = VENDOR) -> Path:
 def test_anothers_eds_is_checked_and_kept_for_the_next_time(served: Served, tmp_path: Path) -> None:
     channel, nodes = served("X")
     nodes[0].drive.objects.values |= {(0x1018, 1): VENDOR, (0x1018, 2): PRODUCT}
-    desk, folder = Desk(refused="take 1000 counts"), tmp_path / "kept"
+    operator, folder = Operator(refused="take 1000 counts"), tmp_path / "kept"
     with pytest.raises(Declined):
-        made(channel, folder, desk, eds=others_eds(tmp_path))
-    assert any("is kept for the next time" in said for said in desk.said)
+        made(channel, folder, operator, eds=others_eds(tmp_path))
+    assert any("is kept for the next time" in said for said in operator.said)
     assert (folder / "00001234-00000077.eds").is_file()
-    again = Desk(refused="take 1000 counts")
+    again = Operator(refused="take 1000 counts")
     with pytest.raises(Declined):
         made(channel, folder, again)
     assert not any("no EDS of this drive" in said for said in again.said)

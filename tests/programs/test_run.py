@@ -1,4 +1,4 @@
-"""Part programs run: the same in simulation and emulation, with somebody at the desk, in every mode."""
+"""Part programs run: the same in simulation and emulation, with an operator, in every mode."""
 
 from __future__ import annotations
 
@@ -261,7 +261,7 @@ def test_the_report_says_where_it_is_worst(part: Path, tmp_path: Path) -> None:
     assert report.table("Changed while it ran").rows[0] == [0.5, "hold", 0.0, 1.0]
 
 
-def test_a_simulation_with_somebody_at_its_desk_waits_for_him(part: Path) -> None:
+def test_a_simulation_with_an_operator_waits_for_him(part: Path) -> None:
     run = PartProgram(part).start()
     reaches(run, State.STOP)
     time.sleep(0.1)
@@ -291,7 +291,7 @@ def test_an_operated_emulation_is_repeated_by_a_simulation(slow_part: Path, alon
     reaches(run, State.STOP)
     stopped = run.status()
     assert stopped is not None and stopped.line == STOP_LINE
-    run.desk.set("X.g1", 1500.0)
+    run.live_values.set("X.g1", 1500.0)
     run.resume()
     emulated = run.wait()
     assert emulated.meta["ending"] == "done"

@@ -114,7 +114,7 @@ class Running:
     """A run as the keys see it."""
 
     def __init__(self, state: State):
-        self.desk = {"hold": 0.0, "override": 1.95}
+        self.live_values = {"hold": 0.0, "override": 1.95}
         self.did: list[str] = []
         self.state = state
 

@@ -87,14 +87,14 @@ def part() -> PartProgram:
 def by_hand(run: Run) -> rds.Result:
     """Slow it down, hold it as soon as it moves, and let it go on."""
     assert run.ready(60.0)
-    run.desk.set("override", 0.5)
-    run.desk.set("hold", 1.0)
+    run.live_values.set("override", 0.5)
+    run.live_values.set("hold", 1.0)
     deadline = time.monotonic() + 60.0
     while not run.done and time.monotonic() < deadline:
         if run.rows is not None and run.rows["program_state"][-1] == State.HELD:
             break
         time.sleep(0.02)
-    run.desk.set_all({"hold": 0.0, "override": 0.8})
+    run.live_values.set_all({"hold": 0.0, "override": 0.8})
     return run.wait()
 
 

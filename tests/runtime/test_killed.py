@@ -156,7 +156,7 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[
     """A target that takes no samples, and its recorder, who is impatient."""
     monkeypatch.setattr(recorder, "HANG_AFTER", 0.3)
     ring = Ring.create(tmp_path / "a.ring", ["sample"], 10, ready=READY)
-    LiveValues.create(ring.desk_path, []).close()
+    LiveValues.create(ring.live_values_path, []).close()
     ring.beat(READY)
     with subprocess.Popen([sys.executable, "-S", "-c", "input()"], stdin=-1, stderr=subprocess.DEVNULL) as target:
         yield target, Recorder(tmp_path, ring)

@@ -30,8 +30,8 @@ def test_a_ring_is_removed_when_the_last_of_its_processes_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ring = Ring.create(tmp_path / "rds-0.ring", ["a"], 100)
-    LiveValues.create(ring.desk_path, [])
-    files = {ring.path, ring.desk_path}
+    LiveValues.create(ring.live_values_path, [])
+    files = {ring.path, ring.live_values_path}
     command = [sys.executable, "-c", HOLDER, str(ring.path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None and other.stdout.readline() == "held\n"
@@ -49,9 +49,9 @@ def test_a_ring_is_removed_when_the_last_of_its_processes_is_killed(
 def test_shared_memory_is_there_to_its_last_byte(tmp_path: Path) -> None:
     """In a full /dev/shm, as that of a container soon is, its pages were missing when the loop came to write them."""
     ring = Ring.create(tmp_path / "rds-0.ring", ["a", "b"], 10_000)
-    LiveValues.create(ring.desk_path, []).close()
+    LiveValues.create(ring.live_values_path, []).close()
     ring.close()
-    for path in (ring.path, ring.desk_path):
+    for path in (ring.path, ring.live_values_path):
         about = path.stat()
         assert about.st_blocks * 512 >= about.st_size > 100_000
 

@@ -48,9 +48,9 @@ def test_a_host_that_dies_with_all_its_processes(bench: Bench, tmp_path: Path) -
     assert f"the part program was in line {LINE}" in left.meta["notes"][-1]
     assert left["program_sample"][-1] > 0.0
     assert np.isfinite(left["X_measured"]).all()
-    for name in ("ring", "desk"):
+    for name in ("ring", "live_values"):
         # the next run on this computer removes them, and may have done so by now
-        Path(processes["desk"]).with_suffix(f".{name}").unlink(missing_ok=True)
+        Path(processes["live_values"]).with_suffix(f".{name}").unlink(missing_ok=True)
 
 
 @ONE

@@ -212,8 +212,8 @@ def test_a_run_of_which_all_processes_were_killed_goes_on_no_more(tmp_path: Path
     deadline = time.monotonic() + 20
     while session.runs_that_go_on() and time.monotonic() < deadline:
         time.sleep(0.05)
-    for kind in (".desk", ".ring"):  # nobody is left to remove what they shared
-        Path(processes["desk"]).with_suffix(kind).unlink()
+    for kind in (".live", ".ring"):  # nobody is left to remove what they shared
+        Path(processes["live_values"]).with_suffix(kind).unlink()
     assert [run.state for run in session.runs()] == [State.CUT_SHORT]
     session.take_machine("another run", object())
 

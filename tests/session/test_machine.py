@@ -17,7 +17,7 @@ from rds.machines import load_machine
 from rds.machines.assembly import first_order, judged
 from rds.panels.machine.configuration import directions, moved, write_machine
 from rds.panels.machine.monitor import BusMonitor, parse_filter
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 from rds.panels.session import Session
 from rds.panels.session.task import Stopped, Task
 
@@ -44,15 +44,15 @@ def done(task: Task[Any]) -> Any:
 
 
 @pytest.fixture
-def desk(alone: Path) -> Iterator[MachineDesk]:
-    made = MachineDesk(Session(alone, "mrmt-oacs"))
+def state(alone: Path) -> Iterator[MachineState]:
+    made = MachineState(Session(alone, "mrmt-oacs"))
     made.choices.set("dialect", "oacs")
     yield made
     made.end()
 
 
 def test_units_on_a_serial_line_are_started_and_found(alone: Path) -> None:
-    made = MachineDesk(Session(alone, "mini-cnc"))
+    made = MachineState(Session(alone, "mini-cnc"))
     assert made.bus[0] == "rds"
     made.choices.set("machine", "starmill")
     assert made.choices["dialect"] == "dcs" and made.bus == ("serial", "starmill")
@@ -149,42 +149,42 @@ def test_filters_that_cannot_be(text: str) -> None:
 
 
 @pytest.mark.realtime
-def test_modules_are_scanned_tuned_and_stepped(desk: MachineDesk) -> None:
+def test_modules_are_scanned_tuned_and_stepped(state: MachineState) -> None:
     with pytest.raises(MachineError, match="no module answers on rds:mrmt-oacs; start the simulated modules"):
-        done(desk.scan())
-    done(desk.start())
+        done(state.scan())
+    done(state.start())
     with pytest.raises(InputError, match="already"):
-        desk.start()
-    rows = done(desk.scan())
-    assert [row["id"] for row in rows] == [2, 3, 4, 5] == sorted(desk.data)
-    desk.load_tuning(4)
-    desk.tuning.set("controller", "P")
-    desk.tuning.set("Kp", 2.5)
-    in_force = done(desk.tune(4))
+        state.start()
+    rows = done(state.scan())
+    assert [row["id"] for row in rows] == [2, 3, 4, 5] == sorted(state.data)
+    state.load_tuning(4)
+    state.tuning.set("controller", "P")
+    state.tuning.set("Kp", 2.5)
+    in_force = done(state.tune(4))
     assert (in_force["controller"], in_force["Kp"], in_force["Ki"]) == ("PI", 2.5, 0.0)
-    saved = desk.save_tuning(4, "four.toml")
-    desk.tuning.set("Kp", 9.0)
-    desk.read_tuning(saved.name)
-    assert desk.tuning["Kp"] == 2.5
+    saved = state.save_tuning(4, "four.toml")
+    state.tuning.set("Kp", 9.0)
+    state.read_tuning(saved.name)
+    assert state.tuning["Kp"] == 2.5
     with pytest.raises(InputError, match="Step first"):
-        desk.suggest()
+        state.suggest()
     with pytest.raises(InputError, match="is a tool"):
-        desk.step(5)
-    result = done(desk.step(4))
+        state.step(5)
+    result = done(state.step(4))
     assert 3.0 < result["X_measured"][-1] - result["X_measured"][0] < 8.0
-    stopped = desk.step(4)
-    assert "4 modules are at zero volts" in desk.session.emergency_stop()
+    stopped = state.step(4)
+    assert "4 modules are at zero volts" in state.session.emergency_stop()
     assert stopped.wait(PATIENCE)
     assert isinstance(stopped.error, Stopped | MachineError)  # whichever comes first
-    desk.session.release_emergency_stop()
+    state.session.release_emergency_stop()
 
 
 @pytest.mark.realtime
-def test_a_monitor_listens_until_it_is_ended(desk: MachineDesk) -> None:
-    done(desk.start())
+def test_a_monitor_listens_until_it_is_ended(state: MachineState) -> None:
+    done(state.start())
     monitor = BusMonitor()
-    task = desk.session.work("bus monitor", monitor.watch(*desk.bus), monitor.end)
-    done(desk.scan())
+    task = state.session.work("bus monitor", monitor.watch(*state.bus), monitor.end)
+    done(state.scan())
     while not monitor.lines("reply")[0]:
         assert not task.wait(0.1)
     assert "kbit/s" in monitor.headline
@@ -194,18 +194,18 @@ def test_a_monitor_listens_until_it_is_ended(desk: MachineDesk) -> None:
 
 def test_the_dialect_is_the_one_that_the_bus_of_the_session_says(tmp_path: Path) -> None:
     """Modules that were started, and the load that was analysed, spoke another one than the runs of the page did."""
-    assert MachineDesk(Session(tmp_path)).choices["dialect"] == "rds"  # which is kept
-    desk = MachineDesk(Session(tmp_path, bus={"dialect": "cia402"}))
-    assert desk.choices["dialect"] == "cia402"
-    desk.choices.set("machine", "mrmt-oacs")
-    assert desk.choices["dialect"] == "cia402"
-    assert MachineDesk(Session(tmp_path / "new", "mrmt-oacs")).choices["dialect"] == "oacs"
+    assert MachineState(Session(tmp_path)).choices["dialect"] == "rds"  # which is kept
+    state = MachineState(Session(tmp_path, bus={"dialect": "cia402"}))
+    assert state.choices["dialect"] == "cia402"
+    state.choices.set("machine", "mrmt-oacs")
+    assert state.choices["dialect"] == "cia402"
+    assert MachineState(Session(tmp_path / "new", "mrmt-oacs")).choices["dialect"] == "oacs"
 
 
 def test_a_machine_of_modules_that_describe_themselves_speaks_their_dialect(tmp_path: Path) -> None:
-    desk = MachineDesk(Session(tmp_path))
-    before = desk.choices["dialect"]
-    desk.choices.set("machine", "mrmt-oacs")
-    assert desk.choices["dialect"] == "oacs"
-    desk.choices.set("machine", "mini-cnc")
-    assert desk.choices["dialect"] == before
+    state = MachineState(Session(tmp_path))
+    before = state.choices["dialect"]
+    state.choices.set("machine", "mrmt-oacs")
+    assert state.choices["dialect"] == "oacs"
+    state.choices.set("machine", "mini-cnc")
+    assert state.choices["dialect"] == before

@@ -19,7 +19,7 @@ from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.machine.modules_view import ModulesView
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 from rds.panels.page.shell import Shell
 from rds.panels.program.run import ProgramWork
 from rds.panels.program.view import RESULT, ProgramView
@@ -132,19 +132,19 @@ def test_a_run_whose_files_are_gone_is_not_sent_without_them(tmp_path: Path, mon
 def test_simulated_modules_that_have_ended_can_be_started_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def scan(self: MachineDesk) -> Any:
+    def scan(self: MachineState) -> Any:
         def none(task: Any) -> None:
             raise InputError("no module answers; start the simulated modules")
 
         return self.session.work("scan", none)
 
     shell = Shell(Session(tmp_path))
-    monkeypatch.setattr(MachineDesk, "scan", scan)
-    monkeypatch.setattr(MachineDesk, "serves", True)
-    view = ModulesView(shell, MachineDesk(shell.session), lambda: None)
+    monkeypatch.setattr(MachineState, "scan", scan)
+    monkeypatch.setattr(MachineState, "serves", True)
+    view = ModulesView(shell, MachineState(shell.session), lambda: None)
     start = next(each for each in _within(view.widget) if getattr(each, "description", "") == "Start modules")
     assert start.disabled
-    monkeypatch.setattr(MachineDesk, "serves", False)  # their process was killed
+    monkeypatch.setattr(MachineState, "serves", False)  # their process was killed
     view.scan()
     while view.bar.busy:
         shell.ticker.tick()

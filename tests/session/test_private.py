@@ -51,8 +51,8 @@ def open_hall(alone: Path) -> Iterator[Path]:
 def shared_memory(folder: Path) -> list[Path]:
     """What the processes of the run in `folder` share, as its record says; other runs of this computer are not ours."""
     with contextlib.suppress(OSError, ValueError):
-        desk = Path(json.loads((folder / "processes.json").read_text())["desk"])
-        return [path for path in (desk, desk.with_suffix(".ring")) if path.exists()]
+        live_values = Path(json.loads((folder / "processes.json").read_text())["live_values"])
+        return [path for path in (live_values, live_values.with_suffix(".ring")) if path.exists()]
     return []
 
 
@@ -75,7 +75,7 @@ def test_a_run_and_its_machine(open_hall: Path, mode: str) -> None:
     experiment = rds.Experiment(duration=0.3, reference=rds.sinusoid(2.0, 1.0), controller={"name": "p"})
     unless_lost(lambda: experiment.run(mode, out=open_hall / "runs" / "one", progress=look))
     look(0, 0)
-    assert {".ring", ".desk", "one", "rds"} <= looked
+    assert {".ring", ".live", "one", "rds"} <= looked
     # the socket has the modes of its umask; its folder keeps others out
     assert [line for line in found if not line.partition(" ")[2].startswith("s")] == []
     assert (open_hall / "runs" / "one" / "record.rds").is_file()

@@ -11,7 +11,7 @@ from rds.bus.tools.link import bus_name
 from rds.core.errors import MachineError
 from rds.panels.jog.state import Jog
 from rds.panels.machine.monitor import BusMonitor
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 from rds.panels.session import Session
 
 REAL = {"interface": "virtual", "channel": 0, "bitrate": 250_000, "dialect": "cia402", "cia402": {"mode": "csp"}}
@@ -32,13 +32,13 @@ def test_the_emergency_stop_opens_the_bus_with_its_bit_rate(
 
 def test_so_do_the_scan_and_the_monitor(tmp_path: Path, opened: list[dict[str, Any]]) -> None:
     session = Session(tmp_path, bus=REAL)
-    desk = MachineDesk(session)
-    task = desk.scan()
+    state = MachineState(session)
+    task = state.scan()
     assert task.wait(20.0) and "virtual:0" in str(task.error)
     assert as_told(opened)
     opened.clear()
     monitor = BusMonitor()
-    watching = session.work("bus monitor", monitor.watch(*desk.bus, **session.bus_options), monitor.end)
+    watching = session.work("bus monitor", monitor.watch(*state.bus, **session.bus_options), monitor.end)
     while not opened:
         assert not watching.wait(0.02)
     watching.stop()
@@ -54,7 +54,7 @@ def test_jogging_looks_on_the_same_channel(tmp_path: Path, opened: list[dict[str
 
 def test_channel_0_of_the_built_in_bus_is_not_the_machine_s(tmp_path: Path, opened: list[dict[str, Any]]) -> None:
     session = Session(tmp_path, bus={"channel": 0})
-    assert MachineDesk(session).bus == ("rds", "0")
+    assert MachineState(session).bus == ("rds", "0")
     session.emergency_stop()
     assert [call["channel"] for call in opened] == ["0"]
     assert bus_name("virtual", 0) == "virtual:0"

@@ -80,7 +80,7 @@ def retune(channel: str, node: int, filters: Sequence[wire.Filter], timeout: flo
 
 
 def visit(channel: str, timeout: float = PATIENCE) -> Connection | None:
-    """A connection for questions to the hub (see hub_desk.py), which is no node; None if the channel has no hub."""
+    """A connection for questions to the hub (see hub_requests.py), which is no node; None if the channel has no hub."""
     hello = wire.Hello(wire.ASK, False, 0, 0, b"")
     connection = _attempt(Address(channel), hello, b"", time.monotonic() + timeout)
     if connection is not None:

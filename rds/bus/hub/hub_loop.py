@@ -4,7 +4,7 @@
 - no loss: a frame that the hub has read reaches everybody. A node may lag by `QUEUE` bytes; then no further frame is
   carried until it has read, so senders wait;
 - with bit timing, frames arrive when they would on a wire, as exactly as this process is on time; the stamps are
-  exact in any case, and how late it was is in its statistics (hub_desk.py);
+  exact in any case, and how late it was is in its statistics (hub_requests.py);
 - nobody waits for ever: a node that reads nothing for `stall` seconds while the others wait is let go and told so;
 - garbage from one node ends that node's connection and nobody else's.
 """
@@ -129,7 +129,7 @@ class Hub(HubNodes):
                     if key not in routes:
                         self._route(key)
                     if medium.bitrate:
-                        self._desk.pickup.add(now - wire.STAMP.unpack_from(record)[0])
+                        self._requests.pickup.add(now - wire.STAMP.unpack_from(record)[0])
                     medium.offer(node, record, now)
                 elif node.state is State.GREETING:
                     self._greet(node, record)
@@ -145,9 +145,9 @@ class Hub(HubNodes):
             self._watch(node)
 
     def _answer(self, node: Node, record: bytes, now: int) -> None:
-        question = self._desk.take_part(node, *wire.decode_part(record))
+        question = self._requests.take_part(node, *wire.decode_part(record))
         if question is not None:
-            node.out += wire.encode_text(self._desk.answer(question, node, now))
+            node.out += wire.encode_text(self._requests.answer(question, node, now))
             self._flush(node)
             if len(node.out) > MOST_UNREAD:
                 raise wire.WireError("it asks and does not read the answers")
@@ -172,7 +172,7 @@ class Hub(HubNodes):
                 break
             sender, frame, at, deaf, only = delivery
             if at:
-                self._desk.delivery.add(now - at)
+                self._requests.delivery.add(now - at)
             stamped = wire.STAMP.pack((at or now) + self._epoch) + frame[8:]
             if only is not None:
                 targets: tuple[Node, ...] = (only,) if only.state is State.JOINED else ()

@@ -11,7 +11,7 @@ from rds.bus.hub import wire
 from rds.bus.hub.address import Address, foreign_user
 from rds.bus.hub.error_states import SEATS, Board
 from rds.bus.hub.hub_node import Node, State
-from rds.bus.hub.hub_requests import Desk
+from rds.bus.hub.hub_requests import Requests
 from rds.bus.hub.poller import READ, WRITE, make_poller
 from rds.bus.medium.medium import Medium, UntimedMedium
 from rds.bus.medium.station import Station
@@ -32,7 +32,7 @@ class HubNodes:
         self._poller = make_poller()
         self._poller.register(self._listener.fileno(), READ)
         self._medium: Medium[Node] = UntimedMedium()
-        self._desk = Desk(self._medium, self._note, time.monotonic_ns())
+        self._requests = Requests(self._medium, self._note, time.monotonic_ns())
         self._board: Board | None = None
         self._paused: set[Node] = set()  # those whose controllers are full
         self._nodes: dict[int, Node] = {}  # by file descriptor
@@ -126,7 +126,7 @@ class HubNodes:
             self._medium = TimedMedium(settings.bitrate, settings.data_bitrate or None, self._show)
         else:
             self._medium = UntimedMedium()
-        self._desk = Desk(self._medium, self._note, time.monotonic_ns())
+        self._requests = Requests(self._medium, self._note, time.monotonic_ns())
         return self._medium
 
     def _show(self, node: Node, station: Station) -> None:
@@ -170,7 +170,7 @@ class HubNodes:
                 self._note(f"node {node.number} ended in the middle of a frame")
             self._forget_member(node)
         elif node.state is State.ASKING:
-            self._desk.forget(node, time.monotonic_ns())
+            self._requests.forget(node, time.monotonic_ns())
         node.state = State.GONE
         del self._nodes[node.fd]
         if not node.hung_up:

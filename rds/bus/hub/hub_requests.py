@@ -1,4 +1,4 @@
-"""The hub's desk: who is not a node asks here how the bus is, and has faults injected.
+"""Questions to the hub: who is not a node asks here how the bus is, and has faults injected.
 
 A question is a JSON object with "do": "nodes", "statistics", "inject", "clear" or "restart"; the answer is one with
 "error" if it was refused. What an asker has injected with "own" ends when its connection does.
@@ -21,7 +21,7 @@ from rds.core.errors import InputError
 _LONGEST_QUESTION = 1 << 20  # bytes
 
 
-class Desk:
+class Requests:
     """Answers for one medium. `delivery` and `pickup` are the hub's lateness, see Hub."""
 
     def __init__(self, medium: Medium[Node], note: Callable[[str], None], now: int):

@@ -89,10 +89,10 @@ class _Session:
     async def _main(self) -> None:
         async with (
             _client(self._scheduler, self._security) as client,
-            _desk(client, self._work, self._scheduler) as desk,
+            _plugin(client, self._work, self._scheduler) as plugin,
         ):
             self.found.put(None)
-            parts = (self._all(client, desk), self._watch(client), self._is_over.wait())
+            parts = (self._all(client, plugin), self._watch(client), self._is_over.wait())
             tasks: list[asyncio.Task[Any]] = [asyncio.create_task(part) for part in parts]
             try:
                 done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -101,9 +101,9 @@ class _Session:
             finally:
                 await _cancel(tasks)
 
-    async def _all(self, client: Any, desk: str) -> None:
+    async def _all(self, client: Any, plugin: str) -> None:
         """Every item; those whose worker ended once more, one by one, so that none is blamed for what lay beside it."""
-        tries = [asyncio.create_task(self._one(client, desk, index)) for index in range(len(self._items))]
+        tries = [asyncio.create_task(self._one(client, plugin, index)) for index in range(len(self._items))]
         left_over = []
         try:
             for each in asyncio.as_completed(tries):
@@ -115,26 +115,26 @@ class _Session:
         finally:
             await _cancel(tries)
         for index in left_over:
-            self.found.put((await self._alone(client, desk, index)).outcome(index))
+            self.found.put((await self._alone(client, plugin, index)).outcome(index))
 
-    async def _alone(self, client: Any, desk: str, index: int) -> Reply:
+    async def _alone(self, client: Any, plugin: str, index: int) -> Reply:
         """An item with none of the others beside it."""
         deaths = 0
         while deaths <= self._work.retries:
-            _, reply = await self._one(client, desk, index)
+            _, reply = await self._one(client, plugin, index)
             if isinstance(reply, Reply):
                 return reply
             deaths += reply
         reason = f"the cluster's worker that had it ended, each of {deaths} times it was tried alone"
         return Reply(failure=Failure.DIED, reason=reason, attempts=deaths)
 
-    async def _one(self, client: Any, desk: str, index: int) -> tuple[int, Reply | int]:
+    async def _one(self, client: Any, plugin: str, index: int) -> tuple[int, Reply | int]:
         """The item's number, and its reply; or how many of the cluster's workers ended while they had it."""
         from distributed import KilledWorker
 
         from rds.core.parallel.remote import run_remotely
 
-        future = client.submit(run_remotely, desk, portable(self._items[index]), pure=False)
+        future = client.submit(run_remotely, plugin, portable(self._items[index]), pure=False)
         try:
             reply: Reply = await future
         except KilledWorker as error:
@@ -199,14 +199,14 @@ async def _has_workers(client: Any) -> bool:
 
 
 @asynccontextmanager
-async def _desk(client: Any, work: Work, scheduler: Scheduler) -> AsyncIterator[str]:
-    """The name of a desk for this work on all workers; InputError if they cannot have one."""
-    from rds.core.parallel.remote import Desk
+async def _plugin(client: Any, work: Work, scheduler: Scheduler) -> AsyncIterator[str]:
+    """The name of a plugin for this work on all workers; InputError if they cannot have one."""
+    from rds.core.parallel.remote import WorkPlugin
 
     name = f"rds-{uuid.uuid4().hex}"
     try:
         try:
-            await client.register_plugin(Desk(work), name=name)
+            await client.register_plugin(WorkPlugin(work), name=name)
         except Exception as error:
             raise InputError(
                 f"the workers of scheduler {scheduler!r} cannot take the work ({reason_of(error)}); they need the same "
@@ -214,7 +214,7 @@ async def _desk(client: Any, work: Work, scheduler: Scheduler) -> AsyncIterator[
             ) from error
         yield name
     finally:
-        with contextlib.suppress(Exception):  # who is gone has no desk
+        with contextlib.suppress(Exception):  # who is gone has no plugin
             await asyncio.wait_for(client.unregister_worker_plugin(name), _GOODBYE)
 
 

@@ -16,7 +16,7 @@ from rds.core.parallel.process import Reply, Work, WorkerProcess
 IDLE = 60.0  # s without an item after which a process ends: who began the work may be dead
 
 
-class Desk(WorkerPlugin):
+class WorkPlugin(WorkerPlugin):
     """On each of the cluster's workers the processes for one piece of work, until it is taken from there."""
 
     def __init__(self, work: Work):
@@ -72,8 +72,8 @@ class _Seat:
                 self._busy.release()
 
 
-def run_remotely(desk: str, data: bytes) -> Reply:
-    """What comes of an item at the desk of that name."""
-    found = get_worker().plugins[desk]
-    assert isinstance(found, Desk)
+def run_remotely(plugin: str, data: bytes) -> Reply:
+    """What comes of an item by the plugin of that name."""
+    found = get_worker().plugins[plugin]
+    assert isinstance(found, WorkPlugin)
     return found.answer(data)

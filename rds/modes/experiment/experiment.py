@@ -199,7 +199,7 @@ class Experiment:
 
             run = experiment.start("emulation")
             run.ready()
-            run.desk.set("X.Pgain", 30.0)
+            run.live_values.set("X.Pgain", 30.0)
             result = run.wait()
 
         `out` and `changes` as for `run`. Raises InputError for what will not do; the run's own errors come from

@@ -19,8 +19,8 @@ from rds.results import Result
 _POLL = 0.05  # s
 
 
-class RunDesk:
-    """The live values of a run: `run.desk.set("X.Pgain", 20.0)`, `run.desk["X.Pgain"]`, `run.desk.channels`."""
+class RunLiveValues:
+    """The live values of a run: `run.live_values.set("X.Pgain", 20.0)`, `run.live_values["X.Pgain"]`, `run.live_values.channels`."""
 
     def __init__(self, live: Live, channels: Mapping[str, Channel]):
         self._live = live
@@ -40,14 +40,14 @@ class RunDesk:
 
     def __getitem__(self, name: str) -> float:
         """What it was set to last; InputError if the run does not have it or is over."""
-        return float(self._live.at_desk(lambda desk: desk[name]))
+        return float(self._live.with_live_values(lambda live_values: live_values[name]))
 
     def __contains__(self, name: object) -> bool:
         return name in self.channels
 
     def values(self) -> dict[str, float]:
         """All live values, as they were set last; InputError if the run is over."""
-        return dict(self._live.at_desk(lambda desk: desk.values()))
+        return dict(self._live.with_live_values(lambda live_values: live_values.values()))
 
 
 class Run:
@@ -65,7 +65,7 @@ class Run:
         self._error: BaseException | None = None
         self._over = threading.Event()  # not join(): a thread counts as ended where Ctrl-C interrupts that
         self._thread = threading.Thread(target=self._go, name="rds run", daemon=True)
-        self.desk = RunDesk(self._live, {channel.name: channel for channel in plan.channels()})
+        self.live_values = RunLiveValues(self._live, {channel.name: channel for channel in plan.channels()})
 
     def start(self) -> Run:
         """Begin."""
@@ -97,7 +97,7 @@ class Run:
         if self._result is not None:
             return [Change(*change) for change in self._result.meta["changes"]]
         try:
-            return timed(self._live.at_desk(lambda desk: desk.notes())[1], self.plan.T)
+            return timed(self._live.with_live_values(lambda live_values: live_values.notes())[1], self.plan.T)
         except InputError:
             return []
 
@@ -159,7 +159,7 @@ class Run:
         return self._result
 
     def here(self, progress: Progress | None = None) -> Result:
-        """Run in this thread, without a desk, and return the result."""
+        """Run in this thread, without live values, and return the result."""
         return self._work(None, progress)
 
     def _go(self) -> None:

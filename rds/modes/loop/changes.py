@@ -16,7 +16,7 @@ from rds.modes.loop.live_values import Channel, LiveValues, Note, find
 
 FILE = "changes.csv"
 STOP = "stop"
-_LOOK = 0.005  # s between two looks at the desk while time stands still
+_LOOK = 0.005  # s between two looks at the live values while time stands still
 _HEADINGS = ("time [s]", "name", "old", "new")
 
 
@@ -38,9 +38,9 @@ class LiveChanges:
     """Takes the changes that are due: called with the number of each sample before it is taken.
 
     `actions` say what a new value does, by channel ("stop" ends the run unless they say otherwise); `planned` are
-    changes known before the run, as (sample, channel, value) in order. Set `desk` to take those of
+    changes known before the run, as (sample, channel, value) in order. Set `live_values` to take those of
     somebody who changes values while it runs. `over()` is asked at each sample whether what drives the axes is at its
-    end, and why. `in_virtual_time`, time stands still for as long as `waits()` says that only somebody at the desk can
+    end, and why. `in_virtual_time`, time stands still for as long as `waits()` says that only an operator can
     go on.
     """
 
@@ -54,7 +54,7 @@ class LiveChanges:
     ):
         self.values = {channel.name: channel.value for channel in channels}
         self.taken: list[Note] = []
-        self.desk: LiveValues | None = None
+        self.live_values: LiveValues | None = None
         self.in_virtual_time = False
         self.reason = ""  # why the run ended early, in a sentence
         self._names = list(self.values)
@@ -66,20 +66,20 @@ class LiveChanges:
 
     def __call__(self, k: int) -> Ending | None:
         """Take what has changed before sample `k`; how the run ends here, if it does."""
-        if self._waits is not None and self.in_virtual_time and self.desk is not None:
-            while self._waits() and not self.desk.news():
+        if self._waits is not None and self.in_virtual_time and self.live_values is not None:
+            while self._waits() and not self.live_values.news():
                 sleep(_LOOK)
         planned = self._planned
-        desk = self.desk
+        live_values = self.live_values
         while self._next < len(planned) and planned[self._next][0] <= k:
             _, name, value = planned[self._next]
             self._next += 1
             self._apply(k, name, value)
-            if desk is not None:
-                desk.show(name, value)
-        if desk is not None and desk.news():
+            if live_values is not None:
+                live_values.show(name, value)
+        if live_values is not None and live_values.news():
             values = self.values
-            for name, value in zip(self._names, desk.take(), strict=False):
+            for name, value in zip(self._names, live_values.take(), strict=False):
                 if value != values[name]:
                     self._apply(k, name, value)
         if self._ending is not None:
@@ -92,11 +92,11 @@ class LiveChanges:
     @property
     def is_idle(self) -> bool:
         """Whether nobody can have a say: then the loop need not ask."""
-        return self.desk is None and not self._planned and self._over is None
+        return self.live_values is None and not self._planned and self._over is None
 
     def expects(self, names: Container[str]) -> bool:
-        """Whether one of these live values can still change: somebody is at the desk, or a change of it is planned."""
-        return self.desk is not None or any(change[1] in names for change in self._planned[self._next :])
+        """Whether one of these live values can still change: an operator may act, or a change of it is planned."""
+        return self.live_values is not None or any(change[1] in names for change in self._planned[self._next :])
 
     def _stop(self, value: float) -> None:
         self._ending = Ending.STOPPED if value else None
@@ -106,8 +106,8 @@ class LiveChanges:
         self.values[name] = value
         note = Note(k, name, old, value)
         self.taken.append(note)
-        if self.desk is not None:
-            self.desk.note(note)
+        if self.live_values is not None:
+            self.live_values.note(note)
         self._actions[name](value)
 
 

@@ -1,4 +1,4 @@
-"""A part program carried out sample by sample: where the axes should be now, whatever somebody at the desk wishes.
+"""A part program carried out sample by sample: where the axes should be now, whatever an operator wishes.
 
 The path is followed at the rate of the override, or brought to rest on it (hold, stop, home). Where it rests by
 itself, the program dwells, waits for the spindle's speed, or for somebody to let it go on (M0, M1, tool change).
@@ -119,7 +119,7 @@ class Execution:
             reference.position.value = value
 
     def actions(self) -> dict[str, Callable[[float], None]]:
-        """What a new value of the desk does, by channel."""
+        """What a new live value does, by channel."""
 
         def setter(name: str) -> Callable[[float], None]:
             return lambda value: self._values.__setitem__(name, value)
@@ -157,7 +157,7 @@ class Execution:
         return self.ending
 
     def waits(self) -> bool:
-        """Whether nothing will happen until somebody at the desk does something."""
+        """Whether nothing will happen until an operator does something."""
         if self._values[STOP] or self._values[HOME] or self.ending is not None:
             return False
         if self.state in (State.STOP, State.TOOL):  # one sample of it is taken first, for others to see

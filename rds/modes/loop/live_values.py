@@ -1,4 +1,4 @@
-"""The desk: live values between host and target, such as a gain, the feed override or the wish to stop.
+"""Live values between host and target, such as a gain, the feed override or the wish to stop.
 
 Shared memory of named float channels. The host sets values whenever it likes; the loop looks once at the beginning of
 each sample, takes what has changed, and notes when it did: sample, channel, old value, new value. From these notes the
@@ -84,7 +84,7 @@ class LiveValues:
 
     @classmethod
     def create(cls, path: str | Path | None, channels: Sequence[Channel]) -> LiveValues:
-        """A new desk in the file `path`, or (None) in the memory of this process alone. OSError if there is no room."""
+        """New live values in the file `path`, or (None) in the memory of this process alone. OSError if there is no room."""
         text = json.dumps([asdict(channel) for channel in channels]).encode()
         values = struct.Struct(f"<{len(channels)}d")
         first = _TEXT + _text_size(len(text))
@@ -102,7 +102,7 @@ class LiveValues:
 
     @classmethod
     def open(cls, path: str | Path) -> LiveValues:
-        """The desk in an existing file."""
+        """The live values in an existing file."""
         memory = _map(path)
         if memory[: len(_MAGIC)] != _MAGIC:
             raise InputError("not a run's live values", str(path))

@@ -1,4 +1,4 @@
-"""Parameters of a controller that may be changed while it runs, as channels of the desk."""
+"""Parameters of a controller that may be changed while it runs, as channels of live values."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Tuning:
         return {f"{self._owner}.{name}": partial(self._set, name) for name in self._values}
 
     def verify(self, values: Mapping[str, float]) -> None:
-        """InputError if these values of the desk will not do together."""
+        """InputError if these values will not do together."""
         if self._retune is not None:
             self._retune({name: values[f"{self._owner}.{name}"] for name in self._values})
 

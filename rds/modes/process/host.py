@@ -100,9 +100,9 @@ def _here(plan: Plan, progress: Progress | None, live: Live | None) -> Rows:
     assert changes is not None
     attached: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
     if live is not None:
-        changes.desk = LiveValues.create(None, plan.channels())
+        changes.live_values = LiveValues.create(None, plan.channels())
         changes.in_virtual_time = True
-        attached = live.attach(plan, changes.desk, columns, units, recorded=recorded)
+        attached = live.attach(plan, changes.live_values, columns, units, recorded=recorded)
     elif changes.is_idle:
         loop = replace(loop, changes=None)
 
@@ -165,7 +165,7 @@ def _recorded(
     if plan.bus.get("interface") == BUILTIN:
         about["channel"] = plan.bus["channel"]
     capacity = min(plan.most_samples, max(_RING_BYTES // (8 * len(columns)), 1000))
-    ring, desk = _shared(plan, columns, capacity, about)
+    ring, live_values = _shared(plan, columns, capacity, about)
     try:
         with tempfile.TemporaryFile() as said:  # by the recorder, which says something only if it fails
             command = [sys.executable, "-P", "-m", "rds.modes.process.recorder", str(directory), str(ring.path)]
@@ -178,7 +178,7 @@ def _recorded(
                 pass_fds=(lock,) if os.name == "posix" else (),
             )
             try:
-                with live.attach(plan, desk, columns, units, ring=ring):
+                with live.attach(plan, live_values, columns, units, ring=ring):
                     _follow(recorder, ring, plan, progress)
             finally:
                 if recorder.poll() is None:
@@ -189,8 +189,8 @@ def _recorded(
         return bool(ring.head)
     finally:
         ring.close()
-        desk.close()
-        for left in (ring.path, ring.desk_path):
+        live_values.close()
+        for left in (ring.path, ring.live_values_path):
             with contextlib.suppress(OSError):
                 left.unlink()
 
@@ -204,7 +204,7 @@ def _shared(plan: Plan, columns: list[str], capacity: int, about: dict[str, Any]
         try:
             ring = Ring.create(path, columns, capacity, **about)
             try:
-                return ring, LiveValues.create(ring.desk_path, plan.channels())
+                return ring, LiveValues.create(ring.live_values_path, plan.channels())
             except OSError:
                 ring.close()
                 path.unlink()

@@ -1,4 +1,4 @@
-"""A run as others see it while it goes on: how far it is, its rows so far, its desk."""
+"""A run as others see it while it goes on: how far it is, its rows so far, its live values."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Live:
         self._hard = False
         self.columns: list[str] = []
         self.units: dict[str, str] = {}
-        self.desk: LiveValues | None = None
+        self.live_values: LiveValues | None = None
         self.attached = threading.Event()
 
     def attach(
         self,
         plan: Plan,
-        desk: LiveValues,
+        live_values: LiveValues,
         columns: list[str],
         units: dict[str, str],
         *,
@@ -44,8 +44,8 @@ class Live:
     ) -> AbstractContextManager[Any]:
         """Show a run whose rows go to `ring`, or are `recorded` in this process, until the context ends."""
         with self._lock:
-            desk.verify_with(plan.verify)
-            self.desk, self._ring, self._recorded = desk, ring, recorded
+            live_values.verify_with(plan.verify)
+            self.live_values, self._ring, self._recorded = live_values, ring, recorded
             self.columns, self.units, self._width = columns, units, len(columns)
             stopped, hard = self._stopped, self._hard
         if stopped:
@@ -74,15 +74,15 @@ class Live:
 
     def set_all(self, values: dict[str, float]) -> None:
         """Set live values; InputError if the run is over, has not begun, or will not have them."""
-        self.at_desk(lambda desk: desk.set_all(values))
+        self.with_live_values(lambda live_values: live_values.set_all(values))
 
-    def at_desk(self, act: Callable[[LiveValues], Any]) -> Any:
-        """What `act` makes of the desk; InputError where there is none."""
+    def with_live_values(self, act: Callable[[LiveValues], Any]) -> Any:
+        """What `act` makes of the live values; InputError where there is none."""
         with self._lock:
-            if self.desk is None:
+            if self.live_values is None:
                 when = "is over" if self.attached.is_set() else "has not begun yet: wait until it is ready"
                 raise InputError(f"no live value can be read or set: the run {when}")
-            return act(self.desk)
+            return act(self.live_values)
 
     def stop(self, hard: bool = False) -> None:
         """Ask for the end: in the order of the run (a program comes to rest on its path), or `hard`, at once."""
@@ -90,8 +90,8 @@ class Live:
             self._stopped, self._hard = True, self._hard or hard
             if hard and self._ring is not None:
                 self._ring.ask_to_stop()
-            elif self.desk is not None:
-                self.desk.set("stop", 1.0)
+            elif self.live_values is not None:
+                self.live_values.set("stop", 1.0)
 
     @property
     def was_stopped(self) -> bool:
@@ -113,7 +113,7 @@ class Live:
     def _detach(self) -> None:
         with self._lock:
             self._count()
-            self.desk = self._ring = self._recorded = None
+            self.live_values = self._ring = self._recorded = None
 
 
 class _Attached(nullcontext[None]):

@@ -48,7 +48,7 @@ class Recorder:
         self.lost = 0  # rows that the ring had overwritten before they were copied
         self._file: RecordFile | None = None
         self._next = 0
-        self._desk = LiveValues.open(ring.desk_path)
+        self._live_values = LiveValues.open(ring.live_values_path)
         self._noted = -1  # changes of live values that have been copied; -1: not known yet
 
     def drain(self) -> int:
@@ -67,8 +67,8 @@ class Recorder:
 
     def host_is_gone(self) -> None:
         """A part program is not carried on without an operator: it comes to rest on its path, and ends."""
-        if HOLD in self._desk:
-            self._desk.set(STOP, 1.0)
+        if HOLD in self._live_values:
+            self._live_values.set(STOP, 1.0)
 
     def _drain_changes(self) -> None:
         """After the rows: a record that begins has removed what an earlier run left."""
@@ -78,7 +78,7 @@ class Recorder:
             self._noted = len(before)
             if before:
                 write_whole(path, as_text(before).encode())
-        first, notes = self._desk.notes(self._noted)
+        first, notes = self._live_values.notes(self._noted)
         if notes:
             with open_private(path, "a") as file:
                 file.write(as_text(timed(notes, self.ring.about["sample_period"]), headings=not file.tell()))
@@ -202,7 +202,7 @@ def main(arguments: list[str]) -> int:
             start_new_session=True,
         )
         # where a user in trouble finds them, and the host if the recorder is killed
-        processes = {"recorder": os.getpid(), "target": target.pid, "desk": str(ring.desk_path)}
+        processes = {"recorder": os.getpid(), "target": target.pid, "live_values": str(ring.live_values_path)}
         processes["channel"] = ring.about.get("channel")  # of the built-in bus: where an emergency stop goes
         write_private(directory / PROCESSES, json.dumps(processes).encode())
         hung = watch(target, recorder, ring.about["sample_period"])
@@ -211,7 +211,7 @@ def main(arguments: list[str]) -> int:
     recorder.close()
     finish(directory, ring, conclude(directory, ring.head, target.returncode, hung))
     ring.close()
-    for path in (ring.path, ring.desk_path):
+    for path in (ring.path, ring.live_values_path):
         with contextlib.suppress(OSError):
             path.unlink()
     return 0

@@ -90,9 +90,9 @@ class Ring:
         return first + lost, data[lost * size :]
 
     @property
-    def desk_path(self) -> Path:
+    def live_values_path(self) -> Path:
         """Where the live values of the same run are (see `loop.live_values`)."""
-        return self.path.with_suffix(".desk")
+        return self.path.with_suffix(".live")
 
     def ask_to_stop(self) -> None:
         """Ask the writer for a safe end at its next sample."""

@@ -20,7 +20,7 @@ _YOUNG = 60.0  # s: a ring may just have been made, and its lock not yet taken
 
 
 def folders() -> list[Path]:
-    """Where the ring of a run may lie, with its desk beside it; the best first."""
+    """Where the ring of a run may lie, with its live values beside it; the best first."""
     memory, disk = Path("/dev/shm"), Path(tempfile.gettempdir())
     return [memory, disk] if os.access(memory, os.W_OK) else [disk]
 
@@ -55,7 +55,7 @@ def hold(ring: IO[bytes]) -> None:
 
 
 def remove_left(folder: Path) -> None:
-    """Remove this user's rings that nobody holds, with their desks. What cannot be removed stays."""
+    """Remove this user's rings that nobody holds, with their live values. What cannot be removed stays."""
     try:
         import fcntl
     except ImportError:
@@ -67,7 +67,7 @@ def remove_left(folder: Path) -> None:
                 about = os.fstat(lock)
                 if about.st_uid == os.geteuid() and time.time() - about.st_ctime > _YOUNG:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    ring.with_suffix(".desk").unlink(missing_ok=True)
+                    ring.with_suffix(".live").unlink(missing_ok=True)
                     ring.unlink()
             finally:
                 os.close(lock)

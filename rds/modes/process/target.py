@@ -38,7 +38,7 @@ from rds.modes.process.ring import Ring
 log = logging.getLogger(__name__)
 
 
-def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
+def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
     """Take every sample of the plan; returns how it ended, why, and the environment."""
     from rds.bus.hub.command import Command
     from rds.bus.hub.run_watch import RunWatch
@@ -68,7 +68,7 @@ def run(plan: Plan, ring: Ring, desk: LiveValues) -> dict[str, Any]:
             signal.signal(signal.SIGCONT, stopwatch.thread.went_on)
         loop = stopwatch.time(mode.build(plan, drivers))
         assert loop.changes is not None
-        loop.changes.desk = desk
+        loop.changes.live_values = live_values
         environment["rehearsal"] = rehearse(clock, drivers, plan.rehearsal)
         counted = asdict(drivers.counters)
         if watch is not None:
@@ -122,7 +122,7 @@ def main(arguments: list[str]) -> None:
         faulthandler.register(ASK_WHERE, open_private(directory / TRACE, "w", is_own=True), all_threads=False)
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     plan = load(directory / PLAN)
-    report = run(plan, ring, LiveValues.open(ring.desk_path))
+    report = run(plan, ring, LiveValues.open(ring.live_values_path))
     write_whole(directory / REPORT, json.dumps(report, default=str).encode())
     sys.stdout.flush()
     sys.stderr.flush()

@@ -54,25 +54,25 @@ class Status:
 
 
 class ProgramRun(Run):
-    """A part program that runs. `desk` has all its live values; the verbs here are those of an operator."""
+    """A part program that runs. `live_values` has all its live values; the verbs here are those of an operator."""
 
     prepared: Prepared | None = None
 
     def hold(self) -> None:
         """Come to rest on the path."""
-        self.desk.set(HOLD, 1.0)
+        self.live_values.set(HOLD, 1.0)
 
     def resume(self) -> None:
         """Go on after a hold, M0, M1 or a tool change."""
-        self.desk.set_all({HOLD: 0.0, RESUME: self.desk[RESUME] + 1.0})
+        self.live_values.set_all({HOLD: 0.0, RESUME: self.live_values[RESUME] + 1.0})
 
     def override(self, share: float) -> None:
         """Feed as a multiple of the programmed one, 0 to 2."""
-        self.desk.set(OVERRIDE, share)
+        self.live_values.set(OVERRIDE, share)
 
     def home(self) -> None:
         """End the program where it is, held or not, and move home: up first, then straight."""
-        self.desk.set_all({HOME: 1.0, HOLD: 0.0})
+        self.live_values.set_all({HOME: 1.0, HOLD: 0.0})
 
     def status(self) -> Status | None:
         """Where it is, by its last sample; None before the first."""

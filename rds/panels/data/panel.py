@@ -9,7 +9,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
-from rds.panels.data.state import DataDesk
+from rds.panels.data.state import DataState
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
@@ -45,7 +45,7 @@ class DataView:
     """Three steps from left to right: data, fit, validation."""
 
     def __init__(self, shell: Any):
-        self.shell, self.desk = shell, DataDesk(shell.session)
+        self.shell, self.state = shell, DataState(shell.session)
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.text, self.figure = widgets.HTML(_FIRST), FigureView()
         self.text.add_class("rds-scroll")
@@ -74,7 +74,7 @@ class DataView:
 
     def _fit_step(self) -> widgets.Widget:
         own = self._field("structure_file")
-        self.desk.choices.watch(lambda name: self._show_own(own))
+        self.state.choices.watch(lambda name: self._show_own(own))
         self._show_own(own)
         fields = [self._field("structure"), own, self._field("options"), self._field("method"), self._field("model")]
         say = self.notice
@@ -92,28 +92,28 @@ class DataView:
 
     def describe(self) -> None:
         """What the file holds."""
-        self._begin(self.desk.describe, self._show_description)
+        self._begin(self.state.describe, self._show_description)
 
     def fit(self) -> None:
         """Estimate."""
-        self._begin(self.desk.fit, self._show_estimate)
+        self._begin(self.state.fit, self._show_estimate)
 
     def validate(self) -> None:
         """Judge the model on other data."""
-        self._begin(self.desk.validate, self._show_validation)
+        self._begin(self.state.validate, self._show_validation)
 
     def save_model(self) -> None:
         """Write the model file."""
-        self.notice.say(f"wrote {self.desk.write_model()}", "good")
+        self.notice.say(f"wrote {self.state.write_model()}", "good")
         self._refresh()
 
     def use_model(self) -> None:
         """Go to equipment control with the model file chosen there."""
-        self.desk.model_to_use()
+        self.state.model_to_use()
         self.shell.open("equipment-control")
         choices = self.shell.session.choices("equipment control", ())
         choices.set("model", "user")
-        choices.set("model_file", self.desk.choices["model"])
+        choices.set("model_file", self.state.choices["model"])
 
     def _begin(self, start: Callable[[], Task[Any]], show: Callable[[Any], None]) -> None:
         def begin() -> Task[Any]:
@@ -161,9 +161,9 @@ class DataView:
         count = len(estimate.warnings)
         said = "fitted" if kind == "good" else f"fitted, with {count} warning{'s' * (count != 1)}: read them first"
         self.notice.say(said, kind)
-        if self.desk.fitted:
-            made = for_logs(structure(estimate.structure, estimate.options), self.desk.fitted)
-            self.figure.show(free_run_picture(estimate, self.desk.fitted[0], made))
+        if self.state.fitted:
+            made = for_logs(structure(estimate.structure, estimate.options), self.state.fitted)
+            self.figure.show(free_run_picture(estimate, self.state.fitted[0], made))
 
     def _show_validation(self, validation: Any) -> None:
         from rds.identification.validate.plots import overlay
@@ -174,12 +174,12 @@ class DataView:
         self.figure.show(overlay(next(iter(validation.assessments.values()))))
 
     def _keep_map(self) -> None:
-        self.desk.keep_map(self._map.value)
+        self.state.keep_map(self._map.value)
         self.describe()
 
     def _picked(self, change: Any) -> None:
         if change["new"]:
-            self.desk.choices.set("file", change["new"])
+            self.state.choices.set("file", change["new"])
 
     def _imported(self, name: str, content: bytes) -> None:
         from rds.core.atomic import write_whole
@@ -188,18 +188,18 @@ class DataView:
         if path.exists():
             raise InputError(f"{path.name} is there already; rename one of them")
         write_whole(path, content)
-        self.desk.choices.set("file", path.name)
+        self.state.choices.set("file", path.name)
         self.notice.say(f"{path.name} is in your folder", "good")
         self._refresh()
 
     def _refresh(self) -> None:
-        self._known.options = [("files of the folder …", ""), *((name, name) for name in self.desk.files())]
+        self._known.options = [("files of the folder …", ""), *((name, name) for name in self.state.files())]
 
     def _show_own(self, own: widgets.Widget) -> None:
-        own.layout.display = "" if self.desk.choices["structure"] == "user" else "none"
+        own.layout.display = "" if self.state.choices["structure"] == "user" else "none"
 
     def _field(self, name: str) -> FieldView:
-        return FieldView(self.desk.choices, name)
+        return FieldView(self.state.choices, name)
 
 
 def _plain(name: str) -> str:

@@ -43,7 +43,7 @@ SUFFIXES = (*TEXTS, ".mat", ".parquet", ".asc", ".blf", ".trc", ".log", ".mf4", 
 
 
 @dataclass
-class DataDesk:
+class DataState:
     """What is chosen, and what was found last. Each step is a Task; its result is kept here when it is over."""
 
     session: Session

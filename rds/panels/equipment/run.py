@@ -234,14 +234,14 @@ class EquipmentRun:
         """
         if self._run is None or self._run.done or not self._run.columns:
             return {}
-        channels = self._run.desk.channels
+        channels = self._run.live_values.channels
         return {name: channel for name, channel in channels.items() if "." in name or name in (HOLD, OVERRIDE)}
 
     def change(self, name: str, value: float) -> None:
         """Change a live value from the next sample on; InputError where that will not do, or when it is over."""
         if self._run is None:
             raise InputError("the run has not begun")
-        self._run.desk.set(name, value)
+        self._run.live_values.set(name, value)
 
     @property
     def changes(self) -> list[Any]:

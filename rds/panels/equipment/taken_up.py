@@ -15,7 +15,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.modes.loop.changes import timed
-from rds.modes.loop.live_values_of_run import desk_of
+from rds.modes.loop.live_values_of_run import live_values_of
 from rds.modes.loop.program import HOLD, OVERRIDE
 from rds.modes.process.record import RecordTail
 from rds.panels.equipment.run import followed, shown
@@ -122,24 +122,26 @@ class TakenUpRun:
     def live_values(self) -> dict[str, Any]:
         """What can be changed now, by name; none when it is over."""
         if not self._channels and self._state is State.GOES_ON:
-            with contextlib.suppress(InputError), desk_of(self.folder) as desk:
-                now = desk.values()
-                wanted = {name: each for name, each in desk.channels.items() if "." in name or name in (HOLD, OVERRIDE)}
+            with contextlib.suppress(InputError), live_values_of(self.folder) as live_values:
+                now = live_values.values()
+                wanted = {
+                    name: each for name, each in live_values.channels.items() if "." in name or name in (HOLD, OVERRIDE)
+                }
                 self._channels = {name: replace(each, value=now[name]) for name, each in wanted.items()}
         return self._channels
 
     def change(self, name: str, value: float) -> None:
         """Change a live value from the next sample on; InputError where that will not do, or when it is over."""
-        with desk_of(self.folder) as desk:
-            desk.set(name, value)
+        with live_values_of(self.folder) as live_values:
+            live_values.set(name, value)
 
     @property
     def changes(self) -> list[Any]:
         """The changes that the loop has taken: time in s, name, old value, new value each."""
         if self.result is not None:
             return list(self.result.meta.get("changes") or [])
-        with contextlib.suppress(InputError), desk_of(self.folder) as desk:
-            self._changes = timed(desk.notes()[1], float(self._about.get("sample_period", 0.0)))
+        with contextlib.suppress(InputError), live_values_of(self.folder) as live_values:
+            self._changes = timed(live_values.notes()[1], float(self._about.get("sample_period", 0.0)))
         return self._changes
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
-from rds.panels.grading.state import GradingDesk, rows
+from rds.panels.grading.state import GradingState, rows
 from rds.panels.kit.button import attempt, button, follow, runs, watch
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import columns, group, row
@@ -40,7 +40,7 @@ class GradingView:
     """Settings on the left, the class on the right."""
 
     def __init__(self, shell: Any):
-        self.shell, self.desk = shell, GradingDesk(shell.session)
+        self.shell, self.state = shell, GradingState(shell.session)
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.table = widgets.HTML(_FIRST)
         self._said = widgets.HTML()
@@ -57,23 +57,23 @@ class GradingView:
             group("Export", *self._fields("to", "gradebook"), row(export)),
         ]
         self.widget = columns(side, [self.bar, self.notice, self._said, self.table])
-        self.desk.choices.watch(lambda name: self._name_button())
+        self.state.choices.watch(lambda name: self._name_button())
         self._name_button()
-        if self.desk.started():
+        if self.state.started():
             attempt("the class as it stands", self.show, self.notice)
-        if (task := self.desk.going_on()) is not None:
+        if (task := self.state.going_on()) is not None:
             watch(self.bar, self.notice, task, self._graded)
             self.notice.say("a batch that was begun earlier goes on; Stop ends it after what is being graded")
 
     def check(self) -> None:
         """Try the assignment itself."""
         self._said.value = ""
-        follow(self.bar, self.notice, self.desk.check, self._show_said)
+        follow(self.bar, self.notice, self.state.check, self._show_said)
 
     def grade(self) -> None:
         """Begin or go on."""
         self._said.value = ""
-        follow(self.bar, self.notice, self.desk.grade, self._graded)
+        follow(self.bar, self.notice, self.state.grade, self._graded)
 
     def _graded(self, count: int) -> None:
         if left := self.show():
@@ -85,7 +85,7 @@ class GradingView:
         """The class as it stands; how many are not graded yet."""
         from rds.results import html
 
-        finished = self.desk.finished()
+        finished = self.state.finished()
         left = len(finished.not_graded)
         page = finished.folder / "index.html"
         about = f"<h3>{escape(finished.title)}: {len(finished.grades)} graded, {left} left</h3>"
@@ -96,13 +96,13 @@ class GradingView:
 
     def review(self) -> None:
         """Keep what a grader says, and show the class with it."""
-        said = self.desk.review()
+        said = self.state.review()
         self.show()
         self.notice.say(said, "good")
 
     def export(self) -> None:
         """Write the chosen gradebook."""
-        written = self.desk.export(self.desk.choices["to"])
+        written = self.state.export(self.state.choices["to"])
         left = "".join(f"\nleft out: {student}: {reason}" for student, reason in written.left_out.items())
         notes = "".join(f"\n{note}" for note in written.notes)
         said = f"{written.students} students: {written.place}{notes}{left}"
@@ -112,7 +112,7 @@ class GradingView:
         self._said.value = f"<pre>{escape(text)}</pre>"
 
     def _name_button(self) -> None:
-        self._run.description = "Go on" if self.desk.started() else "Grade"
+        self._run.description = "Go on" if self.state.started() else "Grade"
 
     def _fields(self, *names: str) -> list[FieldView]:
-        return [FieldView(self.desk.choices, name) for name in names]
+        return [FieldView(self.state.choices, name) for name in names]

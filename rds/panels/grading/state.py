@@ -39,7 +39,7 @@ _ENDS_IN = 10.0  # s that a check may take to end once it was asked to
 
 
 @dataclass
-class GradingDesk:
+class GradingState:
     """What is chosen, and the batch that goes on."""
 
     session: Session

@@ -15,7 +15,7 @@ from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.panels.machine.monitor import BusMonitor, parse_filter
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 from rds.panels.session.fields import Number, Text
 from rds.results import html
 
@@ -43,8 +43,8 @@ def void(_: Any) -> None:
 class BusView:
     """The monitor, and the load."""
 
-    def __init__(self, shell: Any, desk: MachineDesk):
-        self.session, self.desk, self.monitor = shell.session, desk, BusMonitor()
+    def __init__(self, shell: Any, state: MachineState):
+        self.session, self.state, self.monitor = shell.session, state, BusMonitor()
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.choices = shell.session.choices("bus", [_FILTER, *_LOAD])
         self.live, self.load = widgets.HTML(), widgets.HTML()
@@ -73,7 +73,7 @@ class BusView:
         """Begin."""
         if self._task is not None:
             return
-        interface, channel = self.desk.bus
+        interface, channel = self.state.bus
         work = self.monitor.watch(interface, channel, **self.session.bus_options)
         self._task = self.session.work("bus monitor", work, self.monitor.end)
         self.notice.clear()
@@ -86,7 +86,7 @@ class BusView:
 
     def analyse(self) -> None:
         """The bus at worst."""
-        machine, dialect = self.desk.machine, self.desk.choices["dialect"]
+        machine, dialect = self.state.machine, self.state.choices["dialect"]
         bitrate, period, answer = (self.choices[name] for name in ("bitrate", "period", "answer"))
 
         def work(task: Any) -> Any:

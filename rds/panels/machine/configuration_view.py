@@ -17,7 +17,7 @@ from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.machine.configuration import directions, moved, write_machine
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 from rds.panels.session.fields import Choice, Text
 from rds.results import html
 
@@ -33,8 +33,8 @@ _FILE = Text("file", "Machine file", "A file of your folder, which every mode ta
 class ConfigurationView:
     """The order, with buttons that change it."""
 
-    def __init__(self, shell: Any, desk: MachineDesk):
-        self.session, self.desk = shell.session, desk
+    def __init__(self, shell: Any, state: MachineState):
+        self.session, self.state = shell.session, state
         self._ticker, self._figure = shell.ticker, FigureView()
         self.notice = Notice()
         self.choices = shell.session.choices("configuration", [_PART, _FILE])
@@ -52,13 +52,13 @@ class ConfigurationView:
 
     def refresh(self) -> None:
         """Other modules are known."""
-        if {each for each in self.order if isinstance(each, int)} != set(self.desk.data):
-            self.order = order_of(self.desk.machine, self.desk.data) or first_order(self.desk.data)
+        if {each for each in self.order if isinstance(each, int)} != set(self.state.data):
+            self.order = order_of(self.state.machine, self.state.data) or first_order(self.state.data)
         self._show()
 
     def write(self) -> None:
         """Write the file."""
-        path = write_machine(self.session.folder, self.choices["file"], self.order, self.desk.data)
+        path = write_machine(self.session.folder, self.choices["file"], self.order, self.state.data)
         self.notice.say(
             f"wrote {path.name}: every mode takes it as its machine; its head says where models and limits are from, "
             f"which no module knows. Use it: rds app --machine {path.name}",
@@ -68,7 +68,7 @@ class ConfigurationView:
     def _show(self) -> None:
         self._place.children = [self._row(place, number) for place, number in enumerate(self.order, start=1)]
         self._parts.layout.display = None if self.order else "none"
-        verdict = judged(self.order, self.desk.data)
+        verdict = judged(self.order, self.state.data)
         self._write.disabled = not verdict.ok
         if not verdict.ok:
             kind = "warning" if not self.order else "error"
@@ -79,11 +79,11 @@ class ConfigurationView:
         self.notice.say("this order makes a machine that can move as its modules say", "good")
         rows = [
             [name, kind, *map(float, direction.round(6) + 0.0)]
-            for name, (kind, direction) in directions(self.order, self.desk.data).items()
+            for name, (kind, direction) in directions(self.order, self.state.data).items()
         ]
         note = "Unit vectors, in the tool's directions, with all axes at zero."
         self._found.value = html.table(["module", "does", "x", "y", "z"], rows, "What moves how", note)
-        machine = assembled("machine", self.order, self.desk.data)
+        machine = assembled("machine", self.order, self.state.data)
         self._figure.draw(self.session, self._ticker, lambda: _picture(machine), "The links with their frames")
 
     def _row(self, place: int, number: int | str) -> widgets.HBox:
@@ -102,7 +102,7 @@ class ConfigurationView:
     def _name(self, number: int | str) -> str:
         if isinstance(number, str):
             return f"{library()[number].kind} {library()[number].title} ({number})"
-        data = self.desk.data[number]
+        data = self.state.data[number]
         return f"{data['axis']}: {data['kind']} {data['type_text']} (module {number})"
 
     def add(self) -> None:

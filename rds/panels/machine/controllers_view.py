@@ -14,7 +14,7 @@ from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 from rds.panels.session.fields import Text
 from rds.results import html
 
@@ -24,16 +24,16 @@ _FILE = Text("file", "Tuning file", "A file of your folder, to save to and to re
 class ControllersView:
     """One module at a time."""
 
-    def __init__(self, shell: Any, desk: MachineDesk):
-        self.desk = desk
+    def __init__(self, shell: Any, state: MachineState):
+        self.state = state
         self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView(7.4)
         files = shell.session.choices("tuning file", [_FILE])
         self._files = files
         self._which = widgets.Dropdown(description="Module", tooltip="The module that is tuned")
         self._which.observe(self._chosen, "value")
         say = self.notice
-        gains = [FieldView(desk.tuning, name) for name in ("controller", "Kp", "Ki", "Kd")]
-        rest = widgets.Box([FieldView(desk.tuning, name) for name in desk.tuning.fields if name not in _GAINS])
+        gains = [FieldView(state.tuning, name) for name in ("controller", "Kp", "Ki", "Kd")]
+        rest = widgets.Box([FieldView(state.tuning, name) for name in state.tuning.fields if name not in _GAINS])
         rest.add_class("rds-fields")
         more = widgets.Accordion([rest], titles=("Limits and times",))
         more.add_class("rds-folded")
@@ -48,7 +48,7 @@ class ControllersView:
                     button("Read", "Take what the module told at the last scan", self.read, say),
                 ),
             ),
-            group("Step response", *(FieldView(desk.choices, name) for name in ("step", "period", "settled"))),
+            group("Step response", *(FieldView(state.choices, name) for name in ("step", "period", "settled"))),
             group(
                 "Keep",
                 FieldView(files, "file"),
@@ -70,7 +70,7 @@ class ControllersView:
 
     def refresh(self) -> None:
         """Other modules are known."""
-        options = [(words, number) for number, words in self.desk.describing().items()]
+        options = [(words, number) for number, words in self.state.describing().items()]
         if options != list(self._which.options):  # else what was typed for a module stays
             numbers, chosen = [number for _, number in options], self._which.value
             self._which.options = options  # which leaves none of them chosen
@@ -86,30 +86,30 @@ class ControllersView:
         follow(
             self.bar,
             self.notice,
-            lambda: self.desk.tune(self._number()),
+            lambda: self.state.tune(self._number()),
             lambda set_: self.notice.say(f"in force: {set_['controller']}, {_words(set_)}", "good"),
         )
 
     def read(self) -> None:
         """What the module told."""
-        self.desk.load_tuning(self._number())
+        self.state.load_tuning(self._number())
 
     def step(self) -> None:
         """Record a response."""
-        follow(self.bar, self.notice, lambda: self.desk.step(self._number()), self._responded)
+        follow(self.bar, self.notice, lambda: self.state.step(self._number()), self._responded)
 
     def suggest(self) -> None:
         """Gains by table 11."""
-        gains = self.desk.suggest()
+        gains = self.state.suggest()
         self.notice.say(f"{_words(gains)}: press Set to use them", "good")
 
     def save(self) -> None:
         """To a file."""
-        self.notice.say(f"wrote {self.desk.save_tuning(self._number(), self._files['file']).name}", "good")
+        self.notice.say(f"wrote {self.state.save_tuning(self._number(), self._files['file']).name}", "good")
 
     def load(self) -> None:
         """From a file."""
-        self.desk.read_tuning(self._files["file"])
+        self.state.read_tuning(self._files["file"])
         self.notice.say(f"read {self._files['file']}: press Set to use it", "good")
 
     def _responded(self, result: Any) -> None:
@@ -121,7 +121,7 @@ class ControllersView:
 
     def _chosen(self, change: Any) -> None:
         if change["new"] is not None:
-            self.desk.load_tuning(change["new"])
+            self.state.load_tuning(change["new"])
 
     def _number(self) -> int:
         if self._which.value is None:

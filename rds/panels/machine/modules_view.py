@@ -12,7 +12,7 @@ from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 from rds.results import html
 
 _NEXT = "no modules are known yet: start the simulated ones, or switch yours on, and press Scan"
@@ -21,8 +21,8 @@ _NEXT = "no modules are known yet: start the simulated ones, or switch yours on,
 class ModulesView:
     """`found()` is called when other modules are known."""
 
-    def __init__(self, shell: Any, desk: MachineDesk, found: Callable[[], None]):
-        self.desk, self._found = desk, found
+    def __init__(self, shell: Any, state: MachineState, found: Callable[[], None]):
+        self.state, self._found = state, found
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.table = widgets.HTML()
         self.table.add_class("rds-scroll")
@@ -32,8 +32,8 @@ class ModulesView:
         side = [
             group(
                 "Simulated modules",
-                FieldView(desk.choices, "machine"),
-                FieldView(desk.choices, "dialect", buttons=False),
+                FieldView(state.choices, "machine"),
+                FieldView(state.choices, "dialect", buttons=False),
                 row(self._start, self._end),
             ),
             group(
@@ -50,7 +50,7 @@ class ModulesView:
 
     def start(self) -> None:
         """Start the simulated modules, then scan."""
-        follow(self.bar, self.notice, self.desk.start, lambda _: self._scan_next(), failed=self._enable)
+        follow(self.bar, self.notice, self.state.start, lambda _: self._scan_next(), failed=self._enable)
 
     def _scan_next(self) -> None:
         self._enable()
@@ -58,18 +58,18 @@ class ModulesView:
 
     def end(self) -> None:
         """End them."""
-        self.desk.end()
+        self.state.end()
         self.notice.say("the simulated modules are stopped", "note")
         self._show([])
 
     def scan(self) -> None:
         """Who is there."""
         # the simulated modules may be found to have ended
-        follow(self.bar, self.notice, self.desk.scan, self._scanned, failed=self._enable)
+        follow(self.bar, self.notice, self.state.scan, self._scanned, failed=self._enable)
 
     def _scanned(self, rows: list[dict[str, Any]]) -> None:
         self._show(rows)
-        described = len(self.desk.data)
+        described = len(self.state.data)
         text = f"{len(rows)} module{'s' * (len(rows) != 1)} on the bus"
         if described:
             text += f"; {described} say what they are: go on with Configuration or Controllers"
@@ -90,7 +90,7 @@ class ModulesView:
         self._found()
 
     def _data(self) -> str:
-        data = list(self.desk.data.values())
+        data = list(self.state.data.values())
         if not data:
             return ""
         lines: list[list[Any]] = []
@@ -115,11 +115,11 @@ class ModulesView:
 
     def _matrices(self) -> str:
         found = []
-        for each in self.desk.data.values():
+        for each in self.state.data.values():
             moves = f"moves along or about {each['joint']}" if each["joint"] else "is not moved"
             title = f"{each['axis']} (module {each['number']}): transformation matrix; {moves}"
             found.append(html.table(["x", "y", "z", "shift [mm]"], [list(line) for line in each["matrix"]], title))
         return f"<details><summary>Transformation matrices</summary>{''.join(found)}</details>" if found else ""
 
     def _enable(self) -> None:
-        self._start.disabled, self._end.disabled = self.desk.serves, not self.desk.serves
+        self._start.disabled, self._end.disabled = self.state.serves, not self.state.serves

@@ -11,7 +11,7 @@ from rds.panels.machine.configuration_view import ConfigurationView
 from rds.panels.machine.controllers_view import ControllersView
 from rds.panels.machine.library_view import LibraryView
 from rds.panels.machine.modules_view import ModulesView
-from rds.panels.machine.state import MachineDesk
+from rds.panels.machine.state import MachineState
 
 NAME = "machine"
 TITLE = "Machine"
@@ -21,21 +21,21 @@ HELP = "machine-panel"
 
 def build(shell: Any) -> widgets.Widget:
     """The panel: a tab for each step, in the order in which they are done."""
-    desk = MachineDesk(shell.session)
-    configuration = ConfigurationView(shell, desk)
-    controllers = ControllersView(shell, desk)
+    state = MachineState(shell.session)
+    configuration = ConfigurationView(shell, state)
+    controllers = ControllersView(shell, state)
 
     def found() -> None:
         configuration.refresh()
         controllers.refresh()
 
-    modules = ModulesView(shell, desk, found)
+    modules = ModulesView(shell, state, found)
     tabs = widgets.Tab(
         [
             modules.widget,
             configuration.widget,
             controllers.widget,
-            BusView(shell, desk).widget,
+            BusView(shell, state).widget,
             LibraryView(shell).widget,
         ]
     )

@@ -28,7 +28,7 @@ ON_LINE = "dcs"  # the dialect of units on a serial line
 DESCRIBES_ITSELF = "oacs"  # the dialect whose modules say what they are
 
 
-class MachineDesk:
+class MachineState:
     """What can be done with the modules on the bus of a session. Everything that takes time gives a Task.
 
     `rows` are what the last scan found, `data` what modules said of themselves, by number (as `Information.as_dict`),

@@ -124,7 +124,7 @@ class ProgramWork(EquipmentRun):
     def held(self) -> bool:
         """Whether somebody has asked it to hold."""
         try:
-            return bool(self.program_run.desk["hold"])
+            return bool(self.program_run.live_values["hold"])
         except InputError:
             return False
 
@@ -143,11 +143,11 @@ class ProgramWork(EquipmentRun):
     @property
     def steps(self) -> bool:
         """Whether it can rest after each line."""
-        return self.operable and SINGLE_STEP in self.program_run.desk
+        return self.operable and SINGLE_STEP in self.program_run.live_values
 
     def step(self, on: bool) -> None:
         """Rest after each line from now on, or no more."""
-        self.program_run.desk.set(SINGLE_STEP, float(on))
+        self.program_run.live_values.set(SINGLE_STEP, float(on))
 
     def home(self) -> None:
         """End the program where it is, and move home."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
-from rds.modes.loop.live_values_of_run import desk_of
+from rds.modes.loop.live_values_of_run import live_values_of
 from rds.modes.process.record import ENDING, NAME, PROCESSES
 from rds.panels.session.saving import is_being_saved
 
@@ -58,8 +58,8 @@ class KeptRun:
 
     def stop(self) -> None:
         """Ask a run that goes on for a safe end; one that is over stays as it is."""
-        with contextlib.suppress(InputError), desk_of(self.folder) as desk:
-            desk.set("stop", 1.0)
+        with contextlib.suppress(InputError), live_values_of(self.folder) as live_values:
+            live_values.set("stop", 1.0)
 
 
 def kept_runs(folder: Path, most: int | None = None) -> list[KeptRun]:
@@ -103,7 +103,7 @@ def _goes_on(folder: Path) -> bool:
     if not (folder / PROCESSES).is_file():
         return False
     try:
-        with desk_of(folder):
+        with live_values_of(folder):
             return True
     except InputError:
         return False

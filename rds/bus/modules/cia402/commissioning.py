@@ -1,6 +1,6 @@
 """A drive out of the box made ready, step by step: each says what it will do, waits for a yes, and can be taken back.
 
-Nothing here prints or asks: the `Desk` does. `rds drive setup` is one (rds/cli/drive.py).
+Nothing here prints or asks: the `Operator` does. `rds drive setup` is one (rds/cli/drive.py).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Declined(Exception):
     """Somebody said no; what was changed until then has been taken back."""
 
 
-class Desk(Protocol):
+class Operator(Protocol):
     """Where a set-up says what it does, and asks."""
 
     def say(self, text: str) -> None:
@@ -82,7 +82,9 @@ class Commissioned:
         return found
 
 
-def commission(bus: can.BusABC, wishes: Wishes, name: str, desk: Desk, eds_folder: Path | None = None) -> Commissioned:
+def commission(
+    bus: can.BusABC, wishes: Wishes, name: str, operator: Operator, eds_folder: Path | None = None
+) -> Commissioned:
     """Make the drive with node-ID `wishes.node` ready.
 
     Declined after a no; MachineError and InputError say what is wrong.
@@ -91,7 +93,7 @@ def commission(bus: can.BusABC, wishes: Wishes, name: str, desk: Desk, eds_folde
     before: dict[tuple[int, int], bytes] = {}
     made: Commissioned | None = None
     try:
-        made = _commission(bus, wishes, name, desk, before, eds_folder)
+        made = _commission(bus, wishes, name, operator, before, eds_folder)
         return made
     finally:
         keep = set() if made is None else {(index, subindex) for index, subindex, _ in made.choices.write}
@@ -102,30 +104,32 @@ def _commission(
     bus: can.BusABC,
     wishes: Wishes,
     name: str,
-    desk: Desk,
+    operator: Operator,
     before: dict[tuple[int, int], bytes],
     eds_folder: Path | None,
 ) -> Commissioned:
     with library(bus) as network:
-        identity, eds = _recognize(network, wishes, desk, eds_folder)
+        identity, eds = _recognize(network, wishes, operator, eds_folder)
         units = examination.read_units(_bare(network, wishes.node))
-        choices = _units(wishes, name, units, eds, desk)
+        choices = _units(wishes, name, units, eds, operator)
         with _machine(choices) as machine:
-            _mapping(network, machine, choices, identity, wishes, desk)
-        _limits(_bare(network, wishes.node), choices, wishes, desk, before)
-    motion = _move(bus, choices, wishes, units, desk, before)
-    choices.direction = desk.choose_direction(motion.moved)
+            _mapping(network, machine, choices, identity, wishes, operator)
+        _limits(_bare(network, wishes.node), choices, wishes, operator, before)
+    motion = _move(bus, choices, wishes, units, operator, before)
+    choices.direction = operator.choose_direction(motion.moved)
     worst, whole = motion.exchange_worst * 1e3, motion.loop_delay(choices.period) * 1e3
-    desk.say(
+    operator.say(
         f"a cycle takes {motion.exchange * 1e3:.2f} ms from SYNC to answer (99 %: {worst:.2f} ms); from a sample to "
         f"the effect of its command {whole:.1f} ms"
     )
     if motion.exchange_worst > choices.period:
-        desk.say(
+        operator.say(
             f"that is more than the sample period of {choices.period * 1e3:g} ms: give a longer one (--sample-period)"
         )
     if wishes.keep_in_drive:
-        if not desk.agree("store the drive's parameters in its memory (0x1010); the way back is `rds drive restore`"):
+        if not operator.agree(
+            "store the drive's parameters in its memory (0x1010); the way back is `rds drive restore`"
+        ):
             raise Declined
         with library(bus) as network:
             store(_bare(network, wishes.node))
@@ -136,7 +140,7 @@ def _commission(
 
 
 def _recognize(
-    network: canopen.Network, wishes: Wishes, desk: Desk, folder: Path | None
+    network: canopen.Network, wishes: Wishes, operator: Operator, folder: Path | None
 ) -> tuple[Identity, Path | None]:
     """Identity and EDS."""
     network.send_message(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, wishes.node]))
@@ -147,27 +151,27 @@ def _recognize(
             "one to a drive that has none"
         )
     identity = identify(node)
-    desk.say(str(identity))
+    operator.say(str(identity))
     eds = wishes.eds or kept_eds(identity, folder)
     if eds is None:
         if identity.vendor or identity.product != 0x402:  # not our simulated drive
-            desk.say(
+            operator.say(
                 "no EDS of this drive is kept here: the objects of CiA 402 are assumed; give its own by --eds FILE"
             )
         return identity, None
     doubts = check_eds(eds, identity)
     for doubt in doubts:
-        desk.say(f"note: {doubt}")
-    if doubts and not desk.agree(f"use {eds} all the same"):
+        operator.say(f"note: {doubt}")
+    if doubts and not operator.agree(f"use {eds} all the same"):
         raise Declined
     if wishes.eds is not None and not doubts:
         eds = keep_eds(eds, identity, folder)
-        desk.say(f"its EDS is kept for the next time: {eds}")
+        operator.say(f"its EDS is kept for the next time: {eds}")
     return identity, eds
 
 
-def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None, desk: Desk) -> Choices:
-    desk.say(str(units))
+def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None, operator: Operator) -> Choices:
+    operator.say(str(units))
     counts = wishes.counts or units.counts(wishes.lead)
     if counts is None:
         raise InputError(
@@ -177,7 +181,7 @@ def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None
         f"take {counts:g} counts per {wishes.unit} ({wishes.lead:g} {wishes.unit} per revolution of the shaft), travel "
         f"±{wishes.travel:g} {wishes.unit} from where the axis stands at the start"
     )
-    if not desk.agree(proposal):
+    if not operator.agree(proposal):
         raise Declined
     return Choices(
         name=name,
@@ -193,10 +197,10 @@ def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None
 
 
 def _mapping(
-    network: canopen.Network, machine: Machine, choices: Choices, identity: Identity, wishes: Wishes, desk: Desk
+    network: canopen.Network, machine: Machine, choices: Choices, identity: Identity, wishes: Wishes, operator: Operator
 ) -> None:
     """The first mode that the drive has and that can be commanded in process data."""
-    if not desk.agree(
+    if not operator.agree(
         "map statusword and position, controlword and target into the drive's process data; the way back is to switch "
         "it off and on"
     ):
@@ -215,7 +219,7 @@ def _mapping(
                 refused = str(error)
                 continue
             choices.mode, choices.fixed_mapping = mode, fixed
-            desk.say(
+            operator.say(
                 f"mode {mode}" + (", by the process data that the drive has: its mapping is fixed" if fixed else "")
             )
             return
@@ -226,17 +230,17 @@ def _limits(
     node: canopen.RemoteNode,
     choices: Choices,
     wishes: Wishes,
-    desk: Desk,
+    operator: Operator,
     before: dict[tuple[int, int], bytes],
 ) -> None:
     for doubt in examination.limits(node, choices.torque_limit):
         if doubt.stops:
             raise MachineError(doubt.text)
         if not doubt.write:
-            desk.say(doubt.text)
+            operator.say(doubt.text)
             continue
         what = ", ".join(f"0x{index:04X}:{subindex:02X} = {value}" for index, subindex, value in doubt.write)
-        if not desk.agree(f"{doubt.text}: write {what} before each run"):
+        if not operator.agree(f"{doubt.text}: write {what} before each run"):
             raise Declined
         choices.write += doubt.write
     for key in {(index, subindex) for index, subindex, _ in choices.write} | {(0x6072, 0)}:
@@ -250,13 +254,13 @@ def _move(
     choices: Choices,
     wishes: Wishes,
     units: examination.Units,
-    desk: Desk,
+    operator: Operator,
     before: Mapping[tuple[int, int], bytes],
 ) -> FirstMotion:
     distance = wishes.distance / choices.counts
     pushes = not choices.fixed_mapping and _has_torque(bus, choices.node)
     how = f"by a torque that rises to {wishes.torque} ‰ at most" if pushes else "by its position loop"
-    if not desk.agree(
+    if not operator.agree(
         f"switch the power on and move {choices.axis} by {wishes.distance} counts ({distance:.3g} {choices.unit}) and "
         f"back, {how}; the axis must be free, and a hand on the emergency stop"
     ):
@@ -277,9 +281,9 @@ def _move(
             wishes.torque,
         )
     if motion.torque is not None:
-        desk.say(f"{choices.axis} moved by {motion.moved} counts, at a torque of {motion.torque:.0f} ‰")
+        operator.say(f"{choices.axis} moved by {motion.moved} counts, at a torque of {motion.torque:.0f} ‰")
     else:
-        desk.say(f"{choices.axis} moved by {motion.moved} counts")
+        operator.say(f"{choices.axis} moved by {motion.moved} counts")
     if not motion.agrees:
         raise MachineError(
             "a positive torque moves the position downwards: closed loops would run away. Swap two phases of the motor "

@@ -23,9 +23,9 @@ LIMIT = 2.0  # µs
 
 
 def run() -> list[Figure]:
-    """Figures in µs per sample: the desk when nothing and when something changes, and a program on three axes."""
+    """Figures in µs per sample: live values when nothing and when something changes, and a program on three axes."""
     return [
-        Figure(f"a look at a desk of {CHANNELS} live values", "µs", tuple(_look() for _ in range(ROUNDS)), LIMIT),
+        Figure(f"a look at {CHANNELS} live values", "µs", tuple(_look() for _ in range(ROUNDS)), LIMIT),
         Figure("a sample that takes a change", "µs", tuple(_change() for _ in range(ROUNDS))),
         Figure("a program's references of three axes", "µs", tuple(_program(1.0) for _ in range(ROUNDS))),
         Figure("the same at an override of 70 %", "µs", tuple(_program(0.7) for _ in range(ROUNDS))),
@@ -35,8 +35,8 @@ def run() -> list[Figure]:
 def _live() -> tuple[LiveChanges, LiveValues]:
     channels = [Channel(f"value{i}", 0.0, "") for i in range(CHANNELS)]
     live_changes = LiveChanges([*channels, stop_channel()], {channel.name: lambda value: None for channel in channels})
-    live_changes.desk = LiveValues.create(None, [*channels, stop_channel()])
-    return live_changes, live_changes.desk
+    live_changes.live_values = LiveValues.create(None, [*channels, stop_channel()])
+    return live_changes, live_changes.live_values
 
 
 def _look() -> float:
@@ -48,10 +48,10 @@ def _look() -> float:
 
 
 def _change() -> float:
-    live_changes, desk = _live()
+    live_changes, live_values = _live()
     total = 0
     for k in range(2000):
-        desk.set("value7", k + 1.0)
+        live_values.set("value7", k + 1.0)
         started = perf_counter_ns()
         live_changes(k)
         total += perf_counter_ns() - started

@@ -12,7 +12,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.grading.grade import Grade, Status
-from rds.panels.grading.state import GradingDesk, _said, progress, rows
+from rds.panels.grading.state import GradingState, _said, progress, rows
 from rds.panels.session import Session
 from tests.grading.grades import batch_in, grade
 
@@ -28,23 +28,23 @@ def test_progress_is_what_the_journal_has(tmp_path: Path) -> None:
 
 
 def test_what_is_missing_is_said_at_once(tmp_path: Path) -> None:
-    desk = GradingDesk(Session(tmp_path))
+    state = GradingState(Session(tmp_path))
     with pytest.raises(InputError, match="name the assignment's folder"):
-        desk.grade()
-    desk.choices.set("assignment", "a")
+        state.grade()
+    state.choices.set("assignment", "a")
     with pytest.raises(InputError, match="name the folder of submissions"):
-        desk.grade()
-    desk.choices.set("submissions", "s")
+        state.grade()
+    state.choices.set("submissions", "s")
     with pytest.raises(InputError, match="name the folder for grades"):
-        desk.grade()
-    assert not desk.started()
+        state.grade()
+    assert not state.started()
 
 
 def test_an_assignment_that_is_not_there_is_the_task_s_error(tmp_path: Path) -> None:
-    desk = GradingDesk(Session(tmp_path))
+    state = GradingState(Session(tmp_path))
     for name in ("assignment", "submissions", "out"):
-        desk.choices.set(name, name)
-    task = desk.grade()
+        state.choices.set(name, name)
+    task = state.grade()
     assert task.wait(120) and isinstance(task.error, InputError) and "assignment" in str(task.error)
 
 
@@ -93,13 +93,13 @@ def until(there: Callable[[], object]) -> None:
 
 
 def test_a_batch_goes_on_without_its_page_and_another_finds_and_stops_it(slow_grading: Path, tmp_path: Path) -> None:
-    desk = GradingDesk(Session(tmp_path))
-    assert desk.going_on() is None
+    state = GradingState(Session(tmp_path))
+    assert state.going_on() is None
     for name in ("assignment", "submissions", "out"):
-        desk.choices.set(name, name)
-    first = desk.grade()
+        state.choices.set(name, name)
+    first = state.grade()
     until(slow_grading.exists)
-    other = GradingDesk(Session(tmp_path))
+    other = GradingState(Session(tmp_path))
     second = other.grade()
     assert second.wait(20) and "a batch of this folder goes on already" in str(second.error)
     again = other.going_on()
@@ -110,24 +110,24 @@ def test_a_batch_goes_on_without_its_page_and_another_finds_and_stops_it(slow_gr
 
 
 def test_a_check_of_an_assignment_is_stopped(slow_grading: Path, tmp_path: Path) -> None:
-    desk = GradingDesk(Session(tmp_path))
-    desk.choices.set("assignment", "assignment")
-    task = desk.check()
+    state = GradingState(Session(tmp_path))
+    state.choices.set("assignment", "assignment")
+    task = state.check()
     until(slow_grading.exists)
     task.stop()
     assert task.wait(20) and task.stopped
 
 
 def test_words_of_a_grader_are_kept_with_their_name(tmp_path: Path) -> None:
-    desk = GradingDesk(Session(tmp_path))
+    state = GradingState(Session(tmp_path))
     batch_in(tmp_path / "out", [grade("ada")])
-    desk.choices.set("out", "out")
+    state.choices.set("out", "out")
     with pytest.raises(InputError, match="name the student"):
-        desk.review()
+        state.review()
     for name, value in {"student": "ada", "by": "ann"}.items():
-        desk.choices.set(name, value)
+        state.choices.set(name, value)
     with pytest.raises(InputError, match="points of a criterion, or a comment"):
-        desk.review()
-    desk.choices.set("comment", "See me, please.")
+        state.review()
+    state.choices.set("comment", "See me, please.")
     with pytest.raises(InputError, match="cannot be read any more"):  # this batch has no assignment to make pages by
-        desk.review()
+        state.review()

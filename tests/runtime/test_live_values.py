@@ -1,4 +1,4 @@
-"""The desk: live values between host and target, the notes of their changes, and runs that do not block."""
+"""The live_values: live values between host and target, the notes of their changes, and runs that do not block."""
 
 from __future__ import annotations
 
@@ -36,46 +36,46 @@ CHANGES = [(0.4, "X.Pgain", 35.0), (0.4, "X.Igain", 3.0), (0.7215, "X.FF1", 0.0)
 
 @given(values=st.lists(st.tuples(st.sampled_from(["X.Pgain", "override"]), st.floats(0.0, 2.0)), max_size=30))
 def test_a_reader_sees_what_was_set_last(values: list[tuple[str, float]]) -> None:
-    desk = LiveValues.create(None, [GAIN, OVERRIDE])
-    assert not desk.news()
+    live_values = LiveValues.create(None, [GAIN, OVERRIDE])
+    assert not live_values.news()
     expected = {"X.Pgain": 10.0, "override": 1.0}
     for name, value in values:
-        desk.set(name, value)
+        live_values.set(name, value)
         expected[name] = value
-        assert desk.news()
-        assert desk.take() == tuple(expected.values())
-        assert not desk.news()
-    assert desk.values() == expected
+        assert live_values.news()
+        assert live_values.take() == tuple(expected.values())
+        assert not live_values.news()
+    assert live_values.values() == expected
 
 
-def test_two_processes_share_a_desk(tmp_path: Path) -> None:
-    desk = LiveValues.create(tmp_path / "a.desk", [GAIN, OVERRIDE])
-    opened_there = f"LiveValues.open({str(tmp_path / 'a.desk')!r})"
+def test_two_processes_share_live_values(tmp_path: Path) -> None:
+    live_values = LiveValues.create(tmp_path / "a.live", [GAIN, OVERRIDE])
+    opened_there = f"LiveValues.open({str(tmp_path / 'a.live_values')!r})"
     other = f"from rds.modes.loop.live_values import LiveValues; {opened_there}.set('override', 0.25)"
     subprocess.run([sys.executable, "-c", other], check=True)
-    assert desk.take() == (10.0, 0.25)
-    desk.note(Note(3, "override", 1.0, 0.25))
-    opened = LiveValues.open(tmp_path / "a.desk")
-    assert opened.channels == desk.channels
+    assert live_values.take() == (10.0, 0.25)
+    live_values.note(Note(3, "override", 1.0, 0.25))
+    opened = LiveValues.open(tmp_path / "a.live")
+    assert opened.channels == live_values.channels
     assert opened.notes() == (0, [Note(3, "override", 1.0, 0.25)])
 
 
 def test_values_that_belong_together_are_never_seen_apart() -> None:
     """A writer sets both channels to the same value all the time; whoever reads sees equal values or none."""
-    desk = LiveValues.create(None, [OVERRIDE, Channel("hold", 1.0, "", low=0.0, high=2.0)])
+    live_values = LiveValues.create(None, [OVERRIDE, Channel("hold", 1.0, "", low=0.0, high=2.0)])
     stop = threading.Event()
 
     def write() -> None:
         i = 0
         while not stop.is_set():
             i += 1
-            desk.set_all({"override": i % 200 / 100, "hold": i % 200 / 100})
+            live_values.set_all({"override": i % 200 / 100, "hold": i % 200 / 100})
 
     writer = threading.Thread(target=write)
     writer.start()
     seen = []
     while len(seen) < 100:
-        if desk.news() and (values := desk.take()):
+        if live_values.news() and (values := live_values.take()):
             seen.append(values)
     stop.set()
     writer.join()
@@ -84,18 +84,18 @@ def test_values_that_belong_together_are_never_seen_apart() -> None:
 
 
 def test_a_writer_that_died_in_the_middle_blocks_nobody() -> None:
-    desk = LiveValues.create(None, [GAIN])
-    desk._memory[8:16] = (7).to_bytes(8, "little")  # odd, as a killed process leaves it
-    assert desk.take() == ()
-    desk.set("X.Pgain", 3.0)
-    assert desk.take() == (3.0,)
+    live_values = LiveValues.create(None, [GAIN])
+    live_values._memory[8:16] = (7).to_bytes(8, "little")  # odd, as a killed process leaves it
+    assert live_values.take() == ()
+    live_values.set("X.Pgain", 3.0)
+    assert live_values.take() == (3.0,)
 
 
 def test_notes_that_nobody_copied_in_time_are_counted() -> None:
-    desk = LiveValues.create(None, [GAIN])
+    live_values = LiveValues.create(None, [GAIN])
     for k in range(NOTES + 10):
-        desk.note(Note(k, "X.Pgain", float(k), float(k + 1)))
-    first, notes = desk.notes(5)
+        live_values.note(Note(k, "X.Pgain", float(k), float(k + 1)))
+    first, notes = live_values.notes(5)
     assert (first, len(notes), notes[0].sample, notes[-1].sample) == (10, NOTES, 10, NOTES + 9)
 
 
@@ -110,11 +110,11 @@ def test_notes_that_nobody_copied_in_time_are_counted() -> None:
     ],
 )
 def test_what_cannot_be_set_is_refused(name: str, value: Any, said: str) -> None:
-    desk = LiveValues.create(None, [GAIN, OVERRIDE])
+    live_values = LiveValues.create(None, [GAIN, OVERRIDE])
     with pytest.raises(rds.InputError, match=said):
-        desk.set_all({"override": 0.5, name: value})
-    assert desk.values() == {"X.Pgain": 10.0, "override": 1.0}
-    assert not desk.news()
+        live_values.set_all({"override": 0.5, name: value})
+    assert live_values.values() == {"X.Pgain": 10.0, "override": 1.0}
+    assert not live_values.news()
 
 
 # --- when changes are taken ---------------------------------------------------------------------------------------
@@ -246,7 +246,7 @@ def test_compiled_simulations_do_not_ignore_changes(experiment: Maker) -> None:
 def test_a_simulation_is_stopped_and_keeps_what_it_has(experiment: Maker) -> None:
     run = experiment(PID, duration=2000.0).start()
     assert run.ready(10)
-    run.desk.set("X.Pgain", 5.0)
+    run.live_values.set("X.Pgain", 5.0)
     while run.progress[0] < 1000:
         time.sleep(0.001)
     assert not run.done
@@ -263,7 +263,7 @@ def test_a_simulation_is_stopped_and_keeps_what_it_has(experiment: Maker) -> Non
     again = experiment(PID, duration=2000.0).run(changes=result.meta["changes"])
     assert all((again[name] == result[name]).all() for name in result.columns)
     with pytest.raises(rds.InputError, match="no live value can be read or set: the run is over"):
-        run.desk.set("X.Pgain", 1.0)
+        run.live_values.set("X.Pgain", 1.0)
 
 
 def test_an_error_of_the_run_comes_from_wait(experiment: Maker) -> None:
@@ -295,10 +295,10 @@ def test_an_emulation_changed_by_hand_is_repeated_by_a_simulation(experiment: Ma
         seen = run.progress[0]
         while run.progress[0] < seen + 100:
             time.sleep(0.005)
-        run.desk.set_all({"X.Pgain": gain, "X.Igain": gain / 10})
+        run.live_values.set_all({"X.Pgain": gain, "X.Igain": gain / 10})
     with pytest.raises(rds.InputError, match=r"X.Pgain = -3 must be at least 0 V/mm"):
-        run.desk.set("X.Pgain", -3)
-    assert run.desk["X.Pgain"] == 42.0
+        run.live_values.set("X.Pgain", -3)
+    assert run.live_values["X.Pgain"] == 42.0
     emulated = run.wait()
     changes = emulated.meta["changes"]
     assert [(name, new) for _, name, _, new in changes] == [
@@ -316,7 +316,7 @@ def test_an_implementation_is_changed_and_stopped(experiment: Maker, alone: Path
     assert run.ready(30)
     while run.progress[0] < 300:
         time.sleep(0.01)
-    run.desk.set("X.Pgain", 1.0)
+    run.live_values.set("X.Pgain", 1.0)
     while run.progress[0] < 600:
         time.sleep(0.01)
     rows = run.rows
@@ -340,7 +340,7 @@ def test_changes_of_a_run_that_was_killed_are_kept(experiment: Maker, alone: Pat
     assert run.ready(30)
     while run.progress[0] < 100:
         time.sleep(0.01)
-    run.desk.set("X.Pgain", 11.0)
+    run.live_values.set("X.Pgain", 11.0)
     while run.progress[0] < 300:
         time.sleep(0.01)
     send(alone / "run", "recorder")
@@ -378,15 +378,15 @@ def test_a_count_is_never_seen_half_written(tmp_path: Path) -> None:
     assert heads[-1] > heads[0]
 
 
-def test_a_planned_change_is_not_undone_by_a_desk_that_did_not_know_of_it() -> None:
-    desk = LiveValues.create(None, [GAIN, OVERRIDE])
+def test_a_planned_change_is_not_undone_by_a_process_that_did_not_know_of_it() -> None:
+    live_values = LiveValues.create(None, [GAIN, OVERRIDE])
     live_changes = LiveChanges(
         [GAIN, OVERRIDE], dict.fromkeys(("X.Pgain", "override"), lambda value: None), [(0, "override", 0.5)]
     )
-    live_changes.desk = desk
+    live_changes.live_values = live_values
     live_changes(0)
-    assert desk["override"] == 0.5
-    desk.set("X.Pgain", 3.0)
+    assert live_values["override"] == 0.5
+    live_values.set("X.Pgain", 3.0)
     live_changes(1)
     assert live_changes.values == {"X.Pgain": 3.0, "override": 0.5}
     assert [note.name for note in live_changes.taken] == ["override", "X.Pgain"]
