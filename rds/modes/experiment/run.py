@@ -20,7 +20,10 @@ _POLL = 0.05  # s
 
 
 class RunLiveValues:
-    """The live values of a run: `run.live_values.set("X.Pgain", 20.0)`, `run.live_values["X.Pgain"]`, `run.live_values.channels`."""
+    """The live values of a run.
+
+    `run.live_values.set("X.Pgain", 20.0)`, `run.live_values["X.Pgain"]`, `run.live_values.channels`.
+    """
 
     def __init__(self, live: Live, channels: Mapping[str, Channel]):
         self._live = live

@@ -84,7 +84,7 @@ class LiveValues:
 
     @classmethod
     def create(cls, path: str | Path | None, channels: Sequence[Channel]) -> LiveValues:
-        """New live values in the file `path`, or (None) in the memory of this process alone. OSError if there is no room."""
+        """New ones in the file `path`, or (None) in the memory of this process alone. OSError if there is no room."""
         text = json.dumps([asdict(channel) for channel in channels]).encode()
         values = struct.Struct(f"<{len(channels)}d")
         first = _TEXT + _text_size(len(text))
