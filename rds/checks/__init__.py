@@ -4,8 +4,8 @@ Panels, the command line, the tests and the grader use the same ones. `check_fil
 of its own, the others in this one.
 """
 
-from rds.checks.anything import check
 from rds.checks.controller import check_controller
+from rds.checks.dispatch import check
 from rds.checks.file import check_file
 from rds.checks.interpolator import check_interpolator
 from rds.checks.model import check_model

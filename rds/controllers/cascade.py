@@ -23,8 +23,8 @@ from math import exp
 from typing import Any
 
 from rds.controllers.axis_data import AxisData, axis_data
+from rds.controllers.pid_options import OUTPUT_LIMIT, limit_or_none, output_limit, retuned
 from rds.controllers.tuning import cascade_gains
-from rds.controllers.words import OUTPUT_LIMIT, limit_or_none, output_limit, retuned
 from rds.core.errors import InputError
 from rds.core.options import read_options
 from rds.core.quantities import Quantity

@@ -16,8 +16,7 @@ from math import exp
 from typing import Any
 
 from rds.controllers.axis_data import axis_data
-from rds.controllers.tuning import pid_gains, set_point_weight
-from rds.controllers.words import (
+from rds.controllers.pid_options import (
     BIAS,
     ERROR_LIMITS,
     FILTER,
@@ -28,6 +27,7 @@ from rds.controllers.words import (
     output_limit,
     retuned,
 )
+from rds.controllers.tuning import pid_gains, set_point_weight
 from rds.core.options import read_options
 from rds.core.quantities import Quantity
 from rds.core.types import Controller, Reference, Source

@@ -22,8 +22,7 @@ from math import exp
 from typing import Any
 
 from rds.controllers.axis_data import axis_data
-from rds.controllers.tuning import pid_gains
-from rds.controllers.words import (
+from rds.controllers.pid_options import (
     BIAS,
     DEADBAND,
     ERROR_LIMITS,
@@ -36,6 +35,7 @@ from rds.controllers.words import (
     output_limit,
     retuned,
 )
+from rds.controllers.tuning import pid_gains
 from rds.core.options import read_options
 from rds.core.types import Controller, Reference, Source
 

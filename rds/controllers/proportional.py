@@ -7,8 +7,8 @@ from functools import partial
 from typing import Any
 
 from rds.controllers.axis_data import axis_data
+from rds.controllers.pid_options import BIAS, GAINS, OUTPUT_LIMIT, output_limit, retuned
 from rds.controllers.tuning import proportional_gain
-from rds.controllers.words import BIAS, GAINS, OUTPUT_LIMIT, output_limit, retuned
 from rds.core.options import read_options
 from rds.core.types import Controller, Reference, Source
 

@@ -74,11 +74,11 @@ def test_monitor_reports_a_killed_hub(
 ) -> None:
     process = hub("test")
     open_bus()  # a hub without nodes leaves after some seconds, and a monitor may take longer to start
-    with Faults("test") as live_values:
-        others = len(live_values.nodes())
+    with Faults("test") as faults:
+        others = len(faults.nodes())
         watcher = rds("monitor", "--seconds", "3", "--json")
         deadline = time.monotonic() + 20.0
-        while len(live_values.nodes()) == others and time.monotonic() < deadline:
+        while len(faults.nodes()) == others and time.monotonic() < deadline:
             time.sleep(0.05)
     time.sleep(0.5)  # it is reading, not only there
     process.kill()

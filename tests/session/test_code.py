@@ -13,12 +13,12 @@ from rds.core.types import ArcSegment, LineSegment, Source
 from rds.interpolators.interpolator import Interpolator
 from rds.interpolators.path import interpolate
 from rds.panels.code.advice import told
+from rds.panels.code.completions import words
 from rds.panels.code.file import CodeFile, code_files
 from rds.panels.code.state import Code, syntax_fault
 from rds.panels.code.templates import TEMPLATES
 from rds.panels.code.versions import FOLDER, change_sentence, changes, keep, versions
 from rds.panels.code.view import changes_html, verdict
-from rds.panels.code.words import words
 from rds.panels.equipment.build import Builds, Checked, Mark
 from rds.panels.equipment.state import Equipment
 from rds.panels.session import Session

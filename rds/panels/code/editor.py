@@ -10,7 +10,7 @@ from typing import Any
 import anywidget
 import traitlets
 
-from rds.panels.code.words import Word
+from rds.panels.code.completions import Word
 from rds.panels.equipment.build import Mark
 
 _STATIC = Path(__file__).parent / "static"

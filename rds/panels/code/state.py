@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.panels.code.completions import Word, words
 from rds.panels.code.file import CodeFile, check_name, code_files, free_name, role_of
 from rds.panels.code.templates import TEMPLATES
 from rds.panels.code.versions import Version, versions
-from rds.panels.code.words import Word, words
 from rds.panels.equipment.build import Builds, Checked, Mark
 from rds.panels.session.file_params import file_params
 from rds.panels.session.latest import Latest
