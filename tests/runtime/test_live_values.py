@@ -1,4 +1,4 @@
-"""The live_values: live values between host and target, the notes of their changes, and runs that do not block."""
+"""Live values between host and target, the notes of their changes, and runs that do not block."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_reader_sees_what_was_set_last(values: list[tuple[str, float]]) -> Non
 
 def test_two_processes_share_live_values(tmp_path: Path) -> None:
     live_values = LiveValues.create(tmp_path / "a.live", [GAIN, OVERRIDE])
-    opened_there = f"LiveValues.open({str(tmp_path / 'a.live_values')!r})"
+    opened_there = f"LiveValues.open({str(tmp_path / 'a.live')!r})"
     other = f"from rds.modes.loop.live_values import LiveValues; {opened_there}.set('override', 0.25)"
     subprocess.run([sys.executable, "-c", other], check=True)
     assert live_values.take() == (10.0, 0.25)
