@@ -158,6 +158,17 @@ def test_commands_outside_the_limits_are_refused(bench: Benches, fields: dict[st
     rig.say("Command", Code=Code.MOVE, **fields)
     rig.run(0.1)
     assert rig.results() == [result]
+
+
+@pytest.mark.parametrize("data", ["", "03", "63" + 7 * "00", "03" "63" + 6 * "00", "05" "63" + 6 * "00", "00" * 8])
+def test_a_command_that_the_module_does_not_know_is_refused(bench: Benches, data: str) -> None:
+    rig = bench("X")
+    rig.frame(words.COMMAND + rig.module.node, bytes.fromhex(data))
+    rig.frame(words.COMMAND + rig.module.node + 1, bytes.fromhex(data))  # another module's
+    rig.run(0.1)
+    (said,) = [m.fields for m in rig.said("Reply")]
+    assert (said["Acknowledges"], said["Result"]) == (Acknowledges.UNKNOWN, Result.BAD_VALUE)
+    assert rig.module.mover.motion is None and rig.module.plant.voltage == 0.0
     assert rig.module.plant.voltage == 0.0 and rig.module.mover.motion is None
 
 

@@ -74,6 +74,7 @@ class Acknowledges(IntEnum):
     HOME = 6
     READINGS = 7
     EMERGENCY = 8
+    UNKNOWN = 9  # a command that the module does not know
 
 
 OF_MOVE = {

@@ -112,7 +112,8 @@ class OacsModule:
     def receive(self, identifier: int, data: bytes | bytearray, at: float, extended: bool = False) -> list[Frame]:
         """Take a frame stamped `at` (s); return the frames to send now.
 
-        A frame that makes no sense changes nothing, and is reported in the log.
+        A frame that makes no sense changes nothing, and is reported in the log; a command to this module is refused
+        by an acknowledgement as well, so that its sender need not wait for one in vain.
         """
         if extended:
             return []
@@ -131,6 +132,9 @@ class OacsModule:
                     obey(self, message.fields, at)
         except MachineError as error:
             LOG.warning("module %s ignored a frame: %s", self.name, error)
+            if identifier == words.COMMAND + self.node:
+                self.advance(at)
+                self.acknowledge(Acknowledges.UNKNOWN, Result.BAD_VALUE, at)
         return self.expire(at)
 
     def set_emergency_input(self, active: bool, at: float) -> None:
