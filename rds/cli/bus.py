@@ -235,13 +235,16 @@ def serve_slcan(
         from rds.bus.tools.slcan_adapter import SlcanAdapter
 
         place = chosen_bus(interface, channel, experiment)
+        builtin = place.interface == BUILTIN
+        options = {"receive_own_messages": True} if builtin else {}
         with (
-            _opener(place, bitrate, "adapter")() as bus,
+            _opener(place, bitrate, "adapter")(**options) as bus,
             until_ctrl_c() as stop,
-            SlcanAdapter(bus, latency * 1e-3, garble) as adapter,
+            SlcanAdapter(bus, latency * 1e-3, garble, bus_bitrate=_timed(bus), gives_back=builtin) as adapter,
         ):
             _say(f"{place.name} behind an emulated adapter; Ctrl-C ends")
-            _say(f"programs open it with --interface slcan --channel {adapter.path} --bitrate 1000000")
+            its_own = _timed(bus) or 1_000_000
+            _say(f"programs open it with --interface slcan --channel {adapter.path} --bitrate {its_own}")
             while adapter.alive() and not stop.wait(0.2):
                 pass
 
@@ -260,6 +263,11 @@ def _timing(opener: Any) -> int:
     """The bit rate of a channel of the built-in bus, bit/s; 0 if it has no bit timing."""
     with opener() as bus:
         return int(bus.bitrate)
+
+
+def _timed(bus: Any) -> int | None:
+    """The bit rate that an opened bus of the built-in kind has, bit/s; None for others, and without bit timing."""
+    return int(getattr(bus, "bitrate", 0)) or None
 
 
 def _bits(said: Any) -> int:

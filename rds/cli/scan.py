@@ -64,7 +64,7 @@ def scan(
         print_json({"channel": place.channel, "interface": place.interface, "modules": rows})
         return
     if not rows:
-        typer.echo(f"no module answers on {place.name}; is a machine served, or switched on?")
+        typer.echo(f"no module answers on {place.name}; is a machine served, or switched on, at this bit rate?")
         return
     from rds.cli.console import show_table
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import cast
 from uuid import uuid4
 
 import can
 import pytest
+from typer.testing import CliRunner
 
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.drivers import AxisDrivers
@@ -19,11 +23,31 @@ from rds.bus.modules.shared_bus import opener_of
 from rds.bus.tools.adapter import AdapterFailure
 from rds.bus.tools.link import open_bus
 from rds.bus.tools.slcan_adapter import SlcanAdapter
+from rds.cli.main import app
 from rds.core.errors import AdapterError, MachineError
 from rds.machines import load_machine
+from rds.results import open_result
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are not on Windows")
 QUICK = {"sleep_after_open": 0.0, "bitrate": 500_000}
+UNPLUGGED = """
+machine = "mini-cnc"
+axis = "X"
+mode = "implementation"
+duration = 30.0
+sample_period = 0.02
+[reference]
+kind = "sinusoid"
+amplitude = 1.0
+frequency = 0.5
+[controller]
+name = "pid"
+[bus]
+interface = "slcan"
+channel = "{channel}"
+bitrate = 500000
+sleep_after_open = 0.0
+"""
 
 
 @contextmanager
@@ -64,6 +88,56 @@ def test_frames_go_both_ways(channel: str) -> None:
             bus.shutdown()
 
 
+def test_at_another_bit_rate_than_the_bus_nothing_is_heard_nor_acknowledged(channel: str) -> None:
+    with adapter(channel, bus_bitrate=250_000) as plugged, can.Bus(interface="virtual", channel=channel) as other:
+        bus = open_bus("slcan", plugged.path, **QUICK)
+        try:
+            until_open(plugged)
+            bus.send(message(0x123))
+            other.send(message(0x124))
+            assert bus.recv(0.1) is None and other.recv(0.0) is None
+        finally:
+            bus.shutdown()
+
+
+class Prioritizing:
+    """A bus whose controller would send by priority if it held more than one frame; gives each back after a while."""
+
+    def __init__(self) -> None:
+        self.sent: list[int] = []
+        self.held: list[can.Message] = []
+        self.most = 0
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.sent.append(msg.arbitration_id)
+        self.held.append(msg)
+        self.most = max(self.most, len(self.held))
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        time.sleep(0.005)
+        if not self.held:
+            return None
+        back = self.held.pop()
+        back.is_rx = False
+        return back
+
+
+def test_a_frame_waits_until_the_one_before_it_is_on_the_wire() -> None:
+    wire = Prioritizing()
+    with SlcanAdapter(cast(can.BusABC, wire), gives_back=True) as plugged:
+        bus = open_bus("slcan", plugged.path, **QUICK)
+        try:
+            for identifier in (0x202, 0x080, 0x203):
+                bus.send(message(identifier))
+            deadline = time.monotonic() + 10.0
+            while (len(wire.sent) < 3 or wire.held) and time.monotonic() < deadline:
+                time.sleep(0.002)
+            assert wire.sent == [0x202, 0x080, 0x203] and wire.most == 1
+            assert bus.recv(0.0) is None, "its own frames are not the computer's to hear"
+        finally:
+            bus.shutdown()
+
+
 def test_a_garbled_line_names_the_adapter_the_cause_and_the_remedy(channel: str) -> None:
     with adapter(channel, garble=1.0) as plugged, can.Bus(interface="virtual", channel=channel) as other:
         bus = open_bus("slcan", plugged.path, **QUICK)
@@ -100,6 +174,40 @@ def test_an_adapter_that_is_unplugged_ends_a_run_by_its_name(channel: str) -> No
     finally:
         stop.set()
         server.join()
+
+
+@pytest.mark.realtime
+def test_a_whole_run_ends_as_adapter_lost_and_its_record_opens(channel: str, tmp_path: Path) -> None:
+    machine, stop, ready = load_machine("mini-cnc"), threading.Event(), threading.Event()
+    server = threading.Thread(target=serve, args=(machine, "virtual", channel, ["X"], ready.set, stop))
+    server.start()
+    try:
+        assert ready.wait(20.0)
+        with adapter(channel) as plugged:
+            (tmp_path / "unplugged.toml").write_text(UNPLUGGED.format(channel=plugged.path))
+            record = tmp_path / "run" / "record.rds"
+
+            def unplug() -> None:
+                first, deadline = 0, time.monotonic() + 60.0
+                while time.monotonic() < deadline:  # until samples have come behind the head
+                    size = record.stat().st_size if record.is_file() else 0
+                    first = first or size
+                    if size > first:
+                        break
+                    time.sleep(0.01)
+                plugged.unplug()
+
+            watcher = threading.Thread(target=unplug)
+            watcher.start()
+            found = CliRunner().invoke(app, ["run", str(tmp_path / "unplugged.toml"), "--out", str(record.parent)])
+            watcher.join()
+    finally:
+        stop.set()
+        server.join()
+    assert found.exit_code == 1, found.output
+    assert "(adapter lost): the adapter slcan:" in found.stderr and "plug it in again" in found.stderr
+    assert json.loads((record.parent / "ending.json").read_text())["ending"] == "adapter lost"
+    assert 0 < len(open_result(record).table["time"]) < 1500
 
 
 def test_all_modules_share_an_adapter_that_can_be_opened_once(channel: str) -> None:

@@ -160,7 +160,7 @@ def test_commands_outside_the_limits_are_refused(bench: Benches, fields: dict[st
     assert rig.results() == [result]
 
 
-@pytest.mark.parametrize("data", ["", "03", "63" + 7 * "00", "03" "63" + 6 * "00", "05" "63" + 6 * "00", "00" * 8])
+@pytest.mark.parametrize("data", ["", "03", "63" + 7 * "00", "0363" + 6 * "00", "0563" + 6 * "00", "00" * 8])
 def test_a_command_that_the_module_does_not_know_is_refused(bench: Benches, data: str) -> None:
     rig = bench("X")
     rig.frame(words.COMMAND + rig.module.node, bytes.fromhex(data))

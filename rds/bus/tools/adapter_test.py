@@ -173,8 +173,9 @@ def hints(report: AdapterReport, nobody_acknowledges: bool = False) -> list[str]
         )
     elif report.answerer is None:
         found.append(
-            "nobody answers: switch a drive on, or serve a machine (`rds machine serve`), at "
-            f"{report.bitrate / 1e3:g} kbit/s; round trips need one who answers"
+            f"nobody answers at {report.bitrate / 1e3:g} kbit/s: check the drive's supply, the cable, and the bit rate "
+            "(others in use are 125, 250, 500 and 1000 kbit/s), or serve a machine (`rds machine serve`); a drive "
+            "without a node-ID does not answer either (`rds drive node-id`)"
         )
     if report.error_frames:
         asked = max(2 * report.asked, 1)

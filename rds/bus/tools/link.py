@@ -69,10 +69,13 @@ def open_bus(
             **options,
         )
     except (can.CanError, OSError, ValueError, TypeError, NotImplementedError) as error:
-        raise MachineError(
-            f"bus {bus_name(interface, channel)} can't be opened: {error}; check interface, channel and "
-            "options (on the command line, or in the [bus] table)"
-        ) from error
+        remedy = "check interface, channel and options (on the command line, or in the [bus] table)"
+        if interface == "slcan":
+            remedy += (
+                "; `ls /dev/serial/by-id` shows serial adapters; one that may not be opened needs your user in its "
+                "group, dialout as a rule, and one that another program has open waits for that program's end"
+            )
+        raise MachineError(f"bus {bus_name(interface, channel)} can't be opened: {error}; {remedy}") from error
     if interface in NOT_ADAPTERS:
         return bus
     return guard(bus, interface, bus_name(interface, channel))

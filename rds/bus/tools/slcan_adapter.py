@@ -23,23 +23,36 @@ _BITRATES = {b"S0": 10_000, b"S1": 20_000, b"S2": 50_000, b"S3": 100_000, b"S4":
 _BITRATES |= {b"S6": 500_000, b"S7": 750_000, b"S8": 1_000_000}
 _ENDS = b"\r"
 _LONGEST = 64  # bytes of a command
+_ON_THE_WIRE = 0.1  # s that a frame may take until the bus has it
 
 
 class SlcanAdapter:
     """Serves `bus` at the pseudo-terminal `path` from entering the context to leaving it.
 
     `latency` (s): frames for the computer wait up to so long, as in a USB chip that collects bytes; `garble`: the share
-    of frames for the computer in which one character is another one, by `seed`.
+    of frames for the computer in which one character is another one, by `seed`. `bus_bitrate` (bit/s): what the bus
+    has, where that is known; told another one, the adapter hears nothing, and what it sends nobody acknowledges.
+    `gives_back`: `bus` gives back what it has sent, marked as such; then frames keep their order, as in real adapters,
+    and don't overtake each other in a controller that sends by priority.
     """
 
-    def __init__(self, bus: can.BusABC, latency: float = 0.0, garble: float = 0.0, seed: int = 1):
+    def __init__(
+        self,
+        bus: can.BusABC,
+        latency: float = 0.0,
+        garble: float = 0.0,
+        seed: int = 1,
+        bus_bitrate: int | None = None,
+        gives_back: bool = False,
+    ):
         try:
             import pty
             import tty
         except ImportError:
             raise InputError("this system has no pseudo-terminals; emulated serial adapters need one") from None
         self._bus, self._latency, self._garble = bus, latency, garble
-        self._chance = random.Random(seed)
+        self._chance, self._bus_bitrate = random.Random(seed), bus_bitrate
+        self._gives_back, self._sent = gives_back, threading.Event()
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
@@ -75,6 +88,11 @@ class SlcanAdapter:
         """Whether it still serves."""
         return all(thread.is_alive() for thread in self._threads)
 
+    @property
+    def takes_part(self) -> bool:
+        """Whether frames go through it: it is open, and not at another bit rate than the bus."""
+        return self.is_open and self._bus_bitrate in (None, self.bitrate)
+
     def _serve(self) -> None:
         """What the computer says: lines that end in a carriage return."""
         import select
@@ -105,11 +123,14 @@ class SlcanAdapter:
             return b"NRDS0" + _OK
         if line == b"F":
             return b"F00" + _OK
-        if line[:1] in (b"t", b"T", b"r", b"R") and self.is_open:
+        if line[:1] in (b"t", b"T", b"r", b"R") and self.takes_part:
             message = _decode(line)
             if message is not None:
                 with contextlib.suppress(can.CanError, OSError):
-                    self._bus.send(message, 0.1)
+                    self._sent.clear()
+                    self._bus.send(message, _ON_THE_WIRE)
+                    if self._gives_back and not self._sent.wait(_ON_THE_WIRE):
+                        return _ERROR
                     return (b"Z" if message.is_extended_id else b"z") + _OK
         return _OK if not line or line[:1] in (b"Z", b"X") else _ERROR
 
@@ -117,20 +138,30 @@ class SlcanAdapter:
         """What comes over the bus."""
         while not self._ended.is_set():
             try:
-                message = self._bus.recv(_LOOK)
+                message = self._hear(_LOOK)
             except (can.CanError, OSError):
                 return
-            if message is None or message.is_error_frame or message.is_fd:
+            if message is None:
                 continue
             lines = [message]
             if self._latency:
                 until = time.monotonic() + self._latency
                 while (left := until - time.monotonic()) > 0 and not self._ended.is_set():
-                    more = self._bus.recv(left)
-                    if more is not None and not more.is_error_frame:
+                    more = self._hear(left)
+                    if more is not None:
                         lines.append(more)
-            if self.is_open:
+            if self.takes_part:
                 self._say(b"".join(self._disturbed(_encode(line)) for line in lines))
+
+    def _hear(self, seconds: float) -> can.Message | None:
+        """A frame of somebody else on the bus, within so long; None if there was none."""
+        message = self._bus.recv(seconds)
+        if message is None or message.is_error_frame or message.is_fd:
+            return None
+        if not message.is_rx:
+            self._sent.set()
+            return None
+        return message
 
     def _disturbed(self, line: bytes) -> bytes:
         if self._garble and self._chance.random() < self._garble:

@@ -5,7 +5,7 @@
 A stall that struck while the student's code ran looks like running time. The code is deterministic by contract, so
 calls with the same arguments take as long again if they took long by their own doing, and don't if they didn't.
 What else the code does must not happen twice: where it starts a process, writes a file, or opens a connection, the
-second look ends without an answer (see `no_effects`).
+second look ends without an answer (see `no_effects`). So it does where it would take more than `MEMORY`.
 """
 
 from __future__ import annotations
@@ -31,8 +31,14 @@ from rds.modes.process.no_effects import forbid_effects
 from rds.modes.process.record import write_whole
 from rds.modes.process.replay import as_recorded
 
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
 PASSES = 3
 STARTING = 10.0  # s for the process to begin
+MEMORY = 1 << 30  # bytes of data: code that leaks does not fill the computer pass after pass
 
 
 def own_times(plan: Plan, rows: Rows, which: np.ndarray) -> np.ndarray | None:
@@ -132,12 +138,20 @@ def _pass(plan: Plan, samples: list[int], measured: np.ndarray, acting: np.ndarr
     return times
 
 
+def _limit_memory() -> None:
+    """From here on, what would take more than `MEMORY` of data is a MemoryError, where the system has such limits."""
+    if resource is not None:
+        with suppress(OSError, ValueError):  # the user has a lower limit
+            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, resource.getrlimit(resource.RLIMIT_DATA)[1]))
+
+
 def main(arguments: list[str]) -> None:
     """Make the calls again, and write their times."""
     plan_path, calls_path, times_path = map(Path, arguments)
     values = np.frombuffer(calls_path.read_bytes())
     with open(times_path, "r+b") as written:
         had_effect = forbid_effects()
+        _limit_memory()
         plan = load(plan_path)
         _repeat(plan, values.reshape(-1, 2 + 2 * len(plan.axes)), written, had_effect)
         os._exit(0)  # without what the code may have left for the end

@@ -134,8 +134,8 @@ class Slave:
             self._taken(self.node)
 
     def _select(self, part: int, value: int) -> bytes | None:
-        fits = self._identity()[part] == value and self._selected == part
-        self._selected = self._selected + 1 if fits else 0
+        fits = self._identity()[part] == value and part in (0, self._selected)  # the vendor's number begins anew
+        self._selected = part + 1 if fits else 0
         if self._selected < 4:
             return None
         self._selected, self.is_configuring = 0, True
