@@ -304,7 +304,8 @@ class Cia402Drivers(CanDrivers[Remote]):
             for drive in self.drives:
                 if drive.heard_at < inf and now - drive.heard_at > allowed:
                     self.stop()
-                    raise MachineError(f"no heartbeat from {drive} for {now - drive.heard_at:.2f} s")
+                    silent = f"no heartbeat from {drive} for {now - drive.heard_at:.2f} s"
+                    raise MachineError(f"{silent}: check its power and the cable")
 
     # --- the end
 

@@ -123,14 +123,18 @@ class Conversation:
 
 
 def acknowledgement(answers: Acknowledges, last: bool = False) -> Callable[[Decoded], bool]:
-    """Whether a message acknowledges that command; with `last`, as its end."""
+    """Whether a message acknowledges that command; with `last`, as its end.
+
+    A module that does not know the command at all refuses it under a number of its own, at once.
+    """
+    known = {answers} if last else {answers, Acknowledges.UNKNOWN}
 
     def wanted(message: Decoded) -> bool:
         fields = message.fields
         return (
             message.kind == "Reply"
             and fields["Code"] == Says.ACKNOWLEDGEMENT
-            and fields["Acknowledges"] == answers
+            and fields["Acknowledges"] in known
             and not (last and fields["Result"] == Result.ACCEPTED)
         )
 
