@@ -14,6 +14,7 @@ from oacs_bench import MACHINE, Bench
 from rds.bus.modules.oacs import codes as words
 from rds.bus.modules.oacs import messages
 from rds.bus.modules.oacs.codes import Acknowledges, Code, Mode, Move, Parameter, Result, Select
+from rds.bus.modules.oacs.link import acknowledgement
 from rds.bus.modules.rds import frames
 
 Benches = Callable[..., Bench]
@@ -166,7 +167,9 @@ def test_a_command_that_the_module_does_not_know_is_refused(bench: Benches, data
     rig.frame(words.COMMAND + rig.module.node, bytes.fromhex(data))
     rig.frame(words.COMMAND + rig.module.node + 1, bytes.fromhex(data))  # another module's
     rig.run(0.1)
-    (said,) = [m.fields for m in rig.said("Reply")]
+    (answer,) = rig.said("Reply")
+    said = answer.fields
+    assert acknowledgement(Acknowledges.START)(answer) and not acknowledgement(Acknowledges.START, last=True)(answer)
     assert (said["Acknowledges"], said["Result"]) == (Acknowledges.UNKNOWN, Result.BAD_VALUE)
     assert rig.module.mover.motion is None and rig.module.plant.voltage == 0.0
     assert rig.module.plant.voltage == 0.0 and rig.module.mover.motion is None
