@@ -149,7 +149,7 @@ BAD_INPUT = [
     (["check", "model.py", "--axes", "2"], "it defines no control(t, r, y, state, params)"),
     (["check", "e.toml", "--axes", "2"], "--axes 2 is for a coupled controller"),
     (["compare", "gone", "law.py"], "gone"),
-    (["machine", "serve", "gone"], "there is no machine 'gone'; known machines: mini-cnc"),
+    (["machine", "serve", "gone"], "there is no machine 'gone'; known machines: lathe, mini-cnc"),
     (["machine", "serve", "mini-cnc", "--interface", "gone"], "gone"),
 ]
 
