@@ -1,4 +1,8 @@
-"""A program step by step: each line as it is executed, with the words in force after it and where the tool then is."""
+"""A program step by step: each line as it is executed, with the words in force after it and where the tool then is.
+
+Nothing moves here: it is for finding a fault in a program, and tells of lines that move nothing, too. A run that rests
+after each line that moves is another thing, a live value of its motion (`rds.modes.loop.program.SINGLE_STEP`).
+"""
 
 from __future__ import annotations
 

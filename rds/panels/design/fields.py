@@ -22,7 +22,7 @@ def fields(machine: Machine) -> Iterable[Field]:
     sources = {LIBRARY: "Machine's data", MODEL_FILE: "Fitted model"}
     yield Choice("source", "Axis from", "the machine's own data, or a model file that you fitted", LIBRARY, sources)
     yield Choice(AXIS, "Axis", "which axis of the machine", next(iter(axes)), axes)
-    yield Text("model_file", "Model file", "what `rds fit -o MODEL.toml` wrote, in your folder", "", "model.toml")
+    yield Text("model_file", "Model file", "what Save model in Data wrote, in your folder", "", "model.toml")
     yield Number.of(SAMPLE_PERIOD, "sample_period", "Sample period", machine.sample_period)  # fmt: skip
     kinds = {PAIR: "Conjugate pair", REAL: "Two real"}
     yield Choice("kind", "Poles of the error", "how the tracking error dies away: with or without a swing", PAIR, kinds)

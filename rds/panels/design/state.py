@@ -204,7 +204,7 @@ class Design:
             return None
         name = str(self.choices["model_file"]).strip()
         if not name:
-            raise InputError(f"name the model file, as `rds fit -o MODEL.toml` writes it (in {self.session.folder})")
+            raise InputError(f"name the model file, as Save model in Data writes it (in {self.session.folder})")
         return self.session.folder / name
 
 

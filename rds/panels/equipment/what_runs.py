@@ -43,7 +43,7 @@ class WhatRuns:
         save = button("Save the file", "Write it into the folder of your files", self._save, self.notice)
         text = widgets.Accordion(
             [widgets.VBox([self.toml, row(self._name, save), self.notice]), self.python],
-            titles=("Show as file (rds run …)", "Show as Python"),
+            titles=("Show as file", "Show as Python"),
             selected_index=None,
         )
         text.add_class("rds-folded")

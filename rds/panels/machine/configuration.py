@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from rds.core.atomic import write_whole
-from rds.core.errors import InputError
+from rds.core.errors import InputError, RdsError
 from rds.machines import load_machine
 from rds.machines.assembly import Order, assembled, machine_text
+
+# of a machine whose file was written
+NEXT_STEP = "Choose it as Machine at Modules to start its modules here; Help says how the whole page begins with it"
 
 
 def moved(order: Sequence[int | str], number: int | str, by: int) -> list[int | str]:
@@ -20,6 +23,19 @@ def moved(order: Sequence[int | str], number: int | str, by: int) -> list[int | 
     target = min(max(place + by, 0), len(order) - 1)
     rest = [each for each in order if each != number]
     return [*rest[:target], number, *rest[target:]]
+
+
+def machine_files(folder: Path) -> list[Path]:
+    """The machines' files of a folder, by name; what cannot be read is none of them."""
+    return [path for path in sorted(folder.glob("*.toml")) if not path.name.startswith(".") and _is_machine(path)]
+
+
+def _is_machine(path: Path) -> bool:
+    try:
+        load_machine(str(path))
+    except RdsError:
+        return False
+    return True
 
 
 def directions(order: Order, data: Mapping[int, Any]) -> dict[str, tuple[str, np.ndarray]]:

@@ -16,7 +16,7 @@ from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
-from rds.panels.machine.configuration import directions, moved, write_machine
+from rds.panels.machine.configuration import NEXT_STEP, directions, moved, write_machine
 from rds.panels.machine.state import MachineState
 from rds.panels.session.fields import Choice, Text
 from rds.results import html
@@ -59,9 +59,10 @@ class ConfigurationView:
     def write(self) -> None:
         """Write the file."""
         path = write_machine(self.session.folder, self.choices["file"], self.order, self.state.data)
+        self.state.offer(path)
         self.notice.say(
             f"wrote {path.name}: every mode takes it as its machine; its head says where models and limits are from, "
-            f"which no module knows. Use it: rds app --machine {path.name}",
+            f"which no module knows. {NEXT_STEP}",
             "good",
         )
 

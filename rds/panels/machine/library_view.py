@@ -16,7 +16,8 @@ from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
-from rds.panels.machine.configuration import moved, write_machine_text
+from rds.panels.machine.configuration import NEXT_STEP, moved, write_machine_text
+from rds.panels.machine.state import MachineState
 from rds.panels.session.fields import Choice, Text
 
 _FILE = Text("file", "Machine file", "A file of your folder, which every mode takes as its machine", "by-hand.toml")
@@ -26,8 +27,8 @@ _EMPTY = "no module stands here yet: begin with a cutting head, then what carrie
 class LibraryView:
     """The order of modules from the tool to the work, with buttons that change it."""
 
-    def __init__(self, shell: Any):
-        self.session = shell.session
+    def __init__(self, shell: Any, state: MachineState):
+        self.session, self.state = shell.session, state
         self._ticker, self._figure = shell.ticker, FigureView()
         self.notice = Notice()
         names = {name: f"{module.kind}: {name}, {module.title}" for name, module in library().items()}
@@ -57,9 +58,10 @@ class LibraryView:
         """Write the file."""
         file = self.choices["file"]
         path = write_machine_text(self.session.folder, file, lambda name: text_of_modules(self.order, name))
+        self.state.offer(path)
         self.notice.say(
             f"wrote {path.name}: every mode takes it as its machine; its models and limits are chosen, within the "
-            f"modules' speeds. Use it: rds app --machine {path.name}",
+            f"modules' speeds. {NEXT_STEP}",
             "good",
         )
 

@@ -36,7 +36,7 @@ def build(shell: Any) -> widgets.Widget:
             configuration.widget,
             controllers.widget,
             BusView(shell, state).widget,
-            LibraryView(shell).widget,
+            LibraryView(shell, state).widget,
         ]
     )
     for index, title in enumerate(("1 Modules", "2 Configuration", "3 Controllers", "Bus", "By hand")):

@@ -17,6 +17,7 @@ from rds.bus.tools.link import BUILTIN, bus_name, default_channel
 from rds.core.errors import InputError, MachineError, RdsError
 from rds.core.toml_file import read_toml
 from rds.machines import Machine, load_machine, machine_names
+from rds.panels.machine.configuration import machine_files
 from rds.panels.machine.fields import SERVED, STEP, TUNING, tuning_values
 from rds.panels.session.fields import Choice
 from rds.panels.session.session import Session
@@ -38,6 +39,7 @@ class MachineState:
     def __init__(self, session: Session):
         self.session = session
         machines = {session.machine: session.machine} | {name: name for name in machine_names()}
+        machines |= {str(path): path.name for path in machine_files(session.folder)}
         which = Choice(
             "machine", "Machine", "Whose modules are simulated, or are on the bus", session.machine, machines
         )
@@ -54,6 +56,12 @@ class MachineState:
         self._server: subprocess.Popen[bytes] | None = None
         self._task: Task[Any] | None = None
         self._end: weakref.finalize[Any, Any] | None = None
+
+    def offer(self, path: Path) -> None:
+        """Let a machine's file that was written meanwhile be chosen; the bus in use stays the chosen one's."""
+        which = self.choices.fields["machine"]
+        assert isinstance(which, Choice)
+        self.choices.replace([replace(which, options=dict(which.options) | {str(path): path.name})])
 
     def _fit_dialect(self, name: str) -> None:
         """Another machine is chosen; the dialect stays where the session's bus says it."""

@@ -38,6 +38,7 @@ class Operator:
         tip = "Run from the line that the cursor is in: up, across and down to where it begins"
         self.from_button = run_order(shell, tip, run_from, notice, choices, "Run from line")
         self.from_button.remove_class("rds-run")  # Ctrl+Enter runs all of it
+        self.from_button.button_style = ""  # one button stands out
         self.step = FieldView(choices, "single_step")
         tip = "Come to rest on the path"
         self.hold_button = halt("Hold", tip, partial(self._do, "Hold", ProgramWork.hold), notice)

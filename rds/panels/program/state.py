@@ -269,8 +269,8 @@ class Program:
         files += own
         if self.session.bus:
             raise InputError(
-                "this page has a bus of its own, which programs are not run on here; `rds nc run --controller "
-                "experiment.toml` with its [bus] does"
+                "this page has a bus of its own, which programs are not run on here: open a page without [bus] for "
+                "it, or run the program by rds nc in a terminal"
             )
         steps = bool(self.choices["single_step"])
         if motion and (begin or steps):

@@ -246,7 +246,7 @@ class Session:
         if self.interface == BUILTIN and self._own is None:  # nobody may believe that it was stopped
             raise MachineError(
                 f"emergency stop: {self.machine} cannot be read, so the channel of its modules is not known; "
-                "run `rds estop --channel NAME` in a terminal, or cut the power"
+                "cut the power, or correct the file and press again"
             )
         return stopped
 

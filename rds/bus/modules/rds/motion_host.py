@@ -97,7 +97,9 @@ class MotionHost:
         self.port.send(motion_frames.CONTROL, motion_frames.encode_begin(node, kind, position))
         status = self.progress(node).status
         if status & MotionStatus.EMERGENCY:
-            raise MachineError(f"{self.title(node)} has its emergency stop latched; reset it: rds estop --reset")
+            raise MachineError(
+                f"{self.title(node)} has its emergency stop latched; press Release on the page, or rds estop --reset"
+            )
         if not status & MotionStatus.READY:
             raise MachineError(f"{self.title(node)} does not begin: another host commands it; end that run")
 
@@ -288,7 +290,9 @@ class MotionHost:
     def _let_go(self, node: int, status: MotionStatus) -> MachineError:
         who = self.title(node)
         if status & MotionStatus.EMERGENCY:
-            return MachineError(f"emergency stop of {who}; release it by rds estop --reset, and home the machine")
+            return MachineError(
+                f"emergency stop of {who}; press Release on the page, or rds estop --reset, and home the machine"
+            )
         if status & MotionStatus.FAR:
             return MachineError(
                 f"{who} could not follow its set points, and let go of the axis; feed less, or look why"
