@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import tempfile
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -40,14 +41,14 @@ def nbclient_seconds(place: Path, peer_python: str) -> float | str:
     return perf_counter() - begun
 
 
-def autograde_seconds(place: Path, peer_python: str) -> float | str:
+def autograde_seconds(place: Path, peer_python: str, students: int = STUDENTS) -> float | str:
     """`nbgrader autograde` of some students, for each; nbgrader is looked for in the environment of `peer_python`."""
     command = Path(peer_python).with_name("nbgrader")
     if not command.is_file():
         return "skipped: no nbgrader beside --peer-python"
-    course = place / "course"
+    course = Path(tempfile.mkdtemp(prefix="course-", dir=place))
     text = json.dumps(notebook(place))
-    for folder in ("source/ps1", *(f"submitted/s{number}/ps1" for number in range(STUDENTS))):
+    for folder in ("source/ps1", *(f"submitted/s{number}/ps1" for number in range(students))):
         (course / folder).mkdir(parents=True)
         (course / folder / "nb.ipynb").write_text(text)
     (course / "nbgrader_config.py").write_text(f"c = get_config()\nc.CourseDirectory.root = {str(course)!r}\n")
@@ -55,7 +56,7 @@ def autograde_seconds(place: Path, peer_python: str) -> float | str:
         _called([str(command), "generate_assignment", "ps1"], course)
         begun = perf_counter()
         _called([str(command), "autograde", "ps1"], course)
-        return (perf_counter() - begun) / STUDENTS
+        return (perf_counter() - begun) / students
     except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
         said = error.stderr or b""
         return f"skipped: {said.decode(errors='replace').strip().splitlines()[-1][:120] if said else error}"

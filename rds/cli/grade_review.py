@@ -109,9 +109,7 @@ def regrade(
         from rds.grading.review.regrade import regrade as again
 
         with progress_bars() as bar:
-            how = How(
-                jobs, resume=resume, progress=bar("submissions"), announce=lambda t: typer.echo(f"rds: {t}", err=True)
-            )
+            how = How(jobs, resume=resume, progress=bar("submissions"), announce=_announce)
             done, changes = again(out, assignment, new, how)
     if json:
         print_json(
@@ -198,39 +196,16 @@ def _as_json(finished: Finished, entries: list[Entry]) -> dict[str, object]:
 
 def _show_log(finished: Finished) -> None:
     from rds.cli.console import show_table
+    from rds.grading.review.listed import LOG, log
 
-    standing = {entry.number for entry in finished.review.standing}
-    rows = [
-        [
-            str(entry.number),
-            entry.time,
-            entry.by,
-            str(entry.kind) + ("" if entry.number in standing or entry.kind == "undo" else " (undone)"),
-            entry.about,
-            entry.criterion,
-            "" if entry.value is None else f"{entry.value:g}",
-            " / ".join(filter(None, (entry.comment, entry.why))),
-        ]
-        for entry in finished.review.entries
-    ]
-    show_table("Review", ["entry", "time", "by", "what", "about", "criterion", "value", "words"], rows)
+    show_table("Review", LOG, log(finished))
 
 
 def _show_waiting(finished: Finished) -> None:
     from rds.cli.console import show_table
-    from rds.grading.review.applied import of_review
+    from rds.grading.review.listed import WAITING, waiting
 
-    rows = [
-        [g.student, score.name, "could not be measured", score.sentence]
-        for g in finished.grades
-        for score in g.for_review
-    ]
-    rows += [
-        [grade.student, name, "graders differ", "the mean counts; --final settles it"]
-        for grade in finished.grades
-        for name in of_review(grade).get("differ", ())
-    ]
-    if rows:
-        show_table("To look at", ["student", "criterion", "what", "why"], rows)
+    if rows := waiting(finished):
+        show_table("To look at", WAITING, rows)
     else:
         typer.echo("nothing waits for a grader")

@@ -11,6 +11,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.grading.container import container
+from rds.grading.sandbox.requirements import _remedy
 from tests.grading.made import HEAD, RMS, SINE, assignment_in
 
 WITHOUT_UNIX = """
@@ -66,6 +67,38 @@ def test_the_container_reads_what_it_grades_and_writes_one_folder(tmp_path: Path
         "/more/0/class.csv",
     ]
     assert "--network=none" in words and "--privileged" not in words
+
+
+@pytest.mark.parametrize(
+    ("name", "user", "who"),
+    [
+        ("docker", 1000, ["--user=1000:100"]),
+        ("docker", 0, ["--cap-add=SYS_ADMIN"]),
+        ("docker", None, ["--cap-add=SYS_ADMIN"]),  # Windows
+        ("podman", 1000, ["--userns=keep-id"]),
+        ("podman", 0, ["--cap-add=SYS_ADMIN"]),
+        ("podman", None, ["--userns=keep-id"]),
+    ],
+)
+def test_the_caller_grades_and_the_sandbox_may_mount_its_own_proc(
+    name: str, user: int | None, who: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if user is None:
+        monkeypatch.delattr(container.os, "getuid")
+    else:
+        monkeypatch.setattr(container.os, "getuid", lambda: user)
+        monkeypatch.setattr(container.os, "getgid", lambda: 100)
+    words = container.command(name, "rds-grader:1", tmp_path, tmp_path, tmp_path / "out", [])
+    assert [word for word in words if word.startswith(("--user", "--cap-add"))] == who
+    assert {"docker": "systempaths=unconfined", "podman": "unmask=ALL"}[name] in words
+
+
+def test_a_container_that_refuses_the_sandbox_is_told_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "unmask=ALL" in _remedy("bwrap: Can't mount proc on /newroot/proc: Operation not permitted")
+    monkeypatch.setattr("os.geteuid", lambda: 0)
+    assert "--cap-add=SYS_ADMIN" in _remedy("rds sandbox: [Errno 1] unshare: Operation not permitted")
+    monkeypatch.setattr("os.geteuid", lambda: 1000)
+    assert "SYS_ADMIN" not in _remedy("bwrap: No permissions to create a new namespace")
 
 
 def test_the_image_is_made_of_this_copy_and_what_grading_requires(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -11,10 +12,17 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
+from rds.grading.batch.run import run_batch
 from rds.grading.grade import Grade, Status
+from rds.grading.review.applied import of_review
+from rds.grading.review.listed import log, waiting
+from rds.grading.sandbox import available
 from rds.panels.grading.state import GradingState, _said, progress, rows
 from rds.panels.session import Session
-from tests.grading.grades import batch_in, grade
+from tests.grading.batches import law, put
+from tests.grading.grades import grade
+from tests.grading.made import HEAD, RMS, SINE, assignment_in
+from tests.grading.test_review import made
 
 
 def test_progress_is_what_the_journal_has(tmp_path: Path) -> None:
@@ -118,16 +126,84 @@ def test_a_check_of_an_assignment_is_stopped(slow_grading: Path, tmp_path: Path)
     assert task.wait(20) and task.stopped
 
 
-def test_words_of_a_grader_are_kept_with_their_name(tmp_path: Path) -> None:
+@pytest.fixture
+def reviewed(tmp_path: Path) -> GradingState:
+    """A session beside a graded batch in `out`, with its assignment in `task`."""
+    made(tmp_path, grade("ada", score=20.0), grade("ben"), words="student,section\nada,A\nben,B\n")
     state = GradingState(Session(tmp_path))
-    batch_in(tmp_path / "out", [grade("ada")])
-    state.choices.set("out", "out")
-    with pytest.raises(InputError, match="name the student"):
-        state.review()
-    for name, value in {"student": "ada", "by": "ann"}.items():
+    for name, value in {"assignment": "task", "out": "out"}.items():
         state.choices.set(name, value)
-    with pytest.raises(InputError, match="points of a criterion, or a comment"):
-        state.review()
-    state.choices.set("comment", "See me, please.")
-    with pytest.raises(InputError, match="cannot be read any more"):  # this batch has no assignment to make pages by
-        state.review()
+    return state
+
+
+def say(state: GradingState, **said: Any) -> str:
+    for name, value in said.items():
+        state.choices.set(name, value)
+    return state.review()
+
+
+def test_what_an_entry_lacks_is_said(reviewed: GradingState) -> None:
+    for said, fault in (
+        ({"student": "ada", "points": "3"}, "name yourself"),
+        ({"by": "ann", "student": ""}, "name the student, or the section"),
+        ({"student": "ada", "section": "A"}, "name the student, or the section"),
+        ({"section": "", "points": ""}, "give Points"),
+        ({"kind": "extend"}, "give Days"),
+        ({"kind": "undo"}, "give Entry"),
+        ({"kind": "comment"}, "write a comment"),
+    ):
+        with pytest.raises(InputError, match=fault):
+            say(reviewed, **said)
+    assert not reviewed.finished().review.entries
+
+
+def test_each_kind_of_entry_is_kept_and_changes_the_grade(reviewed: GradingState) -> None:
+    def of(student: str) -> Grade:
+        return next(each for each in reviewed.finished().grades if each.student == student)
+
+    before = of("ada").criteria[0].score
+    name = of("ada").criteria[0].name
+    said = say(reviewed, by="ann", student="ada", criterion=name, points=before + 1.0, comment="The plot explains it.")
+    assert "entry 1 is kept: points of ada" in said and of("ada").criteria[0].score == before + 1.0
+    say(reviewed, by="bob", points=before)
+    assert [row[2] for row in waiting(reviewed.finished())] == ["graders differ"]
+    say(reviewed, by="cy", points=before, final=True)
+    assert not waiting(reviewed.finished())
+    # what another kind does not use stays in its field, and counts for nothing
+    say(reviewed, kind="excuse", why="ill")
+    assert of("ada").status is Status.EXCUSED
+    assert "entry 4" in say(reviewed, kind="undo", entry="4") and of("ada").status is Status.OK
+    say(reviewed, kind="extend", student="", section="B", days="2")
+    assert of_review(of("ben"))["extension_days"] == 2.0 and not of_review(of("ada"))["extension_days"]
+    trail = log(reviewed.finished())
+    assert [row[3] for row in trail] == ["points", "points", "points", "excuse (undone)", "undo", "extend"]
+    assert [row[2] for row in trail[:3]] == ["ann", "bob", "cy"] and trail[3][5] == ""
+
+
+def test_the_best_attempt_is_a_batch_of_its_own(reviewed: GradingState, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="folders of the other attempts"):
+        reviewed.best()
+    shutil.copytree(tmp_path / "out", tmp_path / "first")
+    reviewed.choices.set("attempts", "first, ")
+    with pytest.raises(InputError, match="name the new folder"):
+        reviewed.best()
+    reviewed.choices.set("new", "best")
+    task = reviewed.best()
+    assert task.wait(60) and task.error is None and "the best of 2 attempts" in str(task.result)
+    reviewed.choices.set("out", "best")
+    assert [each.student for each in reviewed.finished().grades] == ["ada", "ben"]
+
+
+@pytest.mark.skipif(available() is not None, reason=str(available()))
+def test_a_batch_is_graded_again_by_a_mended_assignment(tmp_path: Path) -> None:
+    assignment_in(tmp_path / "task", HEAD + SINE + RMS)
+    put(tmp_path / "in", {"ada.py": law(8.0)})
+    run_batch(tmp_path / "task", tmp_path / "in", tmp_path / "out", jobs=1)
+    assignment_in(tmp_path / "task", HEAD + SINE + RMS.replace("none = 0.5", "none = 5.0"))
+    state = GradingState(Session(tmp_path))
+    for name, value in {"assignment": "task", "out": "out", "new": "again", "jobs": 1}.items():
+        state.choices.set(name, value)
+    task = state.regrade()
+    assert task.wait(120) and task.error is None and task.result == 1
+    ((change,), left) = state.regraded()
+    assert change.student == "ada" and change.now > change.before and left == 0 and "bands are others" in change.why[0]

@@ -1,13 +1,18 @@
 """`rds grade run` in a container, by Docker or Podman: the image is built when it is first needed.
 
-The container is the grader; the sandbox in it is the same as on Linux, and needs user namespaces, which the container's
-usual filter of system calls refuses. So that filter is switched off for the grader, which is trusted; submissions have
-the sandbox's own, which is narrower. The assignment and the submissions are mounted for reading only.
+The container is the grader; the sandbox in it is the same as on Linux. It needs user namespaces, which the container's
+usual filter of system calls refuses, and a /proc of its own, which the kernel refuses while the container's has masks.
+So both are switched off for the grader, which is trusted; submissions have the sandbox's own filter, which is narrower,
+and see no process but theirs. The assignment and the submissions are mounted for reading only.
+
+The grader is whoever calls, so that the grades are theirs to read. A grader who is root gives submissions another user,
+for which a container needs CAP_SYS_ADMIN.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import shutil
 import subprocess
@@ -22,6 +27,7 @@ from rds.core.private_files import make_folder
 PROGRAMS = ("docker", "podman")
 _PACKAGE = Path(__file__).resolve().parents[2]
 _OPENED = ("--security-opt", "seccomp=unconfined", "--security-opt", "apparmor=unconfined")
+_WHOLE_PROC = {"docker": ("--security-opt", "systempaths=unconfined"), "podman": ("--security-opt", "unmask=ALL")}
 _KEPT = re.compile(r"extra == ['\"](grading|analysis|tables)['\"]")
 
 
@@ -77,8 +83,19 @@ def command(
         places[place] = path, "ro"
         words += [option, place]
     volumes = [f"--volume={path.resolve()}:{place}:{mode}" for place, (path, mode) in places.items()]
-    own = ["--userns=keep-id", "--security-opt", "label=disable"] if name == "podman" else []
-    return [name, "run", "--rm", "--init", "--network=none", *_OPENED, *own, *volumes, image, *words]
+    opened = [*_OPENED, *_WHOLE_PROC[name], *_caller(name)]
+    return [name, "run", "--rm", "--init", "--network=none", *opened, *volumes, image, *words]
+
+
+def _caller(name: str) -> list[str]:
+    """Who grades in the container: the caller. Windows tells no user's number, so that root grades in its Docker."""
+    user = os.getuid() if hasattr(os, "getuid") else None
+    label = ["--security-opt", "label=disable"] if name == "podman" else []
+    if user == 0 or (user is None and name == "docker"):
+        return ["--cap-add=SYS_ADMIN", *label]
+    if name == "podman":
+        return ["--userns=keep-id", *label]
+    return [f"--user={user}:{os.getgid()}", "--env=HOME=/tmp"]
 
 
 def build(name: str) -> str:

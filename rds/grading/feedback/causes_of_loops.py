@@ -53,8 +53,13 @@ def cause(run: CaseRun, criterion: Criterion, score: CriterionScore) -> Cause:
     curves.append(_curve(f"with {best.partition(',')[0]}", changes[best], GREEN, 1.3, "6 3"))
     names = (("gain margin", "dB"), ("phase margin", "°"), ("distance from -1", ""))
     title, unit = names[place]
-    said = f"{near}. With {best}, the {title} would be {after[best][place]:.3g} {unit}".rstrip()
-    return Cause(f"{said} instead of {before[place]:.3g} {unit}".rstrip() + ", all else as it is.", (_panel(curves),))
+    now, then = (_margin(each[place], unit) for each in (before, after[best]))
+    said = f"{near}. With {best}, the {title} would be {then} instead of {now}, all else as it is."
+    return Cause(said, (_panel(curves),))
+
+
+def _margin(value: float, unit: str) -> str:
+    return f"{value:.3g} {unit}".rstrip() if np.isfinite(value) else "unlimited"
 
 
 def _size(value: float) -> float:

@@ -21,7 +21,7 @@ from rds.grading.batch.journal import Journal, read_journal
 
 FILE = "review.jsonl"
 _LONGEST = 4000  # characters of a comment
-_MOST_DAYS = 366.0
+MOST_DAYS = 366.0
 
 
 class Kind(StrEnum):
@@ -110,8 +110,8 @@ def _check(entry: Entry, before: Sequence[Entry]) -> None:
             raise InputError(f"the {key} has {len(text)} characters; {_LONGEST} is the most")
     if entry.value is not None and not isfinite(entry.value):
         raise InputError(f"{entry.value!r} is no number; give a finite one")
-    if entry.kind is Kind.EXTEND and not 0.0 < (entry.value or 0.0) <= _MOST_DAYS:
-        raise InputError(f"an extension of {entry.value:g} days must be above 0 and at most {_MOST_DAYS:g}")
+    if entry.kind is Kind.EXTEND and not 0.0 < (entry.value or 0.0) <= MOST_DAYS:
+        raise InputError(f"an extension of {entry.value:g} days must be above 0 and at most {MOST_DAYS:g}")
     if entry.kind is Kind.UNDO:
         known = {each.number: each for each in before}
         found = known.get(int(entry.value or 0))

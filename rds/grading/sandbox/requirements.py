@@ -21,6 +21,14 @@ _NAMESPACES = (
     "unprivileged user namespaces may be switched off: `sysctl user.max_user_namespaces` must not be 0, on Ubuntu "
     "`sudo sysctl -w kernel.apparmor_restrict_unprivileged_userns=0`; a container must be allowed to make them"
 )
+_MASKED = (
+    "parts of this container's /proc are masked, and then the kernel lets nobody mount one of their own: start it with "
+    "`--security-opt systempaths=unconfined` (Docker) or `--security-opt unmask=ALL` (Podman)"
+)
+_ROOT = (
+    "root gives submissions another user, for which a container needs `--cap-add=SYS_ADMIN`; or grade as another user, "
+    "as in `--user 1000`"
+)
 
 
 @lru_cache
@@ -87,6 +95,10 @@ def _remedy(said: str) -> str:
             "numpy and what it needs must be installed with pip or conda beside RDS, so that their files are known; "
             "try another environment, as in `python -m venv`"
         )
+    if "mount proc" in said:
+        return _MASKED
+    if "unshare" in said and os.geteuid() == 0:
+        return f"{_NAMESPACES}; {_ROOT}"
     return _NAMESPACES
 
 

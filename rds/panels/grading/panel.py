@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from html import escape
-from typing import Any
+from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 import ipywidgets as widgets
 
+from rds.grading.review.entries import Kind
+from rds.panels.grading.review import USES
 from rds.panels.grading.state import GradingState, rows
 from rds.panels.kit.button import attempt, button, follow, runs, watch
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
+
+if TYPE_CHECKING:
+    from rds.grading.batch.finished import Finished
 
 NAME = "grading"
 TITLE = "Grading"
@@ -49,16 +55,24 @@ class GradingView:
         self._run = runs(button("Grade", tip, self.grade, say, primary=True))
         check = button("Check assignment", "Its solution gets full marks, an empty one none", self.check, say)
         export = button("Export", "Write the gradebook into the folder of the grades", self.export, say)
-        words = button("Keep", "Points by hand, or a comment: an entry of the audit trail", self.review, say)
+        words = button("Keep", "An entry of the audit trail; grades, pages and gradebooks follow", self.review, say)
+        tip = "Of this batch and other attempts each student's best grade, into the new folder"
+        best = button("Best of attempts", tip, self.best, say)
+        tip = "What this batch kept, by the assignment as it is now, into the new folder; lists who changes and why"
+        again = button("Grade again", tip, self.regrade, say)
+        kind, by = self._fields("kind", "by")
+        self._words = {name: self._fields(name)[0] for name in dict.fromkeys(chain(*USES.values()))}
         batch = self._fields("assignment", "submissions", "out", "jobs", "scheduler")
         side = [
             group("Batch", *batch, row(check, self._run)),
-            group("Review", *self._fields("student", "criterion", "points", "comment", "by"), row(words)),
+            group("Review", kind, *self._words.values(), by, row(words)),
+            group("Attempts, and a mended assignment", *self._fields("attempts", "new"), row(best, again)),
             group("Export", *self._fields("to", "gradebook"), row(export)),
         ]
         self.widget = columns(side, [self.bar, self.notice, self._said, self.table])
-        self.state.choices.watch(lambda name: self._name_button())
+        self.state.choices.watch(self._changed)
         self._name_button()
+        self._show_words()
         if self.state.started():
             attempt("the class as it stands", self.show, self.notice)
         if (task := self.state.going_on()) is not None:
@@ -90,7 +104,8 @@ class GradingView:
         page = finished.folder / "index.html"
         about = f"<h3>{escape(finished.title)}: {len(finished.grades)} graded, {left} left</h3>"
         links = f"<p>feedback pages: {escape(str(finished.folder / 'students'))}; the class: {escape(str(page))}</p>"
-        self.table.value = about + html.table(["student", "status", "score", "why"], rows(finished.grades)) + links
+        grades = html.table(["student", "status", "score", "why"], rows(finished.grades))
+        self.table.value = about + grades + links + _said_of(finished)
         self._name_button()
         return left
 
@@ -99,6 +114,31 @@ class GradingView:
         said = self.state.review()
         self.show()
         self.notice.say(said, "good")
+
+    def best(self) -> None:
+        """Make a batch of each student's best grade, and show it."""
+        follow(self.bar, self.notice, self.state.best, self._made)
+
+    def regrade(self) -> None:
+        """Grade again by a mended assignment, and show who changes."""
+        follow(self.bar, self.notice, self.state.regrade, lambda count: self._regraded())
+
+    def _made(self, said: str) -> None:
+        self.state.choices.set("out", self.state.choices["new"])
+        self.show()
+        self.notice.say(said, "good")
+
+    def _regraded(self) -> None:
+        from rds.results import html
+
+        changes, left = self.state.regraded()
+        if left:
+            self.notice.say(f"{left} are left: Grade again grades them", "warning")
+            return
+        told = [[each.student, f"{each.before:g}", f"{each.now:g}", "; ".join(each.why)] for each in changes]
+        self._made(f"{len(changes)} students change; the grades are those of the new folder now")
+        if told:
+            self.table.value = html.table(["student", "before", "now", "why"], told, "Changes") + self.table.value
 
     def export(self) -> None:
         """Write the chosen gradebook."""
@@ -111,8 +151,28 @@ class GradingView:
     def _show_said(self, text: str) -> None:
         self._said.value = f"<pre>{escape(text)}</pre>"
 
+    def _changed(self, name: str) -> None:
+        self._name_button()
+        if name == "kind":
+            self._show_words()
+
+    def _show_words(self) -> None:
+        """The fields that what is to be said has."""
+        uses = USES[Kind(self.state.choices["kind"])]
+        for name, view in self._words.items():
+            view.layout.display = "" if name in uses else "none"
+
     def _name_button(self) -> None:
         self._run.description = "Go on" if self.state.started() else "Grade"
 
     def _fields(self, *names: str) -> list[FieldView]:
         return [FieldView(self.state.choices, name) for name in names]
+
+
+def _said_of(finished: Finished) -> str:
+    """What waits for a grader, and what was said, as tables; empty where there is neither."""
+    from rds.grading.review.listed import LOG, WAITING, log, waiting
+    from rds.results import html
+
+    tables = (("Waits for a grader", WAITING, waiting(finished)), ("Audit trail", LOG, log(finished)))
+    return "".join(html.table(columns, found, title) for title, columns, found in tables if found)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from rds.core.errors import InputError
 from rds.core.private_files import open_descriptor, open_private
 from rds.grading.exports import GRADEBOOKS
+from rds.panels.grading.review import entry_of, review_fields
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Number, Text, labels
 from rds.panels.session.session import Session
@@ -31,6 +32,7 @@ except ImportError:  # Windows: a batch that goes on is not found again
 if TYPE_CHECKING:
     from rds.grading.batch.finished import Finished
     from rds.grading.exports.export import Written
+    from rds.grading.review.regrade import Change
 
 LOCK = ".grading.lock"  # in the session's folder: locked while a batch goes on, with its process and folder in it
 LOG = ".grading.log"  # what that batch says on stderr
@@ -70,7 +72,7 @@ class GradingState:
         words = [
             *("run", str(self._path("assignment", "the assignment's folder"))),
             *(str(self._path("submissions", "the folder of submissions")), "-o", str(self.out), "--json"),
-            *([] if self.choices["jobs"] is None else ["--jobs", str(self.choices["jobs"])]),
+            *self._jobs(),
             *(["--scheduler", self.choices["scheduler"]] if self.choices["scheduler"] else []),
             *(["--resume"] if self.started() else []),
         ]
@@ -92,21 +94,53 @@ class GradingState:
         return read_finished(self.out)
 
     def review(self) -> str:
-        """Add what a grader says of one student, and write all out again; what was said, in a sentence."""
-        from rds.grading.review.entries import Entry, Kind
+        """Add what a grader says, and write all out again; what was kept, in a sentence."""
         from rds.grading.review.say import say
 
-        said = {name: str(self.choices[name] or "") for name in ("student", "criterion", "comment", "by")}
-        points = self.choices["points"]
-        if not said["student"] or not said["by"]:
-            raise InputError("name the student, and yourself")
-        if points is None and not said["comment"]:
-            raise InputError("give points of a criterion, or a comment")
-        kind = Kind.COMMENT if points is None else Kind.POINTS
-        words = (said["student"], "", said["criterion"], points, said["comment"])
-        (entry,), finished = say(self.out, [Entry(kind, said["by"], *words)])
+        (entry,), finished = say(self.out, [entry_of(self.choices)])
         score = next((f": {g.score:g} points now" for g in finished.grades if g.student == entry.student), "")
-        return f"entry {entry.number} is kept; {entry.student}{score}"
+        return f"entry {entry.number} is kept: {entry.kind} of {entry.about or f'entry {entry.value:g}'}{score}"
+
+    def best(self) -> Task[str]:
+        """Of this batch and the other attempts each student's best grade, as a new batch: see `rds grade best`.
+
+        The answer says what was made. The attempts are in the order in which they are named, this batch the last.
+        """
+        from rds.grading.review.best import best
+
+        named = [each.strip() for each in self.choices["attempts"].split(",") if each.strip()]
+        if not named:
+            raise InputError("name the folders of the other attempts, with commas between them")
+        batches = [*(self.session.folder / each for each in named), self.out]
+        new = self._path("new", "the new folder")
+
+        def work(task: Task[str]) -> str:
+            made = best(batches, new)
+            return f"{len(made.grades)} students, the best of {len(batches)} attempts: {new}"
+
+        return self.session.work("best of several attempts", work)
+
+    def regrade(self) -> Task[int]:
+        """Grade what this batch kept by the assignment as it is now, into the new folder; see `rds grade regrade`.
+
+        The answer is how many are graded. Where it was stopped, it goes on the next time.
+        """
+        new = self._path("new", "the new folder")
+        words = [
+            *("regrade", str(self.out), str(self._path("assignment", "the assignment's folder"))),
+            *("-o", str(new), "--json", *self._jobs()),
+            *(["--resume"] if (new / "batch.json").is_file() else []),
+        ]
+        batch = _Batch(self.session.folder)
+        return self.session.work("grade again", lambda task: batch.begin(words, new, task), batch.stop)
+
+    def regraded(self) -> tuple[list[Change], int]:
+        """Who changes by the new folder, and how many are not graded in it yet."""
+        from rds.grading.batch.finished import read_finished
+        from rds.grading.review.regrade import changes_of
+
+        new = read_finished(self._path("new", "the new folder"))
+        return changes_of(self.finished(), new), len(new.not_graded)
 
     def export(self, to: str) -> Written:
         """Write a gradebook; see `rds grade export`."""
@@ -115,6 +149,9 @@ class GradingState:
 
         given = self.choices["gradebook"]
         return export(self.out, to, None, Wanted(self.session.folder / given if given else None, None, None))
+
+    def _jobs(self) -> list[str]:
+        return [] if self.choices["jobs"] is None else ["--jobs", str(self.choices["jobs"])]
 
     def _path(self, name: str, what: str) -> Path:
         if not self.choices[name]:
@@ -258,10 +295,6 @@ def _gradebooks() -> dict[str, str]:
     return labels(GRADEBOOKS.names(), own | {"moodle-feedback": "Moodle: feedback files"})
 
 
-def _any(text: str) -> None:
-    """Words, and no name of a file; what is wrong with them is told when they are kept."""
-
-
 def _fields() -> Iterable[Field]:
     yield Text("assignment", "Assignment", "its folder, with assignment.toml", "", "e.g. assignments/tracking")
     yield Text(
@@ -272,11 +305,7 @@ def _fields() -> Iterable[Field]:
     )
     yield Number("jobs", "Jobs", "processes side by side", None, low=1, high=256, whole=True, optional=True)
     yield Text("scheduler", "Scheduler", "of a dask cluster; empty: this computer", "", "e.g. tls://host:8786")
-    yield Text("student", "Student", "whom it is about: an identifier of the table", "", "", refuse=_any)
-    yield Text("criterion", "Criterion", "its name in the assignment; empty for the whole", "", "", refuse=_any)
-    yield Number("points", "Points", "of the criterion, instead of those measured", None, low=0.0, optional=True)
-    yield Text("comment", "Comment", "the student reads it", "", "", refuse=_any)
-    yield Text("by", "Your name", "who says it, in the audit trail", "", "", refuse=_any)
+    yield from review_fields()
     yield Choice("to", "Gradebook", "what grades are exported to", "nbgrader", _gradebooks())
     yield Text(
         "gradebook", "Your gradebook", "as the platform exports it; nbgrader's gradebook.db; LTI's folder", "", ""

@@ -1,0 +1,42 @@
+"""What graders see of a batch: what waits for them, and what was said so far, as rows of text for a table."""
+
+from __future__ import annotations
+
+from rds.grading.batch.finished import Finished
+from rds.grading.review.applied import of_review
+from rds.grading.review.entries import Kind
+
+WAITING = ("student", "criterion", "what", "why")
+LOG = ("entry", "time", "by", "what", "about", "criterion", "value", "words")
+
+
+def waiting(finished: Finished) -> list[list[str]]:
+    """What could not be measured, and where graders differ: rows of `WAITING`."""
+    rows = [
+        [grade.student, score.name, "could not be measured", score.sentence]
+        for grade in finished.grades
+        for score in grade.for_review
+    ]
+    return rows + [
+        [grade.student, name, "graders differ", "the mean counts; a final word (--final) settles it"]
+        for grade in finished.grades
+        for name in of_review(grade).get("differ", ())
+    ]
+
+
+def log(finished: Finished) -> list[list[str]]:
+    """The audit trail, entry by entry: rows of `LOG`."""
+    standing = {entry.number for entry in finished.review.standing}
+    return [
+        [
+            str(entry.number),
+            entry.time,
+            entry.by,
+            str(entry.kind) + ("" if entry.number in standing or entry.kind is Kind.UNDO else " (undone)"),
+            entry.about,
+            entry.criterion,
+            "" if entry.value is None else f"{entry.value:g}",
+            " / ".join(filter(None, (entry.comment, entry.why))),
+        ]
+        for entry in finished.review.entries
+    ]
