@@ -25,7 +25,7 @@ import numpy as np
 from rds.core.geometry import length
 from rds.core.quantities import Quantity
 from rds.core.types import ArcSegment, Segment
-from rds.interpolators.division import Division, Method, Turn, divide
+from rds.interpolators.division import Division, Method, Turn, divide, least_steps
 from rds.interpolators.segment import Arc, checked, samples
 
 BLU = 0.01  # mm: mrm-control, section 8.2; dcs-thesis, eq. 5.1
@@ -46,6 +46,7 @@ class Steps:
     blu: float  # mm
     count: int
     formula: float  # steps, by the step angle of the literature
+    least: int | None  # fewest steps within one BLU, whatever feed and samples; None where `steps` gives the count
     radial_error: float  # mm: of the corners, inside or outside
     chord_error: float  # mm: how far the chords reach inside the circle
     mean_chord_error: float  # mm: of the middles of the chords, + inside
@@ -66,6 +67,7 @@ class Steps:
             "blu_mm": self.blu,
             "count": self.count,
             "formula": self.formula,
+            "least": self.least,
             "radial_error_mm": self.radial_error,
             "chord_error_mm": self.chord_error,
             "mean_chord_error_mm": self.mean_chord_error,
@@ -110,6 +112,7 @@ def steps(segment: ArcSegment, params: Mapping[str, Any], method: Method, T: flo
         blu=blu,
         count=n,
         formula=abs(turn.sweep) / method.formula(turn.radius / blu),
+        least=None if params.get("steps", DEFAULTS["steps"]) else least_steps(turn, blu, method),
         radial_error=float(np.abs(corners).max()),
         chord_error=max(0.0, turn.radius - float(_nearest(walked).min())),
         mean_chord_error=-float(middles.mean()),

@@ -28,7 +28,9 @@ def _steps(done: Interpolation) -> list[tuple[str, str, str]]:
     worst = done.worst_steps
     if worst is None:
         return []
+    least = [("fewest steps within one BLU", str(worst.least), "")] if worst.least is not None else []
     return [
+        *least,
         ("steps of the arc" if len(done.segments) == 1 else "steps of the worst arc", str(worst.count), ""),
         ("steps by the formula", f"{worst.formula:.2f}", ""),
         ("radial error", f"{worst.radial_error:.6f}", "mm"),

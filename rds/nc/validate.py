@@ -32,6 +32,7 @@ TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
 LONGEST_DWELL = 3600.0  # s; chosen: more is a P in milliseconds
 MOST_FAULTS = 1000  # are kept; others are counted
 MOST_WARNINGS = 100  # are kept
+RUNAWAY = 1000  # times that a line has left the travel, each time farther out: its loop is not followed further
 _FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
 LINEAR, ROTARY = slice(0, 3), slice(3, 6)  # of the axes
 _UNITS = ("mm", "mm", "mm", "degrees", "degrees", "degrees")
@@ -139,6 +140,7 @@ class Validator:
         self._spindle = next((axis for axis in machine.axes.values() if axis.unit == "rev/min"), None)
         self._worst: dict[tuple[str, int, str], tuple[float, ProgramError, str]] = {}
         self._files: dict[str, int] = {}
+        self._leaving: dict[tuple[str, int, int], tuple[int, float]] = {}  # by line and axis: times, and how far
         self._more = self._segments = 0
         self._cutting = self._rapid = self._fastest = 0.0
         self._low, self._high = np.full(6, inf), np.full(6, -inf)
@@ -198,7 +200,7 @@ class Validator:
             self._worst[key] = (excess, fault, letters)
 
     def look(self, block: PathBlock) -> None:
-        """Check one block."""
+        """Check one block. Raises ProgramError for a loop that runs out of the travel without an end in sight."""
         self._files.setdefault(block.file, len(self._files))
         limits = self._tools.get(block.tool, ToolLimits())
         for event in block.events:
@@ -248,7 +250,23 @@ class Validator:
                 down = bool(worse_below[at] and (below[at] > above[at] or not worse_above[at]))
                 value = low[at, axis] if down else high[at, axis]
                 message = self._travel_message(axis, float(value), bool(block.segments["plane"][at] >= 0))
-                self._fault(block, lines[at], message, name, float(max(below[at], above[at])), letters)
+                excess = float(max(below[at], above[at]))
+                self._fault(block, lines[at], message, name, excess, letters)
+                self._stop_a_runaway(block, int(lines[at]), axis, excess)
+
+    def _stop_a_runaway(self, block: PathBlock, line: int, axis: int, excess: float) -> None:
+        """Raises ProgramError for a line of a loop that has left the travel again and again, ever farther out."""
+        key = (block.file, line, axis)
+        times, before = self._leaving.get(key, (0, 0.0))
+        times = times + 1 if excess > before else 1
+        self._leaving[key] = times, excess
+        if times >= RUNAWAY:
+            name = AXES[axis]
+            message = (
+                f"this line has left the travel of {name} {times} times, each time farther out, and is not followed "
+                "any more; end its loop before"
+            )
+            raise ProgramError(message, file=block.file or self._name, line=line)
 
     def _travel_message(self, axis: int, value: float, arc: bool) -> str:
         name, unit = AXES[axis], _UNITS[axis]

@@ -244,3 +244,17 @@ def test_the_commands_of_the_document(tmp_path: Path, monkeypatch: pytest.Monkey
         exec(compile(code, "docs/interpolation.md", "exec"), names)
     assert Path("path.csv").is_file()
     assert names["result"].metrics["X"]["max_abs_error"] < 0.05  # mm
+
+
+@pytest.mark.parametrize(("method", "least"), [("euler", 12337), ("improved-euler", 3929), ("improved-tustin", 40)])
+def test_the_fewest_steps_are_those_of_the_document_at_any_feed(method: str, least: int) -> None:
+    assert f"| {method} | " in (document := (ROOT / "docs/interpolation.md").read_text(encoding="utf-8"))
+    assert re.search(rf"^\| {method} \|.*\| {least} \|", document, re.MULTILINE)
+    for feed in (600, 1000):
+        said = numbers(f"--arc 100,0:0,100:0,0 --feed {feed} -m {method}")["steps"]
+        assert said["least"] == least <= said["count"]
+        if method == "euler":
+            assert f"{said['count']}, {'one' if feed == 600 else 'two'}" in document
+    assert (
+        numbers(f"--arc 100,0:0,100:0,0 --feed 600 -m {method} --option steps={least + 100}")["steps"]["least"] is None
+    )

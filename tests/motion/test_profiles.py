@@ -169,3 +169,31 @@ def test_point_to_point_refuses_what_cannot_be() -> None:
         point_to_point((0, 0), (1,), (1, 1), (1, 1), (1, 1), T=1e-3)
     moving = point_to_point((0,), (5,), (10,), (100,), (1e4,), T=1e-3, start_velocity=[5.0])
     assert moving.velocity[0, 0] == 5.0 and moving.position[-1, 0] == 5.0
+    with pytest.raises(InputError, match=r"end_velocity = \(0.0, 1.5\) must be 2 finite numbers within \(1, 1\)"):
+        point_to_point((0, 0), (1, 1), (1, 1), (1, 1), (1, 1), T=1e-3, end_velocity=[0.0, 1.5])
+    with pytest.raises(InputError, match="start_acceleration"):
+        point_to_point((0,), (1,), (1,), (1,), (1,), T=1e-3, start_acceleration=[np.nan])
+
+
+STATES = st.tuples(st.floats(-40, 40), st.floats(-40, 40), st.floats(-300, 300), st.floats(-300, 300))
+
+
+@settings(max_examples=30, deadline=None)
+@given(way=st.tuples(st.floats(-20, 20), st.floats(-20, 20)), there=STATES)
+def test_a_move_that_ends_in_motion_hands_over_to_the_next(way: tuple[float, ...], there: tuple[float, ...]) -> None:
+    """There and to rest again: one sequence of samples, within the limits where the two moves meet as elsewhere."""
+    pytest.importorskip("ruckig")
+    T, limits = 1e-3, ((50.0, 50.0), (400.0, 400.0), (12000.0, 12000.0))
+    room = [min(40.0, 50.0 - a * a / 24000.0) for a in there[2:]]  # a velocity that the acceleration does not overrun
+    speed, push = np.clip(there[:2], -np.array(room), room).tolist(), list(there[2:])
+    first = point_to_point((0, 0), way, *limits, T, end_velocity=speed, end_acceleration=push)
+    assert first.position[-1].tolist() == list(way)
+    assert first.velocity[-1].tolist() == speed and first.acceleration[-1].tolist() == push
+    assert first.duration == pytest.approx((len(first.position) - 1) * T, abs=1e-8)
+    then = point_to_point(way, (way[0] + 30, way[1] - 30), *limits, T, start_velocity=speed, start_acceleration=push)
+    position = np.concatenate((first.position, then.position[1:]))
+    velocity = np.concatenate((first.velocity, then.velocity[1:]))
+    acceleration = np.concatenate((first.acceleration, then.acceleration[1:]))[:-1]
+    assert np.abs(np.diff(position, axis=0)[:-1]).max() <= 50.0 * T * (1 + 1e-6)
+    assert np.abs(np.diff(velocity, axis=0)[:-1]).max() <= 400.0 * T * (1 + 1e-6)
+    assert np.abs(np.diff(acceleration, axis=0)[:-1]).max() <= 12000.0 * T * (1 + 1e-6)

@@ -252,3 +252,23 @@ def test_a_long_path_is_thinned_out_to_be_drawn() -> None:
     assert np.hypot(good[:, 0], good[:, 1]) == pytest.approx(5.0)
     assert np.hypot(*np.diff(good[:, :2], axis=0).T).max() < 3 * trace.resolution
     assert trace.low[:2] == pytest.approx([-5, -5]) and trace.high[:2] == pytest.approx([5, 5])
+
+
+def _loop(rounds: int, *lines: str) -> str:
+    body = "\n".join(lines)
+    return f"G21 G90 F500\n#1=0\nG0 X70\no1 while [#1 lt {rounds}]\n#1=[#1+1]\n{body}\no1 endwhile\nG1 X1 X2\nM2\n"
+
+
+def test_a_loop_that_runs_out_of_the_travel_is_told_when_it_does(tmp_path: Path) -> None:
+    found = check(tmp_path, _loop(10**9, "G91 G1 X.01"))
+    assert [fault.line for fault in found.faults] == [6, 6, 8]  # what comes after it is read, too
+    assert found.stopped is not None
+    assert "left the travel of X 1000 times" in found.stopped.reason
+    assert "X would reach 85 mm" in found.faults[1].reason
+
+
+@pytest.mark.parametrize("lines", [["G91 G1 X.01"], ["G90 G1 X80", "G1 X70"]])
+def test_a_loop_that_ends_or_comes_back_is_followed(tmp_path: Path, lines: list[str]) -> None:
+    found = check(tmp_path, _loop(1400, *lines))
+    assert found.stopped is not None
+    assert found.stopped.line == 7 + len(lines)  # the wrong line behind it

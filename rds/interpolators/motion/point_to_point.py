@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf
 
 import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
+
+_ATTEMPTS = 100  # to end a move on a sample: some durations are none that the axes can do together
+_WHOLE = 1e-6  # of T
 
 
 @dataclass(frozen=True)
@@ -37,11 +40,15 @@ def point_to_point(
     *,
     start_velocity: Sequence[float] | None = None,
     start_acceleration: Sequence[float] | None = None,
+    end_velocity: Sequence[float] | None = None,
+    end_acceleration: Sequence[float] | None = None,
 ) -> PointToPoint:
-    """From `start` to rest at `end`, within velocity, acceleration and jerk of each axis (mm/s, mm/s², mm/s³).
+    """From `start` to `end`, within velocity, acceleration and jerk of each axis (mm/s, mm/s², mm/s³).
 
-    The last sample is at rest on the end. Raises InputError for limits that are not more than 0 or states that cannot
-    be, and where ruckig is not installed.
+    Velocities (mm/s) and accelerations (mm/s²) at both ends are those given, and 0 without. The last sample is the end.
+    A move that ends in motion takes as much longer than the least time as makes its duration a whole number of T, so
+    that the next move begins at its last sample. Raises InputError for limits that are not more than 0 or states that
+    cannot be, and where ruckig is not installed.
     """
     with needed_for("a jerk-limited move in the least time"):
         import ruckig
@@ -54,19 +61,45 @@ def point_to_point(
             raise InputError(f"{name} = {tuple(values)} must be {n} finite numbers, one for each axis of the start")
         if name != "end" and not np.all(np.asarray(values) > 0.0):
             raise InputError(f"{name} = {tuple(values)} must each be more than 0")
+    states = {
+        "start_velocity": (start_velocity, [inf] * n),  # from beyond the limits it slows down
+        "start_acceleration": (start_acceleration, [inf] * n),
+        "end_velocity": (end_velocity, velocity),
+        "end_acceleration": (end_acceleration, acceleration),
+    }
+    ends = {name: _state(name, values, most) for name, (values, most) in states.items()}
     asked = ruckig.InputParameter(n)
     asked.current_position, asked.target_position = list(map(float, start)), list(map(float, end))
-    asked.current_velocity = list(start_velocity or [0.0] * n)
-    asked.current_acceleration = list(start_acceleration or [0.0] * n)
+    asked.current_velocity, asked.current_acceleration = ends["start_velocity"], ends["start_acceleration"]
+    asked.target_velocity, asked.target_acceleration = ends["end_velocity"], ends["end_acceleration"]
     asked.max_velocity, asked.max_acceleration = list(map(float, velocity)), list(map(float, acceleration))
     asked.max_jerk = list(map(float, jerk))
     asked.synchronization = ruckig.Synchronization.Phase
     found = ruckig.Trajectory(n)
-    outcome = ruckig.Ruckig(n).calculate(asked, found)
-    if outcome not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise InputError(f"no motion from {tuple(start)} to {tuple(end)} ({outcome}): check the states at the start")
-    count = ceil(found.duration / T - 1e-9) + 1
+    moving = any(ends["end_velocity"]) or any(ends["end_acceleration"])
+    for _ in range(_ATTEMPTS):
+        outcome = ruckig.Ruckig(n).calculate(asked, found)
+        if outcome not in (ruckig.Result.Working, ruckig.Result.Finished):
+            raise InputError(
+                f"no motion from {tuple(start)} to {tuple(end)} ({outcome}): check the states at both ends"
+            )
+        count = ceil(found.duration / T - 1e-9) + 1
+        if not moving or abs(found.duration - (count - 1) * T) <= _WHOLE * T:
+            break
+        asked.minimum_duration = (count - 1) * T
+    else:
+        raise InputError(f"no motion from {tuple(start)} to {tuple(end)} in a whole number of samples; change T")
     rows = np.array([found.at_time(min(k * T, found.duration))[:3] for k in range(count)])
     position, speeds, pushes = (rows[:, i].reshape(count, n) for i in range(3))
-    position[-1], speeds[-1], pushes[-1] = end, 0.0, 0.0
+    position[-1], speeds[-1], pushes[-1] = end, ends["end_velocity"], ends["end_acceleration"]
     return PointToPoint(T, position, speeds, pushes, float(found.duration))
+
+
+def _state(name: str, values: Sequence[float] | None, most: Sequence[float]) -> list[float]:
+    """The velocities or accelerations at an end. Raises InputError for those beyond the limits."""
+    found = [0.0] * len(most) if values is None else [float(value) for value in values]
+    within = len(found) == len(most) and np.isfinite(found).all() and bool(np.all(np.abs(found) <= most))
+    if not within:
+        limits = "" if inf in most else f" within {tuple(most)}"
+        raise InputError(f"{name} = {tuple(found)} must be {len(most)} finite numbers{limits}, one for each axis")
+    return found

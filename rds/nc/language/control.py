@@ -20,6 +20,7 @@ from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 from rds.nc.language.owords import FANUC, Word, nested, read_fanuc, read_gr, read_word, spelled
 from rds.nc.language.parameters import Parameters
+from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes
 from rds.nc.language.source import Place, Source, open_file
 from rds.nc.language.words import column_of, line_number, recoded, tidy
@@ -80,6 +81,16 @@ class Control:
     def depth(self) -> int:
         """Subroutine calls inside one another."""
         return len(self._frames)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether lines have been executed again, or may be."""
+        return self._jumps > 0
+
+    def again(self, line: Line, lines: RepeatedLines) -> Word | None:
+        """The O word that a kept line is now; None where it is to be read."""
+        scope = self._frames[-1].name if self._frames else ""
+        return None if self._defining else lines.control(line, scope, self.skipping)
 
     def close(self) -> None:
         """Close the program and the files of its subroutines."""

@@ -16,16 +16,16 @@ import numpy as np
 if TYPE_CHECKING:
     from rds.nc.language.parameters import Parameters
 
-_PI = np.longdouble("3.14159265358979323846264338327950288")
+PI = np.longdouble("3.14159265358979323846264338327950288")
 EQUAL = 1e-4  # numbers that differ by less are EQ (LinuxCNC's TOLERANCE_EQUAL)
 WHOLE = 1e-4  # a number this close to a whole one is whole
 DEEPEST = 50  # brackets and # inside one another
 
-_NUMBER = re.compile(r"[+-]*[0-9.]*")
-_SPELLED = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+NUMBER = re.compile(r"[+-]*[0-9.]*")
+SPELLED = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
-_OPERATION = re.compile(r"\*\*|[-+*/\]]|and|mod|or|xor|eq|ne|ge|gt|le|lt")
-_PRECEDENCE = {
+OPERATION = re.compile(r"\*\*|[-+*/\]]|and|mod|or|xor|eq|ne|ge|gt|le|lt")
+PRECEDENCE = {
     **dict.fromkeys(("and", "or", "xor"), 2),
     **dict.fromkeys(("eq", "ne", "ge", "gt", "le", "lt"), 3),
     **dict.fromkeys("+-", 4),
@@ -101,9 +101,9 @@ class Reader:
         return found
 
     def _number(self) -> float:
-        match = _NUMBER.match(self.text, self.at)
+        match = NUMBER.match(self.text, self.at)
         spelled = match[0] if match else ""
-        if not _SPELLED.fullmatch(spelled):
+        if not SPELLED.fullmatch(spelled):
             what = f"{spelled!r} is no number" if spelled else f"a number cannot begin with {self.peek()!r}"
             raise self.fault(f"{what}; write one like -12.5")
         self.at += len(spelled)
@@ -128,10 +128,10 @@ class Reader:
         while operations[0] != "]":
             values.append(self.value())
             operations.append(self._operation())
-            while len(operations) > 1 and _PRECEDENCE[operations[-1]] <= _PRECEDENCE[operations[-2]]:
+            while len(operations) > 1 and PRECEDENCE[operations[-1]] <= PRECEDENCE[operations[-2]]:
                 right = values.pop()
                 try:
-                    values[-1] = _BINARY[operations.pop(-2)](values[-1], right)
+                    values[-1] = BINARY[operations.pop(-2)](values[-1], right)
                 except Fault as fault:
                     fault.at = start
                     raise
@@ -140,7 +140,7 @@ class Reader:
         return values[0]
 
     def _operation(self) -> str:
-        match = _OPERATION.match(self.text, self.at)
+        match = OPERATION.match(self.text, self.at)
         if match is None:
             if not self.peek():
                 raise self.fault("the expression is not closed; add ]")
@@ -163,9 +163,9 @@ class Reader:
         argument = self.expression()
         try:
             if name != "atan":
-                return _UNARY[name](argument)
+                return UNARY[name](argument)
             self.expect("/", "ATAN needs two arguments; write ATAN[y]/[x]")
-            return float(np.longdouble(math.atan2(argument, self.expression()) * 180.0) / _PI)
+            return float(np.longdouble(math.atan2(argument, self.expression()) * 180.0) / PI)
         except Fault as fault:
             if fault.at < 0:
                 fault.at = at
@@ -244,7 +244,7 @@ def _truth(test: Callable[[float, float], bool]) -> Callable[[float, float], flo
     return lambda left, right: float(test(left, right))
 
 
-_BINARY: dict[str, Callable[[float, float], float]] = {
+BINARY: dict[str, Callable[[float, float], float]] = {
     "**": _power,
     "*": lambda left, right: left * right,
     "/": _divide,
@@ -264,14 +264,14 @@ _BINARY: dict[str, Callable[[float, float], float]] = {
 
 
 def _circular(function: Callable) -> Callable[[float], float]:
-    return lambda degrees: float(function(np.longdouble(degrees) * _PI / 180))
+    return lambda degrees: float(function(np.longdouble(degrees) * PI / 180))
 
 
 def _arc(function: Callable[[float], float]) -> Callable[[float], float]:
     def angle(argument: float) -> float:
         if not -1.0 <= argument <= 1.0:
             raise Fault(f"a number from -1 to 1 is asked for, and got {argument:g}; check the expression")
-        return float(np.longdouble(function(argument) * 180.0) / _PI)
+        return float(np.longdouble(function(argument) * 180.0) / PI)
 
     return angle
 
@@ -295,7 +295,7 @@ def _root(argument: float) -> float:
     return math.sqrt(argument)
 
 
-_UNARY: dict[str, Callable[[float], float]] = {
+UNARY: dict[str, Callable[[float], float]] = {
     "abs": lambda argument: -argument if argument < 0.0 else argument,
     "acos": _arc(math.acos),
     "asin": _arc(math.asin),

@@ -22,6 +22,7 @@ from rds.nc.language.moves import move
 from rds.nc.language.names import known_names
 from rds.nc.language.offsets import start
 from rds.nc.language.parameters import Parameters, read_parameters
+from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes, lines_to_restore, modes_now
 from rds.nc.language.source import LONGEST, open_source
 from rds.nc.language.state import State
@@ -94,6 +95,8 @@ class Interpreter:
         self.context.saved_modes = self._saved_modes
         self.control.restore = self._restore
         self.lane = FastLane(self.context, self.source)
+        self._repeated = RepeatedLines(self.context.parameters)
+        self._others = 0  # kept lines that the fast lane could not take, since it was tried
         self._remark = remark
         self._percent = False
         self._first = True  # no block has been executed
@@ -118,7 +121,9 @@ class Interpreter:
             while not ended:
                 wait -= 1
                 if wait < 0:
-                    wait = self.lane.take(self.control)
+                    wait, self._others = self._others, 0
+                    if not wait:
+                        wait = self.lane.take(self.control)
                 raw = self.control.source.read()
                 if raw:
                     ended = self._line(raw)
@@ -208,17 +213,23 @@ class Interpreter:
         self._text = ""
         self._places = {}
         try:
-            if len(raw) > LONGEST + 1:
-                raise Fault(f"the line is longer than {LONGEST} characters; break it")
             if source.name != out.file:
                 out.file = source.name
+            kept = self._repeated.find(raw) if self.control.repeats else None
+            if kept is not None and (ended := self._again(kept)) is not None:
+                return ended
+            if len(raw) > LONGEST + 1:
+                raise Fault(f"the line is longer than {LONGEST} characters; break it")
             self._text = text = tidy(raw)
             out.line = source.line
             if self.options.program_numbers:
                 text = text.rstrip(";")
             if not text or (text[0] == "/" and self.options.block_delete):
                 return False
-            return self._block(text)
+            ended = self._block(text)
+            if self.control.repeats and not self.control.skipping and not self.options.program_numbers:
+                self._repeated.count(raw, text)
+            return ended
         except Fault as fault:
             scripts = Fault(_NO_SCRIPT if self.options.ncc else _SCRIPT_IS_OFF, at=0)
             raise self._error(scripts if _SCRIPT.match(self._text) else fault, raw) from None
@@ -227,6 +238,22 @@ class Interpreter:
                 raise
             word = _MOTION_WORD.match(self._text)  # compensation knows moves, not words
             raise self._error(Fault(error.reason, at=word.start(1) if word else -1), raw) from None
+
+    def _again(self, line: Line) -> bool | None:
+        """Execute a kept line. True when the program ends by it; None where it is to be read."""
+        out, control = self.out, self.control
+        self._text, self._places = line.text, line.places
+        out.line, out.digits, out.n = control.source.line, line.digits, line.n
+        self._others += not line.plain
+        if line.word is not None:
+            word = control.again(line, self._repeated)
+            if word is not None:
+                control.execute(word)
+            return None if word is None else False
+        if control.skipping:
+            return False
+        block = self._repeated.block(line)
+        return None if block is None else self._execute(block)
 
     def _block(self, text: str) -> bool:
         if self.options.program_numbers and not self.control.skipping and self._program_number(text):

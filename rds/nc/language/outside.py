@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-_ROUGHING = "{} a lathe from a contour's subroutine; write its cuts as G0 and G1, or let the CAM program write them"
+_ROUGHING = "{} a lathe from a contour's subroutine; write its cuts as G0 and G1 in a loop, or let the CAM program"
 _G = {
     110: "G11 ends programmable data input of other controls; leave it away, G10 needs no end here",
     120: "G12 mills a circular pocket clockwise on other controls; write the circle as G2 with I and J",

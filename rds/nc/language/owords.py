@@ -12,10 +12,10 @@ _KINDS = (
     *("sub", "endsub", "call", "do", "while", "repeat", "if", "elseif", "else", "endif"),
     *("break", "continue", "endwhile", "endrepeat", "return"),
 )
-_KIND = re.compile("|".join(sorted(_KINDS, key=len, reverse=True)))
-_GLOBAL = frozenset(("sub", "endsub", "call", "return", "program"))
+KIND = re.compile("|".join(sorted(_KINDS, key=len, reverse=True)))
+GLOBAL = frozenset(("sub", "endsub", "call", "return", "program"))
 FANUC = re.compile(r"m0*9([89])(?![0-9.\[#])")  # M98 calls a program by its number, M99 ends it
-_TESTS = frozenset(("while", "repeat", "if", "elseif"))
+TESTS = frozenset(("while", "repeat", "if", "elseif"))
 
 
 @dataclass(slots=True)
@@ -47,12 +47,12 @@ def read_word(text: str, at: int, parameters: Parameters, *, scope: str, definin
         if skipping:
             return Word(at=at)  # worked out from parameters that have no value yet
         raise
-    match = _KIND.match(text, reader.at)
+    match = KIND.match(text, reader.at)
     word = Word(match[0] if match else "", at=at)
     if not match and reader.peek() in ("", "(", ";") and not defining:
         word.kind = "program"  # O1000 alone, as Fanuc's programs begin
     word.spelled = spelled(label)
-    word.name = label if word.kind in _GLOBAL else f"{scope}#{label}"
+    word.name = label if word.kind in GLOBAL else f"{scope}#{label}"
     if match:
         reader.at = match.end()
     elif not defining and not word.kind:
@@ -84,7 +84,7 @@ def _read_values(word: Word, reader: Reader, defining: str, skipping: str) -> No
         word.kind = ""  # passed over now
     elif word.kind == "call":
         _read_arguments(word, reader)
-    elif word.kind in _TESTS and skipping in ("", word.name):
+    elif word.kind in TESTS and skipping in ("", word.name):
         if reader.peek() != "[":
             raise reader.fault(f"{word.kind.upper()} needs an expression in brackets; add [...]")
         word.test = reader.expression()

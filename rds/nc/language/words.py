@@ -17,7 +17,7 @@ _NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
 _PLAIN = re.compile(rf"/?(?:n([0-9]+)(?:\.[0-9]+)?)?((?:[a-mp-z@^]{_NUMBER})*)")
 _WORD = re.compile(rf"([a-z@^])({_NUMBER})")
 _LINE_NUMBER = re.compile(r"/?(?:n([0-9]*)(\.?)([0-9]*))?")
-_OTHERS = frozenset("abcdefhijklpqrstxyz@^")
+OTHERS = frozenset("abcdefhijklpqrstxyz@^")
 _DIGITS_MOST = 9
 _ANYTHING = re.compile(
     rf"gr[0-9]*|(?:{FUNCTION.pattern})(?=\[)|[a-z@^]?{_NUMBER}|#(?:<[^>]*>|[0-9]+)|[\x80-\xff]+|.",
@@ -96,7 +96,7 @@ def fill(block: Block, words: list[tuple[str, str]], text: str) -> None:
                 found[letter] = float(digits)
             elif letter == "m":
                 block.add_m(float(digits))
-            elif letter in _OTHERS:
+            elif letter in OTHERS:
                 block.add(letter, float(digits))
             else:
                 raise Fault(no_such_letter(letter))
@@ -124,7 +124,7 @@ def read_words(text: str, at: int, block: Block, parameters: Parameters) -> dict
             break
         elif letter == "#":
             _read_setting(reader, parameters)
-        elif letter in _OTHERS or letter in "gm":
+        elif letter in OTHERS or letter in "gm":
             if letter == "g" and reader.peek() == "r":
                 raise Fault(GR_IS_OFF, at=start)
             value = reader.value()

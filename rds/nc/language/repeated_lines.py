@@ -1,0 +1,201 @@
+"""Lines of loops and recursion: taken apart once, and executed from then on by the code made of them.
+
+A line is kept by its text once it has been executed some times. What a kept line does is what the reader would do; a
+line that it would fault, or that has anything rare, is left to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rds.nc.language.blocks import Block
+from rds.nc.language.compiled_values import FAULTS, Compiler, Refused, names_of
+from rds.nc.language.owords import FANUC, GLOBAL, KIND, TESTS, Word, spelled
+from rds.nc.language.parameters import ARGUMENTS, Parameters
+from rds.nc.language.words import OTHERS, line_number, read_plain
+
+_OFTEN = 3  # executions after which a line is worth being taken apart
+_MOST = 20_000  # lines kept at once
+_WHOLE = frozenset("hlt")  # words that are whole
+_KINDS = TESTS | frozenset(
+    ("sub", "call", "endsub", "return", "do", "endwhile", "endrepeat", "break", "continue", "else", "endif")
+)
+
+
+class Line:
+    """A kept line: its text as tidy() gives it, and the digits, number and end of its word N."""
+
+    __slots__ = ("code", "comment", "digits", "g", "m", "n", "places", "plain", "text", "word")
+
+    def __init__(self, text: str):
+        self.text = text
+        self.digits = self.n = 0
+        self.g: dict[int, int] = {}
+        self.m: dict[int, int] = {}
+        self.comment = ""
+        self.places: dict[str, int] = {}
+        self.plain = read_plain(text) is not None  # a line that the fast lane may take
+        self.word: Word | None = None  # the O word that the line is
+        self.code: Callable[..., Any] | None = None
+
+
+class RepeatedLines:
+    """The kept lines of one run of a program, by their bytes."""
+
+    def __init__(self, parameters: Parameters):
+        self._parameters = parameters
+        self._names: dict[str, Any] = {}
+        self._lines: dict[bytes, Line | int | None] = {}
+
+    def find(self, raw: bytes) -> Line | None:
+        """The line, if it is kept."""
+        found = self._lines.get(raw, 0)
+        return found if isinstance(found, Line) else None
+
+    def count(self, raw: bytes, text: str) -> None:
+        """The line has been executed by the reader, without a fault."""
+        found = self._lines.get(raw, 0)
+        if not isinstance(found, int):
+            return
+        if len(self._lines) >= _MOST:
+            self._lines.clear()
+        self._lines[raw] = found + 1 if found < _OFTEN else self._take_apart(text)
+
+    def block(self, line: Line) -> Block | None:
+        """The block that a line with words is now, its settings noted; None where the reader says what is wrong."""
+        block, parameters = Block(), self._parameters
+        try:
+            assert line.code is not None
+            words, settings = line.code(parameters.numbers, parameters.locals[-1], parameters.globals)
+        except FAULTS:
+            return None
+        block.words, block.comment = words, line.comment
+        if line.g:
+            block.g = line.g.copy()
+        if line.m:
+            block.m = line.m.copy()
+        for name, value in settings:
+            parameters.set_later(name, value)
+        return block
+
+    def control(self, line: Line, scope: str, skipping: str) -> Word | None:
+        """The O word that a line is now; None where the reader is to say what is wrong."""
+        kept, parameters = line.word, self._parameters
+        assert kept is not None
+        name = kept.name if kept.kind in GLOBAL else f"{scope}#{kept.name}"
+        word = Word(kept.kind, name, kept.spelled, kept.at)
+        if skipping and kept.kind == "call":
+            word.kind = ""
+        elif line.code is not None and skipping in ("", name):
+            try:
+                values = line.code(parameters.numbers, parameters.locals[-1], parameters.globals)
+            except FAULTS:
+                return None
+            if kept.kind == "call":
+                word.arguments = values
+            else:
+                word.test = values[0]
+        return word
+
+    # -- taking apart -------------------------------------------------------------------------------------------------
+
+    def _take_apart(self, text: str) -> Line | None:
+        """None for a line that is left to the reader."""
+        line = Line(text)
+        try:
+            line.digits, line.n, at = line_number(text)
+            if text[:1] in ("/", "%") or text.startswith("gr", at) or FANUC.match(text, at):
+                return None
+            take = self._control_code if text.startswith("o", at) else self._words_code
+            source = take(line, at)
+            line.code = self._compiled(source) if source else None
+        except (Refused, *FAULTS, SyntaxError, RecursionError, MemoryError):
+            return None
+        return line
+
+    def _compiled(self, source: str) -> Callable[..., Any]:
+        """The function `line` of the code. Its values are numbers and names written by repr()."""
+        if not self._names:
+            self._names = names_of(self._parameters)
+        found: dict[str, Any] = {}
+        exec(compile(source, "<line of a part program>", "exec", dont_inherit=True), self._names, found)
+        return found["line"]
+
+    def _control_code(self, line: Line, at: int) -> str:
+        """The code of an O word's values, and the word; "" where it has none."""
+        reader, text = Compiler(line.text, self._parameters, at + 1), line.text
+        label = reader.name() if reader.peek() == "<" else str(int(reader.index()))
+        match = KIND.match(text, reader.at)
+        if match is None or match[0] not in _KINDS:
+            raise Refused
+        reader.at = match.end()
+        line.word = Word(match[0], label, spelled(label), at)
+        values: list[str] = []
+        if match[0] in TESTS:
+            values.append(reader.expression())
+        while reader.peek() in ("[", "("):
+            if reader.peek() == "(":
+                reader.at = text.index(")", reader.at) + 1
+            elif match[0] == "call" and len(values) < ARGUMENTS:
+                values.append(reader.expression())
+            else:
+                raise Refused
+        if reader.peek() not in ("", ";"):
+            raise Refused
+        return f"def line(n, l, q):\n return [{', '.join(values)}]" if values else ""
+
+    def _words_code(self, line: Line, at: int) -> str:
+        reader, text = Compiler(line.text, self._parameters, at), line.text
+        template = Block()
+        steps: list[str] = []
+        words: list[str] = []
+        settings: list[tuple[str, str]] = []
+        while reader.at < len(text):
+            start, letter = reader.at, text[reader.at]
+            reader.at += 1
+            if letter == "(":
+                reader.at = text.index(")", start) + 1
+                line.comment = text[start + 1 : reader.at - 1]
+                continue
+            if letter == ";":
+                break
+            if letter == "#":
+                settings.append(self._setting(reader, steps))
+                continue
+            value = reader.value()
+            if letter in "gm":
+                code = float(value[1:-1])  # ValueError: it is worked out, and left to the reader
+                (template.add_g if letter == "g" else template.add_m)(code)
+                line.places.setdefault(f"{letter}{round(10 * code if letter == 'g' else code)}", start)
+            elif letter in OTHERS and letter not in template.words:
+                template.words[letter] = 0.0
+                line.places[letter] = start
+                variable = f"v{len(steps)}"
+                steps.append(f"{variable} = finite({value})")
+                if letter in _WHOLE:
+                    steps.append(f"{variable} = whole({variable})")
+                if letter in _WHOLE or letter in "fs":
+                    steps.append(f"not_negative({variable})")
+                words.append(f"{letter!r}: {variable}")
+            else:
+                raise Refused
+        line.g, line.m = template.g, template.m
+        steps.append(f"return {{{', '.join(words)}}}, ({''.join(f'({name}, {value}), ' for name, value in settings)})")
+        return "\n ".join(["def line(n, l, q):", *steps])
+
+    def _setting(self, reader: Compiler, steps: list[str]) -> tuple[str, str]:
+        """The steps of #... = value; code of what is set, and of its value."""
+        if reader.peek() == "<":
+            name = reader.name()
+            if name in self._parameters.known:
+                raise Refused
+            steps.append(f"declare({name!r})")
+            place = repr(name)
+        else:
+            place = f"p{len(steps)}"
+            steps.append(f"{place} = {reader.index()}\n settable({place})")
+        reader.expect("=")
+        variable = f"v{len(steps)}"
+        steps.append(f"{variable} = finite({reader.value()})")
+        return place, variable
