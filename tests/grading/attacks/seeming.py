@@ -28,7 +28,7 @@ ATTACKS = {
         "no answer",
     ),
     "params without end": Attack(
-        "import collections.abc\nclass P(dict):\n    def keys(self):\n        n = 0\n        while True:\n            n += 1\n            yield str(n % 9)\n    __iter__ = keys\n    def __getitem__(self, k): return 1.0\n    def items(self): return ((k, 1.0) for k in self.keys())\nparams = P(a=1)\n",
+        "import collections.abc\nclass P(dict):\n    def keys(self):\n        n = 0\n        while True:\n            n += sum(range(10000))\n            yield str(n)\n    __iter__ = keys\n    def __getitem__(self, k): return 1.0\n    def items(self): return ((k, 1.0) for k in self.keys())\nparams = P(a=1)\n",
         TIMED_OUT,
         "no answer",
     ),
