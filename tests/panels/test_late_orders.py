@@ -122,6 +122,7 @@ class Running:
     """A program that runs, for whoever changes its override."""
 
     operable = held = True
+    steps = False  # not line by line
 
     def __init__(self) -> None:
         self.shares: list[float] = []
@@ -137,7 +138,7 @@ class Running:
 def test_a_late_override_is_refused_where_it_is_more_and_taken_where_it_is_less(tmp_path: Path) -> None:
     shell, said = Shell(Session(tmp_path)), Notice()
     choices = program_choices(shell.session)
-    operator = Operator(shell, choices, said, lambda: None)
+    operator = Operator(shell, choices, said, lambda: None, lambda: None)
     slider, work = operator.override, Running()
 
     def ask(percent: float, age: float, ordered: bool = True) -> None:
