@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from rds.core.toml_file import read_toml
 
 _FOLDER = Path(__file__).parent
 ENGLISH = "English"  # of the panels themselves
@@ -27,4 +28,4 @@ def texts(language: str) -> dict[str, str]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+    return read_toml(path)[0]

@@ -25,6 +25,7 @@ from rds.bus.modules.cia402.mapping import find_fixed, map_dynamically
 from rds.bus.modules.cia402.parameters import store
 from rds.bus.modules.cia402.settings import Command, DriveSettings, read_settings
 from rds.core.errors import InputError, MachineError
+from rds.core.private_files import write_private
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 
@@ -319,7 +320,7 @@ class _machine:
 
     def __enter__(self) -> Machine:
         path = Path(self._folder.name) / "machine.toml"
-        path.write_text(self._text, encoding="utf-8")
+        write_private(path, self._text.encode())
         return load_machine(str(path))
 
     def __exit__(self, *_: object) -> None:
