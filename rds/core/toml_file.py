@@ -43,6 +43,11 @@ def read_toml(path: str | Path) -> tuple[dict[str, Any], str]:
     return parse_toml(text.replace("\r\n", "\n"), where), text
 
 
+def read_own_toml(path: Path) -> dict[str, Any]:
+    """The top table of a file of this package, without the limits for files from outside."""
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """The top table of a TOML text; InputError, with `where` and the line, for one that is not TOML or does harm."""
     _check_dots(text, where)

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rds.core.toml_file import read_toml
+from rds.core.toml_file import read_own_toml
 
 _FOLDER = Path(__file__).parent
 ENGLISH = "English"  # of the panels themselves
@@ -28,4 +28,4 @@ def texts(language: str) -> dict[str, str]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    return read_toml(path)[0]
+    return read_own_toml(path)
