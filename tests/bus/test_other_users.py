@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import can
 import pytest
@@ -133,7 +134,7 @@ def test_a_bus_beyond_this_computer_has_to_be_wanted(
     interface: str, channel: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[dict[str, Any]] = []
-    monkeypatch.setattr("can.Bus", lambda **given: opened.append(given))
+    monkeypatch.setattr("can.Bus", lambda **given: opened.append(given) or Mock())
     with pytest.raises(InputError, match="beyond_this_computer = true"):
         open_any(interface, channel, **options)
     with pytest.raises(InputError, match="must be true or false"):
@@ -166,6 +167,6 @@ def test_what_stays_on_this_computer_needs_no_word(
     interface: str, channel: str, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[dict[str, Any]] = []
-    monkeypatch.setattr("can.Bus", lambda **given: opened.append(given))
+    monkeypatch.setattr("can.Bus", lambda **given: opened.append(given) or Mock())
     open_any(interface, channel, **options)
     assert opened

@@ -136,7 +136,6 @@ ELSEWHERE = {
     "grading/sandbox/inside/walls.py": "inside the sandbox",
     "grading/sandbox/inside/probe.py": "inside the sandbox",
     "identification/logs/csv_table.py": "in a folder of mkdtemp",
-    "panels/help/conf.py": "in sphinx's process, which has a umask of rds",
 }
 METHODS = ("write_text", "write_bytes", "mkdir", "makedirs", "touch", "copytree", "copyfile", "copy2", "mknod")
 

@@ -96,7 +96,7 @@ def test_parameters_that_are_not_to_be_used_are_exit_code_1_and_what_uses_them_s
         (["--structure", "axis", "--fix", "tau"], "must be NAME=VALUE"),
         (["--structure", "axis", "--fix", "mass=1"], "no option 'mass'"),
         (["--structure", "axis", "--free", "tau"], "--free is for a model of your own"),
-        (["--structure", "axis", "--method", "inverse-dynamics", "--fix", "tau=0.01"], "is for --method simulation"),
+        (["--structure", "axis", "--method", "step", "--fix", "tau=0.01"], "is for --method simulation"),
         (["--structure", "axis", "-o", "x.json"], "ends in .toml"),
         (["--structure", "absent.py"], "there is no such file"),
     ],
