@@ -47,5 +47,6 @@ def write_made(
         name: Parameter(value, errors[name], value - reach * errors[name], value + reach * errors[name], units[name])
         for name, value in values.items()
     }
-    made = Estimate(structure, options, "simulation", parameters, covariance, (), {}, {}, {}, ())
+    unit = "rev/min" if structure == "spindle" else "mm"
+    made = Estimate(structure, options, "simulation", parameters, covariance, (), {}, {}, {}, (), output_unit=unit)
     return write_model(path, made)

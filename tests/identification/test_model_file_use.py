@@ -85,7 +85,7 @@ def test_what_cannot_be_tracked_with_is_said(tmp_path: Path) -> None:
 def test_a_machine_with_the_estimated_axis(tmp_path: Path) -> None:
     model = write_made(tmp_path / "x.toml", FULL, OPTIONS)
     machine, base = (
-        load_machine(str(write_machine(tmp_path / "m.toml", model, "mini-cnc", "X"))),
+        load_machine(str(write_machine(tmp_path / "m.toml", model, "mini-cnc", "X").path)),
         load_machine("mini-cnc"),
     )
     assert machine.axis("X").model == {"name": "machine-axis", **FULL} and machine.axis("X").machine == FULL

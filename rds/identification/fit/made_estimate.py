@@ -19,6 +19,7 @@ from rds.identification.fit.kstep import ahead, errors_of
 from rds.identification.logs.fingerprint import fingerprint
 from rds.identification.logs.log import Gravity, Log
 from rds.identification.logs.trace import trace
+from rds.identification.structures import INVERSE_DYNAMICS
 from rds.identification.structures.structure import Structure
 
 _START = 1000  # samples from which a log's initial state is estimated
@@ -76,7 +77,7 @@ def made_estimate(
     said += [
         f"{log.name}: {finding.what}" for log in logs for finding in log.findings if finding.gravity is Gravity.WARNING
     ]
-    said += [*said_of_guesses(parameters), *_too_slow(logs, parameters), *warnings]
+    said += [*said_of_guesses(parameters), *_too_slow(logs, parameters, method), *warnings]
     if _none_told(parameters) and not any(UNUSABLE in sentence for sentence in said):
         said.append(
             f"{UNUSABLE}: not one of them is told by these data (every interval is wider than its value, or has no "
@@ -113,10 +114,13 @@ def made_estimate(
     )
 
 
-def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter]) -> list[str]:
-    """A sentence where the samples are too far apart for the time constant, with the period that would do."""
+def _too_slow(logs: Sequence[Log], parameters: Mapping[str, Parameter], method: str) -> list[str]:
+    """A sentence where the samples are too far apart for the time constant, with the period that would do.
+
+    Not of inverse dynamics: derivatives of coarse or noisy positions make its time constants short, whatever they are.
+    """
     made = parameters.get("tau")
-    if made is None or made.std_error == 0.0:
+    if made is None or made.std_error == 0.0 or method == INVERSE_DYNAMICS:
         return []
     period = max(log.sample_period for log in logs)
     if made.value > _PERIODS * period:

@@ -226,6 +226,10 @@ def read_model(path: str | Path) -> ModelFile:
         raise words.fault("structure_sha256", "is for a student's structure, a .py file; remove it")
     if structure.endswith(".py"):
         structure = str((Path(path).resolve().parent / structure).resolve())
+    try:
+        usual = _usual_units(structure)[0]
+    except InputError as error:  # there is no such structure
+        raise InputError(str(error), words.place()) from error
     parameters = _read_parameters(words)
     logs = tuple(_read_log(log) for log in words.tables("logs"))
     versions = words.inner("versions")
@@ -243,7 +247,7 @@ def read_model(path: str | Path) -> ModelFile:
         path=str(path),
         sha256=file_sha256(Path(path)),
         text=words.source,
-        output_unit=words.read("output_unit") or _usual_units(structure)[0],
+        output_unit=words.read("output_unit") or usual,
         command_unit=words.read("command_unit"),
     )
     words.done()
