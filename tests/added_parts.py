@@ -247,12 +247,17 @@ PARTS = {
         "mirrored",
         {
             "rds/bus/modules/NAME/__init__.py": '"""The mirrored dialect: axes mounted the other way round."""\n',
-            "rds/bus/modules/NAME/drivers.py": text("""
-                from rds.bus.modules.rds.drivers import AxisDrivers
+            "rds/bus/modules/NAME/dialect.py": text("""
+                from rds.bus.modules.rds.dialect import IDENTIFIERS, answers
 
-                class MirroredDrivers(AxisDrivers):
-                    def exchange(self):
-                        return [-position for position in super().exchange()]
+                def drivers():
+                    from rds.bus.modules.rds.drivers import AxisDrivers
+
+                    class MirroredDrivers(AxisDrivers):
+                        def exchange(self):
+                            return [-position for position in super().exchange()]
+
+                    return MirroredDrivers
             """),
             "rds/bus/modules/NAME/server.py": text("""
                 import sys
@@ -268,10 +273,9 @@ PARTS = {
             """),
             "rds/bus/modules/dialects.py": [
                 Line(
-                    '    "rds": ("rds.bus.modules.rds.drivers", "AxisDrivers"),',
-                    '    "mirrored": ("rds.bus.modules.mirrored.drivers", "MirroredDrivers"),',
-                ),
-                Line('    "rds": "rds.bus.modules.rds.server",', '    "mirrored": "rds.bus.modules.mirrored.server",'),
+                    '        "rds": "rds.bus.modules.rds.dialect",',
+                    '        "mirrored": "rds.bus.modules.mirrored.dialect",',
+                )
             ],
         },
         run(

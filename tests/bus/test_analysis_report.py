@@ -96,7 +96,7 @@ def test_what_the_times_rest_on_is_said() -> None:
         "modules answer within 50 µs, the host is up to 20 µs late, 2 errors come at once, and one more every 100000 µs"
     )
     assert slow.assumed == slow.to_json()["assumed"] == said
-    with pytest.raises(InputError, match="unknown dialect 'canopen'"):
+    with pytest.raises(InputError, match="there is no dialect 'canopen'; known dialects: rds, oacs, cia402, dcs"):
         analyse(machine, dialect="canopen")
 
 

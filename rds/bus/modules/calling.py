@@ -36,3 +36,20 @@ def find_machine(
     finally:
         bus.shutdown()
     return [name for name in machine.axes if name in found]
+
+
+def answering(machine: Machine, interface: str, channel: str | None, **options: Any) -> tuple[set[int], set[int]]:
+    """The nodes of the machine's modules that answer a call, and those that identify themselves as distributed ones.
+
+    Modules of the oacs dialect answer cyclic frames as well. Raises as `find_machine` does.
+    """
+    from rds.bus.modules.oacs.host import identify  # its messages take a while to read
+
+    nodes = {machine.axis(name).node for name in find_machine(machine, interface, channel, **options)}
+    if not nodes:
+        return set(), set()
+    bus = open_bus(interface, channel, node="scan", **options)
+    try:
+        return nodes, {info.id for info in identify(bus)}
+    finally:
+        bus.shutdown()

@@ -1,54 +1,44 @@
 """What the modules on a bus speak: for each dialect its server, its drivers on the host, and how to see it is there.
 
-A dialect is a folder beside this file. Its server module has `serve(machine, interface, channel, axes, ready, stop,
-**options)` and is a program (`server_program.py`); its drivers are a class that keeps `rds.core.contracts.Drivers`.
+A dialect is a folder beside this file with two modules that are looked for by their names.
+
+`dialect` says what others must know of it: `drivers()`, the class of the host's drivers, which keeps
+`rds.core.contracts.Drivers`; `IDENTIFIERS`, the standard identifiers that it uses, as first, last and what a frame with
+one does to a machine; `answers(machine, interface, channel, **options)`, whether its modules are there, for which
+nothing moves; and, where axes are commanded by other things than voltages, `commands(machine, axes, bus)`. It is read
+for runs that need no bus, so it imports what needs python-can in its functions.
+
+`server` has `serve(machine, interface, channel, axes, ready, stop, **options)` and is a program (`server_program.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rds.bus.hub.bus_settings import SERIAL
 from rds.core.contracts import Drivers
 from rds.core.errors import InputError
+from rds.core.registry import Registry
 from rds.machines.machine import Machine
 
-if TYPE_CHECKING:  # where the type checker proves that every dialect keeps the contract
-    from rds.bus.modules.cia402.host import Cia402Drivers
-    from rds.bus.modules.dcs.drivers import DcsDrivers
-    from rds.bus.modules.oacs.drivers import OacsDrivers
-    from rds.bus.modules.rds.drivers import AxisDrivers
-
-    _CHECKED: tuple[type[Drivers], ...] = (AxisDrivers, OacsDrivers, Cia402Drivers, DcsDrivers)
-
-_DRIVERS = {
-    "rds": ("rds.bus.modules.rds.drivers", "AxisDrivers"),
-    "oacs": ("rds.bus.modules.oacs.drivers", "OacsDrivers"),
-    "cia402": ("rds.bus.modules.cia402.host", "Cia402Drivers"),
-    "dcs": ("rds.bus.modules.dcs.drivers", "DcsDrivers"),
-}
-_SERVERS = {
-    "rds": "rds.bus.modules.rds.server",
-    "oacs": "rds.bus.modules.oacs.server",
-    "cia402": "rds.bus.modules.cia402.server",
-    "dcs": "rds.bus.modules.dcs.server",
-}
-_IDENTIFIERS = {
-    "rds": "rds.bus.modules.rds.frames",
-    "oacs": "rds.bus.modules.oacs.messages",
-    "cia402": "rds.bus.modules.cia402.codes",
-    "dcs": "rds.bus.modules.dcs.frames",
-}
-_COMMANDS = {"cia402": "rds.bus.modules.cia402.settings"}  # where a dialect commands by other things than voltages
+LIBRARY = Registry(
+    "dialect",
+    {
+        "rds": "rds.bus.modules.rds.dialect",
+        "oacs": "rds.bus.modules.oacs.dialect",
+        "cia402": "rds.bus.modules.cia402.dialect",
+        "dcs": "rds.bus.modules.dcs.dialect",
+    },
+    own=False,
+)
 DEFAULT = "rds"
 SERIAL_DIALECTS = ("dcs",)  # not on CAN: their interface is "serial"
 
 
 def dialect_names() -> list[str]:
     """The dialects there are; the first is the cyclic frames of `rds.bus.modules.rds.frames`."""
-    return list(_DRIVERS)
+    return LIBRARY.names()
 
 
 def interface_of(dialect: str, interface: str) -> str:
@@ -68,18 +58,17 @@ def bus_interface(machine: Machine, bus: Mapping[str, Any]) -> str:
 
 def check_dialect(dialect: str) -> None:
     """InputError listing the dialects there are, for another one."""
-    if dialect not in _DRIVERS:
-        raise InputError(f"unknown dialect {dialect!r}; known dialects: {', '.join(_DRIVERS)}")
+    LIBRARY.module(dialect)
 
 
 def server_module(dialect: str) -> str:
     """The module that serves a machine in this dialect, for `python -m`."""
-    return _SERVERS[dialect]
+    return LIBRARY.modules[dialect].removesuffix("dialect") + "server"
 
 
 def identifiers(dialect: str) -> tuple[tuple[int, int, str], ...]:
     """The standard identifiers that a dialect uses, first and last, and what a frame with one does to a machine."""
-    table: tuple[tuple[int, int, str], ...] = import_module(_IDENTIFIERS[dialect]).IDENTIFIERS
+    table: tuple[tuple[int, int, str], ...] = LIBRARY.module(dialect).IDENTIFIERS
     return table
 
 
@@ -89,9 +78,10 @@ def commands(dialect: str, machine: Machine, axes: Sequence[str], bus: Mapping[s
     Such are "velocity", "position", and "profile" for positions that the drive goes to by a profile of its own.
     InputError for a table of the dialect in `bus` that will not do.
     """
-    if dialect not in _COMMANDS:
+    module = LIBRARY.module(dialect)
+    if not hasattr(module, "commands"):
         return dict.fromkeys(axes, "voltage")
-    commanded: dict[str, str] = import_module(_COMMANDS[dialect]).commands(bus.get(dialect) or {}, machine, axes)
+    commanded: dict[str, str] = module.commands(machine, axes, bus)
     return commanded
 
 
@@ -99,9 +89,10 @@ def open_drivers(
     dialect: str, machine: Machine, axes: Sequence[str], sample_period: float, dry_run: bool, bus: dict[str, Any]
 ) -> Drivers:
     """The host's drivers of a machine's axes; `bus` goes to them as it is."""
-    module, name = _DRIVERS[dialect]
-    adapter: Callable[..., Drivers] = getattr(import_module(module), name)
-    return adapter(machine, axes, sample_period=sample_period, dry_run=dry_run, **bus)
+    drivers: Drivers = LIBRARY.module(dialect).drivers()(
+        machine, axes, sample_period=sample_period, dry_run=dry_run, **bus
+    )
+    return drivers
 
 
 def is_served(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:
@@ -111,7 +102,7 @@ def is_served(dialect: str, machine: Machine, interface: str, channel: str | Non
     """
     if _answers(dialect, machine, interface, channel, **options):
         return True
-    rest = [] if dialect in SERIAL_DIALECTS else [other for other in _DRIVERS if other != dialect]
+    rest = [] if dialect in SERIAL_DIALECTS else [other for other in LIBRARY.names() if other != dialect]
     others = [other for other in rest if _answers(other, machine, interface, channel, **options)]
     if not others:
         return False
@@ -131,31 +122,10 @@ def find_dialect(
 
     The dialect `first` is asked for before the others; `options` go to the interface.
     """
-    order = sorted(_DRIVERS, key=lambda dialect: dialect != first)
+    order = sorted(LIBRARY.names(), key=lambda dialect: dialect != first)
     return next((each for each in order if _answers(each, machine, interface, channel, **options)), None)
 
 
 def _answers(dialect: str, machine: Machine, interface: str, channel: str | None, **options: Any) -> bool:
-    if dialect in SERIAL_DIALECTS:
-        from rds.bus.modules.dcs.calling import find_units
-
-        return interface == SERIAL and bool(find_units(machine, channel, **options))
-    if dialect == "cia402":
-        from rds.bus.modules.cia402.scan import scan
-
-        return any(device.is_drive for device in scan(interface, channel, **options))
-    from rds.bus.modules.calling import find_machine
-
-    # the modules of the oacs dialect answer cyclic frames as well
-    nodes = {machine.axis(name).node for name in find_machine(machine, interface, channel, **options)}
-    if not nodes:
-        return False
-    from rds.bus.modules.oacs.host import identify
-    from rds.bus.tools.link import open_bus
-
-    bus = open_bus(interface, channel, node="scan", **options)
-    try:
-        distributed = {info.id for info in identify(bus)}
-    finally:
-        bus.shutdown()
-    return bool(nodes & distributed if dialect == "oacs" else nodes - distributed)
+    is_there: bool = LIBRARY.module(dialect).answers(machine, interface, channel, **options)
+    return is_there
