@@ -68,12 +68,14 @@ def limited(steps: Callable[[], Any] = lambda: None, seconds: float | None = Non
     """
     limit = LIMIT if seconds is None else seconds
     here, ended, lock = threading.current_thread(), threading.Event(), threading.Lock()
+    was_late = False
 
     class Overdue(Endless):
         def __init__(self) -> None:
             super().__init__(limit)
 
     def look() -> None:
+        nonlocal was_late
         last, since = steps(), time.monotonic()
         while not ended.wait(min(max(since + limit - time.monotonic(), _POLL), limit)):
             now, step = time.monotonic(), steps()
@@ -82,6 +84,7 @@ def limited(steps: Callable[[], Any] = lambda: None, seconds: float | None = Non
             elif now - since >= limit:
                 with lock:
                     if not ended.is_set():
+                        was_late = True
                         _raise_in(here, Overdue)
                 since = now - limit + PATIENCE  # once more if the code has caught it
 
@@ -93,14 +96,31 @@ def limited(steps: Callable[[], Any] = lambda: None, seconds: float | None = Non
     finally:
         with lock:
             ended.set()
-            _raise_in(here, None)
+        if was_late:
+            _take_back(here)
 
 
-def _raise_in(thread: threading.Thread, error: type[BaseException] | None) -> None:
-    """None takes back what has not been raised yet."""
+class _TakenBack(BaseException):
+    """Stands in for an error that came too late."""
+
+
+def _take_back(here: threading.Thread) -> None:
+    """Another error in place of one that has not been raised yet in this thread, caught at once.
+
+    Taking it back by NULL, as Python offers, leaves CPython 3.11 believing that an error is due: under a debugger or a
+    profiler it then looks for it for ever.
+    """
+    try:
+        _raise_in(here, _TakenBack)
+        while True:
+            time.sleep(0.0)
+    except _TakenBack:
+        pass
+
+
+def _raise_in(thread: threading.Thread, error: type[BaseException]) -> None:
     if thread.ident is not None:
-        raised = ctypes.py_object(error) if error is not None else None
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), raised)
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(error))
 
 
 class SignalEvent(threading.Event):

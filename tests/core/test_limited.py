@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 
@@ -45,6 +46,26 @@ def test_what_catches_everything_ends_as_well(monkeypatch: pytest.MonkeyPatch) -
                 caught += 1
                 if caught == 2:
                     raise
+
+
+def test_debuggers_and_profilers_see_what_comes_after_it() -> None:
+    """Each call looked for the withdrawn error for ever, in CPython 3.11, as soon as calls were watched."""
+    with limited():
+        pass
+    with pytest.raises(Endless), limited(seconds=0.01):
+        while True:
+            pass
+    watched = []
+    sys.setprofile(lambda frame, event, _: watched.append((frame.f_code.co_name, event)))
+    try:
+        _called()
+    finally:
+        sys.setprofile(None)
+    assert watched[:2] == [("_called", "call"), ("_called", "return")]
+
+
+def _called() -> None:
+    pass
 
 
 @pytest.mark.parametrize(
