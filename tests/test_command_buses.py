@@ -114,7 +114,7 @@ def test_a_machine_is_served_on_the_bus_and_in_the_dialect_of_the_table(
 ) -> None:
     served: list[Any] = []
     monkeypatch.setattr(
-        "rds.bus.modules.serving.serve_machine", lambda *words, **options: served.append((words, options))
+        "rds.bus.modules.dialects.serve_machine", lambda *words, **options: served.append((words, options))
     )
     file = str(experiment(tmp_path, ADAPTER + 'dialect = "oacs"\n'))
     done = CliRunner().invoke(app, ["machine", "serve", "mrmt-oacs", "--experiment", file])

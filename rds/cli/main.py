@@ -290,8 +290,7 @@ def machine_serve(
 ) -> None:
     """Run the machine's axis modules as CAN nodes, or as units on a serial line (--dialect dcs), until Ctrl-C."""
     with refusals():
-        from rds.bus.modules.dialects import DEFAULT, interface_of
-        from rds.bus.modules.serving import serve_machine
+        from rds.bus.modules.dialects import DEFAULT, interface_of, serve_machine
         from rds.bus.tools.link import BUILTIN, bus_name, bus_options, default_channel
         from rds.machines import load_machine
 

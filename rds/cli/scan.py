@@ -1,14 +1,18 @@
-"""`rds scan`: who is on a bus."""
+"""`rds scan`: who is on a bus, once, or with --watch as they come and go."""
 
 from __future__ import annotations
 
+import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from rds.cli.buses import Baud, Bitrate, Channel, Experiment, Interface, chosen_bus, refuse_baud
-from rds.cli.common import Json, print_json, refusals, writes_files
+from rds.cli.common import Json, print_json, refusals, until_ctrl_c, writes_files
+
+_INTERVAL = 0.1  # s between two looks; what is gone is noticed at the third
 
 
 @writes_files
@@ -47,10 +51,8 @@ def scan(
         if watching:
             if place.is_line:
                 raise InputError("--watch is for distributed modules on CAN; units on a serial line do not come and go")
-            from rds.cli.watch import watch
-
             with place.opened() as bus:
-                watch(bus, json, events, modules, seconds, force)
+                _watch(bus, json, events, modules, seconds, force)
             return
         if place.is_line:
             from rds.bus.modules.dcs.scan import scan_channel
@@ -78,3 +80,27 @@ def _check_watch(watching: bool, **words: Any) -> None:
         from rds.core.errors import InputError
 
         raise InputError(f"{', '.join(given)} belongs to --watch, which is not given")
+
+
+def _watch(bus: Any, json: bool, events: Path | None, modules: int | None, seconds: float | None, force: bool) -> None:
+    """Watch the modules on an open bus until Ctrl-C, or for `seconds`; say and write down what happens."""
+    from rds.bus.modules.oacs.events import EventFile, Reconfigurations
+
+    with ExitStack() as stack:
+        watching = Reconfigurations(bus, modules)
+        file = EventFile(events, force) if events is not None else None
+        if file is not None:
+            stack.callback(file.close)
+        stop = stack.enter_context(until_ctrl_c())
+        ends = None if seconds is None else time.monotonic() + seconds
+        rows: list[dict[str, Any]] = []
+        while not stop.is_set() and (ends is None or time.monotonic() < ends):
+            for happened in watching.look():
+                if file is not None:
+                    file.add(happened)
+                rows.append({"time_s": round(happened.time, 3), "event": happened.event, "module": happened.module})
+                if not json:
+                    typer.echo(f"{happened.time:9.3f} s  {happened.event:8} {happened.module}")
+            stop.wait(_INTERVAL)
+    if json:
+        print_json({"expected": watching.expected, "events": rows})

@@ -14,8 +14,7 @@ import can
 import pytest
 
 from rds.bus.hub.faults import Faults
-from rds.bus.modules.dialects import SERIAL_DIALECTS, dialect_names, server_module
-from rds.bus.modules.serving import serve_machine
+from rds.bus.modules.dialects import SERIAL_DIALECTS, dialect_names, serve_machine, server_module
 from rds.core.errors import InputError
 from rds.machines import load_machine
 

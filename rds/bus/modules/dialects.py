@@ -13,7 +13,8 @@ for runs that need no bus, so it imports what needs python-can in its functions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 from rds.bus.hub.bus_settings import SERIAL
@@ -64,6 +65,17 @@ def check_dialect(dialect: str) -> None:
 def server_module(dialect: str) -> str:
     """The module that serves a machine in this dialect, for `python -m`."""
     return LIBRARY.modules[dialect].removesuffix("dialect") + "server"
+
+
+def serve_machine(
+    machine: Machine, dialect: str, interface: str, channel: str | None, ready: Callable[[], Any], **options: Any
+) -> None:
+    """Serve `machine` until the process is told to end; `options` as of `serve_loop.serve_nodes`.
+
+    InputError for an unknown dialect; else as each server says.
+    """
+    check_dialect(dialect)
+    import_module(server_module(dialect)).serve(machine, interface, channel, ready=ready, **options)
 
 
 def identifiers(dialect: str) -> tuple[tuple[int, int, str], ...]:
