@@ -323,3 +323,30 @@ def test_hints_fit_what_was_asked(tmp_path: Path) -> None:
     several = call("compare", str(tmp_path), str(tmp_path))
     assert several.exit_code == 2 and "table05.csv and 34 more); name one" in several.stderr
     assert "table06.csv" not in several.stderr
+
+
+def test_a_command_is_built_alone_and_what_names_none_lists_all() -> None:
+    def built(*words: str) -> set[str]:
+        done = subprocess.run(
+            [sys.executable, "-c", _BUILT, *words], capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL
+        )
+        return set(done.stdout.split())
+
+    everything = built()
+    assert {"run", "fit", "grade", "machine"} <= everything
+    assert built("bogus") == built("--help") == everything
+    assert built("fit", "--help") < everything and "fit" in built("fit", "--help")
+    assert "check" in built("grade", "check") and "machine" not in built("grade", "check")
+
+
+_BUILT = """
+import sys
+from typer.main import get_command
+from rds.cli.main import app, narrow
+narrow(app, sys.argv[1:])
+group = get_command(app)
+names = [*group.commands]
+if sys.argv[1:2] == ["grade"]:
+    names += group.commands["grade"].commands
+print(*names)
+"""

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.main import get_command_name
+from typer.models import CommandInfo
 
 from rds.bus.tools.mf4 import put_off_asammdf
 from rds.cli import (
@@ -344,12 +346,34 @@ def main() -> None:
     program = sys.argv[1:3] == ["nc", "run"] and not sys.stdin.isatty()
     if own or (sys.argv[1:2] in (["run"], ["robustness"]) and not asks) or program:
         guarded(_app)
-    app()
+    _app()
 
 
 def _app() -> int:
+    narrow(app, sys.argv[1:])
     app()
     return 0
+
+
+def narrow(whole: typer.Typer, words: list[str]) -> None:
+    """Leave in `whole` the command that `words` name, and one beside it, without which typer would ask for no name.
+
+    Typer builds every command that there is before it looks at the words, which takes longer than most commands take.
+    What names none is left whole, for the sentence that lists the commands.
+    """
+    named = words[0] if words else ""
+    commands = [each for each in whole.registered_commands if _name_of(each) == named]
+    groups = [each for each in whole.registered_groups if each.name == named]
+    if commands or groups:
+        beside = [each for each in whole.registered_commands if each not in commands][:1]
+        whole.registered_commands, whole.registered_groups = [*commands, *beside], groups
+    for group in groups:
+        if group.typer_instance is not None:
+            narrow(group.typer_instance, words[1:])
+
+
+def _name_of(command: CommandInfo) -> str:
+    return command.name or get_command_name(getattr(command.callback, "__name__", ""))
 
 
 if __name__ == "__main__":

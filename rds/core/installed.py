@@ -19,7 +19,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
-from urllib.request import url2pathname
 
 if TYPE_CHECKING:
     from importlib.metadata import Distribution
@@ -78,6 +77,8 @@ def _origin(found: Distribution) -> dict[str, Any]:
 
 def _local(about: dict[str, Any]) -> Path | None:
     """The folder or file it was installed from, where that is still there."""
+    from urllib.request import url2pathname  # which brings the whole of HTTP along
+
     parts = urlsplit(about.get("url", ""))
     if parts.scheme != "file" or "vcs_info" in about:
         return None

@@ -163,7 +163,7 @@ def test_a_password_that_is_sent_arrives(tmp_path: Path) -> None:
         environment = {f"RDS_SMTP_{key}": value for key, value in named.items()}
         server = mail_server(tmp_path, environment | {"RDS_SMTP_PASSWORD": "secret"})
         send_files(server, "me@example.edu", "s", "t", [])
-        with pytest.raises(MachineError, match="not sent.*535") as refused:
+        with pytest.raises(MachineError, match=r"not sent.*535") as refused:
             send_files(
                 mail_server(tmp_path, environment | {"RDS_SMTP_PASSWORD": "wrong"}), "me@example.edu", "s", "t", []
             )
