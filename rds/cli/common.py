@@ -201,15 +201,23 @@ def ends_as_ctrl_c() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def explain(result: Any) -> None:
-    """Say on stderr why a run that failed or is void is so."""
+Explain = Annotated[bool, typer.Option("--explain", help="Say what the verdict on the timing rests on.")]
+
+
+def explain(result: Any, is_shown: bool = False, in_full: bool = False) -> None:
+    """Say on stderr why a run that failed or is void is so, and what its verdict rests on if that is asked for.
+
+    `is_shown`: its verdict stands on stdout already.
+    """
     if result.meta.get("ending") != "done":
         reason = result.meta.get("ending_reason")
         typer.echo(f"rds: the run ended early ({result.meta['ending']}){f': {reason}' if reason else ''}", err=True)
     # overloaded says no more than that samples were late; of the other early endings, repeating is no remedy
     unexplained = result.meta.get("ending") in ("done", "overloaded")
-    if result.verdict == "missed" or (result.verdict == "void" and unexplained):
+    if not is_shown and (result.verdict == "missed" or (result.verdict == "void" and unexplained)):
         typer.echo(f"rds: timing {result.verdict}: {result.meta.get('verdict_reason')}", err=True)
+    if in_full and (evidence := result.meta.get("verdict_evidence")):
+        typer.echo(f"rds: the verdict on the timing rests on this: {evidence}", err=True)
     for note in result.meta.get("notes", ()):
         typer.echo(f"rds: note: {note}", err=True)
 

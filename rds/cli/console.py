@@ -114,7 +114,7 @@ def show_result(result: Result, files: Mapping[str, Path]) -> None:
         for sentence in findings(about):
             screen.print(escape(sentence), soft_wrap=True)
     if result.verdict is not None:
-        screen.print(escape(verdict_line(result)))
+        screen.print(escape(verdict_line(result)), soft_wrap=True)
     for axis, validation in (result.meta.get("validation") or {}).items():
         screen.print(f"model of {escape(axis)}: {escape(validation['sentence'])}", soft_wrap=True)
         for reason in validation["reasons"]:
@@ -126,14 +126,14 @@ def show_result(result: Result, files: Mapping[str, Path]) -> None:
 
 
 def verdict_line(result: Result) -> str:
-    """The timing verdict in one line, with what it was measured in."""
+    """The timing verdict in one line, and below it the times and what they were measured in."""
     timing: dict[str, Any] = result.meta.get("timing", {})
     environment = result.meta.get("environment", {}).get("sentence", "")
     lateness, compute, io = (timing.get(stage, {}) for stage in ("lateness", "compute", "io"))
     made = f"interpolate {_pair(timing['interpolate'])}, " if "interpolate" in timing else ""
     return (
-        f"timing {result.verdict}: {timing.get('late')} of {timing.get('samples')} samples late; µs at the median and "
-        f"99 %: lateness {_pair(lateness)}, {made}compute {_pair(compute)}, I/O {_pair(io)}"
+        f"timing {result.verdict}: {result.meta.get('verdict_reason')}\n"
+        f"times in µs at the median / 99 %: lateness {_pair(lateness)}, {made}compute {_pair(compute)}, I/O {_pair(io)}"
         f"{f' ({environment})' if environment else ''}"
     )
 

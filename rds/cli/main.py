@@ -51,6 +51,7 @@ from rds.cli import (
 from rds.cli.app import app as app_page
 from rds.cli.buses import Channel, Experiment, Interface, bus_table_of
 from rds.cli.common import (
+    Explain,
     Json,
     ends_as_ctrl_c,
     explain,
@@ -160,6 +161,7 @@ def run(
     exchange: Exchange = None,
     yes: Yes = False,
     events: Events = None,
+    explain_verdict: Explain = False,
     json: Json = False,
 ) -> None:
     """Run an experiment and save its results: tables, plots and a report."""
@@ -182,7 +184,7 @@ def run(
         for each in made:
             show_result(*each)
     for each in made:
-        explain(each[0])
+        explain(each[0], is_shown=not json, in_full=explain_verdict)
     raise typer.Exit(exit_code(result))
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rds.cli.common import (
+    Explain,
     Json,
     declared,
     ends_as_ctrl_c,
@@ -117,6 +118,7 @@ def run(
     exchange: Exchange = None,
     yes: Yes = False,
     events: Events = None,
+    explain_verdict: Explain = False,
     json: Json = False,
 ) -> None:
     """Run a program on all axes and the spindle; report following and contour error by program line.
@@ -224,7 +226,7 @@ def run(
     for each in made:
         if not json:
             _show(*each)
-        explain(each[0])
+        explain(each[0], is_shown=not json, in_full=explain_verdict)
     raise typer.Exit(exit_code(result))
 
 

@@ -84,14 +84,16 @@ def metrics_rows(result: Result) -> tuple[list[str], list[list[Any]]]:
 
 
 def verdict_line(result: Result, label: str = "") -> str:
-    """The verdict with its reason, as a paragraph led by `label`; "" where there is none."""
+    """The verdict with its reason as a paragraph led by `label`, and what it rests on behind *why?*; "" without one."""
     if not result.verdict:
         return ""
     kind = result.verdict if result.verdict in ("met", "missed", "void") else "other"
     reason = str(result.meta.get("verdict_reason") or "")
     lead = f"{escape(label)}: " if label else ""
     because = escape(f": {reason}") if reason else ""
-    return f'<p class="verdict {kind}">{lead}<strong>{escape(str(result.verdict))}</strong>{because}</p>'
+    evidence = str(result.meta.get("verdict_evidence") or "")
+    why = f"<details><summary>why?</summary><p>{escape(evidence)}</p></details>" if evidence else ""
+    return f'<p class="verdict {kind}">{lead}<strong>{escape(str(result.verdict))}</strong>{because}</p>{why}'
 
 
 def notes_list(notes: Iterable[str]) -> str:

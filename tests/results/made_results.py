@@ -51,6 +51,7 @@ def make_result(
         "duration": seconds,
         "period": dict.fromkeys(axes, PERIOD),
         "verdict": None if mode == "simulation" else "met",
+        "verdict_evidence": "",
         "verdict_reason": None
         if mode == "simulation"
         else f"all {len(time)} samples were complete within their period",

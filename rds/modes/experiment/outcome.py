@@ -80,6 +80,7 @@ def _judged(plan: Plan, rows: Rows, sample: np.ndarray) -> dict[str, Any]:
     return {
         "verdict": str(judgement.verdict),
         "verdict_reason": judgement.reason,
+        "verdict_evidence": judgement.evidence,
         "timing": summary(timing, period)
         | {"discarded": judgement.discarded, "late_without_system": judgement.late_without_system},
         "environment": environment | {"sentence": sentence(environment)} if environment else {},

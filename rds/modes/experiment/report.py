@@ -91,6 +91,7 @@ def run_json(result: Result, files: dict[str, Path]) -> dict[str, Any]:
         "mode": result.mode,
         "verdict": result.verdict,
         "verdict_reason": result.meta.get("verdict_reason"),
+        "verdict_evidence": result.meta.get("verdict_evidence"),
         "ending": result.meta.get("ending"),
         "axes": {
             axis: {name: values.get(name) for name in METRICS if name in values}

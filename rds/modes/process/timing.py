@@ -58,10 +58,11 @@ class Timing:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A verdict and its reason in a sentence, with the counts it rests on."""
+    """A verdict, its reason in a sentence, what it rests on ("" where nothing more is to be said), and the counts."""
 
     verdict: Verdict
     reason: str
+    evidence: str
     late: int
     late_without_system: int
     discarded: int
@@ -115,11 +116,11 @@ def judge(
     of that of the run (see `environment`).
     """
     count = int(late_samples(timing, period).sum())
-    lost = f"{count} of {len(timing.sample)} samples were late"
+    lost = f"{count} of {len(timing.sample)} samples late"
     if discarded:
-        lost += f" and {discarded} period{' was' if discarded == 1 else 's were'} discarded"
+        lost += f", {discarded} period{'' if discarded == 1 else 's'} discarded"
     if count + discarded <= limit:
-        return Judgement(Verdict.MET, _met(count, limit, len(timing.sample)), count, 0, discarded)
+        return Judgement(Verdict.MET, _met(count, limit, len(timing.sample)), "", count, 0, discarded)
     io = _usual_io(timing.io, silent)
     student = timing.interpolate + timing.compute + timing.model
     own = student - np.minimum(timing.taken, student)
@@ -133,33 +134,35 @@ def judge(
         elif not _is_proven(own + io, timing, period, stalls, environment or {}):
             alone = 0
     if alone > limit:
-        reason = f"{lost}, and {alone} would have been on a system without delays: {_overrun(own, io, period, timing)}"
-        return Judgement(Verdict.MISSED, reason, count, alone, discarded)
+        reason = f"{_overrun(own, io, period, timing)} ({lost})"
+        evidence = f"{alone} samples would have been late on a computer without delays of its own"
+        return Judgement(Verdict.MISSED, reason, evidence, count, alone, discarded)
     if threads and not stalls:
         reason = (
-            f"{lost}: control() or the model left {threads} thread{'s' if threads > 1 else ''} running, which took the "
-            f"processor from the loop; without the student's code the same clock was on time"
+            f"control() or the model left {threads} thread{'s' if threads > 1 else ''} running, which took the "
+            f"processor from the loop ({lost})"
         )
-        return Judgement(Verdict.MISSED, reason, count, alone, discarded)
+        evidence = "without the student's code the same clock was on time"
+        return Judgement(Verdict.MISSED, reason, evidence, count, alone, discarded)
     if silent >= LASTING and 2 * silent >= count + discarded:
         reason = (
-            f"{lost}, but by the machine's doing: in {silent} periods the loop waited for a module that was silent; "
-            "the run says nothing about the code that it tried: see to the machine, or to what held its program up, "
-            "and repeat it"
+            f"a module of the machine was silent ({lost}). This says nothing about your code. "
+            "Check the machine and the program that serves it, and repeat the run"
         )
-        return Judgement(Verdict.VOID, reason, count, alone, discarded)
-    owner = "the system's own" if not missing else "the system's or the bus's"
+        evidence = f"the loop waited for a silent module in {silent} periods"
+        return Judgement(Verdict.VOID, reason, evidence, count, alone, discarded)
+    busy = "the computer was busy" if not missing else "the computer or the bus was busy"
     answers = f", {missing} answer{'s' if missing > 1 else ''} did not come within the period" if missing else ""
     held = max(float(own_wait(timing, period).max(initial=0.0)), float(timing.taken.max(initial=0.0))) / 1e9
     known = "".join(f"; {cause}" for cause in causes(environment or {}, held))
-    reason = (
-        f"{lost}, but by {owner} doing: the system woke the loop up to "
+    reason = f"{busy} ({lost}). This says nothing about your code. Repeat it on a quieter computer"
+    evidence = (
+        "the system woke the loop up to "
         f"{float(own_wait(timing, period).max(initial=0.0)) / 1e6:.2f} ms late with a period of {period / 1e6:g} ms, "
         f"took {float(timing.taken.sum()) / 1e6:.2f} ms from the running code, "
-        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{answers}{known}; "
-        "the run says nothing about the code that it tried: repeat it on a quieter machine"
+        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{answers}{known}"
     )
-    return Judgement(Verdict.VOID, reason, count, alone, discarded)
+    return Judgement(Verdict.VOID, reason, evidence, count, alone, discarded)
 
 
 def summary(timing: Timing, period: int) -> dict[str, Any]:

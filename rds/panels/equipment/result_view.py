@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -133,11 +132,14 @@ _STAGE_NAMES = {
 
 
 def timing_line(result: Result) -> tuple[str, str, str]:
-    """The verdict on the timing in one line, its kind of notice, and the whole reason."""
+    """The verdict on the timing in one line, its kind of notice, and what it rests on."""
     reason = str(result.meta.get("verdict_reason") or "")
-    first = re.split(r"[;:(]|, but|\. ", reason, maxsplit=1)[0].strip()
     kind = {"met": "good", "missed": "error"}.get(str(result.verdict), "warning")
-    return f"timing {result.verdict}{f': {first}' if first else ''}", kind, reason if reason != first else ""
+    return (
+        f"timing {result.verdict}{f': {reason}' if reason else ''}",
+        kind,
+        str(result.meta.get("verdict_evidence") or ""),
+    )
 
 
 def _contour(result: Result) -> str:
