@@ -91,9 +91,10 @@ def least_squares(problem: Problem, start: np.ndarray, most: int | None = None) 
         return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
 
     # The dogleg needs little more than half the free runs of the reflective method, but ends anywhere where a direction
-    # is not told, and may stay at a bound.
+    # is not told, and may stay at a bound. Initial states alone have nowhere else to go: one that is not told, as the
+    # velocity of an axis that sticks, changes nothing.
     quick = search("dogbox")
-    if quick.converged and not quick.at_bound.any() and tells_all(quick.triangle):
+    if quick.converged and not quick.at_bound.any() and (not problem.names or tells_all(quick.triangle)):
         return quick
     sure = search("trf")
     return sure if sure.squares <= quick.squares else quick

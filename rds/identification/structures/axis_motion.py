@@ -219,7 +219,7 @@ def move(t, u, x0, p, where, y, by, rate_out):
     _begin(x0, p, where, state, tangent)
     plain = p[STRIBECK] == 0.0 and p[BACKLASH] == 0.0
     rate = (1.0 + p[VISCOUS]) / p[TAU]
-    period, decay, reach = -1.0, 1.0, 0.0  # of the last step that was whole
+    periods, decays, reaches = np.full(2, -1.0), np.ones(2), np.zeros(2)  # of the last parts, before and after a change
     acting = 0  # the command that acts now
     out = 1 if rate_out else 2 if p[BACKLASH] > 0.0 else 0
     for k in range(len(t)):
@@ -243,13 +243,16 @@ def move(t, u, x0, p, where, y, by, rate_out):
             v = state[1]
             side = PLUS if v > 0.0 or (v == 0.0 and force > 0.0) else MINUS
             final = (force - p[side]) / (1.0 + p[VISCOUS])
-            if plain and not moved and not moves and v != 0.0 and final * v > 0.0:
-                # the usual sample: no crossing, the same duration as before
+            if plain and v != 0.0 and final * v > 0.0:
+                # the usual part of a sample: no crossing, and the same duration as this part had before
                 time = end - now
-                if abs(time - period) > _SAME:
-                    period = time
-                    decay = exp(-rate * time)
-                    reach = -expm1(-rate * time) / rate
+                part = 1 if moved else 0
+                if abs(time - periods[part]) > _SAME:
+                    periods[part] = time
+                    decays[part] = exp(-rate * time)
+                    reaches[part] = -expm1(-rate * time) / rate
+                decay, reach = decays[part], reaches[part]
+                longer = (1.0 if moves else 0.0) - (1.0 if moved else 0.0)  # d(time) by the delay
                 state[0] += final * time + (v - final) * reach
                 state[1] = final + (v - final) * decay
                 for i in range(n):
@@ -267,6 +270,9 @@ def move(t, u, x0, p, where, y, by, rate_out):
                         decay_by = -decay * rate_by * time
                         x_by -= (v - final) * (decay_by + reach * rate_by) / rate
                         v_by += (v - final) * decay_by
+                    elif kind == DELAY:
+                        x_by += (final + (v - final) * decay) * longer
+                        v_by -= (v - final) * decay * rate * longer
                     tangent[0, i], tangent[1, i] = x_by, v_by
             else:
                 steps = 1
