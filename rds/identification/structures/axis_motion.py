@@ -287,3 +287,40 @@ def move(t, u, x0, p, where, y, by, rate_out):
                     while left > 0.0:
                         left = _part(state, tangent, work, p, where, force, left, stretch)
             now, moved = end, moves
+
+
+@kernel
+def extra_voltages(t, u, firsts, block, x0, ends, p, rate_out, trial, rounds, far, found):
+    """Fill `found` (m) with the constant extra voltage of each block with which it ends at `ends` (m); NaN for none.
+
+    Blocks of `block` samples begin at the samples `firsts` (m), in the states `x0` (m, 3). By the secant method from
+    the voltages 0 and `trial`, `rounds` at most; none that is beyond `far`.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    by, y, command = np.zeros((block + 1, 0)), np.zeros(block + 1), np.zeros(block + 1)
+    for number in range(len(firsts)):
+        first = firsts[number]
+        times = t[first : first + block + 1]
+        found[number] = np.nan
+        a, b, at_a, at_b = 0.0, trial, 0.0, 0.0
+        for turn in range(-2, rounds):
+            if turn >= 0:
+                if not (np.isfinite(at_a) and np.isfinite(at_b)) or at_a == at_b:
+                    break
+                a, at_a, b = b, at_b, b - at_b * (b - a) / (at_b - at_a)
+                if abs(b) > far:
+                    break
+                if abs(b - a) <= 1e-6 * trial:
+                    found[number] = b
+                    break
+            extra = a if turn == -2 else b
+            for k in range(block + 1):
+                command[k] = u[first + k] + extra
+            move(times, command, x0[number], p, none, y, by, rate_out)
+            miss = y[block] - ends[number]
+            if turn == -2:
+                at_a = miss
+            else:
+                at_b = miss
+            if turn == rounds - 1 and abs(at_b) <= 1e-3 * abs(ends[number] - x0[number, 1 if rate_out else 0]):
+                found[number] = b
