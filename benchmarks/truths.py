@@ -179,6 +179,7 @@ def cases(number: int) -> Iterator[Case]:
     yield case("sign reversed", "sign", log=replace(data, position=-y))
     frictions = {n: values[n] * (2.0 if up > 0 else 0.3) for n in ("friction_plus", "friction_minus")}
     yield case("friction off", "friction", values | frictions)
+    yield case("friction off, a file of one's own", "friction", candidate=_own(made, values | frictions))
     estimate = fit([logged(made, 2)], structure("axis", made.options), "simulation")
     wrong, lag = _wrong_in(made.values, estimate.values())
     if not estimate.unusable() and wrong != "?":

@@ -1,6 +1,6 @@
 """Verdicts against truth: the table of what `rds validate` says of right and wrong models, and its two error rates.
 
-python -m benchmarks.verdicts [--machines 40] [--first 0] [--jobs 2] [--json]
+python -m benchmarks.verdicts [--machines 300] [--first 0] [--jobs 2] [--keep FILE] [--json]
 
 *Right ones called wrong* counts right models (exact, or fitted to another log of the same machine) with exit code 1, of
 logs that suffice. *Wrong ones called valid* counts models with exit code 0 for something that they are wrong in: any
@@ -18,12 +18,14 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 
 from benchmarks.figures import Figure
 from benchmarks.truths import Case, cases
-from rds.identification.validate.validate import validate
+from rds.identification.validate.assessment import assess
+from rds.identification.validate.judge import judge
 from rds.identification.validate.verdict import Bands
 
 LIMIT = 2.0  # %
@@ -48,7 +50,8 @@ def rows(number: int, kinds: Sequence[str] = ()) -> list[Row]:
 
 
 def _row(case: Case) -> Row:
-    verdict = validate(case.candidate, case.log).verdict
+    # as `validate` does, without the note of what other choices would say, which changes no word and doubles the time
+    verdict = judge(case.candidate, assess(case.candidate, case.log), Bands())
     says = f"{verdict.word} {re.sub(r'[0-9.e+-]+ (?=mm/s|Hz)', '… ', verdict.purpose)}".strip()
     error = not verdict.ok if not case.wrong else verdict.ok and _claims(case, verdict.purpose)
     return Row(case.machine.number, case.kind, not case.wrong, case.suffices, says, error)
@@ -93,23 +96,34 @@ def _rate(name: str, counted: Sequence[Row]) -> Figure:
     return Figure(name, "%", (100.0 * len(errors) / max(len(counted), 1),), limit=LIMIT, note=note)
 
 
-def run(machines: int = 40, first: int = 0, jobs: int = 2) -> Iterator[Row]:
-    """The verdicts on this many machines, in `jobs` processes."""
+def run(machines: int = 300, first: int = 0, jobs: int = 2, keep: Path | None = None) -> Iterator[Row]:
+    """The verdicts on this many machines, in `jobs` processes. What the file `keep` has of them is not made again."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of each process
+    wanted = range(first, first + machines)
+    lines = keep.read_text().splitlines() if keep is not None and keep.exists() else []
+    kept = [row for row in (Row(**json.loads(line)) for line in lines) if row.machine in wanted]
+    yield from kept
+    done = {row.machine for row in kept}
     with ProcessPoolExecutor(jobs) as pool:
-        for found in pool.map(partial(rows), range(first, first + machines)):
+        for found in pool.map(partial(rows), [number for number in wanted if number not in done]):
+            if keep is not None:
+                with keep.open("a") as file:
+                    file.write("".join(json.dumps(asdict(row)) + "\n" for row in found))
             yield from found
 
 
 def main() -> int:
     """Exit code 0 if both rates are met."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.verdicts", description=__doc__)
-    parser.add_argument("--machines", type=int, default=40)
+    parser.add_argument("--machines", type=int, default=300)
     parser.add_argument("--first", type=int, default=0, help="number of the first machine; others are other draws")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument(
+        "--keep", type=Path, help="file of verdicts: an ended run goes on from it; remove it after a change"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout, nothing else")
     options = parser.parse_args()
-    found = list(run(options.machines, options.first, options.jobs))
+    found = list(run(options.machines, options.first, options.jobs, options.keep))
     figures = rates(found)
     if options.json:
         print(json.dumps({"table": table(found), "rates": [f.to_json() for f in figures]}, ensure_ascii=False))

@@ -276,3 +276,23 @@ def test_rubbish_of_every_ending_is_refused_in_a_sentence(
     with pytest.raises(InputError) as refusal:
         read_log(path)
     assert str(refusal.value).startswith(str(path))
+
+
+def test_a_slip_of_the_encoder_has_its_time(tmp_path: Path) -> None:
+    good = axis()
+    position = good["position"].copy()
+    position[2000:] += 0.12
+    log = read(tmp_path, good | {"position": position})
+    finding = grave(log)["leap"]
+    assert finding.sample == 2000 and "the position leaps at 2 s by +0.1" in finding.what
+    alone = good["position"].copy()
+    alone[2000] += 0.12  # one reading, there and back
+    assert "leap" not in grave(read(tmp_path, good | {"position": alone}))
+
+
+def test_sampling_that_is_too_slow_is_told_with_the_period_that_would_do(tmp_path: Path) -> None:
+    rows = axis(16_000)
+    slow = read(tmp_path, {name: values[::50] for name, values in rows.items()})  # 50 ms, and tau is 10 ms
+    finding = grave(slow)["sampling"]
+    assert "within its sample period of 50 ms" in finding.what and "ms or less tells it" in finding.what
+    assert "sampling" not in grave(read(tmp_path, rows))

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rds
 from rds.core.errors import InputError
 from rds.core.types import Model
+from rds.identification.logs.read_log import read_log
 from rds.identification.validate.in_loop import in_loop
+from rds.identification.validate.own_loop import OwnLoop, own_loop
 from rds.identification.validate.validate import validate
 from rds.results import Result
-from tests.validation.validation_logs import X, candidate, log
+from tests.validation.validation_logs import STEP, T, X, candidate, log
 
 
 def simulate(model: Model) -> Result:
@@ -33,3 +37,45 @@ def test_a_model_three_times_off_does_not_hide_in_its_own_loop() -> None:
     assert any(r.kind == "loop" and "simulated in the loop itself" in r.what for r in found.verdict.reasons)
     with pytest.raises(InputError, match=r"the experiment has a sample period of 0\.001 s, and the log one of 0\.002"):
         in_loop(right, replace(data, time=2.0 * data.time), simulate)
+
+
+@pytest.mark.parametrize("name", ["pid", "tracking", "cascade"])
+def test_the_loop_of_a_result_is_known_from_the_result(name: str, tmp_path: Path) -> None:
+    reference = rds.sinusoid(amplitude=4.0, frequency=0.8)
+    rds.Experiment(axis="X", duration=2.0, reference=reference, controller={"name": name}).run(out=tmp_path / "run")
+    (data,) = read_log(tmp_path / "run")
+    known = own_loop(data)
+    assert isinstance(known, OwnLoop) and known.late == 0
+    assert in_loop(candidate(), data, known.simulate).rmse < 2e-3
+    if name == "pid":
+        found = validate(candidate(X | {"tau": 3.0 * X["tau"]}), data)
+        assert any(r.kind == "loop" and r.side == "against" for r in found.verdict.reasons)
+
+
+def test_a_loop_that_the_result_does_not_tell_is_not_simulated(tmp_path: Path) -> None:
+    law = tmp_path / "mine.py"
+    law.write_text("def control(t, r, y, state, params):\n    return 20.0 * (r.position - y), state\n")
+    reference = rds.sinusoid(amplitude=4.0, frequency=0.8)
+    run = rds.Experiment(axis="X", duration=2.0, reference=reference, controller=str(law)).run(out=tmp_path / "run")
+    (data,) = read_log(tmp_path / "run")
+    assert "give --loop EXPERIMENT.toml" in str(own_loop(data))
+    other = log(run["X_voltage"], run["X_measured"], closed_loop=True)
+    assert own_loop(other) is None
+
+
+def test_without_its_controller_a_closed_loop_is_judged_by_forces() -> None:
+    rng = np.random.default_rng(4)
+    t = np.arange(8000) * T
+    wanted = 5.0 * np.sin(2 * np.pi * 0.7 * t) + 0.5 * np.sin(2 * np.pi * 6.0 * t)
+    x, u, y = (0.0, 0.0), np.zeros(len(t)), np.zeros(len(t))
+    model = rds.library_model("linear-axis", **X)
+    for k in range(len(t)):
+        y[k] = np.rint((x[0] + 1e-4 * rng.standard_normal()) / STEP) * STEP
+        u[k] = np.clip(20.0 * (wanted[k] - y[k]), -10.0, 10.0)
+        x = model.advance(x, u[k], T, X)
+    data = log(u, y, closed_loop=True)
+    sides = {}
+    for factor in (1.0, 3.0):
+        found = validate(candidate(X | {"tau": factor * X["tau"]}), data)
+        (sides[factor],) = [r.side for r in found.verdict.reasons if r.kind == "forces"]
+    assert sides == {1.0: "for", 3.0: "against"}

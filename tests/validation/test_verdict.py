@@ -248,7 +248,7 @@ def test_what_the_structure_lacks_is_no_matter_of_wide_intervals() -> None:
     estimate = fit(logs[:1], structure("axis"))
     assert abs(estimate.parameters["K"].value / X["K"] - 1.0) > 0.1
     found = validate(estimate, logs[1])
-    assert found.verdict.word is Word.PARTLY and "Its parameters may not be" in found.verdict.sentence
+    assert found.verdict.word is Word.NOT and "its gain is" in found.verdict.sentence
     (reason,) = [r for r in found.verdict.reasons if r.kind == "structure"]
     assert reason.side is Side.AGAINST and "times the measurement's noise" in reason.what
 
@@ -323,3 +323,21 @@ def test_no_log_and_too_short_a_log_are_refused() -> None:
         validate(candidate(), log(FRESH[:15]))
     with pytest.raises(InputError, match="initial_samples = 3 must be at least 10"):
         validate(candidate(), log(FRESH), initial_samples=3)
+
+
+@pytest.mark.parametrize("estimated", [True, False])
+def test_logs_of_two_axes_contradict_each_other(estimated: bool) -> None:
+    heavy = X | {"tau": 1.5 * X["tau"]}
+    other = log(
+        FRESH,
+        np.rint(structure("axis").respond(np.arange(len(FRESH)) * T, FRESH, [0.0, 0.0], heavy) / STEP) * STEP,
+        name="b",
+    )
+    model = candidate(share=1e-3) if estimated else candidate()
+    found = validate(model, [log(FRESH, name="a"), other])
+    told = [r.what for r in found.verdict.reasons if r.kind == "contradiction"]
+    about = "tau" if estimated else "what the model is off by in its lag"
+    assert any(what.startswith(f"the logs contradict each other about {about}: by ") for what in told)
+    assert "The logs contradict each other." in found.verdict.sentence
+    alike = validate(model, [log(FRESH, name="a"), log(FRESH, name="b")])
+    assert not any(r.kind == "contradiction" for r in alike.verdict.reasons)

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rds.core.extras import needed_for
 from rds.identification.logs.log import Log
-from rds.identification.structures.structure import PLAY, Structure
+from rds.identification.structures.structure import PLAY, Blocks, Structure
 
 _BLOCKS = 400  # at most; of a longer log, blocks spread evenly
 _ROUNDS = 12
@@ -63,27 +64,46 @@ def needed_voltage(
     chosen = np.unique(np.linspace(0, count - 1, min(count, _BLOCKS)).astype(int)) if count > 0 else np.empty(0, int)
     least = _STEPS_OF_ENCODER * (log.resolution or 0.0)
     trial = _TRIAL * max(float(np.abs(log.command).max()), 1e-6)
-    rows = []
-    for first in chosen * block:
-        part = slice(first, first + block + 1)
-        moved = float(log.position[first + block] - log.position[first])
-        size = float(np.abs(log.position[part]).max()) if is_rate else abs(moved)
-        # where the axis turns, the way is short and friction's part of it large
-        if size <= least or size == 0.0 or (not is_rate and (velocity[part] * np.sign(moved) <= 0.0).any()):
-            continue
-        state = [0.0] * structure.states
-        state[0] = float(log.position[first])
-        if not is_rate and structure.states > 1:
-            state[1] = float(velocity[first])
-        if PLAY in structure.state_names[: structure.states]:
-            state[structure.state_names.index(PLAY)] = float(np.sign(moved))  # it moves that way, pushed by the motor
-        extra = _extra(structure, values, log.time[part], log.command[part], state, log.position[first + block], trial)
-        if extra is not None:
-            middle = first + block // 2
-            rows.append((log.time[middle], velocity[part].mean(), log.command[part][:-1].mean(), extra))
-    table = np.array(rows, dtype=float).reshape(len(rows), 4)
-    time, speed, command, extras = table.T
-    return NeededVoltage(block, time, speed, command, extras, left_out=len(chosen) - len(rows))
+    rows = (chosen * block)[:, None] + np.arange(block + 1)
+    position, speed = log.position[rows], velocity[rows]
+    moved = position[:, -1] - position[:, 0]
+    size = np.abs(position).max(axis=1, initial=0.0) if is_rate else np.abs(moved)
+    kept = (size > least) & (size > 0.0)
+    if not is_rate:  # where the axis turns, the way is short and friction's part of it large
+        kept &= (speed * np.sign(moved)[:, None] > 0.0).all(axis=1)
+    rows, position, speed, moved = rows[kept], position[kept], speed[kept], moved[kept]
+    states = np.zeros((len(rows), structure.states))
+    states[:, 0] = position[:, 0]
+    if not is_rate and structure.states > 1:
+        states[:, 1] = speed[:, 0]
+    if PLAY in structure.state_names[: structure.states]:
+        states[:, structure.state_names.index(PLAY)] = np.sign(moved)  # it moves that way, pushed by the motor
+    blocks = Blocks(rows[:, 0].copy(), block, states, position[:, -1].copy(), trial, _FAR * trial, _ROUNDS)
+    lands = structure.lands or partial(_lands, structure)
+    extra = lands(log.time, log.command, blocks, values)
+    found = np.isfinite(extra)
+    rows = rows[found]
+    return NeededVoltage(
+        block,
+        time=log.time[rows[:, 0] + block // 2],
+        velocity=speed[found].mean(axis=1),
+        command=log.command[rows[:, :-1]].mean(axis=1),
+        extra=extra[found],
+        left_out=len(chosen) - len(rows),
+    )
+
+
+def _lands(
+    structure: Structure, t: np.ndarray, u: np.ndarray, blocks: Blocks, values: Mapping[str, float]
+) -> np.ndarray:
+    """The constant extra voltage of each block; NaN where none is found near."""
+    found = np.full(len(blocks.firsts), np.nan)
+    for number, first in enumerate(blocks.firsts.tolist()):
+        part = slice(first, first + blocks.length + 1)
+        state, end = blocks.states[number].tolist(), float(blocks.ends[number])
+        extra = _extra(structure, values, t[part], u[part], state, end, blocks)
+        found[number] = np.nan if extra is None else extra
+    return found
 
 
 def _extra(
@@ -93,7 +113,7 @@ def _extra(
     u: np.ndarray,
     state: list[float],
     end: float,
-    trial: float,
+    how: Blocks,
 ) -> float | None:
     """The constant extra voltage with which the model ends at `end`; None where none is found near."""
 
@@ -101,15 +121,15 @@ def _extra(
         with np.errstate(all="ignore"):
             return float(structure.respond(t, u + extra, state, values)[-1]) - end
 
-    a, b = 0.0, trial
+    a, b = 0.0, how.trial
     at_a, at_b = miss(a), miss(b)
-    for _ in range(_ROUNDS):
+    for _ in range(how.rounds):
         if not (np.isfinite(at_a) and np.isfinite(at_b)) or at_a == at_b:
             return None  # it sticks, or is unstable: the voltage makes no difference
         a, at_a, b = b, at_b, b - at_b * (b - a) / (at_b - at_a)
-        if abs(b) > _FAR * trial:
+        if abs(b) > how.far:
             return None
-        if abs(b - a) <= 1e-6 * trial:
+        if abs(b - a) <= 1e-6 * how.trial:
             return b
         at_b = miss(b)
     return b if abs(at_b) <= 1e-3 * abs(end - state[0]) else None
@@ -155,4 +175,8 @@ def smoothed_velocity(log: Log, window: int, is_rate: bool) -> np.ndarray:
         return log.position
     length = max(2 * (window // 2) + 1, 5)
     length = min(length, len(log) - (1 - len(log) % 2))
+    steps = np.diff(log.time)
+    period = log.sample_period
+    if np.abs(steps - period).max() <= 1e-9 * period:  # a filter of the time would give the period
+        return savgol_filter(log.position, length, 2, deriv=1, delta=period)
     return savgol_filter(log.position, length, 2, deriv=1) / savgol_filter(log.time, length, 2, deriv=1)

@@ -37,6 +37,8 @@ class Problem:
         self.size = len(self.names) + structure.states * len(self.logs)
         self._order = list(structure.parameters)
         self._tick = tick
+        self.runs = 0  # triangles that were made
+        self._last: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def point(self, values: Mapping[str, float], states: Sequence[Sequence[float]]) -> np.ndarray:
         """The free numbers as one array."""
@@ -72,7 +74,16 @@ class Problem:
         return self.structure.respond(one.time, one.command, self.state(point, log), self.values(point))
 
     def residuals(self, point: np.ndarray, log: int) -> tuple[np.ndarray, np.ndarray]:
-        """Measurement minus free run of one log (N), and the free run's derivatives (N, free parameters + states)."""
+        """Measurement minus free run of one log (N), and the free run's derivatives (N, free parameters + states).
+
+        Those of the last point are kept: what judges a fit asks for them again, where the search has ended.
+        """
+        last = self._last.get(log)
+        if last is None or not np.array_equal(last[0], point):
+            self._last[log] = last = (point.copy(), *self._run(point, log))
+        return last[1], last[2]
+
+    def _run(self, point: np.ndarray, log: int) -> tuple[np.ndarray, np.ndarray]:
         one, values, x0 = self.logs[log], self.values(point), self.state(point, log)
         with np.errstate(over="ignore", invalid="ignore"):
             if self.structure.sensitivities is None:
@@ -92,6 +103,7 @@ class Problem:
     def triangle(self, point: np.ndarray) -> np.ndarray:
         """R (n + 1, n + 1) of [J r]; NaN where the free run leaves the finite numbers."""
         n, blocks = self.size, []
+        self.runs += 1
         for number in range(len(self.logs)):
             error, by = self.residuals(point, number)
             if not (np.isfinite(error).all() and np.isfinite(by).all()):

@@ -27,6 +27,13 @@ class Motion:
 
 def motion_of(log: Log) -> Motion:
     """Differences of the position over as few samples as noise permits."""
+    if "motion" not in log.known:
+        log.known["motion"] = _motion_of(log)
+    found: Motion = log.known["motion"]
+    return found
+
+
+def _motion_of(log: Log) -> Motion:
     y, t = log.position, log.time
     step = log.resolution or 0.0
     noise = max(noise_of(y), step / np.sqrt(12.0))

@@ -70,33 +70,52 @@ def least_squares(problem: Problem, start: np.ndarray, most: int | None = None) 
     samples = sum(len(log) for log in problem.logs)
 
     def residuals(point: np.ndarray) -> np.ndarray:
-        return triangle(point)[:, -1]
+        R = triangle(point)
+        if _settled(R, samples) and (point > low).all() and (point < high).all():
+            raise _Settled
+        return R[:, -1]
 
     def derivatives(point: np.ndarray) -> np.ndarray:
         return -triangle(point)[:, :-1]
 
     def search(method: Literal["dogbox", "trf"]) -> Solution:
-        found = minimize(
-            residuals,
-            start,
-            jac=derivatives,
-            bounds=(low, high),
-            method=method,
-            x_scale="jac",
-            ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
-            xtol=1e-9,
-            gtol=1e-12,
-            max_nfev=most or EVALUATIONS + MORE * max(len(problem.names) - 4, 0),
-        )
+        begun = problem.runs
+        try:
+            found = minimize(
+                residuals,
+                start,
+                jac=derivatives,
+                bounds=(low, high),
+                method=method,
+                x_scale="jac",
+                ftol=float(np.clip(_NEGLIGIBLE / samples, 1e-13, 1e-6)),
+                xtol=1e-9,
+                gtol=1e-12,
+                max_nfev=most or EVALUATIONS + MORE * max(len(problem.names) - 4, 0),
+            )
+        except _Settled:
+            ((point, R),) = last
+            return Solution(point, R, problem.runs - begun, True, np.zeros(len(point)))
         return Solution(found.x, triangle(found.x), int(found.nfev), bool(found.success), np.asarray(found.active_mask))
 
     # The dogleg needs little more than half the free runs of the reflective method, but ends anywhere where a direction
-    # is not told, and may stay at a bound.
+    # is not told, and may stay at a bound. Initial states alone have nowhere else to go: one that is not told, as the
+    # velocity of an axis that sticks, changes nothing.
     quick = search("dogbox")
-    if quick.converged and not quick.at_bound.any() and tells_all(quick.triangle):
+    if quick.converged and not quick.at_bound.any() and (not problem.names or tells_all(quick.triangle)):
         return quick
     sure = search("trf")
     return sure if sure.squares <= quick.squares else quick
+
+
+class _Settled(Exception):
+    """The search is at its end, and need not try one more step to see that."""
+
+
+def _settled(triangle: np.ndarray, samples: int) -> bool:
+    """Whether the step to the least squares, were the free run linear, would lower them by next to nothing."""
+    lowered, all_of = float(triangle[:-1, -1] @ triangle[:-1, -1]), float(triangle[:, -1] @ triangle[:, -1])
+    return lowered <= _NEGLIGIBLE * all_of / samples and tells_all(triangle)
 
 
 def tells_all(triangle: np.ndarray) -> bool:

@@ -44,12 +44,11 @@ def axis_starts(
     longest = max(float(part.time[-1] - part.time[0]) for part in parts)
     finest = min(part.sample_period for part in parts)
     grid = np.geomspace(0.5 * finest, max(0.1 * longest, 2.0 * finest), GRID)
-    found = [(*_regression(parts, motions, tau), tau) for tau in grid]
-    costs = [cost for cost, _, _ in found]
+    costs, solutions = _regressions(parts, motions, grid)
     minima = [i for i in range(GRID) if costs[i] <= costs[max(i - 1, 0)] and costs[i] <= costs[min(i + 1, GRID - 1)]]
-    minima.sort(key=lambda i: costs[i])
+    minima.sort(key=lambda i: float(costs[i]))
     begins = [_initial_state(log, motion, states) for log, motion in zip(parts, motions, strict=True)]
-    first, *rest = ((found[i][1], found[i][2]) for i in minima[:2])
+    first, *rest = ((solutions[i], float(grid[i])) for i in minima[:2])
     for solved, tau in chain([first], stick_starts(parts), rest):
         yield _values(solved, tau, names, parts, motions), begins
 
@@ -121,54 +120,64 @@ def _values(
     return {name: begin[name] for name in names}
 
 
-def _regression(logs: Sequence[Log], motions: Sequence[Motion], tau: float) -> tuple[float, np.ndarray]:
-    """Sum of squares, and K, F₊, F₋ in the least-squares sense for this time constant; 0 for what never occurs."""
-    gram = np.zeros((4, 4))
+def _regressions(logs: Sequence[Log], motions: Sequence[Motion], grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of squares (taus), and K, F₊, F₋ in the least-squares sense for each time constant (taus, 3); 0 for what
+    never occurs.
+    """
+    gram = np.zeros((len(grid), 4, 4))
     for log, motion in zip(logs, motions, strict=True):
         v = motion.velocity
-        products = _products(log.time, log.command, log.position, v > motion.threshold, v < -motion.threshold, tau)
+        forward, backward = v > motion.threshold, v < -motion.threshold
+        products = _products(log.time, log.command, log.position, forward, backward, grid)
         # each log has an initial position and velocity of its own: what they explain is taken out first
-        own, across, shared = products[:2, :2], products[:2, 2:], products[2:, 2:]
-        gram += shared - across.T @ np.linalg.lstsq(own, across, rcond=1e-9)[0]
-    scale = np.sqrt(np.diag(gram)[:3])
-    used = np.flatnonzero(scale > 1e-9 * max(float(scale.max()), 1e-300))
-    solved = np.zeros(3)
-    A, b = gram[np.ix_(used, used)] / np.outer(scale[used], scale[used]), gram[used, 3] / scale[used]
-    solved[used] = np.linalg.lstsq(A, b, rcond=1e-9)[0] / scale[used]
-    signs = np.array([1.0, -1.0, -1.0])
-    cost = float(gram[3, 3] - 2.0 * solved @ gram[:3, 3] + solved @ gram[:3, :3] @ solved)
-    return cost, solved * signs
+        own, across, shared = products[:, :2, :2], products[:, :2, 2:], products[:, 2:, 2:]
+        gram += shared - np.swapaxes(across, 1, 2) @ np.linalg.pinv(own, rcond=1e-9, hermitian=True) @ across
+    scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=1, axis2=2)[:, :3], 0.0))
+    used = scale > 1e-9 * np.maximum(scale.max(axis=1, keepdims=True), 1e-300)
+    inverse = np.where(used, 1.0, 0.0) / np.where(used, scale, 1.0)
+    A = gram[:, :3, :3] * inverse[:, :, None] * inverse[:, None, :]
+    b = gram[:, :3, 3] * inverse
+    solved = (np.linalg.pinv(A, rcond=1e-9, hermitian=True) @ b[:, :, None])[:, :, 0] * inverse
+    costs = gram[:, 3, 3] - 2.0 * (solved * gram[:, :3, 3]).sum(axis=1)
+    costs += (solved * (gram[:, :3, :3] @ solved[:, :, None])[:, :, 0]).sum(axis=1)
+    return costs, solved * np.array([1.0, -1.0, -1.0])
 
 
 @kernel
-def _products(t, u, y, forward, backward, tau):
-    """Sums of products (6, 6) of: 1, the initial velocity's response, those to m u, s₊ and s₋, and the position."""
-    sums, row = np.zeros((6, 6)), np.zeros(6)
+def _products(t, u, y, forward, backward, taus):
+    """Sums of products (taus, 6, 6) of 1, the responses of the initial velocity, m u, s₊ and s₋, and the position."""
+    sums, row = np.zeros((len(taus), 6, 6)), np.zeros(6)
     v = np.zeros(3)  # velocities of the responses
-    row[0] = 1.0
-    step, decay, reach, left = -1.0, 1.0, 0.0, 1.0
-    for k in range(len(t)):
-        row[5] = y[k] - y[0]
+    for number in range(len(taus)):
+        tau = taus[number]
+        row[:] = 0.0
+        v[:] = 0.0
+        row[0] = 1.0
+        every = max(1, len(t) // 2500)  # of the sums: neighbouring samples say the same of where to begin
+        step, decay, reach, left = -1.0, 1.0, 0.0, 1.0
+        for k in range(len(t)):
+            row[5] = y[k] - y[0]
+            if k % every == 0:
+                for i in range(6):
+                    for j in range(i, 6):
+                        sums[number, i, j] += row[i] * row[j]
+            if k + 1 == len(t):
+                break
+            if abs(t[k + 1] - t[k] - step) > 1e-12:
+                step = t[k + 1] - t[k]
+                decay = exp(-step / tau)
+                reach = -tau * expm1(-step / tau)
+            row[1] += left * reach
+            left *= decay
+            for i in range(3):
+                force = 0.0
+                if i == 0 and (forward[k] or backward[k]):
+                    force = u[k]
+                elif (i == 1 and forward[k]) or (i == 2 and backward[k]):
+                    force = 1.0
+                row[2 + i] += force * step + (v[i] - force) * reach
+                v[i] = force + (v[i] - force) * decay
         for i in range(6):
-            for j in range(i, 6):
-                sums[i, j] += row[i] * row[j]
-        if k + 1 == len(t):
-            break
-        if abs(t[k + 1] - t[k] - step) > 1e-12:
-            step = t[k + 1] - t[k]
-            decay = exp(-step / tau)
-            reach = -tau * expm1(-step / tau)
-        row[1] += left * reach
-        left *= decay
-        for i in range(3):
-            force = 0.0
-            if i == 0 and (forward[k] or backward[k]):
-                force = u[k]
-            elif (i == 1 and forward[k]) or (i == 2 and backward[k]):
-                force = 1.0
-            row[2 + i] += force * step + (v[i] - force) * reach
-            v[i] = force + (v[i] - force) * decay
-    for i in range(6):
-        for j in range(i):
-            sums[i, j] = sums[j, i]
+            for j in range(i):
+                sums[number, i, j] = sums[number, j, i]
     return sums

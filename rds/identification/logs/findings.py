@@ -1,11 +1,11 @@
-"""What the data of a log say about themselves: resolution, saturation, excitation, sign, units, a closed loop."""
+"""What the data of a log say about themselves: resolution, excitation, sign, units, a loop, leaps, sampling."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 
-from rds.identification.logs import excitation, plausibility, steps
+from rds.identification.logs import excitation, plausibility, sampling, slips, steps
 from rds.identification.logs.log import Finding, Log
 from rds.machines.machine import Axis
 
@@ -16,6 +16,8 @@ _CHECKS: tuple[Callable[[Log, Axis | None], list[Finding]], ...] = (
     plausibility.direction,
     plausibility.magnitudes,
     plausibility.loop,
+    slips.leaps,
+    sampling.slow,
 )
 
 

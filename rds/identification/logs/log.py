@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -102,6 +104,11 @@ class Log:
     def is_rate(self) -> bool:
         """Whether the position is a speed."""
         return self.units.get("position") in RATES
+
+    @cached_property
+    def known(self) -> dict[str, Any]:
+        """What was worked out of this log and takes long, by who works it out."""
+        return {}
 
     def part(self, first: int, end: int) -> Log:
         """The samples from `first` to before `end`; its times stay what they are."""

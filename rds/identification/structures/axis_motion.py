@@ -219,7 +219,7 @@ def move(t, u, x0, p, where, y, by, rate_out):
     _begin(x0, p, where, state, tangent)
     plain = p[STRIBECK] == 0.0 and p[BACKLASH] == 0.0
     rate = (1.0 + p[VISCOUS]) / p[TAU]
-    period, decay, reach = -1.0, 1.0, 0.0  # of the last step that was whole
+    periods, decays, reaches = np.full(2, -1.0), np.ones(2), np.zeros(2)  # of the last parts, before and after a change
     acting = 0  # the command that acts now
     out = 1 if rate_out else 2 if p[BACKLASH] > 0.0 else 0
     for k in range(len(t)):
@@ -243,13 +243,16 @@ def move(t, u, x0, p, where, y, by, rate_out):
             v = state[1]
             side = PLUS if v > 0.0 or (v == 0.0 and force > 0.0) else MINUS
             final = (force - p[side]) / (1.0 + p[VISCOUS])
-            if plain and not moved and not moves and v != 0.0 and final * v > 0.0:
-                # the usual sample: no crossing, the same duration as before
+            if plain and v != 0.0 and final * v > 0.0:
+                # the usual part of a sample: no crossing, and the same duration as this part had before
                 time = end - now
-                if abs(time - period) > _SAME:
-                    period = time
-                    decay = exp(-rate * time)
-                    reach = -expm1(-rate * time) / rate
+                part = 1 if moved else 0
+                if abs(time - periods[part]) > _SAME:
+                    periods[part] = time
+                    decays[part] = exp(-rate * time)
+                    reaches[part] = -expm1(-rate * time) / rate
+                decay, reach = decays[part], reaches[part]
+                longer = (1.0 if moves else 0.0) - (1.0 if moved else 0.0)  # d(time) by the delay
                 state[0] += final * time + (v - final) * reach
                 state[1] = final + (v - final) * decay
                 for i in range(n):
@@ -267,6 +270,9 @@ def move(t, u, x0, p, where, y, by, rate_out):
                         decay_by = -decay * rate_by * time
                         x_by -= (v - final) * (decay_by + reach * rate_by) / rate
                         v_by += (v - final) * decay_by
+                    elif kind == DELAY:
+                        x_by += (final + (v - final) * decay) * longer
+                        v_by -= (v - final) * decay * rate * longer
                     tangent[0, i], tangent[1, i] = x_by, v_by
             else:
                 steps = 1
@@ -281,3 +287,40 @@ def move(t, u, x0, p, where, y, by, rate_out):
                     while left > 0.0:
                         left = _part(state, tangent, work, p, where, force, left, stretch)
             now, moved = end, moves
+
+
+@kernel
+def extra_voltages(t, u, firsts, block, x0, ends, p, rate_out, trial, rounds, far, found):
+    """Fill `found` (m) with the constant extra voltage of each block with which it ends at `ends` (m); NaN for none.
+
+    Blocks of `block` samples begin at the samples `firsts` (m), in the states `x0` (m, 3). By the secant method from
+    the voltages 0 and `trial`, `rounds` at most; none that is beyond `far`.
+    """
+    none = np.zeros(0, dtype=np.int64)
+    by, y, command = np.zeros((block + 1, 0)), np.zeros(block + 1), np.zeros(block + 1)
+    for number in range(len(firsts)):
+        first = firsts[number]
+        times = t[first : first + block + 1]
+        found[number] = np.nan
+        a, b, at_a, at_b = 0.0, trial, 0.0, 0.0
+        for turn in range(-2, rounds):
+            if turn >= 0:
+                if not (np.isfinite(at_a) and np.isfinite(at_b)) or at_a == at_b:
+                    break
+                a, at_a, b = b, at_b, b - at_b * (b - a) / (at_b - at_a)
+                if abs(b) > far:
+                    break
+                if abs(b - a) <= 1e-6 * trial:
+                    found[number] = b
+                    break
+            extra = a if turn == -2 else b
+            for k in range(block + 1):
+                command[k] = u[first + k] + extra
+            move(times, command, x0[number], p, none, y, by, rate_out)
+            miss = y[block] - ends[number]
+            if turn == -2:
+                at_a = miss
+            else:
+                at_b = miss
+            if turn == rounds - 1 and abs(at_b) <= 1e-3 * abs(ends[number] - x0[number, 1 if rate_out else 0]):
+                found[number] = b

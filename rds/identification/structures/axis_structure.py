@@ -19,7 +19,7 @@ from rds.core.errors import InputError
 from rds.core.quantities import Quantity
 from rds.identification.logs.log import RATES, Log
 from rds.identification.structures.signals import POSITIONS, follow, followed
-from rds.identification.structures.structure import PLAY, Idle, Start, Structure
+from rds.identification.structures.structure import PLAY, Blocks, Idle, Start, Structure
 
 OUTPUTS = ("mm", "deg", "mm/s", "rev/min")
 OPTIONS = ("viscous", "stribeck", "offset", "dead-zone", "delay", "backlash")
@@ -118,6 +118,16 @@ def make(options: Sequence[str] = (), output: str = "mm", command: str = "V") ->
         by[:, both] -= by[:, both + 1]
         return y, np.delete(by, both + 1, axis=1)
 
+    def lands(t: np.ndarray, u: np.ndarray, blocks: Blocks, values: Mapping[str, float]) -> np.ndarray:
+        from rds.identification.structures.axis_motion import extra_voltages
+
+        starts, found = np.zeros((len(blocks.firsts), 3)), np.empty(len(blocks.firsts))
+        begin = 1 if rate else 0
+        starts[:, begin : begin + states] = blocks.states
+        search = (blocks.trial, blocks.rounds, blocks.far)
+        extra_voltages(t, u, blocks.firsts, blocks.length, starts, blocks.ends, place(values), rate, *search, found)
+        return found
+
     def start(logs: Sequence[Log]) -> Iterator[Start]:
         from rds.identification.fit.starting_values import axis_starts, rate_starts
 
@@ -131,6 +141,7 @@ def make(options: Sequence[str] = (), output: str = "mm", command: str = "V") ->
         respond=respond,
         options=tuple(options),
         sensitivities=sensitivities,
+        lands=lands,
         as_model=partial(_as_model, POSITIONS[output][1]) if set(options) <= {"viscous", "offset"} else None,
         at_most={"friction_minus": 0.0} if "friction_minus" in table else {},
         state_names=("velocity",) if rate else ("position", "velocity", PLAY)[:states],

@@ -40,6 +40,18 @@ class Idle(NamedTuple):
     likely: Callable[[Mapping[str, float]], Sequence[float]]  # from the fit's values: what it may be, likeliest first
 
 
+class Blocks(NamedTuple):
+    """Stretches of a log, in each of which a model is to land at a position by a constant extra voltage."""
+
+    firsts: np.ndarray  # (m,) samples at which they begin
+    length: int  # samples
+    states: np.ndarray  # (m, states) at their begin
+    ends: np.ndarray  # (m,) outputs at their end
+    trial: float  # V: the first voltage that is tried, beside 0
+    far: float  # V: none beyond it
+    rounds: int  # of the search, at most
+
+
 @dataclass(frozen=True)
 class Structure:
     """A parametrized model of an axis, ready to be fitted, simulated, validated or written as a model file."""
@@ -53,6 +65,9 @@ class Structure:
     # outputs and their derivatives by parameter and initial state: (samples,), (samples, parameters + states);
     # called as `respond` is; without it, a fit takes finite differences
     sensitivities: Callable[..., tuple[np.ndarray, np.ndarray]] | None = None
+    # the extra voltage of each of these blocks (m,), NaN where none is found, at once: `lands(t, u, blocks, values)`;
+    # without it, block by block with `respond`
+    lands: Callable[[np.ndarray, np.ndarray, Blocks, Mapping[str, float]], np.ndarray] | None = None
     # the `[model]` table or machine parameters that say the same to a run; None where no library model does
     as_model: Callable[[Mapping[str, float]], dict[str, Any]] | None = None
     at_most: Mapping[str, float] = field(default_factory=dict)  # upper bounds of parameters, where there are any

@@ -26,11 +26,15 @@ _RUNS = 60  # free runs of the search, at most
 
 @dataclass(frozen=True)
 class Refitted:
-    """One parameter: the model's value, and what the log by itself says. `apart` is in standard errors of both."""
+    """One parameter: the model's value, and what the log by itself says, with its standard error.
+
+    `apart` is in standard errors of both.
+    """
 
     name: str
     model: float
     here: float
+    error: float
     unit: str
     apart: float
 
@@ -96,4 +100,4 @@ def _compared(name: str, stated: Mapping[str, Parameter], here: float, error: fl
     model = stated[name]
     spread = hypot(model.std_error, error)
     apart = abs(model.value - here) / spread if isfinite(spread) and spread > 0.0 else 0.0
-    return Refitted(name, model.value, here, unit, apart)
+    return Refitted(name, model.value, here, error, unit, apart)

@@ -30,6 +30,8 @@ def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Wo
     if ({"unstable", "sign", "unit"} | WRONG) & against:
         return Word.NOT, ""
     if not position and not velocity:
+        if a.log.closed_loop and any(r.kind == "forces" and r.side is Side.FOR for r in reasons):
+            return Word.PARTLY, " ".join(["foretelling the force of a motion", *_limits(a, bands)])
         if a.log.closed_loop and "voltage" not in against and a.voltage and a.voltage.relative_percent is not None:
             return Word.UNTOLD, ""
         foreseen = foreseen_at(a, bands)
@@ -104,8 +106,11 @@ def _and(words: list[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def overall(verdicts: dict[str, Verdict]) -> Verdict:
-    """The verdict over several logs: not valid if any says so; else the narrowest of those that can tell."""
+def overall(verdicts: dict[str, Verdict], between: tuple[Reason, ...] = ()) -> Verdict:
+    """The verdict over several logs: not valid if any says so; else the narrowest of those that can tell.
+
+    `between` are reasons that no single log gives.
+    """
     if len(verdicts) == 1:
         return next(iter(verdicts.values()))
     for word in (Word.NOT, Word.PARTLY, Word.VALID, Word.UNTOLD):
@@ -122,4 +127,6 @@ def overall(verdicts: dict[str, Verdict]) -> Verdict:
         for name, verdict in verdicts.items()
         for reason in verdict.reasons
     )
-    return Verdict(word, sentence, reasons, "; ".join(purposes))
+    if between:
+        sentence += " The logs contradict each other."
+    return Verdict(word, sentence, (*between, *reasons), "; ".join(purposes))

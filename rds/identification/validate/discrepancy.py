@@ -9,8 +9,9 @@ far below a per cent of the way. So two measures are taken, each with a standard
   up for does not add up. Model and fit are compared as frequency responses K e^(-jωd) / (1 + jωτ) at the intended
   bandwidth.
 - as motion, whatever the model is: the measured position over a constant, the modelled one ŷ, its velocity and its
-  acceleration, by least squares (stretches of a closed loop have a drift of their own). y ≈ g ŷ - L dŷ/dt + Q d²ŷ/dt²
-  is a gain and phase, too.
+  acceleration, and the times for which it has moved forward and backward, by least squares (stretches of a closed loop
+  have a drift of their own). y ≈ g ŷ - L dŷ/dt + Q d²ŷ/dt² is a gain and phase, too; friction that is off adds a
+  constant to the velocity of each direction, and would pass for a gain without these times.
 
 The intended bandwidth, where nobody states one, is that of a position loop on this axis without overshoot: half of 1/τ.
 """
@@ -55,8 +56,8 @@ class Discrepancy:
     """What the model is off by at `frequency` (Hz). Positive: the model has more gain, leads, has more friction.
 
     `lag` is the model's time constant and delay, less the log's; `delay` the delay alone. As the axis, `rmse` is what
-    the model leaves of the log and `reached` the fit, in the position's unit; as motion there is no friction, and no
-    delay apart from the lag.
+    the model leaves of the log and `reached` the fit, in the position's unit; as motion there is no delay apart from
+    the lag, and friction only of a motion both ways.
     """
 
     frequency: float
@@ -256,12 +257,14 @@ def as_motion(
     t, y, u = log.time[first:][:_LONGEST], log.position[first:][:_LONGEST], log.command[first:][:_LONGEST]
     x = modelled[:_LONGEST]
     rate = x if is_rate else np.gradient(x, t)
-    change = np.gradient(rate, t)
     if not np.ptp(x) > 1e-6 * max(float(np.ptp(y)), 1e-300):
         return None
-    tau = max(tau, T) if tau > 0.0 else _time_constant(rate, change, u, T)
+    K, tau_shown = _first_order(rate, np.gradient(rate, t), u, T)
+    tau = max(tau, T) if tau > 0.0 else tau_shown
     f = frequency or 1.0 / (4.0 * pi * tau)
-    columns = [x, -rate, change] if not is_rate else [x, -change, np.gradient(change, t)]
+    change = _backward(x, T)
+    ways = [sign.astype(float) for sign in _signs(x if is_rate else change)]
+    columns = [x, -change, _backward(change, T), *(ways if is_rate else [np.cumsum(way) * T for way in ways])]
     stretches = len(_stretches(log.part(first, len(log)), tau)) if log.closed_loop else 1
     A = np.stack(columns, axis=1)
     residual = y.copy()
@@ -272,25 +275,52 @@ def as_motion(
         both -= own @ np.linalg.lstsq(own, both, rcond=None)[0]
         A[a:b], residual[a:b] = both[:, :-1], both[:, -1]
     scale = np.linalg.norm(A, axis=0)
+    kept = np.concatenate([np.ones(3, dtype=bool), scale[3:] > 1e-9 * np.linalg.norm(np.stack(columns[3:]), axis=1)])
+    A, scale = A[:, kept], scale[kept]
     if not (scale > 0.0).all():
         return None
     found = np.linalg.lstsq(A / scale, residual, rcond=1e-10)[0] / scale
     error = residual - A @ found
     gram = np.linalg.pinv((A / scale).T @ (A / scale), rcond=1e-14) / np.outer(scale, scale)
     covariance = gram * float(error @ error) / effective_samples(error)
-    w = 2.0 * pi * f
+    slope = (1.0 - np.exp(-2j * pi * f * T)) / T  # of the backward difference at f
 
     def phase(p: np.ndarray) -> float:
-        return degrees(atan2(p[1] * w, p[0] - p[2] * w * w))
+        return -degrees(float(np.angle(p[0] - p[1] * slope + p[2] * slope**2)))
 
     return Discrepancy(
         frequency=f,
         gain=min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
         phase=Off(phase(found), _error_of(phase, found, covariance), "°"),
         lag=Off(-float(found[1]), sqrt(max(float(covariance[1, 1]), 0.0)), "s"),
+        friction=_friction_of_ways(found, covariance, kept, K, float(np.abs(u).max())),
         rmse=float(np.sqrt(np.mean((residual - A[:, 0]) ** 2))),
         reached=float(np.sqrt(np.mean(error**2))),
     )
+
+
+def _friction_of_ways(
+    found: np.ndarray, covariance: np.ndarray, kept: np.ndarray, K: float, largest: float
+) -> Off | None:
+    """What the velocities of each direction lack, as friction in % of the largest command; None where not known.
+
+    With v = K u - F of the model and v' = g v + c of the log, c is g F - F', and (F/K - F'/(g K)) = c / (g K).
+    """
+    scale = float(found[0]) * K * largest / 100.0
+    if not (kept[3:].all() and scale > 0.0):
+        return None
+    forward, backward = (
+        Off(sign * float(found[at]) / scale, sqrt(max(float(covariance[at, at]), 0.0)) / scale, "%")
+        for at, sign in ((3, 1.0), (4, -1.0))
+    )
+    return max(forward, backward, key=_clear)
+
+
+def _backward(x: np.ndarray, T: float) -> np.ndarray:
+    """The backward difference over T. No later sample is in it: in a closed loop the command at a sample answers the
+    noise that the encoder read there, and a central difference would explain that noise by itself.
+    """
+    return np.diff(x, prepend=2.0 * x[0] - x[1]) / T
 
 
 def _gain_of_way(found: np.ndarray, covariance: np.ndarray) -> Off:
@@ -301,21 +331,30 @@ def _gain_of_way(found: np.ndarray, covariance: np.ndarray) -> Off:
     return Off(100.0 * (1.0 / float(found[0]) - 1.0), 100.0 * spread / float(found[0]) ** 2, "%")
 
 
+def _signs(rate: np.ndarray) -> list[np.ndarray]:
+    """Where it is forward, and where backward, each (n,) of bool; at rest neither."""
+    least = 1e-6 * float(np.abs(rate).max())
+    return [rate > least, rate < -least]
+
+
 def _gain(measured: np.ndarray, modelled: np.ndarray) -> Off:
-    """By how many per cent the model's velocity is too large, over all that the log did."""
-    size = float(modelled @ modelled)
-    if not size > 0.0:
+    """By how many per cent the model's velocity is too large, friction of each direction apart."""
+    ways = np.stack(_signs(modelled), axis=1).astype(float)
+    own = modelled - ways @ np.linalg.lstsq(ways, modelled, rcond=None)[0]
+    size = float(own @ own)
+    if not size > 1e-12 * float(modelled @ modelled):
         return Off(0.0, float("inf"), "%")
-    ratio = float(measured @ modelled) / size
-    error = measured - ratio * modelled
+    ratio = float(measured @ own) / size
+    error = measured - ratio * own
+    error -= ways @ np.linalg.lstsq(ways, error, rcond=None)[0]
     spread = sqrt(float(error @ error) / (size * max(effective_samples(error) / len(error), 1e-3)) / len(error))
     if not ratio > 0.0:
         return Off(float("inf"), 0.0, "%")
     return Off(100.0 * (1.0 / ratio - 1.0), 100.0 * spread / ratio**2, "%")
 
 
-def _time_constant(rate: np.ndarray, change: np.ndarray, u: np.ndarray, T: float) -> float:
-    """That of the model, by its own motion: rate = K u - τ change - friction."""
+def _first_order(rate: np.ndarray, change: np.ndarray, u: np.ndarray, T: float) -> tuple[float, float]:
+    """Gain (unit/s per V) and time constant (s) of the model, by its own motion: rate = K u - τ change - friction."""
     A = np.stack([u, -change, -np.sign(rate), np.ones(len(u))], axis=1)
-    tau = float(np.linalg.lstsq(A, rate, rcond=1e-9)[0][1])
-    return float(np.clip(tau, 2.0 * T, 10.0))
+    K, tau = np.linalg.lstsq(A, rate, rcond=1e-9)[0][:2]
+    return float(K), float(np.clip(tau, 2.0 * T, 10.0))

@@ -2,13 +2,15 @@
 
 Feedback hides what a model is wrong in from a free run, and a free run lacks what held the axis. In the loop itself a
 wrong time constant shows as another tracking error: so the simulated position is held against the measured one, beside
-the size of the measured tracking error.
+the size of the measured tracking error. Where the controller is not known, forces need none: inverse dynamics with the
+model's parameters, beside a fit to the log.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,10 @@ from rds.core.types import Model
 from rds.identification.fit.run_model import library_table
 from rds.identification.logs.log import Log
 from rds.identification.logs.motion import noise
+from rds.identification.validate.assessment import Assessment
 from rds.identification.validate.candidate import Candidate
+from rds.identification.validate.cross_test import cross_test
+from rds.identification.validate.own_loop import OwnLoop, own_loop
 from rds.identification.validate.verdict import Bands, Reason, Side
 from rds.models import library_model
 from rds.results.result import Result
@@ -73,7 +78,45 @@ def in_loop(candidate: Candidate, log: Log, simulate: Loop) -> InLoop:
     )
 
 
-def reasons(found: InLoop, bands: Bands) -> Iterator[Reason]:
+def closed_loop_reasons(candidate: Candidate, a: Assessment, loop: Loop | None, bands: Bands) -> Iterator[Reason]:
+    """What the loop that was logged says of the model; where that is not known, what the forces in it say.
+
+    `loop` is the experiment, if it is given; of our own results the loop is known without it.
+    """
+    known = own_loop(a.log) if loop is None else None
+    if isinstance(known, OwnLoop):
+        loop = known.simulate
+    if loop is not None:
+        yield from _of_loop(in_loop(candidate, a.log, loop), bands)
+        return
+    if isinstance(known, str):
+        yield Reason(Side.NOTE, "loop", f"the loop itself is not simulated: {known}")
+    if a.log.closed_loop:
+        yield from _of_forces(candidate, a.log, bands)
+
+
+def _of_forces(candidate: Candidate, log: Log, bands: Bands) -> Iterator[Reason]:
+    """By inverse dynamics, what the model leaves of the force, and what of that its parameters are to blame for."""
+    try:
+        (crossed,) = cross_test(candidate, [log])
+    except InputError:  # no equation that is linear in its parameters, or too little motion for the filters
+        return
+    own = sqrt(max(crossed.percent**2 - crossed.fitted_percent**2, 0.0))
+    explained = crossed.fitted_percent <= bands.voltage_percent
+    side = Side.NOTE
+    if explained and own <= bands.gain_percent:
+        side = Side.FOR
+    elif explained and own > bands.voltage_percent:
+        side = Side.AGAINST
+    yield Reason(
+        side,
+        "forces",
+        f"inverse dynamics, which needs no controller: the model leaves {crossed.percent:.3g} % of the force, a fit to "
+        f"this log {crossed.fitted_percent:.3g} %, so {own:.2g} % are its parameters' own",
+    )
+
+
+def _of_loop(found: InLoop, bands: Bands) -> Iterator[Reason]:
     """What the loop says for the model, or against it."""
     good = found.fit_percent >= bands.fit_percent or found.rmse <= _AS_NOISE * found.noise
     yield Reason(

@@ -19,9 +19,9 @@ from rds.identification.validate.alternatives import with_alternatives
 from rds.identification.validate.assessment import Assessment, assess
 from rds.identification.validate.candidate import Candidate, as_candidate
 from rds.identification.validate.conclusion import overall
+from rds.identification.validate.contradictions import contradictions
 from rds.identification.validate.criterion import Ranking, Rival, rank
-from rds.identification.validate.in_loop import Loop, in_loop
-from rds.identification.validate.in_loop import reasons as loop_reasons
+from rds.identification.validate.in_loop import Loop, closed_loop_reasons
 from rds.identification.validate.judge import judge
 from rds.identification.validate.verdict import Bands, Verdict
 
@@ -42,8 +42,8 @@ class Validation:
 
     @property
     def verdict(self) -> Verdict:
-        """Over all logs."""
-        return overall(dict(self.verdicts))
+        """Over all logs, and whether these contradict each other."""
+        return overall(dict(self.verdicts), tuple(contradictions(self.assessments, self.bands)))
 
     @property
     def exit_code(self) -> int:
@@ -88,7 +88,8 @@ def validate(
     `model` may be the path of a model file (.toml) or a student's file (.py), an `Estimate`, a `ModelFile`, an
     `rds.Model` or a `Candidate`. The initial state of each log is estimated from its first `initial_samples` (default
     50, of a short log a tenth), which no error counts. `loop` runs the experiment that was logged, whose controller
-    and reference are known, with the model that it is given: `lambda model: rds.Experiment(..., model=model).run()`.
+    and reference are known, with the model that it is given: `lambda model: rds.Experiment(..., model=model).run()`;
+    without it, the loops of our own results with a controller of the library are known from these.
     Raises InputError for a model or log that will not do.
     """
     candidate = as_candidate(model)
@@ -103,7 +104,7 @@ def validate(
     }
     verdicts = {}
     for name, a in assessments.items():
-        more = () if loop is None else tuple(loop_reasons(in_loop(candidate, a.log, loop), bands))
+        more = tuple(closed_loop_reasons(candidate, a, loop, bands))
         verdicts[name] = with_alternatives(candidate, a, judge(candidate, a, bands, more), bands)
     rankings = {name: _ranking(candidate, a, others, bands, initial_samples) for name, a in assessments.items()}
     return Validation(candidate, assessments, verdicts, bands, others, rankings if others else {})

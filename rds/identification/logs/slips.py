@@ -1,0 +1,59 @@
+"""Where the position leaps: a slip of the encoder, a lost count, a jolt. Told from the log alone, with the time.
+
+At a leap one step of the position is none of those beside it: it lies outside what the steps before and after span, by
+far more than noise and the encoder's own steps do. A change of speed, however quick, has it between them. A slip that
+is smaller than a few of these shows beside a model only (`fit/upsets.py`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rds.identification.logs.log import Finding, Gravity, Log
+from rds.machines.machine import Axis
+
+_CLEAR = 8.0  # robust standard deviations of what a step differs from its neighbours
+_STEPS = 4.0  # encoder steps
+_BESIDE = 3.0  # times what the steps before and after differ by
+_NEIGHBOURS = 4  # steps to each side
+_FEW = 20  # leaps, beyond which it is noise of an odd kind
+_TOLD = 3
+
+
+def leaps(log: Log, axis: Axis | None) -> list[Finding]:
+    """A finding with sample, time and size for the first leaps of the position; none for a log of a speed."""
+    if log.is_rate or len(log) < 50 * _NEIGHBOURS:
+        return []
+    rate = np.diff(log.position) / np.diff(log.time)
+    curve = rate[1:-1] - 0.5 * (rate[:-2] + rate[2:])
+    period = log.sample_period
+    usual = 1.4826 * float(np.median(np.abs(curve))) if len(curve) else 0.0
+    least = max(_CLEAR * usual, _STEPS * (log.resolution or 0.0) / period)
+    candidates = np.flatnonzero(np.abs(curve) > least) + 1
+    found = [(k, size) for k in candidates[: 50 * _FEW].tolist() if abs(size := _outside(rate, k)) > least]
+    # a reading that is off by itself leaps there and back
+    found = [(k, size) for k, size in found if not any(j in (k - 1, k + 1) for j, _ in found)]
+    if not 0 < len(found) <= _FEW:
+        return []
+    unit = log.units.get("position", "mm")
+    places = ", ".join(
+        f"at {log.time[k + 1]:.4g} s by {size * (log.time[k + 1] - log.time[k]):+.3g} {unit}"
+        for k, size in found[:_TOLD]
+    )
+    more = f" and {len(found) - _TOLD} times more" if len(found) > _TOLD else ""
+    what = (
+        f"the position leaps {places}{more}, in one sample and unlike the motion before and after: did the encoder "
+        "slip, or something jolt the axis? Split the log there, or leave that stretch out"
+    )
+    return [Finding("leap", what, Gravity.WARNING, found[0][0] + 1)]
+
+
+def _outside(rate: np.ndarray, k: int) -> float:
+    """By how much the rate at `k` lies outside what those before and after span; 0 for within, or near."""
+    before, after = rate[max(k - _NEIGHBOURS, 0) : k], rate[k + 1 : k + 1 + _NEIGHBOURS]
+    if not len(before) or not len(after):
+        return 0.0
+    beside = np.concatenate([before, after])
+    low, high = float(beside.min()), float(beside.max())
+    off = float(rate[k]) - high if rate[k] > high else min(float(rate[k]) - low, 0.0)
+    return off if abs(off) > _BESIDE * abs(float(np.median(after)) - float(np.median(before))) else 0.0
