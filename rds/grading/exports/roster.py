@@ -37,8 +37,12 @@ class Sheet:
         """As it came, every cell as it is: it is the platform's own."""
         stream = io.StringIO()
         encoding, delimiter = self.form
-        quoting = csv.QUOTE_ALL if self.quotes_all else csv.QUOTE_MINIMAL
-        writer = csv.writer(stream, delimiter=delimiter, lineterminator="\r\n", quoting=quoting)
+        writer = csv.writer(
+            stream,
+            delimiter=delimiter,
+            lineterminator="\r\n",
+            quoting=csv.QUOTE_ALL if self.quotes_all else csv.QUOTE_MINIMAL,
+        )
         writer.writerows([self.columns, *self.rows])
         return (_MARK if self.has_mark else "").encode(encoding) + stream.getvalue().encode(encoding)
 
