@@ -1,8 +1,10 @@
-"""Grading: what the sandbox and five criteria add to a simulation, a batch of 1,000, here and on a cluster; peers."""
+"""Grading: what the sandbox and five criteria add to a simulation; batches, their memory, a cluster; peers."""
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -10,19 +12,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import rds
 from benchmarks.figures import Figure, interleaved, ratios
 from benchmarks.grading_peers import autograde_seconds, nbclient_seconds
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.batch.grade_one import grade
-from rds.grading.batch.run import run_batch
 from rds.grading.sandbox import Pool, available
 
 STUDENTS = 1000
+SMALLER = (100, 300)  # classes whose memory is measured beside that of the whole one
+GROWTH = 1.1  # of memory, from the smallest class to the largest
 JOBS = 2
 BATCH_LIMIT = 90.0  # s
 WORKERS = 4
+FEWER, FEWER_STUDENTS = 2, 300  # a smaller cluster, whose workers have a processor each here
 CLUSTER_SHARE, CLUSTER_START = 1.0 / 3.0, 10.0  # of the batch's own time, and s beside it
 OVER_NBGRADER = 0.2  # whole commands for one submission, in the same run
 LIMITS = {"numpy": 50.0, "scipy and control": 100.0}  # ms over the simulation's own time
@@ -76,12 +81,11 @@ def run(rounds: int = 7, students: int = STUDENTS, peer_python: str = sys.execut
     with tempfile.TemporaryDirectory() as folder:
         place = _written(Path(folder), students)
         figures = _one(place, rounds)
-        begun = perf_counter()
-        run_batch(place / "task", place / "in", place / "out", jobs=JOBS)
-        seconds = perf_counter() - begun
-        figures.append(Figure(f"{students:,} submissions, {JOBS} jobs, in all", "s", (seconds,), BATCH_LIMIT))
-        figures.append(Figure("of one submission", "ms", (1e3 * seconds / students,)))
-        figures.append(_on_a_cluster(place, students, seconds))
+        whole = _batch(place, students, jobs=JOBS)
+        figures.append(Figure(f"{students:,} submissions, {JOBS} jobs, in all", "s", (whole.seconds,), BATCH_LIMIT))
+        figures.append(Figure("of one submission", "ms", (1e3 * whole.seconds / students,)))
+        figures += _memory(place, whole, students)
+        figures += _clusters(place, students, whole.seconds)
         figures += _commands(place, peer_python)
         for name, measure in (("nbclient", nbclient_seconds), ("nbgrader autograde", autograde_seconds)):
             found = measure(place, peer_python)
@@ -91,34 +95,114 @@ def run(rounds: int = 7, students: int = STUDENTS, peer_python: str = sys.execut
     return figures
 
 
-def _on_a_cluster(place: Path, students: int, alone: float) -> Figure:
+class _Batch(NamedTuple):
+    """A batch in a process of its own: s, the largest memory of it and of one of its workers, its processor time."""
+
+    seconds: float
+    main_mb: float
+    worker_mb: float
+    main_cpu_seconds: float
+
+
+_PROGRAM = """
+import json, re, sys, time
+from pathlib import Path
+from rds.grading.batch.run import run_batch
+
+def peak(process):  # MB; of the program that runs there now
+    try: found = re.search(r"VmHWM:\\s*(\\d+)", Path(f"/proc/{process}/status").read_text())
+    except OSError: return 0.0
+    return int(found[1]) / 1024 if found else 0.0
+
+def look(done, of):
+    for path in Path("/proc/self/task").glob("*/children"):
+        for child in path.read_text().split():
+            workers.append(peak(child))
+    workers[:] = [max(workers, default=0.0)]
+
+workers, (task, handed_in, out, how) = [], sys.argv[1:]
+begun = time.perf_counter()
+run_batch(task, handed_in, out, progress=look, **json.loads(how))
+print(json.dumps([time.perf_counter() - begun, peak("self"), max(workers), time.process_time()]))
+"""
+
+
+def _batch(place: Path, students: int, **how: int | str) -> _Batch:
+    """The first `students` of the class, graded."""
+    handed_in, out = place / f"in-{students}", place / f"out-{students}-{len(list(place.iterdir()))}"
+    if not handed_in.exists():
+        handed_in.mkdir()
+        for path in sorted((place / "in").iterdir())[:students]:
+            shutil.copy(path, handed_in)
+    words = [sys.executable, "-c", _PROGRAM, *map(str, (place / "task", handed_in, out)), json.dumps(how)]
+    done = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True)
+    shutil.rmtree(out)
+    return _Batch(*json.loads(done.stdout))
+
+
+def _memory(place: Path, whole: _Batch, students: int) -> list[Figure]:
+    """The largest memory by the size of the class; it is to be flat."""
+    found = {count: _batch(place, count, jobs=JOBS) for count in SMALLER if count < students} | {students: whole}
+    figures = []
+    for name, at in (("the command itself", "main_mb"), ("a worker", "worker_mb")):
+        peaks = {count: getattr(batch, at) for count, batch in found.items()}
+        note = "; ".join(f"{count:,}: {peak:.0f} MB" for count, peak in peaks.items())
+        figures.append(Figure(f"memory of {name}, {students:,} submissions", "MB", (peaks[students],), note=note))
+        growth = (peaks[students] / next(iter(peaks.values())),)
+        figures.append(Figure(f"memory of {name}, over that of the smallest class", "", growth, GROWTH))
+    return figures
+
+
+def _clusters(place: Path, students: int, alone: float) -> list[Figure]:
     """The same batch by workers of one thread each; as fast as they have processors of their own."""
     title = f"{students:,} submissions, dask cluster of {WORKERS} workers, in all"
-    limit = CLUSTER_SHARE * alone + CLUSTER_START
+    limit, processors = CLUSTER_SHARE * alone + CLUSTER_START, os.cpu_count() or 1
     try:
         import distributed  # noqa: F401
     except ImportError as error:
-        return Figure(title, "s", limit=limit, note=f"skipped: {error}")
-    with _cluster() as address:
-        begun = perf_counter()
-        run_batch(place / "task", place / "in", place / "there", scheduler=address)
-        seconds = perf_counter() - begun
-    return Figure(title, "s", (seconds,), limit, f"on {os.cpu_count()} processors")
+        return [Figure(title, "s", limit=limit, note=f"skipped: {error}")]
+    with _cluster(FEWER) as cluster:
+        fewer = _batch(place, min(FEWER_STUDENTS, students), scheduler=cluster.address)
+    with _cluster(WORKERS) as cluster:
+        start = _batch(place, WORKERS, scheduler=cluster.address).seconds
+        before = cluster.cpu_seconds()
+        batch = _batch(place, students, scheduler=cluster.address)
+        alone_at_it = batch.main_cpu_seconds + cluster.cpu_seconds() - before
+    by_four = start + (batch.seconds - start) * min(processors, WORKERS) / WORKERS
+    return [
+        Figure(title, "s", (batch.seconds,), limit, f"on {processors} processors"),
+        Figure(f"of it start: {WORKERS} submissions, one for each worker", "s", (start,)),
+        Figure("of it the command and the scheduler, processor time of one", "ms", (1e3 * alone_at_it / students,)),
+        Figure(
+            f"the same on {WORKERS} processors: what was busy here, shared out", "s", (by_four,), note="by the model"
+        ),
+        Figure(f"of one submission, dask cluster of {FEWER} workers", "ms", (1e3 * fewer.seconds / FEWER_STUDENTS,)),
+    ]
+
+
+class _Cluster(NamedTuple):
+    address: str
+    process: int  # of the scheduler
+
+    def cpu_seconds(self) -> float:
+        """Processor time of the scheduler's process so far."""
+        fields = Path(f"/proc/{self.process}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 @contextmanager
-def _cluster() -> Iterator[str]:
-    """A scheduler with its workers, in processes of their own; its address."""
+def _cluster(workers: int) -> Iterator[_Cluster]:
+    """A scheduler with its workers, in processes of their own."""
     program = (
         "import sys\nfrom distributed import LocalCluster\nif __name__ == '__main__':\n"
-        f"    cluster = LocalCluster(n_workers={WORKERS}, threads_per_worker=1, dashboard_address=None)\n"
+        f"    cluster = LocalCluster(n_workers={workers}, threads_per_worker=1, dashboard_address=None)\n"
         "    print(cluster.scheduler_address, flush=True)\n    sys.stdin.read()\n"
     )
     with subprocess.Popen(
         [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdin is not None and process.stdout is not None
-        yield process.stdout.readline().strip()
+        yield _Cluster(process.stdout.readline().strip(), process.pid)
         process.stdin.close()
         process.wait(30)
 

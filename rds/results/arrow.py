@@ -18,6 +18,17 @@ def to_arrow(values: np.ndarray) -> pa.Array:
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, pa.py_buffer(values)])
 
 
+def repeated(text: str, count: int) -> pa.Array:
+    """A column of `count` times the same text, which is kept once."""
+    import pyarrow as pa
+
+    data = text.encode()
+    parts = [None, pa.py_buffer(np.array([0, len(data)], np.int32)), pa.py_buffer(data)]
+    return pa.DictionaryArray.from_arrays(
+        to_arrow(np.zeros(count, np.int32)), pa.Array.from_buffers(pa.string(), 1, parts)
+    )
+
+
 def to_numpy(column: pa.ChunkedArray) -> np.ndarray:
     """A column of whole numbers or floats as a one-dimensional array; what is null becomes NaN."""
     if column.null_count:

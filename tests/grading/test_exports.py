@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import zipfile
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -215,7 +214,7 @@ def test_two_students_never_share_a_line(tmp_path: Path) -> None:
 def test_moodle_worksheet_is_filled_in_and_otherwise_the_same(tmp_path: Path) -> None:
     sheet = tmp_path / "worksheet.csv"
     sheet.write_text(WORKSHEET, encoding="utf-8")
-    hostile = grade("x", Status.OK, score("rms", 10.0, 30.0, sentence="<script>alert(1)</script>"))
+    hostile = grade("x", Status.OK, score("rms", 10.0, 30.0, sentence="<script>alert(1)</script> \\"))
     grades = [
         from_platform("moodle", "Ada Lovelace_501", id="501", name="Ada Lovelace"),
         replace(hostile, details={"source": {"platform": "moodle", "id": "502"}}),
@@ -229,6 +228,7 @@ def test_moodle_worksheet_is_filled_in_and_otherwise_the_same(tmp_path: Path) ->
     assert "Error rms: 6 of 10 points. The rms error is 0.23 mm." in ada["Feedback comments"]
     assert "Error hidden: 20 of 20 points. Hidden" in ada["Feedback comments"]
     assert "secret" not in text and "<script>" not in text
+    assert "\\" not in text  # behind which Moodle's reader takes a quotation mark for a part of the cell
     assert ada["Email address"] == "Ada@x.edu"  # Moodle minds the capitals
     assert set(done.left_out) == {"Else_777"}
 
@@ -397,60 +397,3 @@ def test_the_command_lists_who_is_left_out(tmp_path: Path) -> None:
     told = json.loads(CliRunner().invoke(app, [*arguments, "--json"]).stdout)
     assert told["students"] == 1 and list(told["left_out"]) == ["nobody"]
     assert CliRunner().invoke(app, ["grade", "export", str(out), "--to", "word"]).exit_code == 2
-
-
-def test_blackboard_gets_its_own_file_back_with_one_column(tmp_path: Path) -> None:
-    heads = (
-        "Last Name\tFirst Name\tUsername\tStudent ID\tTracking [Total Pts: 30 Score] |77\tOther [Total Pts: 5 "
-        "Score] |78"
-    )
-    text = f'{heads}\nLovelace\tAda\tada\t501\t""\t5\nBuilder\tBob\tbob\t502\t""\t4\n'
-    (tmp_path / "down.xls").write_bytes("\ufeff".encode("utf-16-le") + text.encode("utf-16-le"))
-    done = exported(tmp_path, "blackboard", [grade("ada"), grade("eve")], wanted=Wanted(tmp_path / "down.xls"))
-    made = Path(done.files[0]).read_bytes().decode("utf-16")
-    assert made.splitlines() == [
-        "Last Name\tFirst Name\tUsername\tStudent ID\tTracking [Total Pts: 30 Score] |77",
-        "Lovelace\tAda\tada\t501\t26",
-    ]
-    assert set(done.left_out) == {"eve"}
-    with pytest.raises(InputError, match="give --points 5"):
-        exported(tmp_path / "2", "blackboard", [grade("ada")], wanted=Wanted(tmp_path / "down.xls", column="Other"))
-    with pytest.raises(InputError, match="Work Offline"):
-        exported(tmp_path / "3", "blackboard", [grade("ada")])
-
-
-def test_brightspace_gets_the_columns_of_its_sample(tmp_path: Path) -> None:
-    done = exported(tmp_path / "1", "brightspace", [grade("ada")])
-    assert Path(done.files[0]).read_text().splitlines() == [
-        "Username,Tracking Points Grade,End-of-Line Indicator",
-        "#ada,26,#",
-    ]
-    item = "Tracking Points Grade <Numeric MaxPoints:30 Weight:10>"
-    text = f"OrgDefinedId,Username,Email,{item},End-of-Line Indicator\n#501,#ada,ada@example.edu,,#\n"
-    (tmp_path / "down.csv").write_text(text)
-    done = exported(tmp_path / "2", "brightspace", [grade("ada")], wanted=Wanted(tmp_path / "down.csv"))
-    assert rows_of(Path(done.files[0])) == [
-        {"OrgDefinedId": "#501", "Username": "#ada", item: "26", "End-of-Line Indicator": "#"}
-    ]
-    (tmp_path / "down.csv").write_text(text.replace("MaxPoints:30", "MaxPoints:20"))
-    with pytest.raises(InputError, match="give --points 20"):
-        exported(tmp_path / "3", "brightspace", [grade("ada")], wanted=Wanted(tmp_path / "down.csv"))
-
-
-def test_feedback_goes_back_to_moodle_by_the_participants_number(tmp_path: Path) -> None:
-    source = {"platform": "moodle", "name": "Ada_von L/x", "id": "501"}
-    ada, bob = grade("ada", details={"source": source}), grade("bob")
-    pages = {"ada": "<p>yours", "bob": "<p>his"}
-    done = exported(tmp_path / "1", "moodle-feedback", [ada, bob], pages=pages)
-    with zipfile.ZipFile(done.files[0]) as archive:
-        (name,) = archive.namelist()
-        assert archive.read(name) == b"<p>yours"
-    # as Moodle's importer takes it apart: name, participant, kind and name of the plug-in, file
-    assert name.split("_", 4) == ["Ada von L x", "501", "assignfeedback", "file", "feedback.html"]
-    assert "grading worksheet" in done.left_out["bob"]
-    heads = "Identifier,Full name,Email address,Grade,Last modified (grade)"
-    (tmp_path / "sheet.csv").write_text(f"{heads}\nParticipant 502,Bob,bob,,-\nParticipant 501,Ada,ada,,-\n")
-    wanted = Wanted(tmp_path / "sheet.csv")
-    done = exported(tmp_path / "2", "moodle-feedback", [ada, bob], pages=pages, wanted=wanted)
-    with zipfile.ZipFile(done.files[0]) as archive:
-        assert [each.split("_")[1] for each in sorted(archive.namelist())] == ["501", "502"]

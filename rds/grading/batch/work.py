@@ -22,6 +22,7 @@ from rds.grading.batch.grade_one import grade_with_runs
 from rds.grading.batch.scratch import scratch
 from rds.grading.feedback.feedback import feedback_page
 from rds.grading.sandbox import Pool, available
+from rds.results.arrow import repeated, to_arrow
 
 if TYPE_CHECKING:
     from rds.grading.cases.case import CaseRun
@@ -77,10 +78,10 @@ def setup_of(assignment: Assignment, jobs: int | None, shared: bool) -> Setup:
 
 def graded(setup: Setup, task: Task) -> Answer:
     """The grade of a task. An exception is ours, and no fault of the submission."""
-    if fault := available():
+    if not setup.folder and (fault := available()):  # on this computer the walls were tried before any work began
         return Answer(missing=fault)
+    pool = _pool(setup.jobs)  # it starts while the assignment is read
     assignment, solution = _assignment(setup)
-    pool = _pool(setup.jobs)
     began = time.monotonic()
     if task.path:
         found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
@@ -126,9 +127,8 @@ def columns_of(runs: tuple[CaseRun, ...]) -> bytes:
     tables = []
     for run in runs:
         count = len(run.result)
-        case = pa.DictionaryArray.from_arrays(np.zeros(count, np.int32), [run.case])
-        about = {"case": case, "run": np.full(count, run.number, np.int32)}
-        tables.append(pa.table(about | {name: pa.array(values) for name, values in run.result.columns.items()}))
+        about = {"case": repeated(run.case, count), "run": to_arrow(np.full(count, run.number, np.int32))}
+        tables.append(pa.table(about | {name: to_arrow(values) for name, values in run.result.columns.items()}))
     whole = pa.concat_tables(tables, promote_options="permissive").unify_dictionaries()
     floats = [field.name for field in whole.schema if pa.types.is_floating(field.type)]
     sink = pa.BufferOutputStream()
@@ -177,4 +177,4 @@ def _expected(setup: Setup) -> tuple[CaseRun, ...]:
 def _pool(jobs: int | None) -> Pool:
     """The worker's pool, which ends with its process."""
     number = worker_number()
-    return Pool() if jobs is None or number is None else Pool(jobs, slot=number)
+    return Pool(is_tried=True) if jobs is None or number is None else Pool(jobs, slot=number, is_tried=True)

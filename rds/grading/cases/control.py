@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rds.controllers.axis_data import SPINDLE_UNIT
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
 from rds.core.types import Controller, Model
@@ -29,9 +30,9 @@ from rds.machines.encoder import encoder
 from rds.models import library_model
 from rds.modes.experiment.resolve import resolve
 from rds.modes.loop.plan import Plan
-from rds.nc.check import Setup, motion
-from rds.nc.run.judge import judged
-from rds.nc.run.prepare import SPINDLE_UNIT, Prepared, planned
+
+if TYPE_CHECKING:
+    from rds.nc.run.prepare import Prepared
 
 _NOT_HERE = ("mode", "controller", "bus", "network", "timing", "compiled", "signal")
 _STANDS_IN = Controller(lambda t, r, y, state, params: (0.0, state))
@@ -81,7 +82,11 @@ class ControlCase:
         meta = {"period": self.periods, "voltage_range": plan.machine.converter.range}
         done = run_loop(with_parts(plan, self._laws(subjects), self._disturbed(models, seed, number, actual)), meta)
         counts = subjects[0].counts if COUNTS in needs else None
-        result = done.result if self.prepared is None else judged(done.result, self.prepared)
+        result = done.result
+        if self.prepared is not None:
+            from rds.nc.run.judge import judged
+
+            result = judged(result, self.prepared)
         if self.noise:
             result = self._with_actual(result, actual)
         low, high, _ = voltage_limits(plan)
@@ -234,6 +239,9 @@ def _program(words: TomlTable, folder: Path, machine: Machine) -> tuple[Prepared
     name = inside(words, "program", folder)
     if name is None:
         return None, ()
+    from rds.nc.check import Setup, motion  # most assignments have no part program, and these take long to import
+    from rds.nc.run.prepare import planned
+
     T = words.read("sample_period", machine.sample_period)
     # planned from the text: a compiled form beside it would be written into the assignment
     prepared = planned(motion(folder / name, machine, Setup()), machine, T, folder / name)

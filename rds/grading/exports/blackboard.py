@@ -41,7 +41,9 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     found, unmatched = find(finished.to_hand_on, sheet, _KEYS)
     kept = [place for name in _PEOPLE if (place := sheet.at(name)) is not None]
     rows = [[*(sheet.rows[row][k] for k in kept), scaled(found[row].score, factor)] for row in sorted(found)]
-    made = Sheet([*(sheet.columns[k] for k in kept), sheet.columns[at]], rows, sheet.has_mark, sheet.form)
+    heads = [*(sheet.columns[k] for k in kept), sheet.columns[at]]
+    # Blackboard asks for quotation marks around every cell between commas, and for none between tabs
+    made = Sheet(heads, rows, sheet.has_mark, sheet.form, quotes_all=sheet.form[1] == ",")
     return Exported({FILE: made.to_bytes()}, unmatched, students=len(found))
 
 

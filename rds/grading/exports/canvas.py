@@ -18,6 +18,7 @@ USES = ("gradebook", "column", "points")
 STUDENT = ("Student", "ID", "SIS User ID", "SIS Login ID", "Integration ID", "Root Account", "Section")
 _NEEDED = ("Student", "ID", "Section")
 _POINTS = "points possible"
+_OWN = re.compile(r"(?:Current|Final) (?:Score|Points|Grade)|Override (?:Score|Grade|Status)")
 _EXCUSED = "EX"  # Canvas's own word for a student who needs no grade
 _KEYS = (
     Key("ID", lambda grade: platform(grade, "canvas", "id")),
@@ -48,6 +49,12 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     found, unmatched = find(finished.to_hand_on, people, _KEYS)
     kept = [place for name in STUDENT if (place := sheet.at(name)) is not None]
     heading = sheet.columns[at] if at is not None else wanted.column or finished.title
+    if own := _OWN.search(heading):
+        raise InputError(
+            f"Canvas leaves out every column with {own[0]!r} in its heading, as one of its own; rename the assignment "
+            "there, or enter these points by hand",
+            str(wanted.gradebook),
+        )
     rows = [[*(row[k] for k in kept), _head_cell(row, at, finished, factor)] for row in head]
     points = {number: scaled(grade.score, factor) for number, grade in found.items()}
     excused, _ = find(finished.excused, people, _KEYS)

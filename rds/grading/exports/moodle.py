@@ -16,6 +16,7 @@ from rds.grading.exports.said import comment
 from rds.grading.grade import Grade
 
 FILE = "moodle.csv"
+_ESCAPE = "\\"  # to Moodle's reader of CSV a quotation mark behind it ends no cell
 USES = ("gradebook", "column", "points")
 _WORKSHEET = ("Identifier", "Grade", "Last modified (grade)")
 KEYS = (
@@ -48,7 +49,7 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
         _check_points(finished, sheet, row, factor, wanted)
         row[at] = scaled(grade.score, factor)
         if comments is not None:
-            row[comments] = comment(grade)
+            row[comments] = comment(grade).replace(_ESCAPE, "&#92;")
     return Exported({FILE: sheet.to_bytes()}, unmatched, students=len(found))
 
 
@@ -94,10 +95,12 @@ def _check_points(finished: Finished, sheet: Sheet, row: list[str], factor: floa
 
 def _plain(finished: Finished, wanted: Wanted) -> Exported:
     factor = scale(finished, wanted.points)
-    rows = [_plain_row(grade, factor) for grade in finished.to_hand_on]
+    rows = [_plain_row(grade, factor) for grade in finished.to_hand_on if _ESCAPE not in grade.student]
+    odd = [grade.student for grade in finished.to_hand_on if _ESCAPE in grade.student]
     text = csv_text([["useridnumber", "useremail", wanted.column or finished.title], *rows])
     note = "map useridnumber or useremail when Moodle asks; with --gradebook FILE the file fills in a download"
-    return Exported({FILE: text.encode()}, notes=(note,), students=len(rows))
+    said = "Moodle cannot read a backslash in a table; fill in this grade by hand"
+    return Exported({FILE: text.encode()}, dict.fromkeys(odd, said), (note,), len(rows))
 
 
 def _plain_row(grade: Grade, factor: float) -> list[str | float | None]:

@@ -25,6 +25,7 @@ class Sheet:
     rows: list[Row]
     has_mark: bool  # whether it begins with a byte order mark
     form: tuple[str, str] = ("utf-8", ",")  # its encoding, and what stands between cells
+    quotes_all: bool = False  # every cell, not only those that need it
 
     def at(self, column: str) -> int | None:
         """The place of a column, whatever its capitals; None if there is none."""
@@ -36,7 +37,13 @@ class Sheet:
         """As it came, every cell as it is: it is the platform's own."""
         stream = io.StringIO()
         encoding, delimiter = self.form
-        csv.writer(stream, delimiter=delimiter, lineterminator="\r\n").writerows([self.columns, *self.rows])
+        writer = csv.writer(
+            stream,
+            delimiter=delimiter,
+            lineterminator="\r\n",
+            quoting=csv.QUOTE_ALL if self.quotes_all else csv.QUOTE_MINIMAL,
+        )
+        writer.writerows([self.columns, *self.rows])
         return (_MARK if self.has_mark else "").encode(encoding) + stream.getvalue().encode(encoding)
 
 

@@ -11,7 +11,7 @@ from rds.grading.sandbox.errors import SandboxError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.limits import Limits
 from rds.grading.sandbox.place import Place
-from rds.grading.sandbox.requirements import available
+from rds.grading.sandbox.requirements import available, missing
 from rds.grading.sandbox.subject import Subject
 from rds.grading.sandbox.submission import read_submission
 from rds.grading.sandbox.supervise import Supervisor
@@ -27,11 +27,14 @@ class Pool:
     Interpreters for the packages in `preload` are started at once, others when a submission needs them. `slot`, from 0
     to `jobs` - 1, tells pools that run at the same time apart, so that each has a processor of its own. Use a pool in
     the thread that made it: its sandboxes end with that thread. SandboxError where the sandbox does not hold here, with
-    the remedy: there is no other way to run a submission.
+    the remedy: there is no other way to run a submission. `is_tried` says that another process of this program has
+    tried the walls of this computer, just now, and that they hold.
     """
 
-    def __init__(self, jobs: int = 1, preload: Sequence[str] = ("numpy",), slot: int | None = None):
-        fault = available()
+    def __init__(
+        self, jobs: int = 1, preload: Sequence[str] = ("numpy",), slot: int | None = None, is_tried: bool = False
+    ):
+        fault = missing() if is_tried else available()
         if fault:
             raise SandboxError(fault)
         self._user = sandbox_user()

@@ -36,6 +36,19 @@ ATTACKS = {
     ),
     "an exception of no known kind while loading": Attack("raise GeneratorExit('done')", LOAD, "GeneratorExit: done"),
     "as if somebody pressed Ctrl-C": Attack(in_control("raise KeyboardInterrupt"), CONTRACT, "KeyboardInterrupt"),
+    "stops itself, as Ctrl-Z would": Attack(
+        in_control("import signal\nos.kill(os.getpid(), signal.SIGSTOP)"), TIMED_OUT, "no answer"
+    ),
+    "stops all that it can reach": Attack(
+        in_control("import signal\nos.kill(-1, signal.SIGSTOP)"), CONTRACT, "No such"
+    ),
+    "an exception named like a page, whose text is long": Attack(
+        in_control(
+            "name = '<script>alert(1)</script>\\x1b[2J=HYPERLINK(1)'\nraise type(name, (Exception,), {'__str__': lambda s: '\\u202e</pre><img src=x>' * 10**5})()"
+        ),
+        CONTRACT,
+        r"(?s)\A[^\x1b\u202e]{,700}\Z",  # cut, and without what moves a cursor
+    ),
     "an exception whose text leaves": Attack(
         in_control("class Odd(Exception):\n    def __str__(self): raise SystemExit\nraise Odd"), CONTRACT, "Odd"
     ),
