@@ -20,6 +20,7 @@ from rds.nc.run.prepare import least_seconds, require_room
 from rds.nc.tool_centre import shown
 from rds.nc.trace import Trace
 from rds.nc.validate import Validation
+from rds.panels.kit.field_names import in_fields
 from rds.panels.program.stock import Cut, cut, shapes
 from rds.panels.session.task import Task
 
@@ -38,7 +39,8 @@ class Mark:
 
     def to_json(self) -> dict[str, Any]:
         """As the editor takes it."""
-        return {name: getattr(self, name) for name in ("line", "column", "length", "text", "kind")}
+        found = {name: getattr(self, name) for name in ("line", "column", "length", "kind")}
+        return found | {"text": in_fields(self.text)}
 
 
 @dataclass(frozen=True)
