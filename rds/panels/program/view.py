@@ -33,7 +33,7 @@ from rds.panels.program.stock import drawn
 from rds.panels.program.tool_view import ToolView
 from rds.panels.scene.scene import MachineScene
 
-TABS = ("Preview", "Machine", "Result", "Line by line", "Touch off", "MDI", "Settings, tools")
+TABS = ("Preview", "Machine", "Result", "Steps", "Touch off", "MDI", "Settings, tools")
 PREVIEW, MACHINE, RESULT, STEP, SETUP, MDI, SETTINGS = range(len(TABS))
 
 
