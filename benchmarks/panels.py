@@ -27,6 +27,14 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 SECONDS = 20.0  # of each emulation
 ROUNDS = 3
 _TICKS = os.sysconf("SC_CLK_TCK")
+_HOLD = """() => new Promise((done) => {
+    const began = performance.now();
+    [...document.querySelectorAll('button')].find((each) => each.innerText === 'Hold' && each.offsetParent).click();
+    const look = () => [...document.querySelectorAll('.rds-state')].some((each) => /Line 2 held/.test(each.innerText))
+        ? done(performance.now() - began) : requestAnimationFrame(look);
+    look();
+})"""
+_RUNNING = "[...document.querySelectorAll('.rds-state')].some((each) => /Line 2 runs/.test(each.innerText))"
 _SCENE = "document.querySelector('.rds-scene').dataset"
 _RUNS = 100  # short simulations one after the other, to see whether anything grows
 _SETTLED = 20  # of them, before it is looked at first
@@ -41,7 +49,7 @@ def run() -> list[Figure]:
     from playwright.sync_api import sync_playwright
 
     opened, bare, first, answered, there, pictures, costs, in_motion = [], [], [], [], [], [], [], []
-    main_thread, beside, moving, alone, grown = [], [], [], [], []
+    main_thread, beside, moving, alone, grown, held = [], [], [], [], [], []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         for attempt in range(-1, ROUNDS):  # the first start only brings the files into memory
@@ -72,7 +80,8 @@ def run() -> list[Figure]:
                     main_thread.append(busy)
                     moving.append(_p99(result))
                     if attempt == ROUNDS - 1:
-                        grown = _growth(page, server)
+                        grown = _growth(page, server, Path(folder))
+                    held += _held(page)
                     page.close()
             alone.append(_p99(experiment(SECONDS).run("emulation")))
         browser.close()
@@ -82,6 +91,7 @@ def run() -> list[Figure]:
         Figure("a press that opens a panel for the first time, to its title", "ms", tuple(first), 100.0),
         Figure("the same, to the panel", "ms", tuple(there)),
         Figure("a press that goes to a panel that is open, to the panel", "ms", tuple(answered), 100.0),
+        Figure("from Hold to its confirmation, both cores busy", "ms", tuple(held), 500.0),
         Figure("from one picture of the machine in motion to the next", "ms", tuple(pictures), 100.0),
         Figure("kernel, live strip of a run at 10 Hz", "% of a core", tuple(costs), 3.0),
         Figure("kernel, with the machine in motion too", "% of a core", tuple(in_motion), 3.0),
@@ -176,7 +186,34 @@ def _animated(page: Any, server: int, folder: Path) -> tuple[Result, float, floa
     return _saved(page, folder), per_picture, kernel / passed * 100.0, busy
 
 
-def _growth(page: Any, server: int) -> tuple[float, float]:
+def _held(page: Any) -> list[float]:
+    """ms from a press of Hold until the page says that the axes are held, while two processes keep both cores busy."""
+    page.click('.rds-nav button:text-is("Program")')
+    page.wait_for_selector(".rds-editor textarea:visible")
+    page.fill(".rds-editor textarea", "G21 G90 G94\nG1 X70 F30\nM2\n")
+    page.wait_for_selector('.rds-verdict:has-text("1 move, ")', timeout=60_000)
+    page.click('button:visible:text-is("Emulation")')
+    page.click('button:visible:text-is("Run")')
+    page.wait_for_function(_RUNNING, timeout=60_000)
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 2)]
+    found = []
+    try:
+        time.sleep(2.0)
+        for _ in range(5):
+            found.append(float(page.evaluate(_HOLD)))
+            page.click('button:visible:text-is("Resume")')
+            page.wait_for_function(_RUNNING, timeout=60_000)
+            time.sleep(0.5)
+    finally:
+        for each in busy:
+            each.kill()
+            each.wait()
+    page.click('.rds-work button:visible:text-is("Stop")')
+    page.wait_for_selector('.rds-notice:has-text("ended early")', timeout=60_000)
+    return found
+
+
+def _growth(page: Any, server: int, folder: Path) -> tuple[float, float]:
     """kB of the kernel's memory and of the page's heap that one more run leaves, over some of _RUNS simulations."""
     page.select_option('.rds-field:has(label:text-is("Mode")) select', label="Simulation")
     page.get_by_label("Final time").fill("0.2")
@@ -190,8 +227,12 @@ def _growth(page: Any, server: int) -> tuple[float, float]:
 
     for number in range(_RUNS):
         page.wait_for_selector("button.rds-run:visible:enabled", timeout=60_000)
+        before_it, patience = len(list((folder / "runs").iterdir())), time.monotonic() + 60.0
         page.click("button.rds-run:visible")
-        page.wait_for_function("document.querySelector('button.rds-run').disabled", timeout=60_000)
+        while len(list((folder / "runs").iterdir())) == before_it:  # it may be over before anybody sees it run
+            if time.monotonic() > patience:
+                raise RuntimeError(f"run {number} of {_RUNS} was not begun")
+            page.wait_for_timeout(10)
         if number == _SETTLED - 1:
             before = memory()
     page.wait_for_selector("button.rds-run:visible:enabled", timeout=60_000)

@@ -26,6 +26,12 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
+def long_kernel(function: F) -> F:
+    """The same of a kernel that goes on for long: other threads of the program go on meanwhile."""
+    compiled: Any = njit(cache=True, nogil=True)(function) if COMPILED else function
+    return cast(F, compiled)
+
+
 def _forget_old() -> None:
     """Drop what was compiled before a file here changed: numba looks at a kernel's own file, not at those it calls."""
     folder = Path(__file__).parent

@@ -46,6 +46,14 @@ class Modes:
         turned = (x * c + y * s, y * c - x * s, z)
         return {axis: value - g92 for axis, value, g92 in zip("XYZ", turned, self.g92, strict=True)}
 
+    def machine(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """The position of the machine where work coordinates are these, mm."""
+        x, y, z = (value + g92 for value, g92 in zip((x, y, z), self.g92, strict=True))
+        c, s = cos(radians(self.rotation)), sin(radians(self.rotation))
+        turned = (x * c - y * s, x * s + y * c, z)
+        at = [sum(each) for each in zip(turned, self.origin, self.tool_offset, strict=True)]
+        return at[0], at[1], at[2]
+
 
 class Follower(Interpreter):
     """An interpreter that keeps the modes after each line of the program's own file, as its last run left them.

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rds.nc.active import Follower, Modes
+from rds.nc.language.context import INCH
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.fast_lane import NEVER
 from rds.nc.language.parameters import COUNT
@@ -34,6 +35,12 @@ class Step:
     depth: int
     changed: Mapping[str, float]
     skipped: bool = False
+
+    @property
+    def machine_position(self) -> tuple[float, float, float]:
+        """X Y Z in machine coordinates, mm."""
+        unit = INCH if "G20" in self.modes.words else 1.0
+        return self.modes.machine(*(unit * value for value in self.position[:3]))
 
     def __str__(self) -> str:
         place = " ".join(f"{axis}{value:.4f}" for axis, value in zip("XYZ", self.position, strict=False))

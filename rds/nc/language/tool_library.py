@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from math import inf, radians, tan
 from pathlib import Path
@@ -10,8 +11,10 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.quantities import Choice, Quantity, Table, Tables, Text
+from rds.core.toml_file import parse_toml
 from rds.core.toml_table import TomlTable
 
+_LOOKED_AT = 1 << 16  # bytes of a file that may be a library
 SHAPES = ("flat", "ball", "bull", "vee", "drill")
 TOOL = Table(
     "a tool",
@@ -87,9 +90,26 @@ class ShapedTool:
         return np.where(r <= radius * (1 + 1e-12), z, inf)
 
 
+def is_library(path: Path) -> bool:
+    """Whether a TOML file looks like a tool library, and is not an experiment or a machine."""
+    try:
+        with path.open("rb") as stream:
+            return re.search(rb"^\s*\[\[\s*tool\s*\]\]", stream.read(_LOOKED_AT), re.MULTILINE) is not None
+    except OSError:
+        return False
+
+
 def read_library(path: Path) -> list[ShapedTool]:
     """The tools of a library, `[[tool]]` each. InputError with the line for a key or a value that will not do."""
-    top = TomlTable.open(path, LIBRARY)
+    return _tools(TomlTable.open(path, LIBRARY), str(path))
+
+
+def library_of(text: str, name: str) -> list[ShapedTool]:
+    """The tools of a library's text; `name` is where faults are said to be. InputError as `read_library`."""
+    return _tools(TomlTable(parse_toml(text, name), LIBRARY, text, name), name)
+
+
+def _tools(top: TomlTable, name: str) -> list[ShapedTool]:
     tools: list[ShapedTool] = []
     for table in top.tables("tool"):
         given = {key: value for key in TOOL.keys if (value := table.read(key)) is not None}
@@ -104,5 +124,5 @@ def read_library(path: Path) -> list[ShapedTool]:
         tools.append(tool)
     top.done()
     if not tools:
-        raise InputError("has no tools; write [[tool]] with number and diameter", str(path))
+        raise InputError("has no tools; write [[tool]] with number and diameter", name)
     return tools

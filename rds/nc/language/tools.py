@@ -84,7 +84,7 @@ def read_tools(path: Path) -> list[Tool]:
     passes over the first and misreads the second), or a tool that comes twice.
     """
     if path.suffix.lower() == ".toml":
-        return [_of_library(tool) for tool in read_library(path)]
+        return [of_shape(tool) for tool in read_library(path)]
     try:
         text = read_limited(path, _LARGEST, "a tool table", "check its path").decode("utf-8-sig", "replace")
     except OSError as error:
@@ -94,7 +94,8 @@ def read_tools(path: Path) -> list[Tool]:
     return tools_of(text, str(path))
 
 
-def _of_library(tool: ShapedTool) -> Tool:
+def of_shape(tool: ShapedTool) -> Tool:
+    """A tool of a library as a table has it."""
     most = [("S", tool.most_spindle), ("F", tool.most_feed)]
     words = " ".join(f"{letter}{value:g}" for letter, value in most if value is not None)
     offset = (0.0, 0.0, tool.length, 0.0, 0.0, 0.0)

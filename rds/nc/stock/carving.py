@@ -6,7 +6,7 @@ from math import ceil, hypot, sqrt
 
 import numpy as np
 
-from rds.core.compiling import kernel
+from rds.core.compiling import kernel, long_kernel
 
 # Columns of what is found for each number of `owner`.
 VOLUME, DEPTH, RAPID, BELOW, SHANK, HOLDER = range(6)
@@ -30,7 +30,7 @@ def _touches(field, x0, y0, cell, px, py, radius, bottom):
     return into
 
 
-@kernel
+@long_kernel
 def carve(field, x0, y0, cell, floor, points, owner, rapid, radius, profile, cutting, shank, reach, holder, found):
     """Take from `field` (rows of y, columns of x; mm) what a tool sweeps along `points` (n × 3, its tip, mm).
 

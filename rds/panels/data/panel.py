@@ -12,6 +12,7 @@ from rds.core.errors import InputError
 from rds.panels.data.state import DataState
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.field_names import in_fields
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.file_import import FileImport
 from rds.panels.kit.layout import columns, group, row
@@ -136,8 +137,8 @@ class DataView:
             for log in found.logs
         ]
         parts += [
-            f"<p><b>{_SIGNS[str(finding.gravity)]} {escape(str(finding.gravity))}</b>: {escape(finding.what)}</p>"
-            for finding in found.findings
+            f"<p><b>{_SIGNS[str(each.gravity)]} {escape(str(each.gravity))}</b>: {escape(in_fields(each.what))}</p>"
+            for each in found.findings
         ]
         self.text.value = "".join(parts)
         if found.usable:
@@ -156,7 +157,7 @@ class DataView:
         from rds.identification.fit.fit_report import fragment, free_run_picture
         from rds.identification.structures.structures import for_logs, structure
 
-        self.text.value = fragment(estimate)
+        self.text.value = in_fields(fragment(estimate))
         kind = "warning" if estimate.warnings or estimate.untold else "good"
         count = len(estimate.warnings)
         said = "fitted" if kind == "good" else f"fitted, with {count} warning{'s' * (count != 1)}: read them first"
@@ -169,7 +170,7 @@ class DataView:
         from rds.identification.validate.plots import overlay
         from rds.identification.validate.report import fragment
 
-        self.text.value = fragment(validation, pictures=False)
+        self.text.value = in_fields(fragment(validation, pictures=False))
         self.notice.say(validation.verdict.sentence, "good" if validation.verdict.ok else "warning")
         self.figure.show(overlay(next(iter(validation.assessments.values()))))
 

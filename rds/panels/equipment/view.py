@@ -92,6 +92,12 @@ class EquipmentView:
             return
         self._refuse()
         self.notice.clear()
+        choices = self.equipment.choices
+        role = self.code.role if self.code is not None else ""
+        if role in choices and choices[role] == USER and not str(choices[f"{role}_file"]).strip():
+            assert self.code is not None
+            self.code.press()  # the file that has been opened for it, and has no name beside it yet
+            return
         run = self.equipment.run()
         try:
             run.start()

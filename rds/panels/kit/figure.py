@@ -41,8 +41,18 @@ class FigureView(widgets.VBox):
         # in a box of its own, because a closed canvas does not leave a page by itself
         self.children = [widgets.VBox([self._canvas, *words])]
 
-    def draw(self, session: Session, ticker: Ticker, make: Callable[[], Any], caption: str = "") -> None:
-        """Show the figure that `make()` gives, which is called beside the page: drawing takes seconds."""
+    def draw(
+        self,
+        session: Session,
+        ticker: Ticker,
+        make: Callable[[], Any],
+        caption: str = "",
+        then: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Show the figure that `make()` gives, which is called beside the page: drawing takes seconds. None: no figure.
+
+        `then()` is called once it is there.
+        """
         self.clear()
         self.children = [widgets.HTML('<p role="status">drawing …</p>')]
         task = self._waiting = session.work("a plot", lambda task: make())
@@ -58,7 +68,11 @@ class FigureView(widgets.VBox):
                     logging.getLogger(__name__).error("a plot could not be drawn", exc_info=task.error)
                 self.children = [widgets.HTML(f'<p role="alert">✖ no plot: {escape(str(task.error))}</p>')]
                 return
-            self.show(task.result, caption)
+            if task.result is None:
+                self.clear()
+            else:
+                self.show(task.result, caption)
+            then()
 
         end = ticker.add(look)
 

@@ -6,6 +6,8 @@ from html import escape
 
 import ipywidgets as widgets
 
+from rds.panels.kit.field_names import in_fields
+
 _SIGNS = {"note": "ℹ", "good": "✔", "warning": "⚠", "error": "✖"}
 
 
@@ -20,6 +22,7 @@ class Notice(widgets.HTML):
     def say(self, text: str, kind: str = "note", why: str = "") -> None:
         """Show `text`; kind is note, good, warning or error. Empty text shows nothing. *why?* opens the rest, `why`."""
         self._said = text
+        text, why = in_fields(text), in_fields(why)
         if not text:
             self.value = ""
             return

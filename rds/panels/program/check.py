@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,11 @@ from rds.nc.run.prepare import least_seconds, require_room
 from rds.nc.tool_centre import shown
 from rds.nc.trace import Trace
 from rds.nc.validate import Validation
+from rds.panels.kit.field_names import in_fields
+from rds.panels.program.stock import Cut, cut, shapes
 from rds.panels.session.task import Task
+
+_MOST_FAULTS = 50  # of a cut that are marked in the text
 
 
 @dataclass(frozen=True)
@@ -35,12 +39,15 @@ class Mark:
 
     def to_json(self) -> dict[str, Any]:
         """As the editor takes it."""
-        return {name: getattr(self, name) for name in ("line", "column", "length", "text", "kind")}
+        found = {name: getattr(self, name) for name in ("line", "column", "length", "kind")}
+        return found | {"text": in_fields(self.text)}
 
 
 @dataclass(frozen=True)
 class Look:
-    """What one look found. `cycle` and `trouble` (why it cannot be planned) are of valid programs."""
+    """What one look found. `cycle`, `trouble` (why it cannot be planned), `cut` and `uncut` (why there is none) are of
+    valid programs.
+    """
 
     marks: tuple[Mark, ...]
     validation: Validation | None = None
@@ -48,6 +55,8 @@ class Look:
     modes: Mapping[int, Modes] = field(default_factory=dict)
     cycle: CycleTime | None = None
     trouble: str = ""
+    cut: Cut | None = None
+    uncut: str = ""
 
     @property
     def ok(self) -> bool:
@@ -77,11 +86,14 @@ def look(
     machine: Machine,
     setup: Setup,
     early: Callable[[Look], None] = lambda found: None,
+    stock: str = "",
+    part: Path | None = None,
 ) -> Look:
-    """Read, follow and plan the program in `source`, which is called `name` for whoever reads this.
+    """Read, follow, plan and cut the program in `source`, which is called `name` for whoever reads this.
 
-    `early` gets what was found before planning, which takes longer. Writes nothing. Raises Stopped when it should end;
-    faults are marks and never raised.
+    `stock` and `part` are those of `rds.panels.program.stock.cut`. `early` gets what was found before planning and
+    before the cut, which take longer. Writes nothing. Raises Stopped when it should end; faults are marks and never
+    raised.
     """
     try:
         tools = setup.tool_list()
@@ -130,7 +142,19 @@ def look(
         cycle.certificate.require(name)
     except RdsError as error:
         return Look(marks, result, trace, follower.modes, trouble=str(error).replace(label, name))
-    return Look(marks, result, trace, follower.modes, cycle)
+    found = Look(marks, result, trace, follower.modes, cycle)
+    early(found)
+    task.note = "cutting"
+    try:
+        made = cut(kept, follower.modes, shapes(setup.tools), stock, part, lambda: task.advance(0.0, 0.0))
+    except RdsError as error:
+        return replace(found, uncut=str(error))
+    return found if made is None else replace(found, cut=made, marks=(*marks, *_cut_marks(made)))
+
+
+def _cut_marks(made: Cut) -> Iterator[Mark]:
+    for fault in made.faults[:_MOST_FAULTS]:
+        yield Mark(fault.line, 0, 0, str(fault).partition(": ")[2], "warning")
 
 
 def _divided(blocks: Iterable[PathBlock], task: Task[Any]) -> Iterator[PathBlock]:

@@ -66,8 +66,7 @@ class Operator:
         self.run_button.disabled = self.from_button.disabled = work is not None
         self.step.disabled = work is not None and not work.steps  # a run that was not begun with it rests nowhere
         held = operable and work is not None and work.held
-        status = work.status() if operable and work is not None else None
-        waits = status is not None and status.state.name in ("STOP", "TOOL")
+        waits = work is not None and work.waits
         self.hold_button.disabled = not operable or held
         self.resume_button.disabled = not (held or waits)
         self.home_button.disabled = not operable

@@ -10,6 +10,7 @@ import ipywidgets as widgets
 
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
+from rds.panels.program.cut_html import cut_html
 from rds.panels.program.path_view import PathView
 from rds.panels.program.state import Program
 from rds.results import html
@@ -44,7 +45,7 @@ class Preview:
         self.path.show(look.trace, look.sentence)
         if self._space is not None and self.in_space.value:
             self._space.show(look.trace)
-        self.numbers.value = _numbers(look, self._program)
+        self.numbers.value = _numbers(look, self._program) + cut_html(look.cut, look.uncut)
 
     def place(self, position: Sequence[float]) -> None:
         """The tool is there: X, Y, Z in machine coordinates, mm."""

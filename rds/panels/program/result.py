@@ -10,7 +10,9 @@ import ipywidgets as widgets
 
 from rds.panels.equipment.result_actions import ResultActions
 from rds.panels.kit.figure import FigureView
+from rds.panels.program.cut_html import cut_html
 from rds.panels.program.run import ProgramWork
+from rds.panels.program.stock import Cut, cut_of_run
 from rds.results import html
 
 _WORST = 3  # lines that have a button
@@ -25,10 +27,12 @@ class ProgramResult:
         self._shell, self._go = shell, go
         self.words, self.tables = widgets.HTML(_EMPTY), widgets.HTML()
         self.actions = ResultActions(shell)
-        self.path, self.along = FigureView(), FigureView()
+        self.path, self.along, self.cut = FigureView(), FigureView(), FigureView()
+        self.cut_words = widgets.HTML()
         self.worst = widgets.HBox([])
         self.worst.add_class("rds-row")
-        self.widget = widgets.VBox([self.worst, self.words, self.path, self.along, self.tables, self.actions.widget])
+        pictures = [self.path, self.along, self.cut_words, self.cut]
+        self.widget = widgets.VBox([self.worst, self.words, *pictures, self.tables, self.actions.widget])
 
     def show(self, work: ProgramWork) -> None:
         """Sentences, the worst lines, and pictures."""
@@ -53,6 +57,23 @@ class ProgramResult:
         session, ticker = self._shell.session, self._shell.ticker
         self.path.draw(session, ticker, lambda: path(result, prepared))
         self.along.draw(session, ticker, lambda: along(result, prepared))
+        if (planned := work.cut) is None:
+            return
+        cuts: list[Cut] = []
+
+        def make() -> Any:
+            from rds.nc.stock.pictures import picture
+
+            made = cut_of_run(planned, result, prepared)
+            if made is None:
+                return None
+            cuts.append(made)
+            return picture(made.stock, f"{work.file.name} as measured", made.part)
+
+        def say() -> None:
+            self.cut_words.value = cut_html(cuts[0], measured=True) if cuts else ""
+
+        self.cut.draw(session, ticker, make, then=say)
 
     def saved(self, work: ProgramWork) -> None:
         """Its tables are written; pictures and reports follow."""
@@ -66,6 +87,8 @@ class ProgramResult:
         self.worst.children = []
         self.path.clear()
         self.along.clear()
+        self.cut_words.value = ""
+        self.cut.clear()
 
     def _button(self, line: int, error: float) -> widgets.Button:
         tip = "Contour error: how far off its path the tool was at most in this line; shows the line in the editor"

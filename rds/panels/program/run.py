@@ -12,11 +12,13 @@ import numpy as np
 
 from rds.core.errors import ContractError, InputError, RdsError
 from rds.modes.experiment.experiment import FailedRun
+from rds.modes.loop.execution import State
 from rds.modes.loop.program import SINGLE_STEP
 from rds.nc.check import Setup
 from rds.nc.run.report import save_run
 from rds.nc.run.run import PartProgram, ProgramRun, Status
 from rds.panels.equipment.run import STRIP_RATE, EquipmentRun, contour_errors, raise_stopped, recorded
+from rds.panels.program.stock import Cut
 from rds.panels.session.saving import saving
 from rds.panels.session.session import RUNS, Session
 from rds.panels.session.task import Task
@@ -49,6 +51,7 @@ class ProgramWork(EquipmentRun):
         self.folder = session.folder / RUNS / f"{time.strftime('%Y%m%d-%H%M%S')}-{file.stem}-{self.folder.name[-4:]}"
         self._setup, self._controller, self._changes = setup, controller, changes
         self._motion = dict(motion or {})
+        self.cut: Cut | None = None  # what the program makes of its stock, where that is known
 
     def _work(self, task: Task[Result]) -> Result:
         with contextlib.ExitStack() as held:
@@ -116,9 +119,23 @@ class ProgramWork(EquipmentRun):
 
     @property
     def operable(self) -> bool:
-        """Whether it can be held, resumed and so on now."""
+        """Whether it can be held, overridden and so on now."""
+        return self.real_time and self._goes_on
+
+    @property
+    def _goes_on(self) -> bool:
         run = self._run
-        return self.real_time and isinstance(run, ProgramRun) and not run.done and bool(run.columns)
+        return isinstance(run, ProgramRun) and not run.done and bool(run.columns)
+
+    @property
+    def waits(self) -> bool:
+        """Whether it waits for Resume: at a stop, or for its tool. A simulation is given its tools at once."""
+        status = self.status() if self._goes_on else None
+        if status is not None and status.state is State.TOOL and not self.real_time:
+            with contextlib.suppress(InputError):  # it has gone on, and ended
+                self.resume()
+            return False
+        return status is not None and status.state in (State.STOP, State.TOOL)
 
     @property
     def held(self) -> bool:
@@ -161,9 +178,12 @@ class ProgramWork(EquipmentRun):
     # the strip, and the machine
 
     def moved(self) -> list[tuple[str, str]]:
-        """What `new_rows` gives after the traces: the motion of the axes that the program moves, and of the spindle."""
+        """What `new_rows` gives after the traces: the motion of the axes that the program moves, and of the spindle;
+        and the number of the tool where it is known what the program cuts.
+        """
         columns, units = self._columns()
-        return [(name, units.get(name, "")) for name in columns if name.endswith(_MOVED)]
+        found = [(name, units.get(name, "")) for name in columns if name.endswith(_MOVED)]
+        return found if self.cut is None else [*found, ("tool", "")]
 
     def traces(self) -> list[tuple[str, str]]:
         """The following error of each axis, and the contour error; none before the loop has begun."""
@@ -183,5 +203,7 @@ class ProgramWork(EquipmentRun):
             return np.empty((0, 1 + len(self.traces()) + len(self.moved())))
         of = dict(zip(columns, rows[:: max(round(1.0 / (STRIP_RATE * prepared.T)), 1)].T, strict=True))
         errors = [of[f"{axis}_reference"] - of[f"{axis}_measured"] for axis in prepared.program.axes]
+        if self.cut is not None:
+            of["tool"] = self.cut.tool_of(of["program_line"])
         moved = [of[name] for name, _ in self.moved()]
         return np.column_stack([of["time"], *errors, contour_errors(of, prepared), *moved])

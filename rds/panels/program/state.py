@@ -10,6 +10,7 @@ from rds.core.errors import InputError, RdsError
 from rds.core.shared_quantities import FEED_OVERRIDE
 from rds.machines import load_machine
 from rds.nc.bundled import bundled
+from rds.nc.language.tool_library import is_library
 from rds.panels.equipment.build import Builds
 from rds.panels.interpolator.fields import USER
 from rds.panels.interpolator.motion import PLANNED, filter_of, idle_motion, motion_fields
@@ -47,6 +48,11 @@ def _fields(folder: Path) -> Iterable[Field]:
     yield mode_choice("controller")
     yield _table_field(folder)
     yield _offsets_field(folder)
+    tip = (
+        "X Y Z of its lower and of its upper corner, machine coordinates of the tool's tip; empty: as the cut needs it"
+    )
+    yield Text("stock", "Stock [mm]", tip, "", "e.g. -5 -5 -6 45 35 0", 120, check_stock)
+    yield _part_field(folder)
     yield Text(
         "controller",
         "Controller of the axes",
@@ -67,9 +73,21 @@ def _fields(folder: Path) -> Iterable[Field]:
         yield Flag(name, label, tip, False)
 
 
+def check_stock(text: str) -> None:
+    """InputError unless it is empty, or a block's corners."""
+    if text.strip():
+        from rds.panels.program.stock import block_of
+
+        block_of(text)
+
+
 def _table_field(folder: Path) -> Choice:
-    tip = "a .tbl file of your folder, as LinuxCNC keeps it, lengths in mm"
-    return Choice("tools", "Tool table", tip, NO_TABLE, _files(folder, ".tbl"))
+    tip = (
+        "a .tbl file of your folder, as LinuxCNC keeps it, lengths in mm; or a tool library (.toml), with the shapes "
+        "of the tools"
+    )
+    libraries = {name: name for name in _files(folder, ".toml") if name and is_library(folder / name)}
+    return Choice("tools", "Tool table", tip, NO_TABLE, _files(folder, ".tbl") | libraries)
 
 
 def _offsets_field(folder: Path) -> Choice:
@@ -77,9 +95,14 @@ def _offsets_field(folder: Path) -> Choice:
     return Choice("parameters", "Parameter file", tip, NO_TABLE, _files(folder, ".var"))
 
 
-def _files(folder: Path, suffix: str) -> dict[str, str]:
+def _part_field(folder: Path) -> Choice:
+    tip = "what the finished part is compared with: an STL model, or the heights of another cut (.npz), of your folder"
+    return Choice("part", "Intended part", tip, NO_TABLE, _files(folder, ".stl", ".npz") | {NO_TABLE: "as programmed"})
+
+
+def _files(folder: Path, *suffixes: str) -> dict[str, str]:
     try:
-        found = sorted(each.name for each in folder.iterdir() if each.suffix.lower() == suffix and each.is_file())
+        found = sorted(each.name for each in folder.iterdir() if each.suffix.lower() in suffixes and each.is_file())
     except OSError:
         found = []
     return {NO_TABLE: "none"} | {name: name for name in found}
@@ -120,7 +143,7 @@ class Program:
             except InputError as error:
                 self.trouble = str(error)
                 self.choices.set("file", self.text.name)
-        if name in ("file", "tools", "parameters", *OPTIONS):
+        if name in ("file", "tools", "parameters", "stock", "part", *OPTIONS):
             self.look_again()
 
     # the text
@@ -214,6 +237,7 @@ class Program:
 
     def _begin(self) -> Task[Look]:
         text, setup, machine = self.text, self.setup(), self.machine
+        stock, part = self._named("stock"), self._named("part")
 
         def work(task: Task[Look]) -> Look:
             from rds.panels.program.check import look
@@ -222,7 +246,8 @@ class Program:
                 if not task.stopping:
                     self._early = found
 
-            return look(task, text.on_disk(), text.name, machine, setup, early)
+            path = self.session.folder / part if part else None
+            return look(task, text.on_disk(), text.name, machine, setup, early, stock, path)
 
         return self.session.work(f"check {text.name}", work)
 
@@ -239,9 +264,9 @@ class Program:
         return str(self.choices[name])
 
     def refresh(self) -> None:
-        """Look for tool tables and parameter files that have come or gone."""
+        """Look for tool tables, parameter files and parts that have come or gone."""
         folder = self.session.folder
-        found = (_table_field(folder), _offsets_field(folder))
+        found = (_table_field(folder), _offsets_field(folder), _part_field(folder))
         self.choices.replace([each for each in found if each != self.choices.fields[each.name]])
 
     # running it

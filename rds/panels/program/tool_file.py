@@ -1,4 +1,4 @@
-"""A tool table that is edited: a `.tbl` file of the session's folder, as LinuxCNC keeps it."""
+"""A tool table that is edited: a `.tbl` file as LinuxCNC keeps it, or a library with shapes (`.toml`)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,20 @@ if TYPE_CHECKING:
 
 LARGEST = 1 << 20  # bytes of a table that is edited here
 STARTER = "; T number, P pocket, D diameter and Z length in mm, then a comment\nT1 P1 D6 Z0 ;end mill 6 mm\n"
-_NAME = re.compile(r"[^\x00-\x1f/\\:*?\"<>|.][^\x00-\x1f/\\:*?\"<>|]{0,95}\.tbl", re.IGNORECASE)
+LIBRARY_STARTER = """\
+# mm, degrees, mm/min; shape: flat, ball, bull (with corner_radius), vee (with angle), drill
+[[tool]]
+number = 1
+name = "end mill 6 mm"
+shape = "flat"
+diameter = 6.0
+flutes = 2
+cutting_length = 20.0
+reach = 30.0
+holder_diameter = 16.0
+"""
+_NAME = re.compile(r"[^\x00-\x1f/\\:*?\"<>|.][^\x00-\x1f/\\:*?\"<>|]{0,95}\.(tbl|toml)", re.IGNORECASE)
+_LINE = re.compile(r"\bline (\d+)")
 
 
 class ToolFile:
@@ -24,10 +37,18 @@ class ToolFile:
     def __init__(self, folder: Path, name: str):
         """A file that is not there yet begins with one tool."""
         if not _NAME.fullmatch(name):
-            raise InputError(f"{name!r:.60} is no name of a tool table in your folder; write one like tools.tbl")
+            raise InputError(
+                f"{name!r:.60} is no name of a tool table in your folder; write one like tools.toml or tools.tbl"
+            )
         self.name, self.path = name, folder / name
         self._saved = self._read()
-        self.text = STARTER if self._saved is None else self._saved
+        starter = LIBRARY_STARTER if self.is_library else STARTER
+        self.text = starter if self._saved is None else self._saved
+
+    @property
+    def is_library(self) -> bool:
+        """Whether its tools have shapes."""
+        return self.path.suffix.lower() == ".toml"
 
     @property
     def changed(self) -> bool:
@@ -35,9 +56,14 @@ class ToolFile:
         return self.text != self._saved
 
     def tools(self) -> list[Tool]:
-        """The tools as they are written now; ProgramError with line and column of the first fault."""
-        from rds.nc.language.tools import tools_of
+        """The tools as they are written now; ProgramError with line and column of the first fault, InputError of a
+        library's.
+        """
+        from rds.nc.language.tool_library import library_of
+        from rds.nc.language.tools import of_shape, tools_of
 
+        if self.is_library:
+            return [of_shape(tool) for tool in library_of(self.text, self.name)]
         return tools_of(self.text, self.name)
 
     def marks(self) -> list[Mark]:
@@ -50,6 +76,9 @@ class ToolFile:
         except ProgramError as error:
             text = f"{error.word}: {error.reason}" if error.word else error.reason
             return [Mark(error.line, error.column, len(error.word), text)]
+        except InputError as error:
+            found = _LINE.search(str(error))
+            return [Mark(int(found[1]) if found else 0, 0, 0, str(error))]
         return []
 
     def save(self) -> None:

@@ -37,7 +37,8 @@ class ToolView:
         self.state = widgets.HTML()
         choose = row(FieldView(program.choices, "tools", buttons=False), again)
         choose.layout.align_items = "flex-end"
-        self._name = widgets.Text(placeholder="tools.tbl", tooltip="A name for a new tool table")
+        tip = "A name for a new tool table: .toml for tools with shapes, .tbl as LinuxCNC has them"
+        self._name = widgets.Text(placeholder="tools.toml", tooltip=tip)
         self._name.layout.width = "140px"
         begin = button("New table", "Begin a table under the name beside this", self._begin, self.notice)
         self.save_button = button(
@@ -102,7 +103,7 @@ class ToolView:
             return
         try:
             self.table.value = _tools(file.tools(), file.name)
-        except ProgramError:
+        except (ProgramError, InputError):
             self.table.value = ""  # the editor says what is wrong, and where
 
     def _save(self) -> None:

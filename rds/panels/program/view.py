@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import ipywidgets as widgets
@@ -9,6 +10,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.nc.run.run import Status
+from rds.nc.stepping import Step
 from rds.panels.equipment.result_view import timing_line
 from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.interpolator.motion import MADE
@@ -26,12 +28,13 @@ from rds.panels.program.run import ProgramWork
 from rds.panels.program.setup_view import SetupView
 from rds.panels.program.state import OPTIONS, Program
 from rds.panels.program.status import at_the_end, status_html
-from rds.panels.program.stock import cutting_path, stock_of, tool_of
+from rds.panels.program.step_view import StepView
+from rds.panels.program.stock import drawn
 from rds.panels.program.tool_view import ToolView
 from rds.panels.scene.scene import MachineScene
 
-TABS = ("Preview", "Machine", "Result", "Touch off", "MDI", "Settings, tools")
-PREVIEW, MACHINE, RESULT, SETUP, MDI, SETTINGS = range(len(TABS))
+TABS = ("Preview", "Machine", "Result", "Steps", "Touch off", "MDI", "Settings, tools")
+PREVIEW, MACHINE, RESULT, STEP, SETUP, MDI, SETTINGS = range(len(TABS))
 
 
 class ProgramView:
@@ -59,6 +62,7 @@ class ProgramView:
         self.setup = SetupView(self.program, lambda: self._at)
         self.mdi = Mdi(shell, self.program, self._begin, self.notice)
         self.result = ProgramResult(shell, self.editor.go)
+        self.steps = StepView(self.program, self._stepped, lambda: self.editor.caret)
         self.tools = ToolView(self.program)
         self.program.choices.watch(self._chosen)
         self.widget = self._arranged()
@@ -74,10 +78,12 @@ class ProgramView:
         motion.add_class("rds-group")
         self._show_motion()
         settings = field_group(choices, ["controller", "coupled", "optional_stop", *OPTIONS])
-        more = widgets.VBox([motion, settings, self.tools.widget])
+        block = field_group(choices, ["stock", "part"])
+        more = widgets.VBox([motion, settings, self.tools.widget, block])
         run = widgets.VBox([self.scene, self.strip])
         run.add_class("rds-live")
-        pages = [self.preview.widget, run, self.result.widget, self.setup.widget, self.mdi.widget, more]
+        pages = [self.preview.widget, run, self.result.widget, self.steps.widget, self.setup.widget]
+        pages += [self.mdi.widget, more]
         self.tabs = widgets.Tab(pages, titles=TABS)
         self.tabs.add_class("rds-tabs")
         self.tabs.observe(self._turned, "selected_index")
@@ -132,12 +138,21 @@ class ProgramView:
         elif change["new"] == SETUP:
             self.setup.refresh()
 
+    def _stepped(self, step: Step | None) -> None:
+        """The line that was executed last is lit in the text, and the tool on the path."""
+        if self.work is not None:
+            return  # what runs is shown
+        own = step is not None and Path(step.file).name in (self.program.text.name, self.program.text.draft.name)
+        self.editor.running = step.line if step is not None and own else 0
+        if step is not None:
+            self.preview.place(step.machine_position)
+
     def _lay_stock(self, look: Look) -> None:
-        """Stock about what the program cuts, with room for the tool, and the part that it is meant to become."""
-        self.scene.tool = tool_of(look, self.program)
-        found = stock_of(look, self.program, float(self.scene.tool["diameter"]))
-        self.scene.stock = found
-        self.scene.intend(cutting_path(look) if found else np.empty((0, 3)))
+        """The stock that the program cuts, the part that it is meant to become, and the tools."""
+        if look.cut is None:
+            self.scene.lay({}, np.empty(0), {})
+        else:
+            self.scene.lay(*look.cut.shown(), drawn(look.cut.tools))
 
     # ten times a second
 
@@ -153,7 +168,8 @@ class ProgramView:
     def _found(self, look: Look) -> None:
         self.editor.mark(look.marks)
         self.preview.show(look)
-        self._lay_stock(look)
+        if not self.program.looking:  # else the cut is still to come
+            self._lay_stock(look)
 
     # running
 
@@ -176,6 +192,8 @@ class ProgramView:
         if self.work is not None:
             raise InputError("wait until the run is over, or stop it first")
         self.notice.clear()
+        if work.file == self.program.text.path and self.program.latest is not None and not self.program.looking:
+            work.cut = self.program.latest.cut
         work.start()
         self.work = self.operator.work = work
         self.mdi.button.disabled = True

@@ -17,7 +17,6 @@ from rds.panels.scene.bodies import scene_of
 
 _STATIC = Path(__file__).parent / "static"
 _PARTS = ("frames.js", "draw.js", "stock.js", "scene.js")
-TOOL = 6.0  # mm, the diameter of a tool that no table names
 
 
 @cache
@@ -38,14 +37,14 @@ class MachineScene(anywidget.AnyWidget):
     live = traitlets.Bool(False).tag(sync=True)
     shows = traitlets.Bool(False).tag(sync=True)
     asked = traitlets.Bool(False).tag(sync=True)  # whether a page has seen what draws there
-    stock: Any = traitlets.Dict().tag(sync=True)  # {"low": [x, y, z], "high": [x, y, z]}, mm, in the work's frame
-    tool: Any = traitlets.Dict({"diameter": TOOL, "ball": False}).tag(sync=True)
+    stock: Any = traitlets.Dict().tag(sync=True)  # low, high ([x, y, z], mm, in the work's frame), cell, columns, rows
+    tools: Any = traitlets.Dict().tag(sync=True)  # by number: radius, profile, length, rings; a row's column `tool`
 
     def __init__(self, machine: Machine, **options: Any):
         css = (_STATIC / "scene.css").read_text(encoding="utf-8")
         super().__init__(_esm=_module(), _css=css, scene=scene_of(machine), **options)
         self._stream = RowStream()
-        self._intended = np.empty((0, 3), dtype="<f4")
+        self._intended = np.empty(0, dtype="<f4")
         self.on_msg(self._asked)
 
     def begin(self, traces: Sequence[tuple[str, str]], live: bool) -> None:
@@ -61,9 +60,11 @@ class MachineScene(anywidget.AnyWidget):
         if len(chosen) and self.shows:
             self._deliver(chosen)
 
-    def intend(self, points: np.ndarray) -> None:
-        """The path that the part is meant to be cut along: points (n, 3), mm, nan rows between polylines."""
-        self._intended = np.ascontiguousarray(points, dtype="<f4")
+    def lay(self, stock: dict[str, Any], heights: np.ndarray, tools: dict[str, Any]) -> None:
+        """Stock, the heights over its cells that the part is meant to have (mm), and what cuts it; {}: no stock."""
+        with self.hold_sync():
+            self.tools, self.stock = tools, stock
+        self._intended = np.ascontiguousarray(heights, dtype="<f4").ravel()
         if self.shows:
             self.send({"kind": "intended"}, [self._intended.tobytes()])
 

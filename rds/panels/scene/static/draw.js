@@ -108,6 +108,20 @@ function prismShape(painter, sides = 8) { // radius 1, along z from 0 to 1
   }
   return painter.shape(new Float32Array(points), new Uint32Array(indices));
 }
+function latheShape(painter, rings, sides = 16) { // [radius, z] from below to above, about z
+  const points = [], indices = [], [low, high] = [rings[0], rings[rings.length - 1]];
+  for (const [r, z] of rings) for (let i = 0; i < sides; i++) points.push(r * Math.cos(2 * Math.PI * i / sides), r * Math.sin(2 * Math.PI * i / sides), z);
+  for (let k = 0; k + 1 < rings.length; k++) for (let i = 0; i < sides; i++) {
+    const a = k * sides + i, b = k * sides + (i + 1) % sides;
+    indices.push(a, b, b + sides, a, b + sides, a + sides);
+  }
+  [low, high].forEach(([, z], end) => {
+    const middle = points.length / 3, from = end ? (rings.length - 1) * sides : 0;
+    points.push(0, 0, z);
+    for (let i = 0; i < sides; i++) indices.push(middle, from + i, from + (i + 1) % sides);
+  });
+  return painter.shape(new Float32Array(points), new Uint32Array(indices));
+}
 
 // a camera that goes around a point; x to the right, z up. Gives the matrix of the view, and where the light comes from.
 function viewFrom(camera, ratio) {

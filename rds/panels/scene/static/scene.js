@@ -67,10 +67,18 @@ function render({ model, el }) {
   }
   const MEASURED = ["measured", "modelled", "reference"], WANTED = ["reference", "measured", "modelled"], MODELLED = ["modelled", "measured", "reference"];
 
+  // the tool of a row, by its column; a plain one where there are none
+  const PLAIN = { radius: 3, profile: [0, 0], length: 0, rings: [[0, 0], [3, 0]] };
+  function toolAt(row) {
+    const k = model.get("columns").indexOf("tool"), tools = model.get("tools");
+    return tools[k < 0 || row < 0 ? Object.keys(tools)[0] : columns[k + 1][row]] || PLAIN;
+  }
+
   function follow(from) { // rows from there on are new
     const contour = model.get("columns").indexOf("contour_error") + 1;
     for (let i = from; i < columns[0].length; i++) {
-      const is = tipOf(scene(), joints(MEASURED, i)), should = tipOf(scene(), joints(WANTED, i));
+      const is = tipOf(scene(), joints(MEASURED, i)), should = tipOf(scene(), joints(WANTED, i)), { length } = toolAt(i);
+      is[2] -= length; should[2] -= length;
       tips.push(is);
       wanted.push(should);
       errors.push(contour ? Math.abs(columns[contour][i]) || 0 : Math.hypot(...is.map((value, k) => value - should[k])));
@@ -81,7 +89,11 @@ function render({ model, el }) {
 
   function prepare() {
     painter = new Painter(canvas);
-    shapes = { box: boxShape(painter), prism: prismShape(painter), trail: painter.shape(new Float32Array(0), null, new Float32Array(0)), wanted: painter.shape(new Float32Array(0)), stock: null };
+    shapes = { box: boxShape(painter), prism: prismShape(painter), trail: painter.shape(new Float32Array(0), null, new Float32Array(0)), wanted: painter.shape(new Float32Array(0)), stock: null, tools: new Map() };
+  }
+  function lathe(tool, above) { // a tool as it is drawn, up to where the spindle holds it
+    if (!shapes.tools.has(tool)) { const rings = tool.rings, r = rings[rings.length - 1][0]; shapes.tools.set(tool, latheShape(painter, [...rings, [r, Math.max(above + tool.length, rings[rings.length - 1][1])]])); }
+    return shapes.tools.get(tool);
   }
   function trail(until) {
     const step = Math.ceil((until + 1) / MOST_TRAIL) || 1, magnified = factor(), points = [], tints = [], plain = [];
@@ -94,9 +106,8 @@ function render({ model, el }) {
     painter.change(shapes.wanted, new Float32Array(plain));
   }
   function cut(until) {
-    const tool = model.get("tool");
     if (until < cutTo) { stock.reset(); cutTo = 0; cutNow = true; }
-    for (; cutTo < until; cutTo++) { stock.cut(tips[cutTo], tips[cutTo + 1], tool); cutNow = true; }
+    for (; cutTo < until; cutTo++) { stock.cut(tips[cutTo], tips[cutTo + 1], toolAt(cutTo + 1)); cutNow = true; }
     if (!cutNow && !stale) return;
     const [points, tints] = stock.points(on.work, rgb("#B9C2CC"));
     if (!shapes.stock) shapes.stock = painter.shape(points, stock.indices, tints);
@@ -137,12 +148,13 @@ function render({ model, el }) {
   let drawnRow = -1;
 
   function body(frames, alpha) {
-    const tool = model.get("tool"), ghost = alpha < 1 && rgb("#D55E00");
+    const tool = toolAt(index()), ghost = alpha < 1 && rgb("#D55E00");
     for (const { frame, kind, size, at: place, color: hex, spins, tool: isTool, along: axis } of scene().solids) {
       let made = product(frames[frame], shifted(...place));
       if (spins) made = product(made, turnedAbout(2, turned));
       if (axis === 0 || axis === 1) made = product(made, turnedAbout(1 - axis, Math.PI / 2));
-      const edges = kind === "box" ? size : [isTool ? tool.diameter / 2 : size[0], isTool ? tool.diameter / 2 : size[0], size[1]];
+      if (isTool) { painter.draw(lathe(tool, size[1]), product(made, shifted(0, 0, -tool.length)), ghost || rgb(hex), alpha); continue; }
+      const edges = kind === "box" ? size : [size[0], size[0], size[1]];
       painter.draw(shapes[kind], product(made, [edges[0], 0, 0, 0, 0, edges[1], 0, 0, 0, 0, edges[2], 0, 0, 0, 0, 1]), ghost || rgb(hex), alpha);
     }
     for (const arm of scene().arms) {
@@ -223,12 +235,12 @@ function render({ model, el }) {
     if (message.kind === "intended") { const view = buffers[0]; intended = new Float32Array(view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength)); compare(); }
     wake();
   }
-  function compare() { if (stock && intended) { stock.intend(intended, model.get("tool")); cutNow = stale = true; } }
+  function compare() { if (stock && intended) { stock.intend(intended); cutNow = stale = true; } }
   function restock() {
     const given = model.get("stock");
     stock = given && given.low ? new Stock(given) : null;
     camera = null;
-    if (shapes) shapes.stock = null;
+    if (shapes) { shapes.stock = null; shapes.tools.clear(); }
     cutTo = 0;
     compare();
     stale = true;
@@ -251,7 +263,7 @@ function render({ model, el }) {
   function turn(yaw, pitch) { camera.yaw -= yaw; camera.pitch = Math.min(Math.max(camera.pitch + pitch, -1.5), 1.5); wake(); }
 
   model.on("msg:custom", receive);
-  model.on("change:stock change:tool", restock);
+  model.on("change:stock change:tools", restock);
   model.on("change:scene", () => { camera = null; clear(); wake(); });
   model.on("change:shows", shown);
   const sized = new ResizeObserver(() => { stale = true; wake(); });

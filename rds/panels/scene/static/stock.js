@@ -1,13 +1,9 @@
-// Stock as a height field in the work's frame, cut by a flat or a ball-nosed end mill that stands along z. Lengths in mm.
-
-const MOST_CELLS = 160; // along the longer side
+// Stock as a height field in the work's frame, over the middles of its cells, cut by tools that stand along z: `profile`
+// has the heights of a tool's end above its tip, at squared distances that divide radius² evenly. Lengths in mm.
 
 class Stock {
-  constructor({ low, high }) {
-    Object.assign(this, { low, high });
-    this.cell = Math.max(high[0] - low[0], high[1] - low[1], 1) / MOST_CELLS;
-    this.nx = Math.max(Math.ceil((high[0] - low[0]) / this.cell), 2) + 1;
-    this.ny = Math.max(Math.ceil((high[1] - low[1]) / this.cell), 2) + 1;
+  constructor({ low, high, cell, columns, rows }) {
+    Object.assign(this, { low, high, cell, nx: columns, ny: rows });
     this.heights = new Float32Array(this.nx * this.ny).fill(high[2]);
     this.target = null;
     this.indices = this.triangles();
@@ -20,14 +16,15 @@ class Stock {
     if (Math.min(a[2], b[2]) >= this.high[2]) return;
     for (let k = 1; k <= steps; k++) this.press(a.map((value, i) => value + (b[i] - value) * k / steps), tool, heights);
   }
-  press([x, y, z], { diameter, ball }, heights) {
-    const r = diameter / 2, { cell, nx, ny, low } = this, bottom = low[2];
-    const i0 = Math.max(Math.ceil((x - r - low[0]) / cell), 0), i1 = Math.min(Math.floor((x + r - low[0]) / cell), nx - 1);
-    const j0 = Math.max(Math.ceil((y - r - low[1]) / cell), 0), j1 = Math.min(Math.floor((y + r - low[1]) / cell), ny - 1);
+  press([x, y, z], { radius: r, profile }, heights) {
+    const { cell, nx, ny, low } = this, bottom = low[2], fine = profile.length - 1;
+    const i0 = Math.max(Math.ceil((x - r - low[0]) / cell - 0.5), 0), i1 = Math.min(Math.floor((x + r - low[0]) / cell - 0.5), nx - 1);
+    const j0 = Math.max(Math.ceil((y - r - low[1]) / cell - 0.5), 0), j1 = Math.min(Math.floor((y + r - low[1]) / cell - 0.5), ny - 1);
     for (let j = j0; j <= j1; j++) for (let i = i0; i <= i1; i++) {
-      const off = (low[0] + i * cell - x) ** 2 + (low[1] + j * cell - y) ** 2;
+      const off = (low[0] + (i + 0.5) * cell - x) ** 2 + (low[1] + (j + 0.5) * cell - y) ** 2;
       if (off > r * r) continue;
-      const to = Math.max(ball ? z + r - Math.sqrt(r * r - off) : z, bottom), n = j * nx + i;
+      const share = off / (r * r) * fine, k = Math.min(Math.floor(share), fine - 1), n = j * nx + i;
+      const to = Math.max(z + profile[k] + (share - k) * (profile[k + 1] - profile[k]), bottom);
       if (to < heights[n]) heights[n] = to;
     }
   }
@@ -43,16 +40,8 @@ class Stock {
     }
     return height > high ? height - high : height < low ? height - low : 0;
   }
-  // points with NaN where a polyline ends
-  intend(points, tool) {
-    this.target = new Float32Array(this.nx * this.ny).fill(this.high[2]);
-    let last = null;
-    for (let k = 0; k < points.length; k += 3) {
-      const next = Number.isNaN(points[k]) ? null : [points[k], points[k + 1], points[k + 2]];
-      if (next && last) this.cut(last, next, tool, this.target);
-      last = next;
-    }
-  }
+  // the heights that were meant
+  intend(heights) { this.target = heights.length === this.heights.length ? heights : null; }
   // mm³ that are gone; mm that stand too high and lie too low, at most
   numbers() {
     let gone = 0, over = 0, under = 0;
@@ -78,7 +67,7 @@ class Stock {
     const some = 0.02, high = rgb("#E69F00"), low = rgb("#CC79A7"), right = rgb("#009E73");
     for (let j = 0; j < this.ny + 2; j++) for (let i = 0; i < wide; i++) {
       const [u, v, edge] = this.at(i, j), n = v * this.nx + u, k = 3 * (j * wide + i), height = this.heights[n];
-      places[k] = this.low[0] + u * this.cell; places[k + 1] = this.low[1] + v * this.cell; places[k + 2] = edge ? this.low[2] : height;
+      places[k] = this.low[0] + (u + 0.5) * this.cell; places[k + 1] = this.low[1] + (v + 0.5) * this.cell; places[k + 2] = edge ? this.low[2] : height;
       let tint = plain;
       if (compared && this.target) { const off = this.off(n); tint = off > some ? high : off < -some ? low : this.target[n] < this.high[2] ? right : plain; }
       else if (height < this.high[2]) tint = plain.map((value) => 0.8 * value);

@@ -1,0 +1,137 @@
+"""A newcomer with nothing but the browser and an empty folder: from the first controller to two runs compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.panels.conftest import App
+
+MOST = {  # presses (of the mouse, of Enter) of each step; what is typed and chosen from a list counts as one each
+    "write": 3,
+    "break and mend": 4,
+    "run in three modes": 5,
+    "change a gain live": 4,
+    "compare": 4,
+}
+
+
+class Hand:
+    """Whoever uses the page; counts what is pressed, by step."""
+
+    def __init__(self, page: Any):
+        self.page = page
+        self.presses: dict[str, int] = {}
+        self._step = ""
+        self._saved: list[str] = []  # where runs were saved
+
+    def begin(self, step: str) -> None:
+        self._step = step
+        self.presses[step] = 0
+
+    def count(self) -> None:
+        self.presses[self._step] += 1
+
+    def click(self, selector: str) -> None:
+        self.count()
+        self.page.click(selector)
+
+    def press(self, text: str) -> None:
+        self.click(f'button:visible:text-is("{text}")')
+
+    def choose(self, label: str, option: str) -> None:
+        self.count()
+        self.page.locator(f'.rds-field:visible:has(label:text-is("{label}")) select').first.select_option(label=option)
+
+    def type(self, label: str, value: str) -> None:
+        self.count()
+        box = self.page.locator(".rds-field:visible", has_text=label).first.locator("input[type=text]")
+        box.fill(value)
+        box.press("Tab")
+
+    def sees(self, text: str) -> None:
+        self.page.wait_for_selector(f':text("{text}"):visible')
+
+    def keys(self, keys: str) -> None:
+        self.count()
+        self.page.keyboard.press(keys)
+
+    def tab(self, title: str) -> None:
+        self.click(f'.lm-TabBar-tab:visible:has-text("{title}")')
+
+    def saved_anew(self) -> None:
+        """Wait for the files of a run that is none of those before."""
+        self.page.wait_for_function(
+            """(before) => [...document.querySelectorAll('code')].some((each) => each.offsetParent
+                && each.parentElement.innerText.startsWith('Saved with') && !before.includes(each.innerText))""",
+            arg=self._saved,
+        )
+        self._saved.append(self.page.inner_text(':text("Saved with its report in"):visible code'))
+
+
+def test_a_newcomer_gets_from_an_empty_folder_to_two_runs_compared(
+    second_app: App, open_page: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for left in ("*.py", "*.ngc", "*.toml", "session.json"):
+        for each in second_app.folder.glob(left):
+            each.unlink()
+    page = open_page(on=second_app)
+    page.wait_for_selector(".rds-first svg")  # an axis moves before anything is pressed
+    hand = Hand(page)
+
+    hand.begin("write")
+    hand.click('.rds-nav button:text-is("Equipment control")')
+    page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
+    hand.choose("Controller", "User-defined")
+    page.wait_for_selector('.cm-line:has-text("def control(t, r, y, state, params):")')
+    hand.click('.cm-line:has-text("error = r.position")')
+    page.keyboard.press("End")
+    page.keyboard.type("\nslower = 0.5 * error")
+    hand.sees("the controller keeps its interface")
+
+    hand.begin("break and mend")
+    hand.click('.cm-line:has-text("slower = 0.5")')
+    page.keyboard.press("End")
+    page.keyboard.type(" + r.positoin")
+    page.wait_for_selector('.rds-code-says:has-text("Did you mean r.position?")')
+    assert "r.positoin" in page.locator(".rds-code-bad").inner_text()
+    for _ in " + r.positoin":
+        page.keyboard.press("Backspace")
+    page.wait_for_selector(".rds-code-says", state="hidden")
+
+    hand.begin("run in three modes")
+    hand.type("Final time", "0.5")
+    for mode in ("", "Emulation", "Implementation"):
+        if mode:
+            hand.choose("Mode", mode)
+        hand.keys("Control+Enter")
+        hand.saved_anew()
+
+    hand.begin("change a gain live")
+    hand.choose("Mode", "Emulation")
+    hand.type("Final time", "600")
+    hand.keys("Control+Enter")
+    gain = page.locator(".rds-live-values .rds-field:visible", has_text="Kp").locator("input[type=text]")
+    page.wait_for_function("+(document.querySelector('[data-samples]')?.dataset.samples || 0) > 20")
+    hand.count()
+    gain.fill("30")
+    gain.press("Enter")
+    page.wait_for_selector('[data-marks$="X.Kp 30"]')
+    hand.press("Stop")
+    hand.sees("ended early: stopped")
+    hand.saved_anew()
+
+    hand.begin("compare")
+    hand.tab("Earlier runs")
+    rows = page.locator(".rds-runs tbody tr")
+    for k in (0, 1):
+        hand.count()
+        rows.nth(k).locator("input[type=checkbox]").check()
+    hand.press("What differs")
+    page.wait_for_selector('.rds-main td:text-is("changed while it ran"):visible')
+
+    with capsys.disabled():
+        print("\npresses of a newcomer:", ", ".join(f"{step} {count}" for step, count in hand.presses.items()))
+    assert {step: count for step, count in hand.presses.items() if count > MOST[step]} == {}
