@@ -210,7 +210,7 @@ def attempt(case: Case, mode: str, chance: random.Random, seconds: float = 2.0) 
             text=True,
             cwd=HERE,
             env=os.environ | {"XDG_RUNTIME_DIR": str(runtime)},
-            preexec_fn=None if case.room is None else lambda: _limit(case.room or 0),
+            preexec_fn=lambda: _begin(case.room),
         )
         try:
             case.does(Trial(folder, runtime, command, chance))
@@ -229,8 +229,11 @@ def attempt(case: Case, mode: str, chance: random.Random, seconds: float = 2.0) 
     return ending, wrong
 
 
-def _limit(size: int) -> None:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+def _begin(room: int | None) -> None:
+    """As at a terminal, where Ctrl-C is heard, also if this program runs in the background."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if room is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
 
 
 def _judge(code: int, out: Path, said: str, runtime: Path) -> tuple[str, str]:

@@ -29,7 +29,7 @@ from rds.core.private_files import write_private
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 
-ORDER = ("csp", "csv", "cst")  # modes, the easiest to track a sine with first
+ORDER = ("csp", "csv", "cst", "pp")  # modes, the easiest to track a sine with first
 
 
 class Declined(Exception):
@@ -165,7 +165,7 @@ def _recognize(
         operator.say(f"note: {doubt}")
     if doubts and not operator.agree(f"use {eds} all the same"):
         raise Declined
-    if wishes.eds is not None and not doubts:
+    if wishes.eds is not None and not doubts and identity.vendor:
         eds = keep_eds(eds, identity, folder)
         operator.say(f"its EDS is kept for the next time: {eds}")
     return identity, eds
@@ -206,18 +206,18 @@ def _mapping(
         "it off and on"
     ):
         raise Declined
-    refused = ""
-    for mode in (wishes.mode,) if wishes.mode else ORDER:
-        if not identity.has(Command[mode.upper()].mode):
-            refused = f"it has no mode {mode} (0x6502 = {identity.modes or 0:#x})"
-            continue
+    wished = (wishes.mode,) if wishes.mode else ORDER
+    modes = [mode for mode in wished if identity.has(Command[mode.upper()].mode)]
+    refused = f"it has no mode {' or '.join(wished)} (0x6502 = {identity.modes or 0:#x})"
+    for mode in modes:
+        refused = ""
         for fixed in (False, True):
             settings = _settings(machine, replace(choices, mode=mode, fixed_mapping=fixed))
             node = load(network, settings)
             try:
                 (find_fixed if fixed else map_dynamically)(node, settings, 1)
-            except (SdoAbortedError, MachineError, KeyError) as error:
-                refused = str(error)
+            except (SdoAbortedError, MachineError) as error:
+                refused += f"; {error}" if refused else str(error)
                 continue
             choices.mode, choices.fixed_mapping = mode, fixed
             operator.say(
