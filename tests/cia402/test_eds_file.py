@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import canopen
 import pytest
 from typer.testing import CliRunner
 
+from rds.bus.modules.cia402.commissioned import Choices, experiment_text
 from rds.bus.modules.cia402.commissioning import Declined, Wishes, commission
 from rds.bus.modules.cia402.configure import library, prepare
 from rds.bus.modules.cia402.eds_file import read_eds
@@ -152,12 +155,18 @@ def test_a_drive_of_another_eds_has_what_that_says(served: Served, machine: Mach
     )
     other.write_text(without(other.read_text(), "6084", "608F", "6092", "1403", "1603", "6071"))
     channel, nodes = served("X", eds=other)
-    nodes[0].drive.objects.values[0x6502, 0] = 0x61  # profile position, homing, interpolated position
+    nodes[0].drive.objects.values |= {
+        (0x6502, 0): 0x61,
+        (0x6072, 0): 100,
+    }  # profile position, homing, interpolated position
     operator = Operator(refused="switch the power on")
     with opened(channel) as bus, pytest.raises(Declined):
         commission(bus, Wishes(node=2, period=0.01, eds=other, counts=1000.0), "bench", operator, tmp_path / "kept")
-    assert "vendor 0x1a3, product 0x9" in operator.said[0] and "mode pp" in operator.said
-    assert any("encoder ? increments" in said for said in operator.said)
+    assert "vendor 0x1a3, product 0x9" in operator.said[0] and any(
+        said.startswith("mode pp: it moves by profiles") for said in operator.said
+    )
+    for said in ("encoder ? increments", "the largest torque, 0x6072, is 100 ‰"):
+        assert any(said in text for text in operator.said)
     settings = read_settings({"mode": "pp", "axis": {"X": {"node": 2, "eds": str(other)}}}, machine, ["X"])
     with opened(channel) as bus, library(bus) as network:
         prepare(network, settings, 0.01)  # 0x6084, which it lacks, is optional
@@ -178,3 +187,10 @@ def test_our_own_is_read_as_the_library_reads_it() -> None:
     ours, theirs = read_eds(path, 5), canopen.import_od(path, 5)
     assert list(ours) == list(theirs)
     assert ours[0x1A00][2].default == theirs[0x1A00][2].default and ours[0x607D][1].min == theirs[0x607D][1].min
+
+
+def test_a_drive_that_moves_by_profiles_gets_steps_instead_of_a_sine() -> None:
+    choices = Choices("bench", "X", "mm", (-10.0, 10.0), 0.01, "pp", 2, 1000.0)
+    table = tomllib.loads(experiment_text(choices, "bench.toml", {}))
+    assert (table["reference"]["kind"], table["bus"]["cia402"]["mode"]) == ("square", "pp")
+    assert replace(choices, mode="csp").motion == "sine"

@@ -176,7 +176,8 @@ def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None
     counts = wishes.counts or units.counts(wishes.lead)
     if counts is None:
         raise InputError(
-            "the drive does not say how it counts (0x6092, 0x608F): give the position units per axis unit by --counts"
+            "the drive does not say how it counts (0x6092, 0x608F): give the position units per axis unit by --counts "
+            "(mostly four times the encoder's lines, times the gear, divided by the lead)"
         )
     proposal = (
         f"take {counts:g} counts per {wishes.unit} ({wishes.lead:g} {wishes.unit} per revolution of the shaft), travel "
@@ -220,9 +221,10 @@ def _mapping(
                 refused += f"; {error}" if refused else str(error)
                 continue
             choices.mode, choices.fixed_mapping = mode, fixed
-            operator.say(
-                f"mode {mode}" + (", by the process data that the drive has: its mapping is fixed" if fixed else "")
-            )
+            how = ", by the process data that the drive has: its mapping is fixed" if fixed else ""
+            if mode == "pp":
+                how += ": it moves by profiles of its own to positions that stand, and cannot track a sine"
+            operator.say(f"mode {mode}{how}")
             return
     raise MachineError(f"node {choices.node} takes no command in process data: {refused}")
 

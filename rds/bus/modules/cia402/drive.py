@@ -246,7 +246,8 @@ class Drive:
             if Quirk.WRONG_GEAR in self.quirks:
                 values[0x6091, 1] = 10
             if Quirk.ZERO_LIMITS in self.quirks:
-                values |= dict.fromkeys([(0x6072, 0), (0x607D, 1), (0x607D, 2)], 0)
+                limits = [(0x6072, 0), (0x607D, 1), (0x607D, 2)]
+                values |= dict.fromkeys([key for key in limits if key in self.objects.variables], 0)
             self.operation.power_off()
         for pdo in (*self.receive_pdos, *self.transmit_pdos):
             pdo.reset()
