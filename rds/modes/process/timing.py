@@ -17,7 +17,8 @@ no more of them than there were stalls of that length while waiting, are in doub
 again, off the clock and without effects outside (`process.second_look`), and the replay is repeated with the time
 that they take then. The student's code is deterministic by contract: what was its own doing comes back, a stall does
 not. Where it cannot be called again, an overrun that is several times as long as all that the system did in the run
-is the code's own; where nothing is proved, the verdict is void.
+is the code's own, and one that retired the instructions of several periods (`core.instructions`, where the kernel
+counts them); where nothing is proved, the verdict is void.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.instructions import computing_times
 from rds.core.types import Verdict
 from rds.modes.process.environment import TICK, causes
 
@@ -240,8 +242,13 @@ def _is_doubtful(work: np.ndarray, timing: Timing, period: int, stalls: int) -> 
 
 
 def _is_proven(work: np.ndarray, timing: Timing, period: int, stalls: int, environment: Mapping[str, Any]) -> bool:
-    """Whether more calls overran than the system can have held up, or one for longer than it held anything up."""
+    """Whether more calls overran than the system can have held up, or one for longer than it held anything up.
+
+    Or one computed for longer, by its instructions: the usual calls may take up to `BEYOND` times as long for each.
+    """
     if _overruns(work, period) > _stalls(work, timing, period) + stalls:
+        return True
+    if max(computing_times(environment.get("instructions", {})), default=0.0) > BEYOND * period:
         return True
     longest = environment.get("rehearsal", {}).get("lateness_max", np.inf if stalls else 0.0) * 1e3
     longest = max(longest, float(own_wait(timing, period).max(initial=0.0)), float(timing.taken.max(initial=0)))
