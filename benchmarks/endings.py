@@ -1,10 +1,11 @@
 """Runs that end badly, in real processes: killed at random, the disk full, memory leaked, Ctrl-C; counted, as a page.
 
-python -m benchmarks.endings [--minutes 3] [--soak MINUTES] [--case NAME ...] [--seed 1] [--write docs/endings.md]
+python -m benchmarks.endings [--minutes 3] [--soak MINUTES] [--case NAME ...] [--append FILE] [--write docs/endings.md]
 
 Each trial is a run of two seconds at 100 Hz by the command line, in a folder and a runtime directory of its own. It is
 *right* if the command ends within a minute with an exit code of the documents, its record opens or stderr says why
-there is none, and no process and no shared memory of it is left.
+there is none, and no process and no shared memory of it is left. With `--append` each trial is a line of JSON in a
+file, and the next call goes on where the last one ended, until each case has had as many as it should.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 
 from rds.core.errors import RdsError
@@ -161,11 +163,12 @@ class Case:
     modes: tuple[str, ...] = ("emulation", "implementation")
     room: int | None = None  # bytes that a file of it may have
     leaks: bool = False
+    trials: int = 10  # of each mode, for the page
 
 
 CASES = {
     "undisturbed": Case("nothing"),
-    "ctrl-c": Case("Ctrl-C at a random moment, its start included", _interrupt),
+    "ctrl-c": Case("Ctrl-C at a random moment, its start included", _interrupt, trials=50),
     "ctrl-c-thrice": Case("Ctrl-C three times", _interrupt_often),
     "host": Case("the command is killed", _kill_host),
     "target": Case("the process of the loop is killed", _kill("target")),
@@ -181,13 +184,13 @@ CASES = {
 
 
 @dataclass
-class Count:
-    """Of one case and mode."""
+class Ended:
+    """How one trial of a case and mode ended, and what was wrong, or nothing."""
 
-    runs: int = 0
-    right: int = 0
-    endings: Counter[str] = field(default_factory=Counter)
-    wrong: list[str] = field(default_factory=list)
+    case: str
+    mode: str
+    ending: str
+    wrong: str
 
 
 def attempt(case: Case, mode: str, chance: random.Random, seconds: float = 2.0) -> tuple[str, str]:
@@ -207,7 +210,7 @@ def attempt(case: Case, mode: str, chance: random.Random, seconds: float = 2.0) 
             text=True,
             cwd=HERE,
             env=os.environ | {"XDG_RUNTIME_DIR": str(runtime)},
-            preexec_fn=None if case.room is None else lambda: _limit(case.room or 0),
+            preexec_fn=lambda: _begin(case.room),
         )
         try:
             case.does(Trial(folder, runtime, command, chance))
@@ -220,14 +223,17 @@ def attempt(case: Case, mode: str, chance: random.Random, seconds: float = 2.0) 
         left = _left(runtime)
         if not wrong and left:
             wrong = f"left running: {left}"
-        if not wrong and (forgotten := set(Path("/dev/shm").glob("rds-*")) - rings) and not _mapped(forgotten):
+        if not wrong and (forgotten := _forgotten(rings)):
             wrong = f"left in shared memory: {forgotten}"
     shutil.rmtree(runtime, ignore_errors=True)
     return ending, wrong
 
 
-def _limit(size: int) -> None:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+def _begin(room: int | None) -> None:
+    """As at a terminal, where Ctrl-C is heard, also if this program runs in the background."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if room is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
 
 
 def _judge(code: int, out: Path, said: str, runtime: Path) -> tuple[str, str]:
@@ -262,74 +268,80 @@ def _left(runtime: Path) -> dict[int, str]:
     return left
 
 
-def _mapped(rings: set[Path]) -> bool:
-    """Whether a process, of whichever run, still has one of these."""
-    for maps in Path("/proc").glob("[0-9]*/maps"):
-        with suppress(OSError):
-            text = maps.read_text()
-            if any(str(ring) in text for ring in rings):
-                return True
-    return False
+def _forgotten(before: set[Path]) -> set[Path]:
+    """Shared memory that was not there before, and that no process, of whichever run, has for a while."""
+    left = set(Path("/dev/shm").glob("rds-*")) - before
+    for _ in range(2):
+        for maps in Path("/proc").glob("[0-9]*/maps"):
+            with suppress(OSError):
+                text = maps.read_text()
+                left = {ring for ring in left if str(ring) not in text}
+        if left:
+            time.sleep(2.0)
+            left = {ring for ring in left if ring.exists()}
+    return left
 
 
-def run(minutes: float, chosen: list[str] | None, seed: int) -> dict[tuple[str, str], Count]:
-    """All cases in turn, again and again until the time is over; each at least once."""
-    chance = random.Random(seed)
-    counts: dict[tuple[str, str], Count] = {}
+def run(minutes: float, chosen: list[str] | None, seed: int, before: list[Ended]) -> Iterator[Ended]:
+    """Trials of the case and mode that has had fewest, each one once at least, until the time is over or it has all."""
+    chance = random.Random(seed + len(before))
     end = time.monotonic() + 60.0 * minutes
-    for name, mode in _turns(chosen):
-        if time.monotonic() > end and (name, mode) in counts:
-            break
-        count = counts.setdefault((name, mode), Count())
-        ending, wrong = attempt(CASES[name], mode, chance)
-        _add(count, ending, wrong)
-    return counts
+    done = {(name, mode): 0 for name in CASES if not chosen or name in chosen for mode in CASES[name].modes}
+    for earlier in before:
+        if (earlier.case, earlier.mode) in done:
+            done[earlier.case, earlier.mode] += 1
+    while True:
+        name, mode = min(done, key=lambda pair: done[pair] / CASES[pair[0]].trials)
+        so_far = done[name, mode]
+        if so_far >= CASES[name].trials or (so_far and time.monotonic() > end):
+            return
+        yield Ended(name, mode, *attempt(CASES[name], mode, chance))
+        done[name, mode] += 1
 
 
-def soak(minutes: float) -> dict[tuple[str, str], Count]:
+def soak(minutes: float) -> Iterator[Ended]:
     """Three axes for so long, once in each mode."""
-    counts = {}
     for mode in ("emulation", "implementation"):
         ending, wrong = attempt(CASES["undisturbed"], mode, random.Random(1), 60.0 * minutes)
-        _add(counts.setdefault((f"soak of {minutes:g} min", mode), Count()), ending, wrong)
-    return counts
+        yield Ended(f"nothing, for {minutes:g} min", mode, ending, wrong)
 
 
-def _add(count: Count, ending: str, wrong: str) -> None:
-    count.runs += 1
-    count.right += not wrong
-    count.endings[ending] += 1
-    if wrong:
-        count.wrong.append(re.sub(r"\s+", " ", wrong)[:600])
+def read_trials(path: Path) -> list[Ended]:
+    """The trials of a file that `--append` has written; its last line may be torn."""
+    found = []
+    for line in path.read_text().splitlines() if path.exists() else []:
+        with suppress(ValueError):
+            found.append(Ended(**json.loads(line)))
+    return found
 
 
-def _turns(chosen: list[str] | None) -> Iterator[tuple[str, str]]:
-    while True:
-        for name, case in CASES.items():
-            for mode in case.modes:
-                if not chosen or name in chosen:
-                    yield name, mode
-
-
-def page(counts: dict[tuple[str, str], Count]) -> str:
+def page(trials: list[Ended]) -> str:
     """The counts as a page of the documentation."""
-    total, right = (sum(getattr(count, key) for count in counts.values()) for key in ("runs", "right"))
     lines = [
         "# Endings",
         "",
         *_ABOUT,
         "",
-        f"{total} runs, {right} right.",
+        f"{len(trials)} runs, {sum(not trial.wrong for trial in trials)} right.",
         "",
         "| what is done | mode | runs | right | endings |",
         "| --- | --- | --- | --- | --- |",
     ]
-    for (name, mode), count in counts.items():
+    order = list(CASES)
+    pairs = dict.fromkeys((trial.case, trial.mode) for trial in trials)
+    for name, mode in sorted(pairs, key=lambda pair: order.index(pair[0]) if pair[0] in CASES else len(order)):
+        these = [trial for trial in trials if (trial.case, trial.mode) == (name, mode)]
+        counts = Counter(trial.ending for trial in these).most_common()
+        endings = ", ".join(f"{number} {ending}" for ending, number in counts)
+        right = sum(not trial.wrong for trial in these)
         what = CASES[name].what if name in CASES else name
-        endings = ", ".join(f"{number} {ending}" for ending, number in count.endings.most_common())
-        lines.append(f"| {what} | {mode} | {count.runs} | {count.right} | {endings} |")
-    wrong = [f"- {name}, {mode}: {text}" for (name, mode), count in counts.items() for text in count.wrong]
+        lines.append(f"| {what} | {mode} | {len(these)} | {right} | {endings} |")
+    wrong = [f"- {trial.case}, {trial.mode}: {_shortened(trial.wrong)}" for trial in trials if trial.wrong]
     return "\n".join([*lines, *(["", "Wrong:", "", *wrong] if wrong else [])]) + "\n"
+
+
+def _shortened(text: str) -> str:
+    return re.sub(r"\s+", " ", text)[:600]
 
 
 def main() -> int:
@@ -339,17 +351,22 @@ def main() -> int:
     parser.add_argument("--soak", type=float, default=0.0, help="and a run of so many minutes in each mode")
     parser.add_argument("--case", action="append", choices=CASES, help="only this one; repeatable")
     parser.add_argument("--seed", type=int, default=1, help="of the moments at which something is done")
+    parser.add_argument("--append", type=Path, metavar="FILE", help="keep each trial there, and go on from it")
     parser.add_argument("--write", type=Path, help="the page's file; else it is printed")
     options = parser.parse_args()
-    counts = run(options.minutes, options.case, options.seed)
-    if options.soak:
-        counts |= soak(options.soak)
-    text = page(counts)
+    trials = [] if options.append is None else read_trials(options.append)
+    news = run(options.minutes, options.case, options.seed, list(trials))
+    for trial in chain(news, soak(options.soak) if options.soak else ()):
+        trials.append(trial)
+        if options.append is not None:
+            with open(options.append, "a") as file:
+                file.write(json.dumps(asdict(trial)) + "\n")
+    text = page(trials)
     if options.write is None:
         sys.stdout.write(text)
     else:
         options.write.write_text(text, encoding="utf-8")
-    return 0 if all(count.runs == count.right for count in counts.values()) else 1
+    return 1 if any(trial.wrong for trial in trials) else 0
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ def setup(
     ] = None,
     travel: Annotated[float, typer.Option(help="To both sides of where the axis stands, mm (degrees).")] = 10.0,
     mode: Annotated[
-        str | None, typer.Option(help="csp, csv or cst; by default the first of them that the drive can.")
+        str | None, typer.Option(help="csp, csv, cst or pp; by default the first of them that the drive can.")
     ] = None,
     sample_period: Annotated[float, typer.Option(help="s.", min=1e-4, max=0.1)] = 0.002,
     eds: Annotated[Path | None, typer.Option(help="The drive's EDS; it is kept for the next time.")] = None,
@@ -55,7 +55,7 @@ def setup(
     yes: Yes = False,
     json: Json = False,
 ) -> None:
-    """Make a drive ready, step by step, each after a yes; write its machine file and an experiment that tracks a sine.
+    """Make a drive ready, step by step, each after a yes; write its machine file and an experiment that moves it.
 
     It recognizes the drive, takes its units and limits, maps its process data, moves the axis by a few counts at low
     torque and back, and measures the delay. What was changed for that alone is written back, also after a no.
@@ -71,12 +71,12 @@ def setup(
             raise InputError("set-up asks before each step, and there is no terminal: add --yes if somebody watches")
         if direction not in (None, 1, -1):
             raise InputError(f"--direction {direction} must be 1 or -1")
-        if mode not in (None, "csp", "csv", "cst"):
-            raise InputError(f"--mode {mode} must be csp, csv or cst")
+        if mode not in (None, "csp", "csv", "cst", "pp"):
+            raise InputError(f"--mode {mode} must be csp, csv, cst or pp")
         if out.suffix != ".toml":
             raise InputError(f"--out {out} must end with .toml")
-        sine = out.with_name(f"{out.stem}-sine.toml")
-        for path in (out, sine):
+        sine, steps = (out.with_name(f"{out.stem}-{motion}.toml") for motion in ("sine", "steps"))
+        for path in (out, sine, steps):
             if path.exists() and not force:
                 raise InputError("there is such a file already; choose another name, or give --force", str(path))
         place = chosen_bus(interface, channel, experiment, bitrate)
@@ -92,11 +92,12 @@ def setup(
             typer.echo("rds: ended; what was changed on the drive has been written back", err=True)
             raise typer.Exit(1) from None
         write_whole(out, machine_text(made.choices, str(made.identity)).encode())
-        write_whole(sine, experiment_text(made.choices, out.name, _table(place)).encode())
+        written = sine if made.choices.motion == "sine" else steps
+        write_whole(written, experiment_text(made.choices, out.name, _table(place)).encode())
     if json:
-        print_json(made.to_json() | {"machine": str(out), "experiment": str(sine)})
+        print_json(made.to_json() | {"machine": str(out), "experiment": str(written)})
     else:
-        typer.echo(f"wrote {out} and {sine}; next: rds run {sine}")
+        typer.echo(f"wrote {out} and {written}; next: rds run {written}")
 
 
 @app.command("node-id")

@@ -284,6 +284,10 @@ def machine_serve(
             "fixed-mapping, no-node-id."
         ),
     ] = None,
+    eds: Annotated[
+        Path | None,
+        typer.Option(help="EDS of another drive: the simulated ones have its objects and identity (dialect cia402)."),
+    ] = None,
     axes: Annotated[
         str | None,
         typer.Option(help="Only these modules, as in X,Z: end this command and they are unplugged. By default all."),
@@ -322,6 +326,10 @@ def machine_serve(
             if spoken != "cia402":
                 raise InputError(f"--quirks {quirks}: only simulated drives (--dialect cia402) have them")
             options["quirks"] = quirks
+        if eds is not None:
+            if spoken != "cia402":
+                raise InputError(f"--eds {eds}: only simulated drives (--dialect cia402) have one")
+            options["eds"] = eds
         if cut is not None:
             if spoken != "rds":
                 raise InputError(f"--cut {cut}: modules of dialect {spoken} have no load cell; those of rds may")

@@ -157,13 +157,13 @@ def served(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callab
     monkeypatch.setattr("rds.bus.modules.cia402.host.LOST_AFTER", PATIENCE)
     with contextlib.ExitStack() as stack:
 
-        def starter(*axes: str, quirks: str = "") -> tuple[str, list[DriveNode]]:
+        def starter(*axes: str, quirks: str = "", eds: Path | None = None) -> tuple[str, list[DriveNode]]:
             channel, nodes = f"test-{uuid4().hex[:8]}", []  # type: ignore[var-annotated]
             ready, stop = threading.Event(), threading.Event()
             thread = threading.Thread(
                 target=serve,
                 args=(machine, "virtual", channel, axes, ready.set, stop),
-                kwargs={"nodes": nodes, "quirks": quirks},
+                kwargs={"nodes": nodes, "quirks": quirks, "eds": eds},
             )
             thread.start()
             stack.callback(thread.join)

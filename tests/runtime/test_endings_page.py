@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from benchmarks.endings import HERE, Count, _judge, page
+from benchmarks.endings import HERE, Ended, _judge, page, read_trials
 
 
 @pytest.mark.parametrize(
@@ -26,10 +25,14 @@ def test_what_is_right(code: int, said: str, ending: str, is_right: bool, tmp_pa
 
 
 def test_the_page_has_the_counts_and_what_was_wrong() -> None:
-    counts = {
-        ("hub", "implementation"): Count(3, 2, Counter({"machine lost": 2, "hangs": 1}), ["it hung"]),
-        ("leak", "emulation"): Count(1, 1, Counter(done=1)),
-    }
-    text = page(counts)
+    hub = [Ended("hub", "implementation", *told) for told in (("machine lost", ""), ("hangs", "it hung"))]
+    text = page([hub[0], Ended("leak", "emulation", "done", ""), *hub])
     assert "4 runs, 3 right." in text and "- hub, implementation: it hung" in text
     assert "| the bus's hub is killed | implementation | 3 | 2 | 2 machine lost, 1 hangs |" in text
+
+
+def test_trials_are_read_up_to_a_torn_line(tmp_path: Path) -> None:
+    kept = tmp_path / "trials.jsonl"
+    assert read_trials(kept) == []
+    kept.write_text('{"case": "hub", "mode": "emulation", "ending": "done", "wrong": ""}\n{"case": "h')
+    assert read_trials(kept) == [Ended("hub", "emulation", "done", "")]

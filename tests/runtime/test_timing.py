@@ -118,16 +118,14 @@ class TestWhoseFault:
         timing, counts = ran(io=1.5, discard=discard)
         judgement = judge(timing, MS, **counts)
         assert judgement.verdict == Verdict.MISSED
-        assert "the bus's I/O took 1.500 ms at the median" in judgement.reason
+        assert "the bus's I/O took 1.500 ms at best" in judgement.reason
 
     def test_a_bus_that_leaves_no_time_to_compute_missed_and_is_named(self, discard: bool) -> None:
         """The controller was named alone, with its twentieth of the period."""
         timing, counts = ran(io=0.97, discard=discard)
         judgement = judge(timing, MS, **counts)
         assert judgement.verdict == Verdict.MISSED
-        assert (
-            "the bus's I/O took 0.970 ms at the median, and control() and the model took 0.060 ms" in judgement.reason
-        )
+        assert "the bus's I/O took 0.970 ms at best, and control() and the model took 0.060 ms" in judgement.reason
 
     @pytest.mark.parametrize("first", [0, 1, 7, 20, 800])
     def test_a_module_that_falls_silent_is_not_the_loops_fault(self, discard: bool, first: int) -> None:
@@ -152,6 +150,16 @@ class TestWhoseFault:
         io = np.full(N, 0.1)
         io[50::100] = 2.5
         assert verdict(io=io, discard=discard) == Verdict.VOID
+
+    def test_a_busy_computer_that_holds_up_the_buss_programs_is_void(self, discard: bool) -> None:
+        """Without real-time priority on two busy cores: 0.2 ms at best, 3 ms at the median."""
+        io = np.r_[np.full(N // 50, 0.2), np.full(N - N // 50, 3.0)]
+        timing, counts = ran(compute=0.3, io=io, discard=discard)
+        judgement = judge(timing, MS, **counts)
+        assert judgement.verdict == Verdict.VOID
+        assert "(3.00 ms at the median, 0.20 ms at best)" in judgement.evidence
+        assert judgement.reason.endswith("on a quieter computer, or with a longer period")
+        assert verdict(compute=0.9, io=io, discard=discard) == Verdict.MISSED
 
 
 def test_without_doubt_nothing_is_called_again() -> None:
@@ -217,7 +225,8 @@ def test_reasons_say_what_and_how_much() -> None:
     timing, counts = ran(compute=SLOW)
     judgement = judge(timing, MS, **counts)
     assert judgement.reason == (
-        "control() and the model took 2.010 ms at the 99th percentile, of a sample period of 1 ms (999 of 1000 samples late)"
+        "control() and the model took 2.010 ms at the 99th percentile, of a sample period of 1 ms "
+        "(999 of 1000 samples late)"
     )
     assert judgement.evidence == "999 samples would have been late on a computer without delays of its own"
     timing, counts = ran(waits={500: 50.0})

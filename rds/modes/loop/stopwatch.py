@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from rds.core.clock import RealTimeClock
+from rds.core.instructions import InstructionCounter
 from rds.core.thread_time import ThreadTime
 from rds.core.types import Ending
 from rds.modes.loop.loop import Law, Loop
@@ -26,6 +27,7 @@ class Stopwatch:
     def __init__(self, clock: RealTimeClock, append: Callable[[list[float]], None], stop: Callable[[], bool]):
         self._clock, self._append, self._stop = clock, append, stop
         self.thread = ThreadTime()
+        self.instructions = InstructionCounter(clock.period)
         self._k = self._started = self._read = self._referred = self._computed = self._written = self._ended = 0
         self._is_copy = False  # of the process, made by a fork in the student's code: it must neither drive nor record
         if hasattr(os, "register_at_fork"):
@@ -33,7 +35,7 @@ class Stopwatch:
 
     def time(self, loop: Loop) -> Loop:
         """The same loop, timed; its rows go to `append`, and it ends when `stop()` is true or by the late policy."""
-        clock, now, begin = self._clock, self._clock.now, self.thread.begin
+        clock, now, begin, count = self._clock, self._clock.now, self.thread.begin, self.instructions.begin
         wait_until, read, write, follow = clock.wait, loop.read, loop.write, loop.follow
 
         def wait(k: int) -> int:
@@ -45,6 +47,7 @@ class Stopwatch:
             positions = read()
             self._read = now()
             begin()
+            count()
             self._referred = self._read
             return positions
 
@@ -74,6 +77,11 @@ class Stopwatch:
             finish=self._end,
         )
 
+    def close(self) -> None:
+        """Let go of the kernel's accounts."""
+        self.thread.close()
+        self.instructions.close()
+
     def end_copy(self) -> None:
         """In a copy of the process: end it here. Whoever runs the loop asks when it has ended in whatever way."""
         if self._is_copy:
@@ -94,14 +102,15 @@ class Stopwatch:
 
     def _row(self, row: list[float]) -> None:
         started, read, computed, written, ended = self._started, self._read, self._computed, self._written, self._ended
-        referred = self._referred
+        referred, taken = self._referred, self.thread.taken(ended - read)
+        self.instructions.end(ended - read - taken - (written - computed))
         row[1:1] = (
             self._clock.lateness(int(row[0]), started),
             read - started + written - computed,
             referred - read,
             computed - referred,
             ended - written,
-            self.thread.taken(ended - read),
+            taken,
         )
         self._append(row)
 

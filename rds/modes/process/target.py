@@ -101,7 +101,8 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
         stack.close()
         if stopwatch is not None:
             environment |= {"stops": stopwatch.thread.stops, "page_faults": stopwatch.thread.page_faults}
-            stopwatch.thread.close()
+            environment["instructions"] = stopwatch.instructions.to_json()
+            stopwatch.close()
     after = stolen_ticks()
     environment["stolen_ticks"] = after - stolen if after is not None and stolen is not None else None
     report["samples"] = ring.head

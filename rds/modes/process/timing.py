@@ -4,9 +4,11 @@ Each sample's time has three owners: the system (waking the loop), the student (
 bus (I/O). A late sample is the student's only if it would have been late on a system without any delay of its own.
 That is decided by a replay of the run on such a system: every sample starts the moment it is due, or when the
 one before it is complete; the student's code takes the time it took, less what the scheduler took from it;
-I/O takes its median of the periods in which every module answered: where one was silent, the loop waited for it in
-vain, and how long says nothing about the bus. If the replay keeps the period and the run did not, the system alone
-(or the machine) could not keep it, and the verdict is void: it says nothing about the student's code.
+I/O takes what it took in the fastest hundredth of the periods in which every module answered: that much the bus itself
+needs, and what is more may be a computer that let the bus's programs wait (on a busy one, without real-time priority,
+the median is several times as long). Where a module was silent, the loop waited for it in vain, and how long says
+nothing about the bus. If the replay keeps the period and the run did not, the system alone (or the machine) could not
+keep it, and the verdict is void: it says nothing about the student's code.
 
 What the code's own time is, the kernel's accounts say (`core.thread_time`): what the scheduler took from it, a
 process that was stopped, a page that came from the disk do not count. What they cannot say is whether a hypervisor
@@ -15,7 +17,8 @@ no more of them than there were stalls of that length while waiting, are in doub
 again, off the clock and without effects outside (`process.second_look`), and the replay is repeated with the time
 that they take then. The student's code is deterministic by contract: what was its own doing comes back, a stall does
 not. Where it cannot be called again, an overrun that is several times as long as all that the system did in the run
-is the code's own; where nothing is proved, the verdict is void.
+is the code's own, and one that retired the instructions of several periods (`core.instructions`, where the kernel
+counts them); where nothing is proved, the verdict is void.
 """
 
 from __future__ import annotations
@@ -26,12 +29,14 @@ from typing import Any
 
 import numpy as np
 
+from rds.core.instructions import computing_times
 from rds.core.types import Verdict
 from rds.modes.process.environment import TICK, causes
 
 STAGES = ("lateness", "io", "interpolate", "compute", "model")
 LASTING = 9  # periods of silence, the shortest that ends a run (with a tenth, which has no row)
 FEW = 3  # overruns that may be stalls even if nothing stalled while waiting
+FASTEST = 1.0  # % of the exchanges with the bus, which the computer did not hold up
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9}
 BEYOND = 3.0  # times the longest stall of the system: an overrun that none of them explains
 BIN_EDGES_US = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
@@ -121,7 +126,7 @@ def judge(
         lost += f", {discarded} period{'' if discarded == 1 else 's'} discarded"
     if count + discarded <= limit:
         return Judgement(Verdict.MET, _met(count, limit, len(timing.sample)), "", count, 0, discarded)
-    io = _usual_io(timing.io, silent)
+    io, usual_io = _exchange_times(timing.io, silent)
     student = timing.interpolate + timing.compute + timing.model
     own = student - np.minimum(timing.taken, student)
     alone = _late_alone(own + io, timing, period)
@@ -154,13 +159,16 @@ def judge(
     busy = "the computer was busy" if not missing else "the computer or the bus was busy"
     answers = f", {missing} answer{'s' if missing > 1 else ''} did not come within the period" if missing else ""
     held = max(float(own_wait(timing, period).max(initial=0.0)), float(timing.taken.max(initial=0.0))) / 1e9
+    slow = usual_io > period
+    usual = f" ({usual_io / 1e6:.2f} ms at the median, {io / 1e6:.2f} ms at best)" if slow else ""
+    longer = ", or with a longer period" if slow else ""
     known = "".join(f"; {cause}" for cause in causes(environment or {}, held))
-    reason = f"{busy} ({lost}). This says nothing about your code. Repeat it on a quieter computer"
+    reason = f"{busy} ({lost}). This says nothing about your code. Repeat it on a quieter computer{longer}"
     evidence = (
         "the system woke the loop up to "
         f"{float(own_wait(timing, period).max(initial=0.0)) / 1e6:.2f} ms late with a period of {period / 1e6:g} ms, "
         f"took {float(timing.taken.sum()) / 1e6:.2f} ms from the running code, "
-        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{answers}{known}"
+        f"and kept I/O waiting up to {float(timing.io.max(initial=0)) / 1e6:.2f} ms{usual}{answers}{known}"
     )
     return Judgement(Verdict.VOID, reason, evidence, count, alone, discarded)
 
@@ -205,10 +213,13 @@ def own_wait(timing: Timing, period: int) -> np.ndarray:
     return late
 
 
-def _usual_io(io: np.ndarray, silent: int) -> float:
-    """The median of the I/O times in ns but for those of `silent` periods, which last longest; 0 if none is left."""
+def _exchange_times(io: np.ndarray, silent: int) -> tuple[float, float]:
+    """I/O times in ns, of the fastest hundredth and at the median; 0 where none is left.
+
+    Those of `silent` periods, which last longest, do not count.
+    """
     answered = np.sort(io)[: max(len(io) - silent, 0)]
-    return float(np.median(answered)) if len(answered) else 0.0
+    return (float(np.percentile(answered, FASTEST)), float(np.median(answered))) if len(answered) else (0.0, 0.0)
 
 
 def _late_alone(work: np.ndarray, timing: Timing, period: int) -> int:
@@ -234,8 +245,13 @@ def _is_doubtful(work: np.ndarray, timing: Timing, period: int, stalls: int) -> 
 
 
 def _is_proven(work: np.ndarray, timing: Timing, period: int, stalls: int, environment: Mapping[str, Any]) -> bool:
-    """Whether more calls overran than the system can have held up, or one for longer than it held anything up."""
+    """Whether more calls overran than the system can have held up, or one for longer than it held anything up.
+
+    Or one computed for longer, by its instructions: the usual calls may take up to `BEYOND` times as long for each.
+    """
     if _overruns(work, period) > _stalls(work, timing, period) + stalls:
+        return True
+    if max(computing_times(environment.get("instructions", {})), default=0.0) > BEYOND * period:
         return True
     longest = environment.get("rehearsal", {}).get("lateness_max", np.inf if stalls else 0.0) * 1e3
     longest = max(longest, float(own_wait(timing, period).max(initial=0.0)), float(timing.taken.max(initial=0)))
@@ -247,7 +263,7 @@ def _overrun(own: np.ndarray, io: float, period: int, timing: Timing) -> str:
     """What took too long, in a sentence's end."""
     over = _overruns(own + io, period)
     of = f"of a sample period of {period / 1e6:g} ms"
-    bus = f"the bus's I/O took {io / 1e6:.3f} ms at the median"
+    bus = f"the bus's I/O took {io / 1e6:.3f} ms at best"
     often = over > len(own) / 100
     took, where = (float(np.percentile(own, 99)), "the 99th percentile") if often else (float(own.max()), "most")
     code = f"{_whose(timing)} took {took / 1e6:.3f} ms at {where}"

@@ -1,4 +1,4 @@
-"""The files that a set-up ends with: a machine of one axis, and an experiment that tracks a sine on it."""
+"""The files that a set-up ends with: a machine of one axis, and an experiment that moves it."""
 
 from __future__ import annotations
 
@@ -25,6 +25,11 @@ class Choices:
     fixed_mapping: bool = False
     torque_limit: int = 1000
     write: list[tuple[int, int, int]] = field(default_factory=list)
+
+    @property
+    def motion(self) -> str:
+        """What the experiment tracks: a sine, or steps where the drive moves by profiles of its own."""
+        return "steps" if self.mode == "pp" else "sine"
 
 
 def cia402_table(choices: Choices, **instead: Any) -> dict[str, Any]:
@@ -78,18 +83,18 @@ jerk = {speed * 500.0!r}
 
 
 def experiment_text(choices: Choices, machine: str, bus: Mapping[str, Any]) -> str:
-    """An experiment file: a slow sine of a tenth of the travel, on the drive."""
+    """An experiment file: a slow sine, or steps, of a tenth of the travel, on the drive."""
     low, high = choices.travel
     amplitude = round(min(abs(low), abs(high)) / 10.0, 6)
     lines = [
-        f'title = "A sine on {choices.axis}"',
+        f'title = "{"A sine" if choices.motion == "sine" else "Steps"} on {choices.axis}"',
         f'machine = "{machine}"',
         f'axis = "{choices.axis}"',
         'mode = "implementation"',
         "duration = 8.0                 # s",
         "",
         "[reference]",
-        'kind = "sinusoid"',
+        f'kind = "{"sinusoid" if choices.motion == "sine" else "square"}"',
         f"amplitude = {amplitude!r}                # {choices.unit}",
         "frequency = 0.25               # Hz",
         "",

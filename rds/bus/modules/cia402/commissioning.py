@@ -29,7 +29,7 @@ from rds.core.private_files import write_private
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 
-ORDER = ("csp", "csv", "cst")  # modes, the easiest to track a sine with first
+ORDER = ("csp", "csv", "cst", "pp")  # modes, the easiest to track a sine with first
 
 
 class Declined(Exception):
@@ -165,7 +165,7 @@ def _recognize(
         operator.say(f"note: {doubt}")
     if doubts and not operator.agree(f"use {eds} all the same"):
         raise Declined
-    if wishes.eds is not None and not doubts:
+    if wishes.eds is not None and not doubts and identity.vendor:
         eds = keep_eds(eds, identity, folder)
         operator.say(f"its EDS is kept for the next time: {eds}")
     return identity, eds
@@ -176,7 +176,8 @@ def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None
     counts = wishes.counts or units.counts(wishes.lead)
     if counts is None:
         raise InputError(
-            "the drive does not say how it counts (0x6092, 0x608F): give the position units per axis unit by --counts"
+            "the drive does not say how it counts (0x6092, 0x608F): give the position units per axis unit by --counts "
+            "(mostly four times the encoder's lines, times the gear, divided by the lead)"
         )
     proposal = (
         f"take {counts:g} counts per {wishes.unit} ({wishes.lead:g} {wishes.unit} per revolution of the shaft), travel "
@@ -206,23 +207,24 @@ def _mapping(
         "it off and on"
     ):
         raise Declined
-    refused = ""
-    for mode in (wishes.mode,) if wishes.mode else ORDER:
-        if not identity.has(Command[mode.upper()].mode):
-            refused = f"it has no mode {mode} (0x6502 = {identity.modes or 0:#x})"
-            continue
+    wished = (wishes.mode,) if wishes.mode else ORDER
+    modes = [mode for mode in wished if identity.has(Command[mode.upper()].mode)]
+    refused = f"it has no mode {' or '.join(wished)} (0x6502 = {identity.modes or 0:#x})"
+    for mode in modes:
+        refused = ""
         for fixed in (False, True):
             settings = _settings(machine, replace(choices, mode=mode, fixed_mapping=fixed))
             node = load(network, settings)
             try:
                 (find_fixed if fixed else map_dynamically)(node, settings, 1)
-            except (SdoAbortedError, MachineError, KeyError) as error:
-                refused = str(error)
+            except (SdoAbortedError, MachineError) as error:
+                refused += f"; {error}" if refused else str(error)
                 continue
             choices.mode, choices.fixed_mapping = mode, fixed
-            operator.say(
-                f"mode {mode}" + (", by the process data that the drive has: its mapping is fixed" if fixed else "")
-            )
+            how = ", by the process data that the drive has: its mapping is fixed" if fixed else ""
+            if mode == "pp":
+                how += ": it moves by profiles of its own to positions that stand, and cannot track a sine"
+            operator.say(f"mode {mode}{how}")
             return
     raise MachineError(f"node {choices.node} takes no command in process data: {refused}")
 

@@ -19,6 +19,7 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
 from rds.bus.modules.cia402 import codes
 from rds.bus.modules.cia402.codes import Mode, NmtCommand, State, error_text, state_of, status_text
+from rds.bus.modules.cia402.eds_file import read_eds
 from rds.bus.modules.cia402.mapping import Layout, find_fixed, map_dynamically
 from rds.bus.modules.cia402.presence import refuse_clashes
 from rds.bus.modules.cia402.settings import Command, DriveSettings, Settings
@@ -222,10 +223,7 @@ def _wait_for_home(node: canopen.RemoteNode, drive: DriveSettings, deadline: flo
 
 
 def load(network: canopen.Network, drive: DriveSettings) -> canopen.RemoteNode:
-    try:
-        node = network.add_node(drive.node, drive.eds)
-    except Exception as error:  # the library raises whatever its parser stumbles over
-        raise InputError(f"not a readable EDS: {error}", drive.eds) from error
+    node = network.add_node(drive.node, read_eds(drive.eds, drive.node))
     node.sdo.RESPONSE_TIMEOUT = _ANSWERS_IN
     return node
 
@@ -259,8 +257,9 @@ def _profile(node: canopen.RemoteNode, drive: DriveSettings) -> None:
     """The profile of mode pp, within the axis's limits; the drive's own where the machine's file has none."""
     limits = drive.axis.limits
     if limits is not None:
-        for index, most in ((0x6081, limits.velocity), (0x6083, limits.acceleration), (0x6084, limits.acceleration)):
+        for index, most in ((0x6081, limits.velocity), (0x6083, limits.acceleration)):
             _download(node, index, 0, round(most * drive.velocity_counts))
+        _optional(node, drive, 0x6084, 0, round(limits.acceleration * drive.velocity_counts))  # without it: 0x6083
 
 
 def _choose(node: canopen.RemoteNode, drive: DriveSettings, mode: Mode) -> None:
@@ -311,7 +310,8 @@ def _download(node: canopen.RemoteNode, index: int, subindex: int, value: int) -
         variable = node.object_dictionary.get_variable(index, subindex)
         if variable is None:
             raise MachineError(f"node {node.id}: the EDS has no object 0x{index:04X}:{subindex:02X}")
-        node.sdo.download(index, subindex, variable.encode_raw(int(value)))
+        size = max(len(variable) // 8, 1)
+        node.sdo.download(index, subindex, (int(value) % (1 << 8 * size)).to_bytes(size, "little"))
     except SdoAbortedError as error:
         raise MachineError(f"node {node.id} refuses 0x{index:04X}:{subindex:02X} = {int(value)}: {error}") from error
 

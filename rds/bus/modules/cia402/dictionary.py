@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from functools import cache
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import Any
 
 import canopen
-from canopen.objectdictionary import ODVariable
+from canopen.objectdictionary import ODVariable, datatypes
 from canopen.objectdictionary.datatypes import NUMBER_TYPES
 from canopen.sdo import SdoAbortedError
 
 from rds.bus.modules.cia402.codes import Abort
+from rds.bus.modules.cia402.eds_file import read_eds
 
 Key = tuple[int, int]  # index, sub-index
 _NO_PARAMETERS = (0x1003, 0x1010, 0x1011, 0x6040, 0x6060, 0x6071, 0x607A, 0x60FF)  # errors, orders, targets
+_AS_LEFT = (0x6072, 0x607D, 0x6502)  # limits and modes in which a drive of another EDS differs from ours
+_IDENTITY = 0x1018
+_PDO_COMMUNICATION, _DOES_NOT_EXIST = ((0x1400, 0x1600), (0x1800, 0x1A00)), 1 << 31
+_EMPTY = {
+    datatypes.VISIBLE_STRING: "",
+    datatypes.UNICODE_STRING: "",
+    datatypes.OCTET_STRING: b"",
+    datatypes.DOMAIN: b"",
+}
 
 
 def axis_eds(node: int) -> canopen.ObjectDictionary:
@@ -37,15 +49,43 @@ def _variables(objects: canopen.ObjectDictionary) -> list[ODVariable]:
     return found
 
 
+@cache
+def _described(eds: Path, node: int) -> dict[Key, ODVariable]:
+    """The objects of another drive's EDS: those that ours has, with the access that it says, and others.
+
+    Data types and limits of ours stay, which are those of CiA 402, whatever the EDS says.
+    """
+    described = read_eds(eds, node)
+    said, ours = described.device_information, _axis_variables(node)
+    found: dict[Key, ODVariable] = {}
+    for other in _variables(described):
+        key = other.index, other.subindex
+        if other.index < 0x1000 or (other.data_type not in NUMBER_TYPES and other.data_type not in _EMPTY):
+            continue
+        found[key] = variable = copy(ours.get(key, other))
+        variable.access_type, variable.pdo_mappable = other.access_type, other.pdo_mappable
+        is_said = key not in ours or other.index < 0x2000 or other.index in _AS_LEFT
+        if is_said and other.default is not None and not (variable.max is not None and other.default > variable.max):
+            variable.default = other.default
+    for place, value in ((1, said.vendor_number), (2, said.product_number), (3, said.revision_number)):
+        if value is not None and (_IDENTITY, place) in found:
+            found[_IDENTITY, place].default = value
+    if (0x1008, 0) in found:
+        found[0x1008, 0].default = said.product_name or "a drive"  # type: ignore[assignment]  # a text
+    return found
+
+
 class Dictionary:
-    """The objects of the simulated drive with node-ID `node`.
+    """The objects of the simulated drive with node-ID `node`; with another drive's `eds`, those that it has.
 
     `values` holds what is neither computed nor text, by (index, sub-index). A reader computes an object's value when
     it is asked for; a writer takes a new value before it is stored, and may refuse it by SdoAbortedError.
     """
 
-    def __init__(self, node: int):
-        self.variables = self.object_dictionary = _axis_variables(node)
+    def __init__(self, node: int, eds: Path | None = None):
+        ours = _axis_variables(node)
+        self.variables = self.object_dictionary = ours if eds is None else _described(eds, node)
+        self._hidden = {key: variable for key, variable in ours.items() if key not in self.variables}
         self._indices = {index for index, _ in self.variables}
         self.values: dict[Key, Any] = {}
         self.readers: dict[Key, Callable[[], Any]] = {}
@@ -55,10 +95,15 @@ class Dictionary:
 
     def reset(self, lowest: int = 0, highest: int = 0xFFFF) -> None:
         """Values as in the EDS, for the objects from `lowest` to `highest`."""
-        for key, variable in self.variables.items():
+        for key, variable in (self._hidden | self.variables).items():
             if lowest <= key[0] <= highest:
-                default = variable.default if variable.default is not None else 0
+                nothing = _EMPTY.get(variable.data_type or 0, 0)
+                default = nothing if variable.default is None else variable.default
                 self.values[key] = self._stored.get(key, default)
+        for first, last in _PDO_COMMUNICATION:
+            for index in range(first, last):
+                if (index, 1) in self._hidden:  # a PDO that this EDS does not have
+                    self.values[index, 1] |= _DOES_NOT_EXIST
 
     def store(self) -> None:
         """Keep the values of parameters as they are now, for when it is switched on again (0x1010)."""

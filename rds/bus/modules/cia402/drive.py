@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import secrets
 from math import inf
+from pathlib import Path
 from typing import Any
 
 from canopen.sdo import SdoAbortedError
@@ -38,9 +39,8 @@ _MOVING = 2e-3  # s between two looks at an axis under power if no frame comes
 
 
 class Drive:
-    """The drive of `axis`; `node` is its node-ID (default: the axis's), `volts` its full voltage at 1000 ‰ torque.
-
-    `quirks` are things that are wrong with it.
+    """The drive of `axis`; `node` is its node-ID (default: the axis's), `volts` its full voltage at 1000 ‰ torque,
+    `quirks` are things that are wrong with it. With another drive's `eds` it has the objects and identity of that.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class Drive:
         volts: float = 10.0,
         node: int | None = None,
         quirks: frozenset[Quirk] = frozenset(),
+        eds: Path | None = None,
     ):
         self.quirks = quirks
         self.name = axis.name
@@ -60,7 +61,7 @@ class Drive:
         self.syncs = 0
         self.serial = secrets.randbelow(1 << 31) + 1
         self._out: list[Frame] = []
-        self.objects = Dictionary(self.node)
+        self.objects = Dictionary(self.node, eds)
         self.servo = Servo(axis, machine_parameters(axis), start, volts, self._axis_fault)
         self.errors = Errors(self.objects, self._send)
         self.operation = Operation(self.objects, self.servo, self.errors.report, self.errors.clear)
@@ -74,7 +75,7 @@ class Drive:
         self.objects.writers[0x1019, 0] = self._check_sync_counter
         self.objects.writers[0x1010, 1] = self._store
         self.objects.writers[0x1011, 1] = self._restore
-        self.objects.readers |= {(0x1010, 1): lambda: _ON_COMMAND, (0x1011, 1): lambda: _ON_COMMAND}
+        self.objects.readers |= dict.fromkeys([(0x1010, 1), (0x1011, 1)], lambda: _ON_COMMAND)
         if Quirk.FIXED_MAPPING in quirks:
             for key in self.objects.variables:
                 if 0x1600 <= key[0] < 0x1604 or 0x1A00 <= key[0] < 0x1A04:
@@ -245,7 +246,8 @@ class Drive:
             if Quirk.WRONG_GEAR in self.quirks:
                 values[0x6091, 1] = 10
             if Quirk.ZERO_LIMITS in self.quirks:
-                values |= dict.fromkeys([(0x6072, 0), (0x607D, 1), (0x607D, 2)], 0)
+                limits = [(0x6072, 0), (0x607D, 1), (0x607D, 2)]
+                values |= dict.fromkeys([key for key in limits if key in self.objects.variables], 0)
             self.operation.power_off()
         for pdo in (*self.receive_pdos, *self.transmit_pdos):
             pdo.reset()

@@ -59,7 +59,15 @@ class Doubt:
 def limits(node: canopen.RemoteNode, torque: int) -> list[Doubt]:
     """Limits that leave no motion, switches that are active, faults that stay. `torque` is the ‰ that are wanted."""
     found = []
-    if number(node, 0x6072) == 0:
+    largest = number(node, 0x6072)
+    if largest is not None and 0 < largest < torque / 2:
+        found.append(
+            Doubt(
+                f"the largest torque, 0x6072, is {largest} ‰ of the rated one: an axis that needs more falls behind "
+                "(following error); raise it in the drive once its motor's data are in"
+            )
+        )
+    if largest == 0:
         found.append(
             Doubt(
                 f"the largest torque, 0x6072, is 0: the drive would never move; it is to be {torque} ‰",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import configparser
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +10,8 @@ import canopen
 from canopen.sdo import SdoAbortedError, SdoCommunicationError
 
 from rds.bus.modules.cia402.codes import Mode
-from rds.core.errors import InputError
+from rds.bus.modules.cia402.eds_file import read_eds
 from rds.core.private_files import make_folder, write_private
-
-_LARGEST = 4 << 20  # bytes of an EDS
 
 
 @dataclass(frozen=True)
@@ -92,18 +89,8 @@ def keep_eds(path: Path, identity: Identity, folder: Path | None = None) -> Path
 
 def check_eds(path: Path, identity: Identity) -> list[str]:
     """What of an EDS does not fit the drive, as sentences. InputError for a file that is no EDS."""
-    if not path.is_file():
-        raise InputError("there is no such EDS; check the name", str(path))
-    if path.stat().st_size > _LARGEST:
-        raise InputError(f"it has {path.stat().st_size} bytes, and an EDS has less than {_LARGEST}", str(path))
-    parser = configparser.RawConfigParser(strict=False, allow_no_value=True)
-    try:
-        parser.read_string(path.read_text(encoding="utf-8", errors="replace"))
-        device = parser["DeviceInfo"]
-        vendor, product = (_whole(device.get(key)) for key in ("VendorNumber", "ProductNumber"))
-        canopen.import_od(str(path), identity.node)
-    except Exception as error:  # the library raises whatever its parser stumbles over
-        raise InputError(f"not a readable EDS: {error}", str(path)) from error
+    device = read_eds(path, identity.node).device_information
+    vendor, product = device.vendor_number, device.product_number
     doubts = []
     if vendor is not None and vendor != identity.vendor:
         doubts.append(f"the EDS is of vendor {vendor:#x}, and the drive says {identity.vendor:#x}")
@@ -114,10 +101,3 @@ def check_eds(path: Path, identity: Identity) -> list[str]:
 
 def _file_name(identity: Identity) -> str:
     return f"{identity.vendor:08X}-{identity.product or 0:08X}.eds"
-
-
-def _whole(text: str | None) -> int | None:
-    try:
-        return int(text, 0) if text else None
-    except ValueError:
-        return None

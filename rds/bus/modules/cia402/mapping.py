@@ -14,7 +14,8 @@ from rds.core.errors import MachineError
 
 RPDOS, TPDOS = (0x200, 0x300, 0x400, 0x500), (0x180, 0x280, 0x380, 0x480)  # + node-ID: the predefined connection set
 _CONTROLWORD, _STATUSWORD = 0x6040, 0x6041
-_INVALID, _NUMBER = 1 << 31, 0x7FF
+_INVALID, _NO_REMOTE_REQUEST, _NUMBER = 1 << 31, 1 << 30, 0x7FF
+_PDOS, _MAPPING = 0x200, 0x200  # PDOs each way at most; from the communication object of one to its mapping
 _DUMMIES = range(1, 8)  # data types that stand in a mapping for bits of no object
 _SIGNED = {16: "h", 32: "i"}
 Entry = tuple[int, int, int]  # index, sub-index, bits
@@ -47,24 +48,36 @@ def actual_of(drive: DriveSettings) -> int:
 
 
 def map_dynamically(node: canopen.RemoteNode, drive: DriveSettings, transmission: int) -> Layout:
-    """RPDO 1: controlword and target. TPDO 1: statusword and actual position (or velocity). No other PDO."""
-    for maps in (node.rpdo, node.tpdo):
-        for number, pdo in maps.items():
-            identifier = pdo.com_record[1].raw
-            if number > 1 and not identifier & _INVALID:
-                pdo.com_record[1].raw = identifier | _INVALID
-    received, sent = node.rpdo[1], node.tpdo[1]
-    for pdo, objects, kind in (
-        (received, (_CONTROLWORD, drive.command.target), transmission),
-        (sent, (_STATUSWORD, actual_of(drive)), 1),
+    """RPDO 1: controlword and target. TPDO 1: statusword and actual position (or velocity). No other PDO.
+
+    The bits are those of CiA 402, and the entries those that the drive takes, whatever its EDS says of them. Raises
+    MachineError that names what it refuses.
+    """
+    layout = standard(drive)
+    target_bits = 16 if drive.command is Command.CST else 32
+    for communication, identifier, kind, objects in (
+        (0x1400, layout.receive, transmission, ((_CONTROLWORD, 16), (drive.command.target, target_bits))),
+        (0x1800, layout.send | _NO_REMOTE_REQUEST, 1, ((_STATUSWORD, 16), (actual_of(drive), 32))),
     ):
-        pdo.clear()
-        for index in objects:
-            pdo.add_variable(index)
-        pdo.cob_id, pdo.trans_type, pdo.enabled = pdo.predefined_cob_id, kind, True
-        pdo.rtr_allowed = pdo is received  # the bit has no meaning there
-        pdo.save()
-    return standard(drive)
+        for other in range(communication + 1, communication + _PDOS):
+            if other in node.object_dictionary and not (taken := _number(node, other, 1)) & _INVALID:
+                _write(node, drive, other, 1, taken | _INVALID, 4)
+        mapping = communication + _MAPPING
+        _write(node, drive, communication, 1, identifier | _INVALID, 4)
+        _write(node, drive, communication, 2, kind, 1)
+        _write(node, drive, mapping, 0, 0, 1)
+        for place, (index, bits) in enumerate(objects, 1):
+            _write(node, drive, mapping, place, index << 16 | bits, 4)
+        _write(node, drive, mapping, 0, len(objects), 1)
+        _write(node, drive, communication, 1, identifier, 4)
+    return layout
+
+
+def _write(node: canopen.RemoteNode, drive: DriveSettings, index: int, subindex: int, value: int, size: int) -> None:
+    try:
+        node.sdo.download(index, subindex, value.to_bytes(size, "little"))
+    except SdoAbortedError as error:
+        raise MachineError(f"{drive.name} refuses 0x{index:04X}:{subindex:02X} = {value:#x}: {error}") from error
 
 
 def find_fixed(node: canopen.RemoteNode, drive: DriveSettings, transmission: int) -> Layout:

@@ -50,8 +50,13 @@ class Pdo:
         self.reset()
 
     def reset(self) -> None:
-        """Work with what the dictionary says now."""
-        self._remap(self._values[self.mapping, 0])
+        """Work with what the dictionary says now. A mapping of another drive's EDS that ours cannot do: no such PDO."""
+        try:
+            self._remap(self._values[self.mapping, 0])
+        except (SdoAbortedError, KeyError):
+            self._values[self.communication, 1] |= INVALID
+            self._values[self.mapping, 0] = 0
+            self._remap(0)
 
     def restart(self) -> None:
         """NMT has entered or left OPERATIONAL."""
@@ -89,7 +94,7 @@ class Pdo:
     # --- what is written over SDO
 
     def _set_identifier(self, value: int) -> None:
-        if value & EXTENDED or not (self.receives or value & NO_RTR):
+        if value & EXTENDED or (not self.receives and self._values[self.communication, 1] & ~value & NO_RTR):
             raise SdoAbortedError(Abort.VALUE)  # neither 29-bit identifiers nor remote requests
         if not value & INVALID:
             if self.exists and (value ^ self._values[self.communication, 1]) & 0x3FFFFFFF:

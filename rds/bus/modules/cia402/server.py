@@ -17,6 +17,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rds.bus.modules import server_program
@@ -39,25 +40,31 @@ def serve(
     ready: Callable[[], Any] | None = None,
     stop: threading.Event | None = None,
     quirks: str | Iterable[str] = (),
+    eds: str | Path | None = None,
     **options: Any,
 ) -> None:
     """Serve a drive for each axis of `machine` (or of its `axes`). What else may be said, and errors: as `serve_nodes`.
 
-    `quirks` are things that are wrong with the drives, as in "wrong-sign,zero-limits" (see quirks.py).
+    `quirks` are things that are wrong with the drives, as in "wrong-sign,zero-limits" (see quirks.py). With `eds`, the
+    EDS of another drive, they have its objects and identity.
 
     A drive's node-ID is its axis's node, its full voltage the converter's range. It counts as commanded while SYNC
     comes.
     """
-    make_node = partial(_make_node, machine.converter.range, read_quirks(quirks))
+    file = None if eds is None else Path(eds)
+    make_drive = partial(_make_drive, volts=machine.converter.range, quirks=read_quirks(quirks), eds=file)
+    make_node = partial(_make_node, make_drive)
     serve_nodes(machine, make_node, interface, channel, axes, ready, stop, **options)
 
 
-def _make_node(volts: float, quirks: frozenset[Quirk], slot: int, axis: Axis, opener: Opener) -> DriveNode:
-    return DriveNode(axis.name, partial(_make_drive, axis, volts, quirks), opener)
+def _make_node(make_drive: Callable[..., Drive], slot: int, axis: Axis, opener: Opener) -> DriveNode:
+    return DriveNode(axis.name, partial(make_drive, axis), opener)
 
 
-def _make_drive(axis: Axis, volts: float, quirks: frozenset[Quirk], start: float, node: int | None) -> Drive:
-    return Drive(axis, start, volts, node, quirks)
+def _make_drive(
+    axis: Axis, start: float, node: int | None, volts: float, quirks: frozenset[Quirk], eds: Path | None
+) -> Drive:
+    return Drive(axis, start, volts, node, quirks, eds)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,196 @@
+"""EDS files as makers write them: read all the same, mapped all the same, and simulated as they say."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import canopen
+import pytest
+from typer.testing import CliRunner
+
+from rds.bus.modules.cia402.commissioned import Choices, experiment_text
+from rds.bus.modules.cia402.commissioning import Declined, Wishes, commission
+from rds.bus.modules.cia402.configure import library, prepare
+from rds.bus.modules.cia402.eds_file import read_eds
+from rds.bus.modules.cia402.settings import read_settings
+from rds.cli.main import app
+from rds.core.errors import InputError
+from rds.machines import Machine
+
+from .test_commissioning import Operator, Served, opened
+
+ODD = """; made by a tool
+[FileInfo]
+Description=a drive
+[Comments]
+Line1=no number of lines
+[DeviceInfo]
+VendorName=Geräte
+VendorNumber=
+ProductName=Axis 5°
+PRODUCTNUMBER=1A2B
+[DummyUsage]
+Dummy0005=1
+[1018Sub1]
+ParameterName=Vendor
+DataType=7
+AccessType=RO
+DefaultValue=0x9A
+[1018SUB2]
+PARAMETERNAME=Product
+datatype=0007
+DefaultValue=00010
+[1018]
+ParameterName=Identity
+ObjectType=0x9
+[1003]
+ParameterName=Errors
+ObjectType=8
+DataType=0x0007
+AccessType=ro
+CompactSubObj=3
+[1003Name]
+NrOfEntries=3
+2=the second alone has a name
+[603f]
+ParameterName=Error code ; of CiA 402
+  that goes on here
+DataType=0x0006
+AccessType=ro
+LowLimit=
+HighLimit=n/a
+[1014]
+ParameterName=Emergency
+DataType=0x0007
+AccessType=rw
+DefaultValue=0x80 + $NodeID
+[1400sub1]
+ParameterName=COB-ID
+DataType=0x0007
+AccessType=rw
+DefaultValue=$NODEID+0x200
+[6040]
+ParameterName=Controlword
+DataType=0x0006
+[6040]
+ParameterName=Controlword, said twice
+DataType=0x0006
+AccessType=rww
+[2000]
+ParameterName=no data type
+"""
+
+
+@pytest.mark.parametrize(
+    "encode",
+    [
+        pytest.param(lambda text: text.encode(), id="utf-8"),
+        pytest.param(lambda text: text.encode("latin-1"), id="latin-1"),
+        pytest.param(lambda text: text.encode("utf-8-sig"), id="byte order mark"),
+        pytest.param(lambda text: text.replace("\n", "\r\n").encode("cp1252"), id="Windows"),
+    ],
+)
+def test_what_makers_write_is_read(encode: object, tmp_path: Path) -> None:
+    path = tmp_path / "odd.eds"
+    path.write_bytes(encode(ODD))  # type: ignore[operator]
+    found = read_eds(path, 5)
+    device = found.device_information
+    assert (device.vendor_number, device.product_number) == (None, 0x1A2B)
+    assert (device.vendor_name, device.product_name) == ("Geräte", "Axis 5°")
+    assert (found[0x1018][1].default, found[0x1018][2].default) == (0x9A, 10)
+    assert found[0x1003][3].data_type == 7 and 4 not in list(found[0x1003])
+    assert found[0x603F].name == "Error code" and (found[0x603F].min, found[0x603F].max) == (None, None)
+    assert (found[0x1014].default, found[0x1400][1].default) == (0x85, 0x205)
+    assert found[0x6040].access_type == "rww" and 0x2000 not in found
+
+
+@pytest.mark.parametrize(
+    "text, said", [("", "no section"), ("[DeviceInfo\n", "not a readable EDS"), ("[1000]\n", "no section")]
+)
+def test_what_is_no_eds_is_told(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "no.eds").write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_eds(tmp_path / "no.eds", 5)
+    with pytest.raises(InputError, match="no such EDS"):
+        read_eds(tmp_path / "nowhere.eds", 5)
+
+
+def changed(folder: Path, *changes: tuple[str, str]) -> Path:
+    """Our drive's EDS, otherwise."""
+    text = files("rds.bus.modules.cia402").joinpath("axis.eds").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "other.eds"
+    path.write_text(text)
+    return path
+
+
+def without(text: str, *indices: str) -> str:
+    """An EDS without some objects."""
+    sections = text.split("\n[")
+    return "\n[".join(section for section in sections if section.split("]")[0].split("sub")[0] not in indices)
+
+
+def test_a_mapping_that_is_an_array_is_written(served: Served, tmp_path: Path) -> None:
+    """The library writes no entry of it: it asks for their number, which it has just set to 0."""
+    text = files("rds.bus.modules.cia402").joinpath("axis.eds").read_text()
+    sections = text.split("[1600]\n")
+    other = tmp_path / "array.eds"
+    other.write_text(sections[0] + "[1600]\n" + sections[1].replace("ObjectType=0x9", "ObjectType=0x8", 1))
+    channel, nodes = served("X")
+    operator = Operator(refused="switch the power on")
+    with opened(channel) as bus, pytest.raises(Declined):
+        commission(bus, Wishes(node=2, period=0.01, eds=other), "bench", operator, tmp_path)
+    assert "mode csp" in operator.said
+    assert nodes[0].drive.receive_pdos[0].mapped == [(0x6040, 0), (0x607A, 0)]
+
+
+def test_a_drive_of_another_eds_has_what_that_says(served: Served, machine: Machine, tmp_path: Path) -> None:
+    other = changed(
+        tmp_path, ("VendorNumber=0x0\n", "VendorNumber=0x1A3\n"), ("ProductNumber=0x402", "ProductNumber=9")
+    )
+    other.write_text(without(other.read_text(), "6084", "608F", "6092", "1403", "1603", "6071"))
+    channel, nodes = served("X", eds=other)
+    nodes[0].drive.objects.values |= {
+        (0x6502, 0): 0x61,
+        (0x6072, 0): 100,
+    }  # profile position, homing, interpolated position
+    operator = Operator(refused="switch the power on")
+    with opened(channel) as bus, pytest.raises(Declined):
+        commission(bus, Wishes(node=2, period=0.01, eds=other, counts=1000.0), "bench", operator, tmp_path / "kept")
+    assert "vendor 0x1a3, product 0x9" in operator.said[0] and any(
+        said.startswith("mode pp: it moves by profiles") for said in operator.said
+    )
+    for said in ("encoder ? increments", "the largest torque, 0x6072, is 100 ‰"):
+        assert any(said in text for text in operator.said)
+    settings = read_settings({"mode": "pp", "axis": {"X": {"node": 2, "eds": str(other)}}}, machine, ["X"])
+    with opened(channel) as bus, library(bus) as network:
+        prepare(network, settings, 0.01)  # 0x6084, which it lacks, is optional
+    assert nodes[0].drive.objects[0x6060] == 1
+
+
+def test_only_drives_have_an_eds(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["machine", "serve", "mini-cnc", "--eds", str(tmp_path / "x.eds")])
+    assert done.exit_code == 2 and "only simulated drives" in done.output
+    done = CliRunner().invoke(
+        app, ["machine", "serve", "mini-cnc", "--dialect", "cia402", "--eds", str(tmp_path / "x.eds")]
+    )
+    assert done.exit_code == 2 and "no such EDS" in done.output
+
+
+def test_our_own_is_read_as_the_library_reads_it() -> None:
+    path = str(files("rds.bus.modules.cia402").joinpath("axis.eds"))
+    ours, theirs = read_eds(path, 5), canopen.import_od(path, 5)
+    assert list(ours) == list(theirs)
+    assert ours[0x1A00][2].default == theirs[0x1A00][2].default and ours[0x607D][1].min == theirs[0x607D][1].min
+
+
+def test_a_drive_that_moves_by_profiles_gets_steps_instead_of_a_sine() -> None:
+    choices = Choices("bench", "X", "mm", (-10.0, 10.0), 0.01, "pp", 2, 1000.0)
+    table = tomllib.loads(experiment_text(choices, "bench.toml", {}))
+    assert (table["reference"]["kind"], table["bus"]["cia402"]["mode"]) == ("square", "pp")
+    assert replace(choices, mode="csp").motion == "sine"
