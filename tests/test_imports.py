@@ -89,10 +89,15 @@ ONLY = {
     ("identification", "bus"): {
         *("rds.bus.modules.rds.frames", "rds.bus.tools.decode", "rds.bus.tools.logs", "rds.bus.tools.mf4"),
     },
-    ("identification", "controllers"): {"rds.controllers.tracking", "rds.controllers.design"},
+    ("identification", "controllers"): {
+        *("rds.controllers.tracking", "rds.controllers.design"),
+        # the law of a run of one's own, which closes the loop around the model that is judged
+        *("rds.controllers.controller_module", "rds.controllers.library_controller"),
+    },
     # a killed run reopens from its record; how a mode's response is drawn
     ("results", "modes"): {"rds.modes", "rds.modes.process.record"},
-    ("identification", "modes"): {"rds.modes", "rds.modes.loop.mode"},  # what the mode of a result says of its data
+    # what the mode of a result says of its data; how a run of it begins
+    ("identification", "modes"): {"rds.modes", "rds.modes.loop.mode", "rds.modes.parts.start"},
 }
 # inside functions only
 LAZY = [("results", "modes"), ("modes", "bus"), ("results.reports", "bus")]
