@@ -189,7 +189,11 @@ def _in_python(file: Path) -> float:
 
 @contextmanager
 def _closed_lane() -> Iterator[None]:
-    with patch.object(fast_lane, "kernel", lambda: None):
+    with (
+        patch.object(fast_lane, "kernel", lambda: None),
+        patch.object(fast_lane, "stored", lambda: None),
+        patch.object(fast_lane, "is_loaded", lambda: False),
+    ):
         yield
 
 

@@ -11,6 +11,11 @@ _INTERRUPTED = 130  # the exit code of what Ctrl-C ended, by the shell's custom
 def main() -> None:
     """Run the command line; Ctrl-C in the middle of an import is no traceback."""
     try:
+        from rds.cli.canon import canon_alone
+
+        code = canon_alone(sys.argv[1:])
+        if code is not None:
+            sys.exit(code)
         from rds.cli.main import main as run
 
         run()

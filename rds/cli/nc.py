@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rds.cli import nc_bundled, nc_cut, nc_job, nc_make, nc_methods, nc_run, nc_step
+from rds.cli.canon import print_canon
 from rds.cli.common import Json, declared, print_json, progress_bars, refusals, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
 from rds.core.shared_quantities import SAMPLE_PERIOD
@@ -121,19 +122,14 @@ def canon(
     The move after G40 may be as short as LinuxCNC lets it be; `rds nc check` calls a move that gouges a fault.
     """
     with refusals():
-        from rds.nc.language.canon_text import text, texts
+        from rds.nc.language.canon_text import texts
 
         items = setup(tools, parameters, [*(with_ or ()), "any-exit"], max_jumps).interpret(file)
         if json:
             calls = (json_text.dumps({"n": n, "call": call}) for n, call in texts(items))
             _print_when_whole(_json_lines(file, calls))
             return
-        try:
-            for line in text(items):
-                sys.stdout.write(line + "\n")
-            sys.stdout.flush()
-        except BrokenPipeError:  # `| head` has seen enough
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print_canon(items)
 
 
 def _json_lines(file: Path, calls: Iterator[str]) -> Iterator[str]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rds.nc import Dialect
 from rds.nc.language import canon
-from rds.nc.language.fast_lane import NEVER, FastLane
+from rds.nc.language.fast_lane import NEVER, FastLane, kernel
 from rds.nc.language.interpreter import Interpreter
 from rds.nc.language.source import CHUNK, LONGEST
 
@@ -21,6 +21,12 @@ from .fuzz_targets import outcome, same
 pytest.importorskip("numba", reason="without numba (extra fast) there is no fast lane")
 
 HEAD = b"G21 G90 G17 F300\n"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """A program of this length would not wait for the compiler."""
+    assert kernel() is not None
 
 
 @pytest.fixture
@@ -150,6 +156,8 @@ def test_without_numba_the_usual_way_is_taken(monkeypatch: pytest.MonkeyPatch) -
     program = HEAD + b"G1\n" + b"X1 Y2\nX3\n" * 50 + b"M2\n"
     usual = outcome(program, NEVER)
     monkeypatch.setattr("rds.nc.language.fast_lane.kernel", lambda: None)
+    monkeypatch.setattr("rds.nc.language.fast_lane.stored", lambda: None)
+    monkeypatch.setattr("rds.nc.language.fast_lane.is_loaded", lambda: False)
     assert outcome(program, 0) == usual
 
 

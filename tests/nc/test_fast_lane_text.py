@@ -10,6 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rds.nc.language import canon, canon_text
+from rds.nc.language.fast_lane import kernel
 
 pytest.importorskip("numba", reason="without numba (extra fast) rows are written by Python")
 
@@ -37,15 +38,15 @@ def rows(draw: st.DrawFn) -> np.ndarray:
 @example(np.array([(3, 0, 0, 1, (0.03125, *[0] * 8)), (3, 0, 0, 1, (0.09375, *[0] * 8))], canon.MOTION), 1)
 @example(np.array([(0, 0, 0, 1, (99999999999.99998, -1e11, 1e11, 0, 0, 0, 0, 0, 0))], canon.MOTION), 1)
 def test_the_same_text(rows: np.ndarray, number: int) -> None:
-    from rds.nc.language.fast_lane_text import written
-
+    compiled = kernel()
+    assert compiled is not None
     usual = list(canon_text.text([canon.MotionBlock(rows)]))
     assert len(rows) < canon_text.MANY  # written by Python
     usual = [f"{number + k:5d} {line[6:]}" for k, line in enumerate(usual)]
     at = 0
-    for count, lines in written(rows, number):
+    for count, lines in compiled.written(rows, number):
         if lines:
-            assert lines == usual[at : at + count]
+            assert lines.splitlines() == usual[at : at + count]
         else:
             assert not np.abs(rows["values"][at]).max() < 1e11  # left to Python for a reason
         at += count
@@ -62,7 +63,8 @@ def test_large_blocks_are_written_alike(monkeypatch: pytest.MonkeyPatch) -> None
     rows["values"][::5000, 0] = 1e15  # by Python, in between
     monkeypatch.setattr(canon_text, "LONG_TEXT", 0)
     items = [canon.Call("SELECT_PLANE", ("XY",)), canon.MotionBlock(rows), canon.Call("PROGRAM_END")]
-    fast = list(canon_text.text(items))
-    monkeypatch.setattr(canon_text, "_compiled", lambda: None)
+    kernel()
+    fast = "\n".join(canon_text.text(items)).splitlines()
+    monkeypatch.setattr(canon_text, "_compiled", lambda number, rows: None)
     assert fast == list(canon_text.text(items))
     assert len(fast) == len(rows) + 2

@@ -23,7 +23,7 @@ def fault(text: str, **options: bool | int) -> ProgramError:
 
 # program, line, column, word, part of the message
 FAULTS = [
-    ("G21\nG71 Q1 X1\nM2", 2, 1, "G71", "turns a lathe from a contour's subroutine; write its cuts as G0 and G1"),
+    ("G21 G18 F1\nG71 Q1 X1\nM2", 2, 1, "O1 CALL", "the subroutine 1 is not defined"),
     ("G0 X1 U2\nM2", 1, 7, "U2", "the axes are X Y Z A B C"),
     ("G0 X1\n  g1 y2\nM2", 2, 3, "G1", "no feed rate is set; write F"),
     ("X1\nM2", 1, 1, "X1", "write G0, G1, G2 or G3 before it"),
@@ -92,7 +92,7 @@ FAULTS = [
     ("G68 X0 Y0 R30\nM2", 1, 1, "G68", "turns the coordinates on other controls; write G10 L2 P0 R"),
     ("F1 G2 G53 X1 R2\nM2", 1, 7, "G53", "G53 needs G0 or G1"),
     ("G28 G1 X1\nM2", 1, 5, "G1", "both use the axis words"),
-    ("G0 X1 P2\nM2", 1, 7, "P2", "nothing on the line uses P; it goes with G2, G3, G4, G5, G10, G64, G76, G82"),
+    ("G0 X1 P2\nM2", 1, 7, "P2", "nothing on the line uses P; it goes with G2, G3, G4, G5, G10, G64, G70, G76, G82"),
     ("G41 D3\nM2", 1, 5, "D3", "has no tool 3"),
     ("G19 G41.1 D3\nM2", 1, 5, "G41.1", "planes of G17 and G18 only"),
     ("T2\nM2", 1, 1, "T2", "it is empty; give one"),

@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rds.machines import load_machine
-from rds.nc import Dialect, ProgramError, Setup, check_program, interpret
+from rds.nc import Dialect, ProgramError, interpret
 from rds.nc.language.blocks import G_GROUPS, M_GROUPS
 from rds.nc.language.canon import ARC, BLOCK_ROWS, FEED, RATE, TRAVERSE, Call, MotionBlock
 from rds.nc.language.canon_text import text
@@ -302,20 +301,3 @@ def test_the_document_s_example_runs(capsys: pytest.CaptureFixture[str]) -> None
     example = document[document.index("```python") + 9 :]
     exec(example[: example.index("```")], {})
     assert "ARC_FEED(11.0000, 2.0000, 6.0000, 2.0000, -1, 0.0000" in capsys.readouterr().out
-
-
-def test_the_document_s_shaft_is_turned_on_the_lathe(tmp_path: Path) -> None:
-    document = (Path(__file__).parents[2] / "docs" / "part-program-language.md").read_text(encoding="utf-8")
-    program = tmp_path / "shaft.ngc"
-    begin = document.index("G21 G18 G90 G8")
-    program.write_text(document[begin : document.index("```", begin)], encoding="utf-8")
-    found, _ = check_program(program, load_machine("lathe"), Setup())
-    assert found.ok and found.segments == 25 and found.cutting == pytest.approx(144.2)
-    ends = [
-        (row["values"][0], row["values"][2])
-        for item in interpret(program)
-        if isinstance(item, MotionBlock)
-        for row in item.rows[item.rows["kind"] == FEED]
-    ]
-    assert [z for x, z in ends if x == pytest.approx(10.0)] == [-20.0]  # the finishing cut alone is at the shaft
-    assert [x for x, z in ends if z == pytest.approx(-19.7)][::2] == pytest.approx([14, 13, 12, 11, 10.3])

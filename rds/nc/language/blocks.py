@@ -30,10 +30,11 @@ GROUP_NAMES = {
 }
 CYCLES = frozenset((730, 740, *range(810, 900, 10)))  # canned
 PROBES = frozenset((382, 383, 384, 385))
+TURNING = frozenset((700, 710, 711, 712, 720, 721, 722))  # lathe cycles along a contour
 # G words by ten times their number.
 G_GROUPS: dict[int, int] = {
     **dict.fromkeys((40, 53, 100, 280, 281, 300, 301, 520, 530, 920), NON_MODAL),
-    **dict.fromkeys((0, 10, 20, 30, 50, 51, 52, 330, 331, 760, 800, *PROBES, *CYCLES), MOTION),
+    **dict.fromkeys((0, 10, 20, 30, 50, 51, 52, 330, 331, 760, 800, *PROBES, *CYCLES, *TURNING), MOTION),
     **dict.fromkeys((170, 180, 190), PLANE),
     **dict.fromkeys((900, 910), DISTANCE),
     **dict.fromkeys((901, 911), ARC_DISTANCE),
@@ -67,7 +68,7 @@ M_NAMES = {
 }
 COVET_AXES = frozenset((100, 280, 300, 520, 920))  # non-modal words that take the block's axis words for themselves
 COMPENSATING = frozenset((410, 411, 420, 421))
-_WITHOUT_AXES = frozenset((0, 10, 20, 30, 52))  # words of motion that may stand without axis words
+_WITHOUT_AXES = frozenset((0, 10, 20, 30, 52, *TURNING))  # words of motion that may stand without axis words
 
 
 class Block:
@@ -228,12 +229,18 @@ def check(block: Block, state: State) -> None:
     if CHECKED.isdisjoint(words):
         return
     signal, sets_modes = block.m.get(SIGNALS, -1), block.m.get(SPINDLE, -1)
-    cycle = motion in CYCLES
+    cycle, turning = motion in CYCLES, motion in TURNING
     users = {
-        "d": (compensating in COMPENSATING or g.get(SPINDLE_MODE) == 960, "G41, G42, G41.1, G42.1 or G96"),
-        "e": (motion == 760 or signal in (66, 67, 68), "G76, M66, M67 or M68"),
+        "d": (
+            compensating in COMPENSATING or g.get(SPINDLE_MODE) == 960 or turning,
+            "G41, G42, G41.1, G42.1, G70 to G72 or G96",
+        ),
+        "e": (motion in (700, 760) or signal in (66, 67, 68), "G70, G76, M66, M67 or M68"),
         "h": (g.get(TOOL_OFFSET) in (430, 432, 434) or motion == 760, "G43 or G76"),
-        "i": (arc or setting or motion in (50, 51, 331, 760, 870), "G2, G3, G5, G33.1, G76 or G87"),
+        "i": (
+            arc or setting or motion in (50, 51, 331, 760, 870) or (turning and motion != 700),
+            "G2, G3, G5, G33.1, G71, G72, G76 or G87",
+        ),
         "j": (arc or setting or motion in (50, 51, 760, 870), "G2, G3, G5, G76 or G87"),
         "k": (arc or motion in (330, 331, 760, 870), "G2, G3, G33, G76 or G87"),
         "l": (
@@ -244,24 +251,25 @@ def check(block: Block, state: State) -> None:
             non_modal in (40, 100)
             or g.get(CONTROL) == 640
             or arc
-            or motion in (50, 52, 740, 760, 820, 840, 860, 880, 890)
+            or motion in (50, 52, 700, 740, 760, 820, 840, 860, 880, 890)
             or signal in (62, 63, 64, 65, 66)
             or sets_modes == 19
             or block.m.get(OVERRIDES, 0) >= 50,
-            "G2, G3, G4, G5, G10, G64, G76, G82, G84, G86, G88, G89, M19 or M50 to M66",
+            "G2, G3, G4, G5, G10, G64, G70, G76, G82, G84, G86, G88, G89, M19 or M50 to M66",
         ),
         "q": (
             g.get(CONTROL) == 640
             or setting
             or motion in (50, 730, 760, 830)
+            or turning
             or signal in (66, 67, 68)
             or sets_modes == 19
             or block.m.get(TOOL_CHANGE) == 61,
-            "G5, G10, G64, G73, G76, G83, M19, M61 or M66 to M68",
+            "G5, G10, G64, G70 to G73, G76, G83, M19, M61 or M66 to M68",
         ),
         "r": (
-            arc or setting or cycle or motion == 760 or sets_modes == 19,
-            "G2, G3, G10, G76, M19 or a canned cycle",
+            arc or setting or cycle or motion == 760 or sets_modes == 19 or (turning and motion != 700),
+            "G2, G3, G10, G71, G72, G76, M19 or a canned cycle",
         ),
         "@": (motion not in (-1, 800), "a move"),
         "^": (motion not in (-1, 800), "a move"),

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE, Call, MotionBlock
+from rds.nc.language.fast_lane import is_loaded, kernel, stored
+
+if TYPE_CHECKING:
+    from rds.nc.language.fast_lane_native import Kernels
 
 MANY = 1024  # rows that are worth writing by compiled code
-LONG_TEXT = 200_000  # lines that Python writes in the time that numba takes to load
+LONG_TEXT = 20_000  # lines that Python writes in the time that compiled code takes to load
 
 # How each call is written; others are written with %.4f for floats and %s for the rest, separated by commas.
 _FORMATS = {
@@ -63,6 +66,7 @@ _ROW_FORMATS = {
     RATE: ("SET_FEED_RATE(%.4f)", 1),
     SPEED: ("SET_SPINDLE_SPEED(0, %.4f)", 1),
 }
+_LINE_FORMATS = {kind: (f"%5d N..... {pattern}", count) for kind, (pattern, count) in _ROW_FORMATS.items()}
 
 
 def _row_texts(rows: np.ndarray) -> Iterator[tuple[str, str]]:
@@ -89,37 +93,39 @@ def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
     """
     number = 1
     for item in items:
-        if isinstance(item, MotionBlock) and len(item) >= MANY and (write := _writer(number)) is not None:
+        if isinstance(item, MotionBlock) and (compiled := _compiled(number, len(item))) is not None:
             first = 0
-            for count, lines in write(item.rows, number):
-                yield from lines or _numbered(_row_texts(item.rows[first : first + count]), number)
+            for count, lines in compiled.written(item.rows, number):
+                yield lines.rstrip("\n") or "\n".join(_numbered(_row_texts(item.rows[first : first + count]), number))
                 first += count
                 number += count
         elif isinstance(item, Call) and item.name == "PRINT":
             yield from item.args
         else:
-            lines = list(_numbered(texts((item,)), number))
+            lines = _lines_of(item, number)
             yield from lines
             number += len(lines)
+
+
+def _compiled(number: int, rows: int) -> Kernels | None:
+    """What writes many rows at once, when loading it is worth the time: it is loaded already, or the text is long."""
+    if rows < MANY:
+        return None
+    return kernel() if is_loaded() else stored() if number + rows > LONG_TEXT else None
+
+
+def _lines_of(item: MotionBlock | Call, number: int) -> list[str]:
+    """The lines of one item, numbered from `number`; rows without a word N, which most are, by one format each."""
+    if isinstance(item, Call) or item.rows["digits"].any():
+        return list(_numbered(texts((item,)), number))
+    lines = []
+    for kind, values in zip(item.rows["kind"].tolist(), item.rows["values"].tolist(), strict=True):
+        pattern, count = _LINE_FORMATS[kind]
+        lines.append(pattern % (number, *values[:count]))
+        number += 1
+    return lines
 
 
 def _numbered(calls: Iterable[tuple[str, str]], first: int) -> Iterator[str]:
     for number, (n, call) in enumerate(calls, start=first):
         yield f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}"
-
-
-def _writer(number: int) -> Callable[[np.ndarray, int], Iterator[tuple[int, list[str]]]] | None:
-    """What writes many rows at once, when loading it is worth the time: it is loaded already, or the text is long."""
-    if number > LONG_TEXT or "rds.nc.language.fast_lane_kernel" in sys.modules:
-        return _compiled()
-    return None
-
-
-@cache
-def _compiled() -> Callable[[np.ndarray, int], Iterator[tuple[int, list[str]]]] | None:
-    """None without numba."""
-    try:
-        from rds.nc.language.fast_lane_text import written
-    except ImportError:
-        return None
-    return written

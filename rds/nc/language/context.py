@@ -16,6 +16,7 @@ from rds.nc.language.tools import ToolTable
 if TYPE_CHECKING:
     from rds.nc.compensation.compensation import Compensation
     from rds.nc.compensation.moves import Stretch
+    from rds.nc.language.turning_contour import Piece
 
 INCH = 25.4
 INCHES_PER_MM = 0.03937007874016  # as LinuxCNC's stand-alone interpreter has it
@@ -43,6 +44,7 @@ class Context:
         self.control_points: list[tuple[float, float, float]] = []  # x, y, weight: of the NURBS since G5.2
         self.order = 3  # of that NURBS
         self.saved_modes: Callable[[Context, int], None]  # does M70 to M73, which belong to subroutines
+        self.contour: Callable[[str], list[Piece]]  # of G70 to G72: what a subroutine would move along
         self.left_turned = 0.0  # degrees, the rotation of the coordinates at that G40
 
     def from_machine(self, length: float) -> float:

@@ -6,25 +6,25 @@ Without numba (extra `fast`) it stays closed.
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rds.nc.language.canon import MOTION
 from rds.nc.language.state import NO_MOTION, PER_MINUTE
 
 if TYPE_CHECKING:
     from rds.nc.language.context import Context
     from rds.nc.language.control import Control
+    from rds.nc.language.fast_lane_native import Kernels, LineReader
     from rds.nc.language.source import Source
 
-# Loading numba takes the time of some ten thousand lines in Python: it is done for programs that are certain to be
-# longer, and for others (of unknown length, or with loops) once they have turned out to be.
-LONG_PROGRAM = 1 << 21  # bytes
-OPENS_AFTER = 50_000  # lines
+# Loading the kernels takes the time of some thousand lines in Python, and compiling them that of a million: each is done
+# for programs that are certain to be long, and for others (of unknown length, or with loops) once they have turned out to be.
+WORTH_LOADING = 1 << 17  # bytes
+OPENS_AFTER = 5_000  # lines
+LONG_PROGRAM = 1 << 21  # bytes; worth compiling
+COMPILES_AFTER = 50_000  # lines
 ROWS = 16384  # at once
 FEW_LINES = 4  # less in one go are not worth the way
 LONGEST_PAUSE = 63  # lines until the next attempt
@@ -33,13 +33,30 @@ _PLAIN = frozenset((0, 10, 20, 30, NO_MOTION))  # motions that a line without a 
 
 
 @cache
-def kernel() -> Callable[..., tuple[int, int, int]] | None:
-    """The compiled reader; None without numba."""
+def stored() -> Kernels | None:
+    """The compiled kernels, if they have been compiled before; loading takes the time of some thousand lines."""
     try:
-        from rds.nc.language.fast_lane_kernel import read_lines
+        from rds.nc.language.fast_lane_native import stored_kernels
     except ImportError:
         return None
-    return read_lines
+    return stored_kernels()
+
+
+@cache
+def kernel() -> Kernels | None:
+    """The compiled kernels, compiled now if need be (some 15 s); None without numba."""
+    found = stored()
+    if found is None:
+        try:
+            from rds.nc.language.fast_lane_native import compile_kernels
+        except ImportError:
+            return None
+        found = compile_kernels()
+    return found
+
+
+def is_loaded() -> bool:
+    return any(loaded.cache_info().currsize and loaded() is not None for loaded in (stored, kernel))
 
 
 class FastLane:
@@ -49,13 +66,13 @@ class FastLane:
         self._context = context
         if context.dialect.program_numbers:
             self.wait = NEVER
-        elif "rds.nc.language.fast_lane_kernel" in sys.modules or source.size() >= LONG_PROGRAM:
+        elif is_loaded() or source.size() >= WORTH_LOADING:
             self.wait = 0
         else:
             self.wait = OPENS_AFTER
         self._pause = 0
-        self._rows: np.ndarray | None = None
-        self._columns: list[np.ndarray] = []
+        self._is_long = source.size() >= LONG_PROGRAM
+        self._reader: LineReader | None = None
         self._state = np.zeros(8)
         self._modes = np.zeros(5, np.int64)
 
@@ -64,10 +81,14 @@ class FastLane:
 
         Returns how many lines to read the usual way before the next attempt, besides the one that was not plain.
         """
-        read = kernel()
-        if read is None:
-            return NEVER
-        taken = self._read(read, control.source) if self._open(control) else 0
+        kernels = kernel() if self._is_long or is_loaded() else stored()
+        if kernels is None:
+            wait = NEVER if self._is_long else COMPILES_AFTER
+            self._is_long = True
+            return wait
+        if self._reader is None:
+            self._reader = kernels.reader(self._state, self._modes, ROWS)
+        taken = self._read(self._reader, control.source) if self._open(control) else 0
         self._pause = 0 if taken >= FEW_LINES else min(2 * self._pause + 1, LONGEST_PAUSE)
         return self._pause
 
@@ -87,21 +108,17 @@ class FastLane:
             and state.motion in _PLAIN
         )
 
-    def _read(self, read: Callable[..., Any], source: Source) -> int:
+    def _read(self, read: LineReader, source: Source) -> int:
         """Lines taken."""
         state, out = self._context.state, self._context.out
-        if self._rows is None:
-            self._rows = np.zeros(ROWS, MOTION)
-            self._columns = [self._rows[name] for name in ("kind", "digits", "n", "line", "values")]
         values, modes = self._state, self._modes
         values[:] = state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate, state.speed
         modes[:] = state.motion, state.absolute, state.arc_absolute, state.plane, state.inches
-        data = np.frombuffer(source.buffer, np.uint8)
-        size, lines, rows = read(data, source.at, len(data), source.next_line, values, modes, *self._columns)
+        size, lines, rows = read(np.frombuffer(source.buffer, np.uint8), source.at, source.next_line)
         if lines:
             state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate, state.speed = values.tolist()
             state.motion = int(modes[0])
             out.file = source.name
-            out.rows(self._rows[:rows])
+            out.rows(read.rows(rows))
             source.skip(size, lines)
         return lines

@@ -54,7 +54,7 @@ _RADIUS_TOLERANCE = np.array(RADIUS_TOLERANCE)
 _SPIRAL_TOLERANCE = np.array(SPIRAL_TOLERANCE)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _read_words(data, at, end, words):
     """The words of the line at `at`.
 
@@ -133,7 +133,7 @@ def _read_words(data, at, end, words):
     return bad  # too long, or not read to its end yet
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _centre(words, given, first, second, third, clockwise, arc_absolute, inches, x0, y0, x1, y1):
     """The centre of an arc in its plane; the first value tells whether it is without doubt."""
     largest = max(max(abs(x0), abs(y0)), max(abs(x1), abs(y1)))
@@ -173,16 +173,15 @@ def _centre(words, given, first, second, third, clockwise, arc_absolute, inches,
     return error <= spiral or (error / most <= SPIRAL_RELATIVE and error <= spiral * SPIRAL_MOST), centre_x, centre_y
 
 
-@njit(cache=True)
-def read_lines(data, at, end, line, state, modes, kinds, digits, ns, lines, values):
+@njit(cache=True, error_model="numpy")
+def read_lines(data, at, end, line, state, modes, words, target, kinds, digits, ns, lines, values):
     """Read and execute plain lines of `data` from `at` until one that is not plain, the end, or no room for rows.
 
     `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes`
     the active motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both
-    are left as the last line that was read leaves them. The other arrays, one element or row per row of MOTION, are
+    are left as the last line that was read leaves them. `words` (12) and `target` (6) are room to work in. The other arrays, one element or row per row of MOTION, are
     filled. Returns bytes and lines read, and rows written.
     """
-    words, target = np.zeros(12), np.zeros(6)
     begin, first_line, row, room = at, line, 0, len(kinds) - 2
     absolute, arc_absolute, plane, inches = modes[1], modes[2], modes[3], modes[4]
     if plane == XY:

@@ -7,7 +7,6 @@ number that is too large for that are left to Python.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 from numba import njit
@@ -15,8 +14,7 @@ from numba import njit
 from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE
 
 _LIMIT = 1e11  # ten thousand times this is below 2^53, where every whole number is a float
-_LONGEST = 256  # bytes of a line: 9 numbers of at most 18 with their commas, and what stands before them
-_SIZE = 1 << 20
+LONGEST = 256  # bytes of a line: 9 numbers of at most 18 with their commas, and what stands before them
 _SPLIT = 134217729.0  # 2^27 + 1: cuts a float into two halves of 26 digits (Dekker 1971)
 _NUMBERS = {TRAVERSE: 6, FEED: 6, ARC: 9, RATE: 1, SPEED: 1}
 _NAMES = {
@@ -32,7 +30,7 @@ _LENGTHS = np.array([len(_NAMES[kind]) for kind in sorted(_NAMES)])
 _LETTERS = np.array([list(_NAMES[kind].ljust(24)) for kind in sorted(_NAMES)], np.uint8)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _ten_thousandths(value):
     """The whole number nearest to 10000 · value, for 0 <= value < _LIMIT; a tie goes to the even one."""
     product = value * 10000.0
@@ -49,7 +47,7 @@ def _ten_thousandths(value):
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _put_whole(out, at, value, width, fill):
     """Write a whole number, with `fill` before it up to `width`. Returns where it ends."""
     size, rest = 1, value // 10
@@ -67,13 +65,13 @@ def _put_whole(out, at, value, width, fill):
     return end
 
 
-@njit(cache=True)
-def _write_rows(number, kinds, digits, ns, values, out):
+@njit(cache=True, error_model="numpy")
+def write_rows(number, kinds, digits, ns, values, out):
     """Write rows as lines, the first one with the running `number`, until `out` is full or a row is left to Python.
 
     Returns rows and bytes written.
     """
-    at, room = 0, len(out) - _LONGEST
+    at, room = 0, len(out) - LONGEST
     for row in range(len(kinds)):
         kind = kinds[row]
         if at > room:
@@ -120,20 +118,3 @@ def _write_rows(number, kinds, digits, ns, values, out):
         out[at], out[at + 1] = 41, 10
         at += 2
     return len(kinds), at
-
-
-def written(rows: np.ndarray, number: int) -> Iterator[tuple[int, list[str]]]:
-    """The lines of rows (dtype MOTION), numbered from `number`, in portions: rows of it and their lines.
-
-    A portion without lines is a row that Python is to write.
-    """
-    out = np.empty(min(_SIZE, _LONGEST * (len(rows) + 1)), np.uint8)
-    first = 0
-    while first < len(rows):
-        rest = rows[first:]
-        count, size = _write_rows(number + first, rest["kind"], rest["digits"], rest["n"], rest["values"], out)
-        if count:
-            yield count, out[:size].tobytes().decode("ascii").splitlines()
-        else:
-            yield 1, []
-        first += count or 1

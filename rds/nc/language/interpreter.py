@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, STOP, Block, check, settle_motion
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.context import Context
+from rds.nc.language.contour_reading import ContourReading, gathered
 from rds.nc.language.control import Control
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
@@ -21,6 +22,7 @@ from rds.nc.language.modes import execute
 from rds.nc.language.moves import move
 from rds.nc.language.names import known_names
 from rds.nc.language.offsets import start
+from rds.nc.language.owords import Word, spelled
 from rds.nc.language.parameters import Parameters, read_parameters
 from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes, lines_to_restore, modes_now
@@ -33,6 +35,7 @@ from rds.nc.language.words import column_of, fill, line_number, place_of, read_p
 if TYPE_CHECKING:
     from rds.machines.ncc import Script
     from rds.nc.compensation.moves import Stretch
+    from rds.nc.language.turning_contour import Piece
 
 _USUAL = frozenset((0, 10, 20, 30))  # motions that no line goes on with wrongly but by words that are checked
 _PROGRAM_NUMBER = re.compile(r"[po][0-9]+")
@@ -94,6 +97,8 @@ class Interpreter:
         self.context.parameters.known = known_names(self.context, self.control, lambda: self.control.source.line)
         self.context.saved_modes = self._saved_modes
         self.control.restore = self._restore
+        self.context.contour = self._contour_of
+        self._contour: ContourReading | None = None  # while the moves of a contour's subroutine are gathered
         self.lane = FastLane(self.context, self.source)
         self._repeated = RepeatedLines(self.context.parameters)
         self._others = 0  # kept lines that the fast lane could not take, since it was tried
@@ -297,7 +302,10 @@ class Interpreter:
         return self._execute(block)
 
     def _execute(self, block: Block) -> bool:
-        context, words = self.context, block.words
+        context = self.context
+        if self._contour is not None:
+            block = self._contour.block(block)
+        words = block.words
         self._first = False
         state = context.state
         if state.diameter and "x" in words:
@@ -324,6 +332,32 @@ class Interpreter:
         if ended:
             self._after_end(f"M{block.m[STOP]}")
         return ended
+
+    def _contour_of(self, name: str) -> list[Piece]:
+        """The contour that the subroutine `name` holds, for G70 to G72. Raises Fault, ProgramError."""
+        text, places, out, remark = self._text, self._places, self.out, self._remark
+        line = out.line
+
+        def run(reading: ContourReading) -> None:
+            self.out = self.context.out = reading.out
+            self._contour = reading
+            depth = self.control.depth
+            self.control.execute(Word("call", name, spelled(name), max(self._place("q"), 0)))
+            while self.control.depth > depth:
+                if raw := self.control.source.read():
+                    self._line(raw)
+                else:
+                    self._file_ended()
+
+        try:
+            pieces, passed_over = gathered(run, self.context.state)
+        finally:
+            self._text, self._places, self._contour = text, places, None
+            self.out = self.context.out = out
+        if passed_over and remark is not None:
+            said = f"the contour in subroutine {name}: {', '.join(passed_over)} passed over; only its moves count"
+            remark(ProgramError(said, file=out.file, line=line))
+        return pieces
 
     def _saved_modes(self, m: Context, code: int) -> None:
         """M70, M73 (save the modes), M71 (forget them), M72 (restore them). Raises Fault."""

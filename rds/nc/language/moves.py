@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from rds.nc.language.arcs import AXES_OF, by_centre, by_radius, centre_offsets, swept
-from rds.nc.language.blocks import AXES, CYCLES, NON_MODAL, PROBES, Block
+from rds.nc.language.blocks import AXES, CYCLES, NON_MODAL, PROBES, TURNING, Block
 from rds.nc.language.canon import ARC, FEED, TRAVERSE
 from rds.nc.language.context import Context, given, rotate
 from rds.nc.language.cycles import cycle
@@ -414,6 +414,12 @@ def _contact(m: Context, code: int, start: list[float], end: list[float]) -> tup
     return [begin + part * (there - begin) for begin, there in zip(start, end, strict=True)], True
 
 
+def _turns(m: Context, block: Block) -> None:
+    from rds.nc.language.turning_cycles import turning_cycle  # only lathe programs need it
+
+    turning_cycle(m, block, target(m.state, block.words))
+
+
 def _threads_of(m: Context, block: Block) -> None:
     threading(m, block, target(m.state, block.words))
 
@@ -426,4 +432,5 @@ _RARE: dict[int, Callable[[Context, Block], None]] = {
     331: thread,
     760: _threads_of,
     **dict.fromkeys(PROBES, probe),
+    **dict.fromkeys(TURNING, _turns),
 }

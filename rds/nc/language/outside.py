@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-_ROUGHING = "{} a lathe from a contour's subroutine; write its cuts as G0 and G1 in a loop, or let the CAM program"
 _G = {
     110: "G11 ends programmable data input of other controls; leave it away, G10 needs no end here",
     120: "G12 mills a circular pocket clockwise on other controls; write the circle as G2 with I and J",
@@ -23,9 +22,6 @@ _G = {
     670: "G67 ends G66 of other controls; leave it away",
     680: "G68 turns the coordinates on other controls; write G10 L2 P0 R and the angle",
     690: "G69 ends G68 of other controls; write G10 L2 P0 R0",
-    700: _ROUGHING.format("G70 finishes"),
-    **dict.fromkeys((710, 711, 712), _ROUGHING.format("G71 turns")),
-    **dict.fromkeys((720, 721, 722), _ROUGHING.format("G72 faces")),
     750: "G75 cuts grooves on other controls; write its cuts as G0 and G1",
     770: "G77 is a turning cycle of other controls; write its cuts as G0 and G1",
     780: "G78 is a threading cycle of other controls; write G76 or G33",

@@ -1,0 +1,163 @@
+"""The fast lane's kernels as machine code from an object file, which numba has compiled once.
+
+Importing numba and having it look through what it has kept takes longer than 100,000 lines of a program; an object file
+is loaded by llvmlite alone, in a tenth of that. It lies with Python's own compiled files, and is made anew whenever
+anything that went into it has changed. Importing this needs llvmlite, which comes with numba.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from llvmlite import __version__ as llvmlite_version
+from llvmlite import binding as llvm
+
+from rds.core.private_files import open_private
+from rds.nc.language.canon import MOTION
+
+ENTRIES = ("rds_read_lines", "rds_write_rows")
+_SOURCES = ("fast_lane_kernel.py", "fast_lane_object.py", "fast_lane_text.py", "arcs.py", "canon.py", "state.py")
+_OUT = 1 << 20  # bytes of text at once
+_POINTER = ctypes.c_void_p
+
+
+def target_machine() -> llvm.TargetMachine:
+    """What code is made for and loaded by: this machine's processor, addresses in full (objects may lie far apart)."""
+    triple = llvm.get_process_triple() + ("-elf" if sys.platform == "win32" else "")  # as numba has it
+    return llvm.Target.from_triple(triple).create_target_machine(
+        cpu=llvm.get_host_cpu_name(),
+        features=llvm.get_host_cpu_features().flatten(),
+        opt=3,
+        reloc="static",
+        jit=True,
+    )
+
+
+class Kernels:
+    """The kernels, ready to be called."""
+
+    def __init__(self, objects: dict[str, bytes]):
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
+        for object_file in objects.values():
+            self._engine.add_object_file(llvm.ObjectFileRef.from_data(object_file))
+        self._engine.finalize_object()
+        read, write = (self._engine.get_function_address(name) for name in ENTRIES)
+        whole = ctypes.c_int64
+        # numba's own convention: the result and what an exception would be, neither of which is used, then the arguments
+        head = (ctypes.c_int32, _POINTER, _POINTER)
+        self._read = ctypes.CFUNCTYPE(*head, _POINTER, whole, whole, whole, *([_POINTER] * 8), whole, _POINTER)(read)
+        self._write = ctypes.CFUNCTYPE(*head, whole, *([_POINTER] * 4), whole, _POINTER, whole, _POINTER)(write)
+        self._answer = np.zeros(4, np.int64)
+        self._unused = np.zeros(2, np.int64)
+        self._out: np.ndarray | None = None
+
+    def reader(self, state: np.ndarray, modes: np.ndarray, rows: int) -> LineReader:
+        return LineReader(self._read, state, modes, rows)
+
+    def written(self, rows: np.ndarray, number: int) -> Iterator[tuple[int, str]]:
+        """The text of rows (dtype MOTION), numbered from `number`, in portions: rows of it and their lines.
+
+        A portion without text is a row that Python is to write.
+        """
+        if self._out is None:
+            self._out = np.empty(_OUT, np.uint8)
+        columns = [np.ascontiguousarray(rows[name]) for name in ("kind", "digits", "n", "values")]
+        strides = [column.itemsize * (column.size // len(rows)) for column in columns]
+        starts = [column.ctypes.data for column in columns]
+        unused, answer, out = self._unused.ctypes.data, self._answer.ctypes.data, self._out.ctypes.data
+        first = 0
+        while first < len(rows):
+            places = [start + first * stride for start, stride in zip(starts, strides, strict=True)]
+            self._write(unused, unused + 8, number + first, *places, len(rows) - first, out, _OUT, answer)
+            count, size = self._answer[:2].tolist()
+            yield (count, self._out[:size].tobytes().decode("ascii")) if count else (1, "")
+            first += count or 1
+
+
+class LineReader:
+    """The reader of plain lines for one run, with room for so many rows."""
+
+    def __init__(self, read: Any, state: np.ndarray, modes: np.ndarray, rows: int):
+        self._read, self._room = read, rows
+        self._columns = [np.zeros(rows, MOTION[name]) for name in ("kind", "digits", "n", "line")]
+        self._columns.append(np.zeros((rows, 9)))
+        self._kept = (state, modes, np.zeros(18))
+        self._answer, self._unused = np.zeros(4, np.int64), np.zeros(2, np.int64)
+        places = (*self._kept, *self._columns)
+        self._places = [place.ctypes.data for place in places]
+        self._answers = self._unused.ctypes.data, self._unused.ctypes.data + 8, self._answer.ctypes.data
+
+    def __call__(self, data: np.ndarray, at: int, line: int) -> tuple[int, int, int]:
+        """Bytes and lines read, and rows written, as of `read_lines`."""
+        result, fault, answer = self._answers
+        self._read(result, fault, data.ctypes.data, len(data), at, line, *self._places, self._room, answer)
+        size, lines, rows, _ = self._answer.tolist()
+        return size, lines, rows
+
+    def rows(self, count: int) -> np.ndarray:
+        """The rows that were written, as MOTION."""
+        found = np.zeros(count, MOTION)
+        for name, column in zip(("kind", "digits", "n", "line", "values"), self._columns, strict=True):
+            found[name] = column[:count]
+        return found
+
+
+def stored_kernels() -> Kernels | None:
+    """The kernels from their object files; None where there are none."""
+    try:
+        return Kernels({name: _file(name).read_bytes() for name in ENTRIES})
+    except OSError:
+        return None
+
+
+def compile_kernels() -> Kernels | None:
+    """The kernels, compiled now and kept where that can be. None without numba."""
+    try:
+        from rds.nc.language.fast_lane_object import compiled
+    except ImportError:
+        return None
+    objects = compiled()
+    if objects is None:
+        return None
+    with suppress(OSError):
+        _keep(objects)
+    return Kernels(objects)
+
+
+def _file(name: str) -> Path:
+    return Path(__file__).parent / "__pycache__" / f"fast_lane.{_key()}.{name}.o"
+
+
+def _keep(objects: dict[str, bytes]) -> None:
+    """Each file whole or not at all; those of earlier sources are removed."""
+    folder = _file("").parent
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("fast_lane.*.o"):
+        old.unlink()
+    for name, content in objects.items():
+        new = folder / f"{name}.{os.getpid()}"
+        with open_private(new, "wb", is_own=True) as stream:
+            stream.write(content)
+        new.replace(_file(name))
+
+
+@cache
+def _key() -> str:
+    """Of everything that the machine code depends on."""
+    folder = Path(__file__).parent
+    about = f"{sys.version} {llvmlite_version} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+    digest = hashlib.sha256(about.encode())
+    for name in _SOURCES:
+        digest.update((folder / name).read_bytes())
+    return digest.hexdigest()[:16]
