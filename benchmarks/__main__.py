@@ -24,6 +24,7 @@ from benchmarks import (
     kinematics,
     live_values,
     machine,
+    motion,
     nc,
     network,
     panels,
@@ -44,6 +45,7 @@ SUBJECTS = {
     "timed-bus": "Four modules on the bus with bit timing: 1 Mbit/s, 1 kHz",
     "cia402": "CiA 402 drives at 1 Mbit/s: our cyclic loop beside the canopen library's",
     "nc": "Part programs: 200,000 lines and arcs, beside rs274 -g",
+    "motion": "Planned motion beside the least time of its path, and beside LinuxCNC's planner",
     "contour": "A circle of 10 mm under every law, on a machine with everything wrong in it",
     "live-values": "Live values and part programs in the loop",
     "identification": "A fit of tau, K, F+ and F- to 10 s at 1 kHz",
@@ -91,7 +93,7 @@ def main() -> int:
     parser.add_argument(
         "--peer-python",
         default=sys.executable,
-        help="an interpreter that has the peers (bdsim, control and rds; gcodeparser, pygcode; nbgrader)",
+        help="an interpreter that has the peers (bdsim, control and rds; gcodeparser, pygcode; nbgrader; toppra)",
     )
     parser.add_argument("--quiet-load", type=float, default=0.5, help="load average to wait for (default 0.5)")
     parser.add_argument("--patience", type=float, default=60.0, help="s to wait for it before each (default 60)")
@@ -106,6 +108,7 @@ def main() -> int:
         "timed-bus": run_timed_bus,
         "cia402": run_cia402,
         "contour": contour.run,
+        "motion": lambda: motion.run(peer_python=options.peer_python),
         "live-values": live_values.run,
         "identification": identification.run,
         "rate": rate.run,

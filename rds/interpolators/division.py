@@ -1,7 +1,10 @@
 """How many steps an arc is divided into by reference word, and how samples and steps go together.
 
-A sample is taken at every corner, and between corners at equal parts of the chord, so that the straight way from one
-sample to the next never cuts a corner: what holds for the polygon holds for the motion.
+Where the bound has room for it, samples are taken every so much along the polygon, whatever its corners: the straight
+way from one sample to the next is then inside the polygon by at most the height of a chord of that length, and the
+number of steps is the fewest, at any feed. So it is with Euler and improved Euler, whose many steps use up the bound
+outside of the circle. Else a sample is taken at every corner, and between corners at equal parts of the chord: what
+holds for the polygon then holds for the motion.
 """
 
 from __future__ import annotations
@@ -39,7 +42,8 @@ class Method:
     `formula(R)` is the step angle of the literature, rad, for a radius in BLU; `deviation(turn, n)` the largest
     distance from the circle with `n` steps, mm, not growing with n; `corners(turn, n)` finds the n - 1 corners between
     start and end, relative to the centre. Where steps differ in size, `widest(turn, n)` is the widest angle, rad.
-    `least(turn, bound)` is the smallest n within a bound (mm), where that has a closed form.
+    `least(turn, bound)` is the smallest n within a bound (mm), where that has a closed form. `inside(turn, n)` is how
+    far the polygon reaches inside of the circle, mm, where that is less than the deviation.
     """
 
     name: str
@@ -48,14 +52,19 @@ class Method:
     corners: Callable[[Turn, int], Iterator[complex]]
     widest: Callable[[Turn, int], float] = lambda turn, n: abs(turn.sweep) / n
     least: Callable[[Turn, float], int] | None = None
+    inside: Callable[[Turn, int], float] | None = None
 
 
 class Division(NamedTuple):
-    """`steps` of an arc, each walked in `samples` of equal length, or `corners` of them walked in one sample."""
+    """`steps` of an arc, each walked in `samples` of equal length, or `corners` of them walked in one sample.
+
+    `through`: samples are equally far apart along the polygon instead, and need not be at corners.
+    """
 
     steps: int
     samples: int = 1
     corners: int = 1
+    through: bool = False
 
 
 def divide(turn: Turn, way: float, blu: float, given: float, method: Method) -> Division:
@@ -71,6 +80,11 @@ def divide(turn: Turn, way: float, blu: float, given: float, method: Method) -> 
             return Division(n, samples=ceil(reach / way - _HAIR))
         return Division(n, corners=floor(way / reach + _HAIR))
     n = least_steps(turn, blu, method)
+    height = way * way / (8.0 * turn.radius)
+    if method.inside is not None and height < blu:
+        within = n if method.inside(turn, n) + height <= blu else least_steps(turn, blu - height, method)
+        if within <= _SLOWER * n:
+            return Division(within, through=True)
     reach = turn.radius * method.widest(turn, n)
     if reach < way * (1.0 - _HAIR):
         N = ceil(around / way - _HAIR)
@@ -122,9 +136,13 @@ def grown(radius: float, growth: float, angle: float, n: int) -> float:
     """
     if n == 1:
         return radius * (1.0 - cos(0.5 * angle))
+    return radius * max(growth ** (n - 1) - 1.0, 1.0 - grown_nearest(growth, angle))
+
+
+def grown_nearest(growth: float, angle: float) -> float:
+    """How near a chord from the radius 1 to `growth`, `angle` rad on, comes to the centre."""
     chord = sqrt(1.0 + growth * growth - 2.0 * growth * cos(angle))
-    nearest = growth * abs(sin(angle)) / chord if growth * cos(angle) < 1.0 else 1.0
-    return radius * max(growth ** (n - 1) - 1.0, 1.0 - nearest)
+    return growth * abs(sin(angle)) / chord if growth * cos(angle) < 1.0 else 1.0
 
 
 def check_steps(value: Any, owner: str) -> None:

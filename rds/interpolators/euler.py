@@ -14,7 +14,7 @@ import numpy as np
 
 from rds.core.types import Segment
 from rds.interpolators import reference_word
-from rds.interpolators.division import Method, Turn, grown, rotated
+from rds.interpolators.division import Method, Turn, grown, grown_nearest, rotated
 
 OPTIONS, DEFAULTS = reference_word.OPTIONS, reference_word.DEFAULTS
 
@@ -32,7 +32,12 @@ def _corners(turn: Turn, n: int) -> Iterator[complex]:
     return rotated(turn, complex(1.0, _alpha(turn, n)), n - 1)
 
 
-METHOD = Method("euler", lambda R: atan(sqrt(8.0 / R)), _deviation, _corners)
+def _inside(turn: Turn, n: int) -> float:
+    angle = turn.sweep / n
+    return turn.radius * (1.0 - grown_nearest(1.0 / cos(angle), angle)) if n > 1 else _deviation(turn, n)
+
+
+METHOD = Method("euler", lambda R: atan(sqrt(8.0 / R)), _deviation, _corners, inside=_inside)
 
 
 def interpolate(segment: Segment, T: float, params: Mapping[str, Any]) -> Iterator[tuple[np.ndarray, ...]]:

@@ -42,9 +42,13 @@ def _after(arm: complex, alpha: float, n: int) -> complex:
 
 
 def _deviation(turn: Turn, n: int) -> float:
+    return max(_outside_inside(turn, n))
+
+
+def _outside_inside(turn: Turn, n: int) -> tuple[float, float]:
     alpha, R = _alpha(turn, n), turn.radius
     if abs(alpha) > _WIDEST:
-        return inf
+        return inf, inf
     first = atan2(turn.arm.imag, turn.arm.real)
     low, high = sorted((first, first + turn.sweep))
     # sin 2θ is largest at 45° + k 180°, smallest at 135° + k 180°
@@ -53,7 +57,7 @@ def _deviation(turn: Turn, n: int) -> float:
     kept = 1.0 - 0.5 * alpha * sin(2.0 * first)
     radii = [R * sqrt(kept / (1.0 - 0.5 * alpha * sin(2.0 * angle))) for angle in (low, high, *turning)]
     inside = R - min(radii) + R * (1.0 - cos(0.5 * (1.0 + abs(alpha)) * turn.sweep / n))  # steps differ a little
-    return max(max(radii) - R, inside)
+    return max(radii) - R, inside
 
 
 def _corners(turn: Turn, n: int) -> Iterator[complex]:
@@ -64,7 +68,13 @@ def _corners(turn: Turn, n: int) -> Iterator[complex]:
         yield complex(x, y)
 
 
-METHOD = Method("improved-euler", lambda R: 4.0 / R, _deviation, _corners)
+METHOD = Method(
+    "improved-euler",
+    lambda R: 4.0 / R,
+    _deviation,
+    _corners,
+    inside=lambda turn, n: _outside_inside(turn, n)[1],
+)
 
 
 def interpolate(segment: Segment, T: float, params: Mapping[str, Any]) -> Iterator[tuple[np.ndarray, ...]]:

@@ -7,7 +7,8 @@ From corner to corner (oacs-thesis, eq. 7.35 to 7.43; dcs-thesis, eq. 3.1 and 3.
 and the methods differ in what they put for A and B, and in the step angle α that keeps the polygon within one BLU
 (basic length unit) of the circle: outside it at the corners (radial error ER), inside at the middle of the chords
 (chord height error EH). Straight lines are walked by F T in each sample (eq. 7.27), and the residual in the last (eq.
-7.29 to 7.31); the chords of an arc in equal parts of at most F T, at the velocity of eq. 7.44 and 7.45.
+7.29 to 7.31), and so is the polygon where the bound has room for the corners that this cuts; else the chords of an arc
+are walked in equal parts of at most F T, at the velocity of eq. 7.44 and 7.45.
 
 Here the number of steps is the smallest whose polygon stays within one BLU everywhere, and the steps are of one size
 (see `division.py`); the number by the formulas of the literature is `Steps.formula`.
@@ -28,6 +29,7 @@ from rds.core.types import ArcSegment, Segment
 from rds.interpolators.division import Division, Method, Turn, divide, least_steps
 from rds.interpolators.segment import Arc, checked, samples
 
+_HAIR = 1e-9
 BLU = 0.01  # mm: mrm-control, section 8.2; dcs-thesis, eq. 5.1
 OPTIONS: Mapping[str, Quantity] = {
     "blu": Quantity("basic length unit, which bounds the errors of an arc", "mm", above=0.0),
@@ -133,9 +135,12 @@ def _words(line: Segment, T: float) -> Iterator[np.ndarray]:
 
 
 def _chords(segment: ArcSegment, T: float, params: Mapping[str, Any], method: Method) -> Iterator[np.ndarray]:
-    """Points of the polygon: its corners, or every so many of them, and between them equal parts of the chords."""
+    """Points of the polygon: F T apart along it; or its corners, or every so many of them, and equal parts between."""
     arc = Arc.of(segment)
     division = _division(arc, segment, T, params, method)
+    if division.through:
+        yield from _through(segment, T, _corners(arc, segment, division, method))
+        return
     here = np.array(segment.start)
     for corner in islice(_corners(arc, segment, division, method), division.corners - 1, None, division.corners):
         for part in range(1, division.samples):
@@ -144,6 +149,20 @@ def _chords(segment: ArcSegment, T: float, params: Mapping[str, Any], method: Me
         here = corner
     if division.steps % division.corners:
         yield np.array(segment.end)
+
+
+def _through(segment: ArcSegment, T: float, corners: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
+    """Points F T apart along a polygon, and its end."""
+    here, word = np.array(segment.start), segment.feed_rate * T
+    left = word  # to the next point
+    for corner in corners:
+        ahead = float(np.linalg.norm(corner - here))
+        while ahead > left * (1.0 + _HAIR):
+            here = here + (corner - here) * (left / ahead)
+            ahead, left = ahead - left, word
+            yield here
+        here, left = corner, left - ahead
+    yield np.array(segment.end)
 
 
 def _corners(arc: Arc, segment: ArcSegment, division: Division, method: Method) -> Iterator[np.ndarray]:

@@ -22,9 +22,10 @@ from rds.nc.language.interpreter import interpret
 from rds.nc.language.parameters import read_parameters
 from rds.nc.language.reading_on import Later, faults_never_run
 from rds.nc.language.tools import Tool, read_tools
+from rds.nc.passed_over import Report
 from rds.nc.path_block import PathBlock
 from rds.nc.tool_centre import ToolCentre, has_tool_centre
-from rds.nc.toolpath import Report, raise_it, toolpath
+from rds.nc.toolpath import raise_it, toolpath
 from rds.nc.validate import Validation, Validator
 
 Item = MotionBlock | Call

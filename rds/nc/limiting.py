@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rds.interpolators.motion.least_time import LeastTime
 from rds.interpolators.motion.limits import Limits
+from rds.interpolators.motion.pieces import BEND, DISTANCE, RATIO, SLOPE, TWIST
 from rds.interpolators.motion.planner import plan
 from rds.interpolators.motion.segments import AXES
 from rds.nc.path_block import PathBlock
@@ -20,7 +22,10 @@ KINDS = ("velocity", "acceleration", "jerk")
 UNITS = ("mm/s", "mm/s²", "mm/s³")
 FEED, PATH, REST = "programmed feed", "corners and ends ahead", "at rest"
 NEAR = 0.95  # of a limit: it holds the motion back
+EVEN = 0.75  # of the even speed that a bend allows: it does so too; the planner keeps some of the jerk for ramps
+TINY = 1e-9  # of a derivative of the path: what is less asks nothing of an axis
 SAVED = 1.0  # s
+ASKED = 3  # limits
 MOST_TIMES = 16.0  # that a limit is raised to, when a second is looked for
 _ROUNDS = 10
 
@@ -28,8 +33,9 @@ _ROUNDS = 10
 @dataclass(frozen=True)
 class Limiting:
     """Of each planned sample: time (s), way along the programmed path (mm), programmed and planned speed (mm/s; nan
-    and the planned one in rapids), the highest speed that the axes allow in its direction (mm/s), its line, and what
-    holds it back (index into `causes`)."""
+    and the planned one in rapids), the highest even speed at which the axes can go along its piece of the path (mm/s),
+    its line, and what holds it back (index into `causes`). least_time: of the whole, without a limit of the jerk, s.
+    """
 
     time: np.ndarray
     way: np.ndarray
@@ -40,6 +46,7 @@ class Limiting:
     cause: np.ndarray
     causes: tuple[str, ...]
     T: float
+    least_time: float
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -63,7 +70,12 @@ class Limiting:
         every = max(len(self.time) // 20000, 1)
         way = self.way[::every]
         top.plot(
-            way, self.allowed[::every], color=GREY, linewidth=1.0, linestyle=(0, (4, 2)), label="allowed by the axes"
+            way,
+            self.allowed[::every],
+            color=GREY,
+            linewidth=1.0,
+            linestyle=(0, (4, 2)),
+            label="allowed by velocity, acceleration and jerk",
         )
         top.plot(way, self.programmed[::every], color=ORANGE, linewidth=2.0, alpha=0.6, label="programmed")
         top.plot(way, self.planned[::every], color=BLUE, linewidth=1.2, label="planned")
@@ -79,9 +91,36 @@ class Limiting:
         return shown
 
 
+class _Pieces(LeastTime):
+    """Keeps of each piece where it begins, what even speed its axes allow (programmed mm/s), and by which limit."""
+
+    def __init__(self, limits: Limits, T: float):
+        super().__init__(limits, T)
+        self._table: list[np.ndarray] = []
+        self._most = np.concatenate([getattr(limits, kind) for kind in KINDS])
+
+    def extend(self, f: np.ndarray, u: np.ndarray) -> None:
+        super().extend(f, u)
+        derivatives = np.column_stack([f[:, first : first + 6] for first in (SLOPE, BEND, TWIST)])
+        asks = np.where(derivatives > TINY, derivatives, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            speeds = np.where(asks > 0.0, (self._most / asks) ** np.repeat([1.0, 1.0 / 2.0, 1.0 / 3.0], 6), np.inf)
+        by = speeds.argmin(axis=1)
+        self._table.append(np.column_stack((f[:, DISTANCE], speeds.min(axis=1) * f[:, RATIO], by)))
+
+    def at(self, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Allowed speed and limit (6 × kind + axis) of the pieces at these places along the programmed path."""
+        if not self._table:
+            return np.full(len(way), np.nan), np.zeros(len(way), int)
+        table = np.concatenate(self._table)
+        piece = (np.searchsorted(table[:, 0], way, side="right") - 1).clip(0)
+        return table[piece, 1], table[piece, 2].astype(int)
+
+
 def limiting(blocks: Sequence[PathBlock], limits: Limits, T: float) -> Limiting:
     """Plan the motion, and tell for each sample what holds it back. All samples are kept: some 200 bytes each."""
-    samples = list(plan(blocks, limits, T, start=np.zeros(6)))
+    pieces = _Pieces(limits, T)
+    samples = list(plan(blocks, limits, T, start=np.zeros(6), least_time=pieces))
     path = np.concatenate([block.segments for block in blocks])
     position = np.concatenate([block.position for block in samples])
     segment = np.concatenate([block.segment for block in samples]).clip(0, len(path) - 1)
@@ -97,16 +136,17 @@ def limiting(blocks: Sequence[PathBlock], limits: Limits, T: float) -> Limiting:
     table = np.column_stack(shares)
     planned = np.linalg.norm(velocity[:, :3], axis=1)
     rate = np.where(path["rapid"], np.nan, path["rate"])[segment]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        most = np.where(np.abs(velocity) > 0.0, limits.velocity / np.abs(velocity), np.inf)[:, :3].min(axis=1)
-        allowed = np.where(planned > 0.0, planned * most, np.nan)
+    way = np.concatenate([block.distance for block in samples])
+    allowed, by = pieces.at(way)
     causes = (FEED, PATH, REST, *names)
-    cause = np.where(table.max(axis=1) >= NEAR, 3 + table.argmax(axis=1), 1)
+    axes = np.cumsum(limits.present) - 1
+    bend = 3 + by // 6 * int(limits.present.sum()) + axes[by % 6]
+    cause = np.where(table.max(axis=1) >= NEAR, 3 + table.argmax(axis=1), np.where(planned >= EVEN * allowed, bend, 1))
     cause = np.where(planned >= 0.98 * np.nan_to_num(rate, nan=np.inf), 0, cause)
     cause = np.where(planned == 0.0, 2, cause)
     return Limiting(
         time=np.arange(len(position)) * T,
-        way=np.concatenate([block.distance for block in samples]),
+        way=way,
         programmed=rate,
         planned=planned,
         allowed=allowed,
@@ -114,6 +154,7 @@ def limiting(blocks: Sequence[PathBlock], limits: Limits, T: float) -> Limiting:
         cause=cause,
         causes=causes,
         T=T,
+        least_time=pieces.seconds,
     )
 
 
@@ -137,18 +178,18 @@ def to_save(blocks: Sequence[PathBlock], limits: Limits, T: float, kind: str, ax
 
 
 def explained(blocks: Sequence[PathBlock], limits: Limits, T: float) -> tuple[Limiting, list[dict[str, Any]]]:
-    """What holds the motion back, and a row for each cause: seconds, lines, and for the largest limit of an axis what
-    it would have to be to save a second."""
+    """What holds the motion back, and a row for each cause: seconds, lines, and of the limits that do so for longest,
+    ASKED at most, what each would have to be to save a second, up to the first that can."""
     found = limiting(blocks, limits, T)
     rows: list[dict[str, Any]] = []
-    asked = False
+    left = ASKED
     for cause, seconds in found.seconds.items():
         row: dict[str, Any] = {"cause": cause, "seconds": seconds, "lines": found.lines_of(cause)}
         kind, _, axis = cause.partition(" of ")
-        if kind in KINDS and not asked:
-            asked = True
+        if kind in KINDS and left:
             now = float(getattr(limits, kind)[AXES.index(axis)])
             times = to_save(blocks, limits, T, kind, axis)
+            left = left - 1 if times is None else 0
             row |= {
                 "limit": now,
                 "to_save_a_second": None if times is None else times * now,

@@ -15,52 +15,17 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.interpolators.motion.segments import BLEND, EXACT_PATH, EXACT_STOP, SEGMENT
-from rds.nc.language.canon import ARC, FEED, MOTION, RATE, SPEED, Call, MotionBlock
+from rds.nc.feed_rates import FeedRates
+from rds.nc.language.canon import ARC, FEED, MOTION, SPEED, Call, MotionBlock
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import Frame, only_rotary, segments_of
+from rds.nc.passed_over import BEYOND, PassedOver, Report
 from rds.nc.path_block import DefaultFeed, Event, PathBlock
+from rds.nc.spline import CURVE_ERROR, curve
 from rds.nc.tool_centre import ToolCentre
 
 BLOCK_SEGMENTS = 65536  # a PathBlock is handed on when it has at least so many
 MODES = {"EXACT_PATH": EXACT_PATH, "EXACT_STOP": EXACT_STOP, "CONTINUOUS": BLEND}
-# Calls that say nothing to axes and spindle. A pallet shuttle (M60, M30) comes with a stop or the end.
-WITHOUT_EFFECT = {
-    "COMMENT",
-    "MESSAGE",
-    "PRINT",
-    "ON_RESET",
-    "SET_FEED_REFERENCE",
-    "START_CHANGE",
-    "PALLET_SHUTTLE",
-    "FINISH",
-    "TURN_PROBE_ON",
-    "TURN_PROBE_OFF",
-    "RELOAD_TOOLDATA",
-    "SET_TOOL_TABLE_ENTRY",
-}
-# Calls that nothing here carries out, and that spoil nothing: told once each.
-PASSED_OVER = {
-    "LOG": "(LOG, ...) writes no file here",
-    "LOGOPEN": "(LOGOPEN, ...) opens no file here",
-    "LOGAPPEND": "(LOGAPPEND, ...) opens no file here",
-    "LOGCLOSE": "(LOGCLOSE) closes no file here",
-    "WAIT": "M66 waits for no input here, and #5399 keeps its value",
-    "ENABLE_ADAPTIVE_FEED": "there is no adaptive feed here",
-    "DISABLE_ADAPTIVE_FEED": "there is no adaptive feed here",
-    "ENABLE_FEED_HOLD": "the operator's feed hold works all the same",
-    "DISABLE_FEED_HOLD": "the operator's feed hold works all the same",
-}
-# Each by the call that switches it on again. Cycles and threads do both within a line, which needs no word.
-OVERRIDES_OFF = {"ENABLE_FEED_OVERRIDE": "DISABLE_FEED_OVERRIDE", "ENABLE_SPEED_OVERRIDE": "DISABLE_SPEED_OVERRIDE"}
-# Why no machine here does what a call wants, and what to write instead.
-BEYOND = {
-    "ORIENT_SPINDLE": "the spindle here cannot stop at an angle (M19, G87); leave it out, or bore with G85 or G86",
-    "RIGID_TAP": "the axes here do not follow the spindle back (G33.1); tap with G84, or cut the thread with G33",
-}
-CURVE_ERROR = 0.001  # mm: a spline becomes chords that are no further from it
-MOST_CHORDS = 4096  # of one spline
-
-Report = Callable[[ProgramError], None]
 
 
 def raise_it(fault: ProgramError) -> NoReturn:
@@ -101,35 +66,6 @@ def toolpath(
     yield from converter.ready()
 
 
-def curve(points: np.ndarray, order: int, error: float) -> np.ndarray:
-    """Places (n, 2) on a NURBS with control points (n, 3: x, y, weight), whose chords are within `error` of it.
-
-    Its knots are evenly spaced and `order`-fold at both ends (LinuxCNC's), evaluated by de Boor's recurrence.
-    """
-    count = len(points)
-    knots = np.concatenate([np.zeros(order - 1), np.arange(count - order + 2), np.full(order - 1, count - order + 1.0)])
-    weighted = np.column_stack([points[:, :2] * points[:, 2:], points[:, 2]])
-    chords = 8 * (count - order + 1)
-    while True:
-        where = np.linspace(0.0, count - order + 1.0, 2 * chords + 1)
-        found = _de_boor(weighted, knots, order, where)
-        middles = 0.5 * (found[:-2:2] + found[2::2])
-        if np.hypot(*(found[1::2] - middles).T).max() <= error or chords >= MOST_CHORDS:
-            return found[::2]
-        chords *= 2
-
-
-def _de_boor(weighted: np.ndarray, knots: np.ndarray, order: int, where: np.ndarray) -> np.ndarray:
-    spans = np.clip(np.searchsorted(knots, where, side="right") - 1, order - 1, len(weighted) - 1)
-    found = weighted[spans[:, None] + np.arange(1 - order, 1)]
-    for level in range(1, order):
-        for j in range(order - 1, level - 1, -1):
-            low = knots[spans + 1 - order + j]
-            part = ((where - low) / (knots[spans + 1 + j - level] - low))[:, None]
-            found[:, j] = (1.0 - part) * found[:, j - 1] + part * found[:, j]
-    return found[:, -1, :2] / found[:, -1, 2:]
-
-
 class _Converter:
     """Gathers rows while nothing changes that matters to them, then makes segments of them at once."""
 
@@ -142,14 +78,9 @@ class _Converter:
         tool_centre: ToolCentre | InputError | None,
     ):
         self._report, self._warn = report, warn
-        self._default_feed, self._assume = default_feed, assume
-        self._assumed = False
+        self._feeds, self._passed_over = FeedRates(report, assume, default_feed), PassedOver(warn)
         self._frame = Frame()
         self._mode, self._tolerance, self._collinear = BLEND, inf, 0.0
-        self._per_revolution = False
-        self._pitch = 0.0  # of a thread being cut, program units per turn; 0: none
-        self._told: set[str] = set()  # names of calls that were passed over, and told
-        self._off: dict[str, tuple[str, int]] = {}  # where overrides were locked that are so still
         self._speed = 0.0  # rev/min, as last said
         self._turning = 0  # +1 clockwise, −1 counter-clockwise
         self._stood = False  # has been told to turn at no speed
@@ -158,8 +89,6 @@ class _Converter:
         self._tool_centre, self._for_tip = tool_centre, False
         if isinstance(tool_centre, ToolCentre):
             self._position = tool_centre.joints_meant(self._joints)
-        self._rate = (0.0, 0.0)  # program units/min (per revolution) and mm/min
-        self._rate_line = 0
         self._file = ""
         self._rows: list[np.ndarray] = []
         self._segments: list[np.ndarray] = []
@@ -185,15 +114,14 @@ class _Converter:
     def end(self) -> None:
         """A program without M2 or M30 ends with its last line."""
         self._convert()
-        for name in tuple(self._off):
-            self._override_was_off(name)
+        self._passed_over.end()
         if not self._ended:
             self._event("end", 0.0, self._last_line)
         self.flush()
 
     def take(self, block: MotionBlock) -> None:
         self._in_file(block.file)
-        if self._per_revolution or self._pitch:  # the feed hangs on the speed
+        if self._feeds.by_speed:
             for rows in np.split(block.rows, np.flatnonzero(block.rows["kind"] == SPEED)):
                 self._convert()
                 self._rows += [rows] if len(rows) else []
@@ -207,16 +135,7 @@ class _Converter:
         if call.file:
             self._in_file(call.file)
         self._last_line = call.line or self._last_line
-        if call.name in WITHOUT_EFFECT:
-            return
-        if call.name in OVERRIDES_OFF.values():
-            self._off.setdefault(call.name, (call.file or self._file, call.line))
-            return
-        if call.name in OVERRIDES_OFF:
-            self._override_was_off(OVERRIDES_OFF[call.name], call.line)
-            return
-        if call.name in PASSED_OVER:
-            self._pass_over(call.name, PASSED_OVER[call.name], call.file or self._file, call.line)
+        if self._passed_over.take(call, call.file or self._file):
             return
         self._convert()
         action = _ACTIONS.get(call.name)
@@ -226,26 +145,12 @@ class _Converter:
         else:
             action(self, call)
 
-    def _override_was_off(self, name: str, until: int | None = None) -> None:
-        """Tell of an override that the program locked, unless a cycle did so within the line `until`."""
-        file, line = self._off.pop(name, ("", until))
-        if line != until:
-            self._pass_over(
-                "override", "M49, M50 P0 and M51 P0 lock no override of the operator's here", file, line or 0
-            )
-
-    def _pass_over(self, key: str, why: str, file: str, line: int) -> None:
-        if key not in self._told:
-            self._told.add(key)
-            said = f"{why}; leave it out, or run the program where it is done"
-            self._warn(ProgramError(said, file=file, line=line))
-
     def _in_file(self, name: str) -> None:
         if name != self._file:
             self._convert()
             self._hand_on()
             self._file = name
-            self._rate_line = 0
+            self._feeds.forget_line()
 
     def _fault(self, call: Call, message: str) -> None:
         self._report(ProgramError(message, file=call.file or self._file, line=call.line))
@@ -271,7 +176,7 @@ class _Converter:
         given = rows[speeds]
         if len(speeds):
             self._speed = float(given["values"][-1, 0])
-        rates, angular, rate_lines = self._rates(rows)
+        rates, angular, rate_lines = self._feeds.of(rows, self._frame.unit, self._speed * abs(self._turning))
         moves = np.flatnonzero(rows["kind"] <= ARC)
         rows, rates, angular, rate_lines = rows[moves], rates[moves], angular[moves], rate_lines[moves]
         if not len(rows):
@@ -292,14 +197,7 @@ class _Converter:
                 )
             )
         moving = segments["length"] > 0.0
-        still = ~segments["rapid"] & ~(segments["rate"] > 0.0)
-        if self._default_feed is not None and not self._per_revolution and still.any():
-            self._take_default(self._default_feed, segments, still)
-            rate_lines = np.where(still, np.int32(0), rate_lines)  # no word F gave it
-            still &= ~(segments["rate"] > 0.0)
-        still &= moving
-        if still.any():
-            self._no_feed(int(segments["line"][np.argmax(still)]))
+        rate_lines = self._feeds.complete(segments, rate_lines, self._file, self._turning, self._speed)
         segments, rate_lines, moves = segments[moving], rate_lines[moving], moves[moving]
         centre = self._tool_centre
         if len(segments) and isinstance(centre, ToolCentre) and (self._for_tip or centre.correct):
@@ -314,42 +212,6 @@ class _Converter:
 
     def _complain(self, line: int, message: str) -> None:
         self._report(ProgramError(message, file=self._file, line=line))
-
-    def _take_default(self, feed: DefaultFeed, segments: np.ndarray, still: np.ndarray) -> None:
-        rotary = only_rotary(segments[still]) & ((segments["length"][still] > 0.0) | (feed.linear == 0.0))
-        segments["rate"][still] = np.where(rotary, feed.rotary, feed.linear) / 60.0
-        if not self._assumed:
-            self._assumed = True
-            value, unit = (feed.rotary, "degrees/min") if rotary[0] else (feed.linear, "mm/min")
-            message = (
-                f"no feed rate is set before this move: the default feed of {feed.machine}, {value:g} {unit}, is "
-                "assumed (option default-feed)"
-            )
-            line = int(segments["line"][np.argmax(still)])
-            self._assume(ProgramError(message, file=self._file, line=line))
-
-    def _no_feed(self, line: int) -> None:
-        if self._per_revolution and not self._turning:
-            message = "a feed per revolution (G95) while the spindle stands still moves nothing; start it (S, M3)"
-        elif self._per_revolution and not self._speed:
-            message = "a feed per revolution (G95) at S0 moves nothing; give a spindle speed before"
-        else:
-            message = "the move has no feed rate; give one (F) in this line or before it"
-        self._report(ProgramError(message, file=self._file, line=line))
-
-    def _rates(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each row: mm/s, degrees/s for moves of rotary axes alone, and the line of its word F."""
-        given = rows["kind"] == RATE
-        last = np.maximum.accumulate(np.where(given, np.arange(1, len(rows) + 1), 0))  # 0: from before
-        plain = np.concatenate(([self._rate[0]], rows["values"][:, 0]))[last]
-        linear = np.concatenate(([self._rate[1]], rows["values"][:, 0] * self._frame.unit))[last]
-        lines = np.concatenate(([self._rate_line], rows["line"])).astype(np.int32)[last]
-        self._rate, self._rate_line = (float(plain[-1]), float(linear[-1])), int(lines[-1])
-        if self._pitch:
-            plain, linear = np.full(len(rows), self._pitch), np.full(len(rows), self._pitch * self._frame.unit)
-        turning = self._per_revolution or self._pitch
-        scale = (self._speed * abs(self._turning) if turning else 1.0) / 60.0
-        return linear * scale, plain * scale, lines
 
     # what single calls do
 
@@ -396,13 +258,13 @@ class _Converter:
         self._collinear = float(call.args[0]) * self._frame.unit
 
     def _feed_mode(self, call: Call) -> None:
-        self._per_revolution = bool(call.args[-1])
+        self._feeds.per_revolution = bool(call.args[-1])
 
     def _synchronize(self, call: Call) -> None:
-        self._pitch = float(call.args[0])
+        self._feeds.pitch = float(call.args[0])
 
     def _end_synchronizing(self, call: Call) -> None:
-        self._pitch = 0.0
+        self._feeds.pitch = 0.0
 
     def _rows_of(self, call: Call, ends: np.ndarray) -> None:
         """Moves by feed to places in program coordinates (one row each, X Y Z A B C)."""

@@ -151,4 +151,16 @@ def test_euler_walks_many_steps_in_a_sample() -> None:
     taken = method.steps(quadrant, 0.01)
     rows = method.rows(quadrant, 0.01)
     assert taken is not None and taken.within and len(rows) == 158
-    assert taken.count % 158 == 0 and taken.count >= 1234  # π² R / 8, R = 1000 BLU
+    assert taken.count == taken.least == 1234  # π² R / 8, R = 1000 BLU
+
+
+@pytest.mark.parametrize(("name", "count"), [("euler", 1234), ("improved-euler", 394)])
+@pytest.mark.parametrize("feed", [0.5, 10.0, 16.7, 80.0])
+def test_the_steps_of_euler_do_not_depend_on_the_feed(name: str, count: int, feed: float) -> None:
+    quadrant = ArcSegment((10.0, 0.0), (0.0, 10.0), (0.0, 0.0), feed)
+    method = library_interpolator(name)
+    taken, rows = method.steps(quadrant, 0.01), method.rows(quadrant, 0.01)
+    assert taken is not None and (taken.count, taken.least, taken.within) == (count, count, True)
+    ways = np.linalg.norm(np.diff(np.vstack([quadrant.start, rows[:, 0]]), axis=0), axis=1)
+    assert ways.max() <= feed * 0.01 * (1 + 1e-6)
+    assert np.median(ways) == pytest.approx(feed * 0.01, rel=1e-3)

@@ -14,7 +14,8 @@ from rds.nc.language.canon import ARC, FEED, RATE, TRAVERSE, Call, MotionBlock
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.interpreter import interpret
-from rds.nc.toolpath import CURVE_ERROR, curve, toolpath
+from rds.nc.spline import CURVE_ERROR, curve
+from rds.nc.toolpath import toolpath
 
 Moves = list[tuple[int, tuple[float, float, float]]]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import TOLERANCE
 from rds.interpolators.motion.samples import SampleBlock
 from rds.interpolators.motion.segments import AXES
+
+if TYPE_CHECKING:
+    from rds.interpolators.motion.least_time import LeastTime
 
 KINDS = ("velocity", "acceleration", "jerk")
 EXCESS = 1e-6  # by which a limit may be exceeded, relative
@@ -65,6 +68,7 @@ class Certificate:
     limits: Limits
     tolerance: float = TOLERANCE
     promised: tuple[str, ...] = (*KINDS, "deviation")  # other kinds are measured, and no violations
+    least_time: LeastTime | None = None  # of a planned motion: what is given to `plan` as well
     samples: int = 0
     T: float = 0.0
     count: int = 0  # violations
@@ -92,6 +96,15 @@ class Certificate:
     def time(self) -> float:
         """s: samples times their period."""
         return self.samples * self.T
+
+    @property
+    def ratio(self) -> float | None:
+        """How many times the least time that the path takes without a limit of the jerk; None where that is not known.
+
+        Of the time from the first sample, at rest, to the last.
+        """
+        least = 0.0 if self.least_time is None else self.least_time.seconds
+        return (self.samples - 1) * self.T / least if least > 0.0 else None
 
     def add(self, block: SampleBlock) -> None:
         """The next samples."""
@@ -206,6 +219,8 @@ class Certificate:
             "deviation": vars(self.worst.get(("deviation", ""), Worst())).copy(),
             "violations": [vars(violation).copy() for violation in self.violations],
             "violation_count": self.count,
+            "least_time": None if self.least_time is None else self.least_time.seconds,
+            "times_least_time": self.ratio,
         }
 
     def sentence(self) -> str:
@@ -228,7 +243,13 @@ class Certificate:
                 share, axis, line = self._most(kind)
                 others.append(f"{kind} ({100.0 * share:.0f} % of the limit: {axis} in line {line})")
         others += [] if "deviation" in self.promised else [f"the path ({off})"]
-        return f"{said} Not promised: {', '.join(others)}." if others else said
+        said = f"{said} Not promised: {', '.join(others)}." if others else said
+        if (ratio := self.ratio) is None or self.least_time is None:
+            return said
+        return (
+            f"{said} It takes {ratio:.3f} times the {self.least_time.seconds:.3f} s that velocity and acceleration "
+            "alone allow along this path."
+        )
 
     def _most(self, kind: str) -> tuple[float, str, int]:
         """The largest share of a kind's limit, its axis and line."""

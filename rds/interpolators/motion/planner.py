@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from math import ceil, inf
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from rds.interpolators.motion.checking import check_segments
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.samples import Rows, SampleBlock
 from rds.interpolators.motion.segments import SEGMENT
+
+if TYPE_CHECKING:
+    from rds.interpolators.motion.least_time import LeastTime
 
 TOLERANCE = 0.05  # mm (degrees), of G64 without P; chosen
 LONGEST_RAMP = 1000.0  # s, acceleration over jerk of an axis, over which the motion is averaged
@@ -29,6 +32,7 @@ def plan(
     *,
     tolerance: float = TOLERANCE,
     start: np.ndarray | None = None,
+    least_time: LeastTime | None = None,
 ) -> Iterator[SampleBlock]:
     """The samples of a program's motion, T s apart, in bounded memory; the same for the same segments.
 
@@ -36,6 +40,7 @@ def plan(
     `line`: what happens after segment `after` of the block, −1 before the first). The motion comes to rest for each
     event but coolant and outputs, and stays there for the `value` s of a "dwell". tolerance: mm or degrees, of mode
     BLEND without one. start: where the axes are if events come before motion (6); default the first segment's start.
+    least_time: is shown the path, and knows at the end how long it takes at the least.
 
     Each finite difference of the samples keeps to the velocity, acceleration and jerk of each axis; the speed along the
     path to the programmed rate. On exact paths all samples are on the path, and the motion slows down where direction
@@ -46,11 +51,13 @@ def plan(
     """
     if not T > 0.0:
         raise InputError(f"sample period T = {T!r} must be more than 0 s")
-    planner = _Planner(limits, T, tolerance, start)
+    planner = _Planner(limits, T, tolerance, start, least_time)
     for block in blocks:
         planner.take(getattr(block, "segments", block), getattr(block, "events", ()))
         yield from planner.run(final=False)
     yield from planner.run(final=True)
+    if least_time is not None:
+        least_time.finish()
 
 
 def predicted_time(blocks: Iterable[SampleBlock]) -> float:
@@ -62,7 +69,7 @@ def predicted_time(blocks: Iterable[SampleBlock]) -> float:
 
 
 class _Planner:
-    def __init__(self, limits: Limits, T: float, tolerance: float, start: np.ndarray | None):
+    def __init__(self, limits: Limits, T: float, tolerance: float, start: np.ndarray | None, least: LeastTime | None):
         from rds.interpolators.motion.stretch import Stretch  # numba, where it is installed
 
         self.limits, self.T, self.tolerance = limits, T, tolerance
@@ -76,6 +83,7 @@ class _Planner:
                 "raise the jerk of [axis.NAME.limits], or lower the acceleration"
             )
         self.stretch = Stretch(self.within, self.tau, T)
+        self.least_time = least
         self.state = np.array([0.0, 0.0, float(limits.velocity.max())])
         self.point = None if start is None else np.array(start, dtype=float)
         self.new = np.empty(0, SEGMENT)  # not yet handed to `build`, or not done with
@@ -161,6 +169,8 @@ class _Planner:
         )
         u[:, 1:3] += first
         self.stretch.extend(f, u)
+        if self.least_time is not None:
+            self.least_time.extend(f, u)
         self.new = new[done:]
 
     def _add(self, position, velocity, acceleration, distance, first, last) -> None:
@@ -185,6 +195,8 @@ class _Planner:
             _, event = self.events.pop(0)
             self.out.events.append((self.out.total - 1, event))
             rows = ceil(event.value / self.T - 1e-9) if event.kind == "dwell" else 0
+            if self.least_time is not None:
+                self.least_time.rest(rows * self.T)
             while rows > 0:
                 part = min(rows, 16384)
                 self._stay(part, position)

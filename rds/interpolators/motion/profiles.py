@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.samples import SampleBlock
 from rds.interpolators.motion.segments import JOINTS
 
+if TYPE_CHECKING:
+    from rds.interpolators.motion.least_time import LeastTime
+
 
 class Profile(NamedTuple):
     """`promised`: which kinds of limits its samples keep; `about`: what it does, for people."""
@@ -21,9 +24,9 @@ class Profile(NamedTuple):
     about: str
 
 
-BLENDED = "blended"
+PLANNED, BLENDED = "planned", "blended"
 PROFILES = {
-    "planned": Profile(
+    PLANNED: Profile(
         ("velocity", "acceleration", "jerk", "deviation"), "look-ahead and blending within G64's tolerance"
     ),
     "trapezoid": Profile(("velocity", "acceleration", "deviation"), "constant accelerations, at rest after each move"),
@@ -47,17 +50,25 @@ def motion_of(
         raise InputError(f"profile {profile!r} is not one of {', '.join(PROFILES)}")
     if not T > 0.0:
         raise InputError(f"sample period T = {T!r} must be more than 0 s")
-    certificate = Certificate(limits, promised=PROFILES[profile].promised)
-    return certified(_samples(profile, blocks, limits, T, start), certificate), certificate
+    from rds.interpolators.motion.least_time import LeastTime  # numba, where it is installed
+
+    least_time = LeastTime(limits, T) if profile == PLANNED else None
+    certificate = Certificate(limits, promised=PROFILES[profile].promised, least_time=least_time)
+    return certified(_samples(profile, blocks, limits, T, start, least_time), certificate), certificate
 
 
 def _samples(
-    profile: str, blocks: Iterable[Any], limits: Limits, T: float, start: np.ndarray | None
+    profile: str,
+    blocks: Iterable[Any],
+    limits: Limits,
+    T: float,
+    start: np.ndarray | None,
+    least_time: LeastTime | None,
 ) -> Iterator[SampleBlock]:
-    if profile == "planned":
+    if profile == PLANNED:
         from rds.interpolators.motion.planner import plan
 
-        return plan(blocks, limits, T, start=start)
+        return plan(blocks, limits, T, start=start, least_time=least_time)
     blocks = _of_joints(blocks, profile)
     if profile == BLENDED:
         from rds.interpolators.motion.blended_path import blended_path
