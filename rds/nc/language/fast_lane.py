@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from rds.nc.language.fast_lane_native import Kernels, LineReader
     from rds.nc.language.source import Source
 
-# Loading the kernels takes the time of some thousand lines in Python, and compiling them that of a million: each is done
-# for programs that are certain to be long, and for others (of unknown length, or with loops) once they have turned out to be.
+# Loading the kernels takes the time of some thousand lines in Python, and compiling them that of a million: each is
+# done for programs that are certain to be long, and for others (of unknown length, or with loops) once they have turned
+# out to be.
 WORTH_LOADING = 1 << 17  # bytes
 OPENS_AFTER = 5_000  # lines
 LONG_PROGRAM = 1 << 21  # bytes; worth compiling

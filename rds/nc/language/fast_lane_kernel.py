@@ -179,8 +179,8 @@ def read_lines(data, at, end, line, state, modes, words, target, kinds, digits, 
 
     `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes`
     the active motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both
-    are left as the last line that was read leaves them. `words` (12) and `target` (6) are room to work in. The other arrays, one element or row per row of MOTION, are
-    filled. Returns bytes and lines read, and rows written.
+    are left as the last line that was read leaves them. `words` (12) and `target` (6) are room to work in. The other
+    arrays, one element or row per row of MOTION, are filled. Returns bytes and lines read, and rows written.
     """
     begin, first_line, row, room = at, line, 0, len(kinds) - 2
     absolute, arc_absolute, plane, inches = modes[1], modes[2], modes[3], modes[4]

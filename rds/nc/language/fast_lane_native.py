@@ -54,7 +54,7 @@ class Kernels:
         self._engine.finalize_object()
         read, write = (self._engine.get_function_address(name) for name in ENTRIES)
         whole = ctypes.c_int64
-        # numba's own convention: the result and what an exception would be, neither of which is used, then the arguments
+        # numba's convention: the result and what an exception would be (neither is used), then the arguments
         head = (ctypes.c_int32, _POINTER, _POINTER)
         self._read = ctypes.CFUNCTYPE(*head, _POINTER, whole, whole, whole, *([_POINTER] * 8), whole, _POINTER)(read)
         self._write = ctypes.CFUNCTYPE(*head, whole, *([_POINTER] * 4), whole, _POINTER, whole, _POINTER)(write)

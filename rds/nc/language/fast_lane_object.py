@@ -1,8 +1,9 @@
-"""The kernels of the fast lane as an object file, compiled by numba once. Importing this needs numba, and takes long."""
+"""The kernels of the fast lane as object files, compiled by numba once. Importing this needs numba, and is slow."""
 
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from llvmlite import binding as llvm
 from numba import carray, njit, types
@@ -68,7 +69,8 @@ def compiled() -> dict[str, bytes] | None:
     machine = target_machine()
     found = {}
     for name, (function, arguments) in _ENTRIES.items():
-        plain = njit(types.int64(*arguments), error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        options: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        plain: Any = njit(types.int64(*arguments), **options)
         overload = plain(function).overloads[arguments]
         text = _NO_DESTRUCTOR.sub(r"define \1 { ret void }", overload.library.get_llvm_str())
         if not all(_FROM_OUTSIDE.fullmatch(symbol.strip('"')) for symbol in _DECLARED.findall(text)):

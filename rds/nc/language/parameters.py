@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,6 +104,17 @@ class Parameters:
             names[name] = value
         self._numbered.clear()
         self._named.clear()
+
+    def settle_now(self, settings: Iterable[tuple[int | str, float]]) -> None:
+        """Do settings at once, each index or declared name with its value."""
+        for key, value in settings:
+            if isinstance(key, str):
+                names = self.globals if key[:1] == "_" else self.locals[-1]
+                self.changes += names[key] != value
+                names[key] = value
+            else:
+                self.changes += self.numbers[key] != value
+                self.numbers[key] = value
 
     def snapshot(self) -> tuple[list[float], dict[str, float], list[dict[str, float]]]:
         """What all parameters are, to compare later."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rds.nc.language.blocks import Block
+from rds.nc.language.blocks import AXIS_SET, MOTION, Block
 from rds.nc.language.compiled_values import FAULTS, Compiler, Refused, names_of
 from rds.nc.language.owords import FANUC, GLOBAL, KIND, TESTS, Word, spelled
 from rds.nc.language.parameters import ARGUMENTS, Parameters
@@ -18,6 +18,9 @@ from rds.nc.language.words import OTHERS, line_number, read_plain
 _OFTEN = 3  # executions after which a line is worth being taken apart
 _MOST = 20_000  # lines kept at once
 _WHOLE = frozenset("hlt")  # words that are whole
+_NOTHING = Word()
+_SIMPLE = frozenset("xyzabcf")
+_STRAIGHT: tuple[dict[int, int], ...] = ({}, {MOTION: 0}, {MOTION: 10})
 _KINDS = TESTS | frozenset(
     ("sub", "call", "endsub", "return", "do", "endwhile", "endrepeat", "break", "continue", "else", "endif")
 )
@@ -26,7 +29,10 @@ _KINDS = TESTS | frozenset(
 class Line:
     """A kept line: its text as tidy() gives it, and the digits, number and end of its word N."""
 
-    __slots__ = ("code", "comment", "digits", "g", "m", "n", "places", "plain", "text", "word")
+    __slots__ = (
+        *("axes", "code", "comment", "digits", "g", "m", "motion", "n", "places", "plain", "ready", "scope", "simple"),
+        *("text", "word"),
+    )
 
     def __init__(self, text: str):
         self.text = text
@@ -37,6 +43,11 @@ class Line:
         self.places: dict[str, int] = {}
         self.plain = read_plain(text) is not None  # a line that the fast lane may take
         self.word: Word | None = None  # the O word that the line is
+        self.ready, self.scope = Word(), ""  # that word with its name in a subroutine (the scope)
+        self.simple = (
+            False  # nothing but settings, F, and a straight move (its G word, or -1, and its axis words, if any)
+        )
+        self.motion, self.axes = -1, False
         self.code: Callable[..., Any] | None = None
 
 
@@ -79,15 +90,29 @@ class RepeatedLines:
             parameters.set_later(name, value)
         return block
 
+    def values(self, line: Line) -> tuple[dict[str, float], tuple[tuple[int | str, float], ...]] | None:
+        """The words of a simple line and its settings; None where the reader says what is wrong."""
+        parameters = self._parameters
+        try:
+            assert line.code is not None
+            found: tuple[dict[str, float], tuple[tuple[int | str, float], ...]]
+            found = line.code(parameters.numbers, parameters.locals[-1], parameters.globals)
+        except FAULTS:
+            return None
+        return found
+
     def control(self, line: Line, scope: str, skipping: str) -> Word | None:
         """The O word that a line is now; None where the reader is to say what is wrong."""
         kept, parameters = line.word, self._parameters
         assert kept is not None
-        name = kept.name if kept.kind in GLOBAL else f"{scope}#{kept.name}"
-        word = Word(kept.kind, name, kept.spelled, kept.at)
+        word = line.ready
+        if not word.kind or line.scope != scope:
+            name = kept.name if kept.kind in GLOBAL else f"{scope}#{kept.name}"
+            word = line.ready = Word(kept.kind, name, kept.spelled, kept.at)
+            line.scope = scope
         if skipping and kept.kind == "call":
-            word.kind = ""
-        elif line.code is not None and skipping in ("", name):
+            return _NOTHING
+        elif line.code is not None and skipping in ("", word.name):
             try:
                 values = line.code(parameters.numbers, parameters.locals[-1], parameters.globals)
             except FAULTS:
@@ -181,6 +206,9 @@ class RepeatedLines:
             else:
                 raise Refused
         line.g, line.m = template.g, template.m
+        line.motion, line.axes = line.g.get(MOTION, -1), not AXIS_SET.isdisjoint(template.words)
+        simple = line.g in _STRAIGHT and not line.m and not line.comment and template.words.keys() <= _SIMPLE
+        line.simple = simple and (line.axes or line.motion == -1)
         steps.append(f"return {{{', '.join(words)}}}, ({''.join(f'({name}, {value}), ' for name, value in settings)})")
         return "\n ".join(["def line(n, l, q):", *steps])
 

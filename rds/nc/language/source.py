@@ -25,6 +25,9 @@ class Place(NamedTuple):
     column: int
 
 
+_KNOWN_MOST = 20_000  # blocks remembered
+
+
 class Source:
     """Blocks of a program as bytes: a line each, or with `semicolons` up to the next `;` outside of comments.
 
@@ -55,6 +58,7 @@ class Source:
         self._semicolons = semicolons
         self._ended = False
         self._fresh = True  # nothing has been read
+        self._known: dict[int, tuple[bytes, Place]] = {}  # by their place: blocks read again, and what follows them
 
     def size(self) -> int:
         """Bytes of the whole program; 0 when that is not known before it is read."""
@@ -91,6 +95,21 @@ class Source:
             self._base += len(codecs.BOM_UTF8)
             self._next = Place(self._base, 1, 0)
         return text
+
+    def read_again(self) -> bytes:
+        """As `read`, for a program whose blocks are read many times: those that have been are remembered."""
+        place = self._next
+        known = self._known.get(place.offset)
+        if known is not None and self.at + len(known[0]) <= len(self.buffer):
+            self.place = place
+            self.line, self.column = place.line, place.column
+            raw, self._next = known
+            self.at += len(raw)
+            return raw
+        raw = self.read()
+        if len(self._known) < _KNOWN_MOST and raw[-1:] == b"\n":
+            self._known[place.offset] = raw, self._next
+        return raw
 
     def read(self) -> bytes:
         """The next block, with the line break that ends it; b"" at the end."""
