@@ -39,6 +39,7 @@ number = 2
 shape = "drill"
 diameter = 3.0
 feed = 120
+spindle = 3000
 """
 SVG = """\
 <svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"

@@ -10,6 +10,8 @@ from rds.nc.language.words import line_number, tidy
 
 _COMMENTS = re.compile(r"\([^()]*\)|;.*", re.DOTALL)
 _SUB = re.compile(r"o(?:<[^>]*>|[0-9]+)(sub|endsub)")
+_PROGRAM = re.compile(r"o[0-9]+")  # a subprogram, which M98 calls, up to its M99
+_RETURN = re.compile(r"m0*99(?![0-9.])")
 
 
 class LeftOver:
@@ -36,6 +38,10 @@ class LeftOver:
         match = _SUB.match(text)
         if match:
             self._defining = match[1] == "sub"
+        elif _PROGRAM.fullmatch(text):
+            self._defining = True
+        elif self._defining and _RETURN.search(text):
+            self._defining = False
         elif text not in ("", "%") and not self._defining:
             self.line = line
 

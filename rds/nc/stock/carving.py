@@ -42,7 +42,8 @@ def carve(field, x0, y0, cell, floor, points, owner, rapid, radius, profile, cut
     `floor` the tip went, and how deep shank and holder went into the material (mm).
 
     The depth is the mean over the cells that one step cuts, where these are more than a few: at the walls single cells
-    are left by one pass and cut by the next.
+    are left by one pass and cut by the next. Of a tool with a point, and straight down, it is that under the tip, from
+    where the material was before the move.
     """
     rows, columns = field.shape
     area = cell * cell
@@ -50,6 +51,8 @@ def carve(field, x0, y0, cell, floor, points, owner, rapid, radius, profile, cut
     scale = fine / (radius * radius) if radius > 0.0 else 0.0
     many = max(3, int(0.5 * radius / cell))
     since = 0
+    pointed = profile[fine] > profile[0]
+    before, seen = np.empty((rows, columns)), np.full((rows, columns), -1, np.int64)
     x, y, z = points[0, 0], points[0, 1], points[0, 2]
     for k in range(n):
         dx, dy, dz = points[k, 0] - x, points[k, 1] - y, points[k, 2] - z
@@ -80,6 +83,8 @@ def carve(field, x0, y0, cell, floor, points, owner, rapid, radius, profile, cut
                     bottom = pz + profile[m] + (at - m) * (profile[m + 1] - profile[m])
                     above = field[i, j] - bottom
                     if above > 0.0:
+                        if seen[i, j] != who:
+                            seen[i, j], before[i, j] = who, field[i, j]
                         volume += above
                         count += 1
                         field[i, j] = bottom
@@ -87,6 +92,10 @@ def carve(field, x0, y0, cell, floor, points, owner, rapid, radius, profile, cut
                 found[who, VOLUME] += volume * area
                 if rapid[k]:
                     found[who, RAPID] += volume * area
+                i, j = int(np.floor((py - y0) / cell)), int(np.floor((px - x0) / cell))
+                inside = 0 <= i < rows and 0 <= j < columns
+                if (pointed or (dx == 0.0 and dy == 0.0)) and inside and seen[i, j] == who:
+                    found[who, DEPTH] = max(found[who, DEPTH], before[i, j] - pz)
                 if pz < floor:
                     found[who, BELOW] = max(found[who, BELOW], floor - pz)
                 if count > many:

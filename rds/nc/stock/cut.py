@@ -26,11 +26,12 @@ class CutFault:
     """Something that a cut must not do: its line of the program, what, and how much (mm, or mm³ in rapids)."""
 
     line: int
-    kind: str  # "rapid", "table", "shank", "holder"
+    kind: str  # "spindle", "rapid", "table", "shank", "holder"
     value: float
 
     def __str__(self) -> str:
         said = {
+            "spindle": f"the spindle stands still, and the tool takes {self.value:.3g} mm³; start it before (S, M3)",
             "rapid": f"a rapid move goes through material and takes {self.value:.3g} mm³; lift the tool before it",
             "table": f"the tool cuts {self.value:.3g} mm below the stock, into what is under it; cut less deep",
             "shank": f"material is {self.value:.3g} mm above the cutting edges; cut in passes, or take a longer tool",
@@ -151,6 +152,9 @@ class Carving:
             k = int(np.argmax(rate))
             if rate[k] > load.rate:
                 load.rate, load.rate_line = float(rate[k]), int(line[k])
+            if spindle is not None:
+                for row in np.flatnonzero(cutting & (spindle == 0.0)).tolist():
+                    self._fault(int(line[row]), "spindle", float(volume[row]))
             turns = cutting if spindle is None else cutting & (spindle > 0.0)
             if spindle is not None and turns.any():
                 per_tooth = 60.0 * float((speed[turns] / spindle[turns]).max()) / tool.flutes
