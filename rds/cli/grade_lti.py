@@ -18,8 +18,10 @@ def lti(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this computer; 0: any free one.")] = 8378,
     title: Annotated[str, typer.Option(help="Heading of the page.")] = "Hand in your file",
 ) -> None:
-    """Let students hand in from their course by LTI 1.3, until Ctrl-C; `rds grade export --to lti` gives the "
-    "points back."""
+    """Let students hand in from their course by LTI 1.3, until Ctrl-C.
+
+    `rds grade export --to lti` sends the points back.
+    """
     with refusals():
         from rds.grading.lti.tool import Tool, serve
 

@@ -28,7 +28,7 @@ def measure(
     ] = None,
     dialect: Annotated[str | None, typer.Option(help="What the modules speak; by default rds.")] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Write the delays as a trace for [network], FILE.csv.")
+        Path | None, typer.Option("--out", "-o", help="Write the delays as a trace for \\[network], FILE.csv.")
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Write histograms and the host's load as a PNG.")] = None,
     json: Json = False,

@@ -253,7 +253,7 @@ def _read(file: Path) -> bytes:
     if not file.exists():
         raise InputError("there is no such file; check the name and the folder", where)
     if not file.is_file():
-        kind = "a directory" if file.is_dir() else "not a regular file"
+        kind = "a folder" if file.is_dir() else "not a regular file"
         raise InputError(f"it is {kind}; name the Python file in which the functions are", where)
     if file.suffix == ".ipynb":
         raise InputError("it is a notebook; save the cells that define the functions as a .py file", where)

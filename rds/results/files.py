@@ -75,7 +75,7 @@ def read_saved(path: str | Path, make: Callable[..., Made]) -> Made:
         if path.name == _RECORD:
             return make(*from_record(path.parent))
         if not path.exists():
-            raise InputError("there is no such file; give a saved result (.parquet, .csv, .mat) or its directory")
+            raise InputError("there is no such file; give a saved result (.parquet, .csv, .mat) or its folder")
         columns, header = _format(path).read(path)
         return make(*(from_table(columns) if header is None else assemble(columns, header)))
     except InputError as error:

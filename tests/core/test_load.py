@@ -108,7 +108,7 @@ def test_what_is_wrong_is_said_with_its_place(write, text, parts):
 
 def test_a_missing_file_a_folder_and_a_notebook_are_refused(tmp_path, write):
     assert "no such file" in failure(tmp_path / "none.py")
-    assert "a directory" in failure(tmp_path)
+    assert "a folder" in failure(tmp_path)
     assert "notebook" in failure(write("{}", "mine.ipynb"))
 
 

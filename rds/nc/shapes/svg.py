@@ -184,7 +184,7 @@ def _transform(text: str, name: str) -> Matrix:
         try:
             matrix = _times(matrix, _one_transform(kind, v))
         except (ValueError, IndexError):
-            raise InputError(f"transform {kind}({inner}) has numbers too few", name) from None
+            raise InputError(f"transform {kind}({inner}) has too few numbers", name) from None
     return matrix
 
 
