@@ -103,7 +103,7 @@ def _show_friction(found: FrictionCurve) -> None:
         for name, told in of_way.items()
     ]
     show_table("Friction", ["direction", "", "value", "std error", "unit"], numbers)
-    for sentence in found.untold:
+    for sentence in found.unidentifiable:
         typer.echo(f"- not told: {sentence}")
 
 

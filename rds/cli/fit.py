@@ -204,7 +204,7 @@ def _show(estimate: Estimate, validation: Validation | None) -> None:
     show_table(f"{described(estimate)} by {estimate.method}, from {logs}", *parameter_rows(estimate))
     show_table("On the data that were fitted", *error_rows(estimate), note(estimate))
     show_table("Correlation of the estimates", *correlation_rows(estimate))
-    for sentence in (*estimate.warnings, *estimate.untold):
+    for sentence in (*estimate.warnings, *estimate.unidentifiable):
         typer.echo(f"- {sentence}")
     if validation is not None:
         share = round(100 * (1 - FITTED_SHARE))

@@ -88,7 +88,8 @@ def run(
     ] = None,
     profile: ProfileName = "planned",
     cut: Annotated[
-        Path | None, typer.Option(help="A file of the cut and its \\[limits]: the feed is lowered so that they are kept.")
+        Path | None,
+        typer.Option(help="The cut and its \\[limits] (TOML): the feed is lowered so that they are kept."),
     ] = None,
     method: Annotated[
         str | None,

@@ -17,7 +17,7 @@ def robustness(
     runs: Annotated[int, typer.Option("--runs", "-n", help="How many draws.")] = 1000,
     seed: Annotated[int, typer.Option(help="Of the draws: the same seed gives the same ones.")] = 0,
     model: Annotated[Path | None, typer.Option(help="A model file instead of the experiment's \\[model].")] = None,
-    ranges: Annotated[Path | None, typer.Option(help="TOML file of \\[AXIS] tables: PARAMETER = \\[low, high].")] = None,
+    ranges: Annotated[Path | None, typer.Option(help="TOML of \\[AXIS] tables: PARAMETER = \\[low, high].")] = None,
     level: Annotated[float, typer.Option(help="Of the confidence region that is drawn from.")] = 0.95,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Local processes; default: all.")] = None,
     scheduler: cluster_options.Address = None,

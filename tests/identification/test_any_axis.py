@@ -155,8 +155,8 @@ def test_one_speed_is_said_to_hold_friction() -> None:
     units = {"position": "mm/s", "command": "N"}
     data = Log("steady", t, np.full(len(t), 2.0), np.full(len(t), 10.0), units=units, resolution=1e-3)
     found = fit([data], structure("axis-mass", ("per-direction",)), None, {"fixed": {"M": 1.0}})
-    assert sum("no row of the data holds it" in s for s in found.untold) == 2  # of those backward
-    assert any(s.startswith("F_v_plus and F_c_plus come only together") for s in found.untold)
+    assert sum("no row of the data holds it" in s for s in found.unidentifiable) == 2  # of those backward
+    assert any(s.startswith("F_v_plus and F_c_plus come only together") for s in found.unidentifiable)
     assert found.unusable()
     with pytest.raises(InputError, match="gain and friction come only together: the motion is at one speed"):
         fit([data], structure("axis"), "inverse-dynamics", {"fixed": {"tau": 0.01}})
@@ -190,17 +190,22 @@ def test_a_friction_curve_from_runs_at_constant_speed() -> None:
         assert {name: told.value for name, told in numbers.items()} == pytest.approx(truth, rel=0.05)
         assert numbers["F_v"].unit == "N·s/m" and all(told.std_error > 0.0 for told in numbers.values())
     assert found.at(np.array([-10.0]), "backward") == pytest.approx([-10.0], rel=0.02)
-    assert "inertia" in found.untold[0] and any("below 0.5 mm/s" in sentence for sentence in found.untold)
+    assert "inertia" in found.unidentifiable[0] and any(
+        "below 0.5 mm/s" in sentence for sentence in found.unidentifiable
+    )
 
 
 def test_what_a_friction_curve_cannot_tell() -> None:
     fast = friction_curve([steady([20.0, 25.0, 30.0, 36.0, 44.0, 53.0, 65.0], noise=0.05)])
     assert set(fast.directions["forward"]) == {"F_c", "F_v"}
     assert (
-        any("on a line as well" in s for s in fast.untold) and "friction backward: no run goes that way" in fast.untold
+        any("on a line as well" in s for s in fast.unidentifiable)
+        and "friction backward: no run goes that way" in fast.unidentifiable
     )
     one = friction_curve([steady([20.0])])
-    assert set(one.directions["forward"]) == {"F_c"} and any("viscous friction: all runs" in s for s in one.untold)
+    assert set(one.directions["forward"]) == {"F_c"} and any(
+        "viscous friction: all runs" in s for s in one.unidentifiable
+    )
     t = np.arange(4000) * T
     with pytest.raises(InputError, match="no stretch keeps its speed"):
         friction_curve([Log("sine", t, np.sin(6 * t), 10 * np.sin(9 * t), units={"position": "mm/s"})])

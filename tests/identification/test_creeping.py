@@ -40,7 +40,7 @@ def test_intervals_hold_or_are_refused(kind: str) -> None:
                 told += 1
                 inside.append(parameter.low <= truth <= parameter.high)
             else:
-                assert any(name in sentence for sentence in found.untold)
+                assert any(name in sentence for sentence in found.unidentifiable)
     assert told >= 2 and all(inside)
 
 

@@ -49,7 +49,7 @@ def test_json_holds_what_is_promised_and_the_model_file_the_same(tmp_path: Path)
     code, out, _ = run(log, "--structure", "axis", "--json", "-o", tmp_path / "x.toml")
     said = json.loads(out)
     assert code == 0
-    promised = {"parameters", "fit_percent", "rmse", "relative_error_percent", "warnings", "untold", "ahead"}
+    promised = {"parameters", "fit_percent", "rmse", "relative_error_percent", "warnings", "unidentifiable", "ahead"}
     assert promised <= set(said)
     for name, value in X.items():
         p = said["parameters"][name]

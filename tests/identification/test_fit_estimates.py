@@ -39,7 +39,7 @@ def test_60_logs_of_a_slow_sine_all_settle_and_their_intervals_contain_the_truth
         values = mini_cnc("XYZ"[number % 3])
         noise = 0.002 * np.random.default_rng(number).standard_normal(len(t))
         found = fit([Log("sine", t, u, structure.respond(t, u, (0.0, 0.0), values) + noise)], structure)
-        assert not found.untold and all("told together" in warning for warning in found.warnings), number
+        assert not found.unidentifiable and all("told together" in warning for warning in found.warnings), number
         inside += [found.parameters[name].low <= value <= found.parameters[name].high for name, value in values.items()]
     assert 0.90 <= np.mean(inside) <= 0.99
 
@@ -113,7 +113,7 @@ def test_viscous_friction_is_held_unless_another_parameter_is() -> None:
     log = axis_log(values, options=("viscous",))
     alone = fit([log], make(("viscous",)))
     assert alone.parameters["viscous"].value == 0.0
-    assert "ratios to 1 + viscous" in alone.untold[0]
+    assert "ratios to 1 + viscous" in alone.unidentifiable[0]
     assert alone.parameters["K"].value == pytest.approx(values["K"] / 1.2, rel=1e-3)
     beside = fit([log], make(("viscous",)), options={"fixed": {"K": values["K"]}})
     assert beside.parameters["viscous"].value == pytest.approx(0.2, abs=5 * beside.parameters["viscous"].std_error)

@@ -19,7 +19,7 @@ X = mini_cnc("X")
 
 def said(log: Log, **options: object) -> str:
     found = fit([log], make(), options=options)
-    return "\n".join((*found.untold, *found.warnings))
+    return "\n".join((*found.unidentifiable, *found.warnings))
 
 
 def forward(u: np.ndarray) -> Log:
@@ -86,7 +86,10 @@ def test_a_direction_that_never_occurs_is_not_told() -> None:
     t = np.arange(5000) * 0.001
     log = forward(2.5 + np.sin(9.0 * t) + np.sin(23.0 * t))
     found = fit([log], make())
-    assert "friction_minus changes nothing" in found.untold[0] and "never moves backward" in found.untold[0]
+    assert (
+        "friction_minus has no effect" in found.unidentifiable[0]
+        and "never moves backward" in found.unidentifiable[0]
+    )
     assert np.isinf(found.parameters["friction_minus"].std_error)
     assert found.parameters["K"].value == pytest.approx(X["K"], rel=0.01)
     assert found.to_json()["parameters"]["friction_minus"]["std_error"] is None
@@ -125,7 +128,9 @@ def test_little_motion_is_said() -> None:
 
 def test_a_constant_voltage_tells_only_a_combination_of_gain_and_friction() -> None:
     found = fit([forward(np.full(4000, 3.0))], make())
-    assert any(s.startswith("K and friction_plus cannot be told apart") for s in found.untold), found.untold
+    assert any(s.startswith("K and friction_plus cannot be told apart") for s in found.unidentifiable), (
+        found.unidentifiable
+    )
     assert np.isinf(found.parameters["K"].std_error)
 
 

@@ -28,7 +28,7 @@ def test_an_interval_wider_than_its_value_and_a_value_at_a_bound_are_marked() ->
     marked = replace(estimate, parameters=parameters, details={"at_bound": ["friction_minus"]})
     _, rows = parameter_rows(marked)
     shown = {row[0]: row[1] for row in rows}
-    assert shown["friction_plus"] == "(0.5, hardly told)" and shown["friction_minus"].endswith("at its bound)")
+    assert shown["friction_plus"] == "(0.5, poorly determined)" and shown["friction_minus"].endswith("at its bound)")
     assert shown["K"].startswith("1.76") and estimate.details["at_bound"] == [] and not estimate.unusable()
 
 

@@ -73,7 +73,7 @@ def test_an_axis_that_keeps_one_way_comes_back_and_its_intervals_hold() -> None:
         assert sum(inside) >= 34, name  # of 40; 95 % claimed
         assert np.mean([e.values()[name] for e in found]) == pytest.approx(value, rel=0.003)
     assert found[0].parameters["friction_minus"].std_error == np.inf
-    assert found[0].untold[0].startswith("friction_minus")
+    assert found[0].unidentifiable[0].startswith("friction_minus")
     assert found[0].details["misfit"] == pytest.approx(1.0, abs=0.4)
 
 

@@ -23,7 +23,7 @@ from rds.identification.validate.report import _parameters
 from rds.identification.validate.validate import validate
 from tests.identification.fit_logs import mini_cnc
 
-SAID = "not told by the data that were fitted: friction_minus = "
+SAID = "not determined by the data that were fitted: friction_minus = "
 
 
 def forward(seed: int, low: float) -> Log:
@@ -43,14 +43,17 @@ def estimate() -> Estimate:
 def test_the_fit_says_it(estimate: Estimate) -> None:
     assert guesses(estimate.parameters) == ["friction_minus"]
     (said,) = [sentence for sentence in estimate.warnings if sentence.startswith(SAID)]
-    assert said.endswith("; its value is a guess") and not estimate.unusable()
+    assert said.endswith("; its value is assumed") and not estimate.unusable()
     rows = {row[0]: row for row in parameter_rows(estimate)[1]}
-    assert "a guess" in rows["friction_minus"][1] and rows["friction_minus"][2:4] == ["–", "not told by these data"]
-    assert "not told by these data" in fragment(estimate) and "inf" not in fragment(estimate)
+    assert "assumed" in rows["friction_minus"][1] and rows["friction_minus"][2:4] == [
+        "–",
+        "not determined by these data",
+    ]
+    assert "not determined by these data" in fragment(estimate) and "inf" not in fragment(estimate)
     parameters = estimate.to_json()["parameters"]
     assert isinstance(parameters["friction_minus"]["value"], float)
     assert all(parameters["friction_minus"][key] is None for key in ("std_error", "low", "high"))
-    assert "a guess" not in rows["K"][1] and parameters["K"]["std_error"] > 0.0
+    assert "assumed" not in rows["K"][1] and parameters["K"]["std_error"] > 0.0
 
 
 def test_a_held_parameter_has_no_interval_of_no_width() -> None:
@@ -88,4 +91,4 @@ def test_validation_says_it_of_a_model_that_holds_otherwise(estimate: Estimate) 
     assert "Do not take its friction_minus for the axis's own" in found.verdict.sentence
     assert any(reason.kind == "guess" and SAID in reason.what for reason in found.verdict.reasons)
     page = _parameters(found)
-    assert "friction_minus (a guess: not told by the fit" in page and "K (a guess" not in page
+    assert "friction_minus (assumed: not determined by the fit" in page and "K (assumed" not in page

@@ -150,7 +150,7 @@ def test_several_logs_are_one_regression() -> None:
 def test_an_axis_that_only_moves_forward_says_so() -> None:
     command = 3.0 + stairs(volts=1.5)
     estimate = fit([simulated(command)], structure("axis"), "inverse-dynamics")
-    assert any(sentence.startswith("friction_minus") for sentence in estimate.untold)
+    assert any(sentence.startswith("friction_minus") for sentence in estimate.unidentifiable)
     assert estimate.parameters["friction_minus"].std_error == np.inf
 
 

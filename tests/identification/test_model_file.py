@@ -31,7 +31,7 @@ def estimate(values: tuple[float, ...] = (0.01, 1.7, 0.5, -0.2), structure: str 
             for name, value, unit in zip(names, values, units, strict=True)
         },
         covariance=np.diag([1e-6] * 4) + 1e-8,
-        untold=("friction_plus and friction_minus: no reversal",),
+        unidentifiable=("friction_plus and friction_minus: no reversal",),
         initial_state={LOG["name"]: (0.0, 1.25)},
         free_run={LOG["name"]: errors},
         ahead={LOG["name"]: {1: errors, 10: errors}},
@@ -46,7 +46,7 @@ def test_what_was_written_is_read_back(tmp_path: Path) -> None:
     assert (read.structure, read.options, read.method) == ("axis", (), "simulation")
     assert read.parameters == given.parameters
     assert np.array_equal(read.covariance, given.covariance)
-    assert (read.warnings, read.untold) == (given.warnings, given.untold)
+    assert (read.warnings, read.unidentifiable) == (given.warnings, given.unidentifiable)
     assert read.logs[0]["ahead"] == given.ahead[LOG["name"]]
     assert read.logs[0]["free_run"] == given.free_run[LOG["name"]]
     assert read.logs[0]["initial_state"] == (0.0, 1.25) and read.logs[0]["command"] == (-4.0, 4.0)

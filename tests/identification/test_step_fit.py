@@ -115,7 +115,7 @@ def test_one_voltage_each_way_tells_no_gain() -> None:
 
 def test_steps_to_one_speed_forward_tell_no_friction_backward() -> None:
     estimate = fit([axis_log(2, [0.0, 2.0, 0.0, 3.0, 0.0, 4.0])], structure("axis"), "step")
-    assert estimate.untold == ("friction_minus: no step ends in motion backward",)
+    assert estimate.unidentifiable == ("friction_minus: no step ends in motion backward",)
     assert estimate.parameters["friction_minus"].std_error == np.inf
     assert estimate.values()["K"] == pytest.approx(1.764, rel=0.005)
 

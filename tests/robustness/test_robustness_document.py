@@ -43,7 +43,7 @@ def test_files_commands_and_code_in_their_order(tmp_path: Path, monkeypatch: pyt
 
 def test_the_keys_of_a_model_file_are_there(tmp_path: Path) -> None:
     save(BLOCKS, tmp_path)
-    assert read_model(tmp_path / "fitted.toml").untold == ()
+    assert read_model(tmp_path / "fitted.toml").unidentifiable == ()
     of_file = {"path", "sha256", "text", "covariance", "parameters"}  # what is not a key, or has an entry of its own
     assert {field.name for field in fields(ModelFile)} - of_file <= NAMED
     assert {"parameters.NAME", "covariance", "free_run", "ahead", "initial_state", "command", "velocity"} <= NAMED

@@ -135,7 +135,7 @@ class TestWhoseFault:
         silent = int((timing.io >= MS).sum())
         judgement = judge(timing, MS, **counts, missing=silent + 1, silent=silent)
         assert judgement.verdict == Verdict.VOID
-        assert "a module of the machine was silent (" in judgement.reason
+        assert "a module of the machine did not answer in time (" in judgement.reason
         assert judgement.evidence == f"the loop waited for a silent module in {silent} periods"
         slow, counts = ran(compute=2.0, io=io, samples=len(io), discard=discard)
         silent = int((slow.io >= MS).sum())

@@ -27,7 +27,7 @@ class Parameter:
 
     @property
     def told(self) -> bool:
-        """Whether the data tell it; if not, its value is a guess."""
+        """Whether the data tell it; if not, its value is assumed."""
         return not isinf(self.std_error)
 
     @property
@@ -46,8 +46,8 @@ def said_of_guesses(parameters: Mapping[str, Parameter]) -> list[str]:
     said = [f"{name} = {parameters[name].value:.3g} {parameters[name].unit}".rstrip() for name in guesses(parameters)]
     if not said:
         return []
-    which = "its value is a guess" if len(said) == 1 else "their values are guesses"
-    return [f"not told by the data that were fitted: {', '.join(said)}; {which}"]
+    which = "its value is assumed" if len(said) == 1 else "their values are assumed"
+    return [f"not determined by the data that were fitted: {', '.join(said)}; {which}"]
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Estimate:
     method: str  # simulation, inverse-dynamics, step, frequency
     parameters: Mapping[str, Parameter]
     covariance: np.ndarray
-    untold: tuple[str, ...]  # sentences: parameters (or combinations) that these data cannot tell
+    unidentifiable: tuple[str, ...]  # sentences: parameters (or combinations) that these data cannot tell
     initial_state: Mapping[str, tuple[float, ...]]  # per log, estimated
     free_run: Mapping[str, Errors]  # per log
     ahead: Mapping[str, Mapping[int, Errors]]  # per log and number of steps predicted ahead

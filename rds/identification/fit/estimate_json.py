@@ -26,7 +26,7 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
             "correlation": dict(
                 zip(names, (dict(zip(names, row, strict=True)) for row in estimate.correlation.tolist()), strict=True)
             ),
-            "untold": list(estimate.untold),
+            "unidentifiable": list(estimate.unidentifiable),
             "fit_percent": fit,
             "rmse": rmse,
             "unit": _unit(estimate),
@@ -63,13 +63,13 @@ def parameter_rows(estimate: Estimate) -> tuple[list[str], Rows]:
 def _shown(p: Parameter, at_bound: bool = False) -> tuple[str, str, str]:
     """Value, standard error and interval; of what the data do not tell few digits, and that it is no estimate."""
     if not p.told:
-        return f"({p.value:.2g}, a guess)", "–", "not told by these data"
+        return f"({p.value:.2g}, assumed)", "–", "not determined by these data"
     if p.std_error == 0.0:
         return f"{p.value:.6g}", "–", "held"
     if at_bound:
-        return f"({p.value:.2g}, at its bound)", "–", "not told by these data"
+        return f"({p.value:.2g}, at its bound)", "–", "not determined by these data"
     if p.wide:
-        return f"({p.value:.2g}, hardly told)", f"{p.std_error:.2g}", f"{p.low:.2g} to {p.high:.2g}"
+        return f"({p.value:.2g}, poorly determined)", f"{p.std_error:.2g}", f"{p.low:.2g} to {p.high:.2g}"
     return f"{p.value:.6g}", f"{p.std_error:.2g}", f"{p.low:.6g} to {p.high:.6g}"
 
 

@@ -92,7 +92,7 @@ def _page(estimate: Estimate, pictures: Sequence[_Drawn]) -> str:
 
 def fragment(estimate: Estimate) -> str:
     """The estimate as HTML without a page around it, for a notebook or another report; all text is escaped."""
-    doubts = [*estimate.untold, *estimate.warnings]
+    doubts = [*estimate.unidentifiable, *estimate.warnings]
     parts = [
         f'<p class="about">Method: {escape(estimate.method)}; {len(estimate.logs)} '
         f"{'log' if len(estimate.logs) == 1 else 'logs'}.</p>",

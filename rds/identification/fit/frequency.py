@@ -73,9 +73,9 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     full = np.zeros((len(order), len(order)))
     places = [order.index(name) for name in names]
     full[np.ix_(places, places)] = covariance
-    untold: list[str] = []
+    unidentifiable: list[str] = []
     if not is_rate:
-        untold = _friction(logs, values, full, order)
+        unidentifiable = _friction(logs, values, full, order)
     lines = sum(len(response.frequency) for response in responses)
     return made_estimate(
         structure,
@@ -84,7 +84,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         values,
         full,
         max(2 * lines - len(names), 1),
-        untold=untold,
+        unidentifiable=unidentifiable,
         warnings=_warnings(logs, responses, values, chi, is_rate),
         judged=is_rate or all(map(_direction, logs)),  # without the friction of a reversing axis, no free run is right
         details={
@@ -135,7 +135,7 @@ def _fit(
 
 def _friction(logs: Sequence[Log], values: dict[str, float], covariance: np.ndarray, order: Sequence[str]) -> list[str]:
     """Fill in friction where the mean velocity tells it, else zero with no end of error; sentences on the latter."""
-    untold = []
+    unidentifiable = []
     for name, way in (("friction_plus", 1.0), ("friction_minus", -1.0)):
         at, gain = order.index(name), order.index("K")
         one_way = [_steady(log, values["tau"]) for log in logs if _direction(log) == way]
@@ -143,14 +143,16 @@ def _friction(logs: Sequence[Log], values: dict[str, float], covariance: np.ndar
         covariance[at, at] = np.inf
         if not one_way:
             where = "forward" if way > 0 else "backward"
-            untold.append(f"{name}: a frequency response tells no friction, but where the axis moves {where} all along")
+            unidentifiable.append(
+                f"{name}: a frequency response tells no friction, but where the axis moves {where} all along"
+            )
             continue
         voltage, speed = (float(np.mean(np.concatenate([pair[i] for pair in one_way]))) for i in (0, 1))
         friction = values["K"] * voltage - speed
         values[name] = way * max(way * friction, 0.0)
         covariance[at, :] = covariance[:, at] = voltage * covariance[gain, :]
         covariance[at, at] = voltage**2 * covariance[gain, gain]
-    return untold
+    return unidentifiable
 
 
 def _steady(log: Log, tau: float) -> tuple[np.ndarray, np.ndarray]:

@@ -60,7 +60,7 @@ class FrictionCurve:
 
     points: tuple[SteadyPoint, ...]
     directions: Mapping[str, Mapping[str, Told]]
-    untold: tuple[str, ...]
+    unidentifiable: tuple[str, ...]
     speed_unit: str
     force_unit: str
     per_si: float = 1.0  # of the speed's unit in that of F_v
@@ -80,7 +80,7 @@ class FrictionCurve:
             "directions": {
                 way: {name: asdict(told) for name, told in numbers.items()} for way, numbers in self.directions.items()
             },
-            "untold": list(self.untold),
+            "unidentifiable": list(self.unidentifiable),
             "speed_unit": self.speed_unit,
             "force_unit": self.force_unit,
         }
@@ -102,21 +102,23 @@ def friction_curve(logs: Sequence[Log]) -> FrictionCurve:
             "no stretch keeps its speed; log runs at constant speed, each for a while, at several speeds both ways",
             ", ".join(log.name for log in logs),
         )
-    untold = ["inertia, time constant and delay: at constant speed nothing accelerates"]
+    unidentifiable = ["inertia, time constant and delay: at constant speed nothing accelerates"]
     directions: dict[str, Mapping[str, Told]] = {}
     for way, name in ((1.0, "forward"), (-1.0, "backward")):
         of_way = [point for point in points if way * point.speed > 0.0]
         if not of_way:
-            untold.append(f"friction {name}: no run goes that way")
+            unidentifiable.append(f"friction {name}: no run goes that way")
             continue
         directions[name], said = _fitted(of_way, way, speed_unit, force_unit, output)
-        untold += [f"{name}: {sentence}" for sentence in said]
+        unidentifiable += [f"{name}: {sentence}" for sentence in said]
     if force_unit == command and command not in ("N", "Nm"):
         key = "torque_gain" if output in ROTARY else "force_gain"
-        untold.append(f"forces: all is in {command}; state {key} in the map for N or Nm")
+        unidentifiable.append(f"forces: all is in {command}; state {key} in the map for N or Nm")
     if len(directions) == 2:
-        untold.append("whether what differs by direction is friction, or gravity or an offset of the drive")
-    return FrictionCurve(points, directions, tuple(untold), speed_unit, force_unit, _viscous(output, force_unit)[0])
+        unidentifiable.append("whether what differs by direction is friction, or gravity or an offset of the drive")
+    return FrictionCurve(
+        points, directions, tuple(unidentifiable), speed_unit, force_unit, _viscous(output, force_unit)[0]
+    )
 
 
 def _steady(log: Log, gain: float) -> list[SteadyPoint]:

@@ -89,9 +89,9 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     places = [order.index(name) for name in names]
     covariance[np.ix_(places, places)] = found.covariance
     open_ended = [name for name in names if not np.isfinite(found.covariance[names.index(name), names.index(name)])]
-    untold = [f"{name}: no row of the data holds it (the axis never moves that way)" for name in found.absent]
+    unidentifiable = [f"{name}: no row of the data holds it (the axis never moves that way)" for name in found.absent]
     if together := [name for name in open_ended if name not in found.absent]:
-        untold.append(
+        unidentifiable.append(
             f"{' and '.join(together)} come only together: the motion is the same at all times, or at one speed each "
             "way, so the data cannot tell them apart; log other speeds, or hold one of them (--fix)"
         )
@@ -103,7 +103,7 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         {**found.values, **given},
         covariance,
         freedom,
-        untold=untold,
+        unidentifiable=unidentifiable,
         warnings=_warnings(found),
         relative_error_percent=regression.relative_percent,
         details={
@@ -147,7 +147,7 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
     regression, held = _with_signs(table[:, 1:], table[:, 0], lengths, form, fixed)
     theta = regression.values
     if form.gain is not None and theta[form.gain] == 0.0:
-        alone = not table[:, 1 + form.gain].any() or form.gain not in regression.untold
+        alone = not table[:, 1 + form.gain].any() or form.gain not in regression.unidentifiable
         why = (
             f"the velocity is nowhere in the {form.target}: there is no gain to estimate"
             if alone
@@ -298,12 +298,12 @@ def _with_signs(
         return found, held
     part = A[:, kept]
     hidden = np.isinf(np.diag(found.covariance))
-    untold = (part[:, hidden] != 0.0).any(axis=1)
+    unidentifiable = (part[:, hidden] != 0.0).any(axis=1)
     covariance = part @ np.where(np.isfinite(found.covariance), found.covariance, 0.0) @ part.T
-    covariance[untold, :] = covariance[:, untold] = 0.0
-    covariance[untold, untold] = np.inf
+    covariance[unidentifiable, :] = covariance[:, unidentifiable] = 0.0
+    covariance[unidentifiable, unidentifiable] = np.inf
     ordinary = np.sqrt((part**2) @ np.where(np.isfinite(found.ordinary), found.ordinary, 0.0) ** 2)
-    ordinary[untold] = np.inf
+    ordinary[unidentifiable] = np.inf
     size = float(np.linalg.norm(y))
     return (
         replace(
@@ -311,7 +311,7 @@ def _with_signs(
             values=theta,
             covariance=covariance,
             ordinary=ordinary,
-            untold=tuple(np.flatnonzero(untold).tolist()),
+            unidentifiable=tuple(np.flatnonzero(unidentifiable).tolist()),
             relative_percent=100.0 * float(np.linalg.norm(found.residual)) / size if size > 0.0 else np.inf,
         ),
         held,

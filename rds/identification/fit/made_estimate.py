@@ -37,7 +37,7 @@ def made_estimate(
     covariance: np.ndarray,
     freedom: float,
     *,
-    untold: Sequence[str] = (),
+    unidentifiable: Sequence[str] = (),
     warnings: Sequence[str] = (),
     relative_error_percent: float | None = None,
     details: Mapping[str, Any] | None = None,
@@ -56,7 +56,7 @@ def made_estimate(
     width = t_quantile(freedom)
     errors = np.sqrt(np.diag(covariance))
     parameters = {}
-    notes = list(untold)
+    notes = list(unidentifiable)
     for (name, value), error in zip(values.items(), errors.tolist(), strict=True):
         _check_bounds(structure, name, value, method)
         reach = 0.0 if name in given else width * error
@@ -65,7 +65,8 @@ def made_estimate(
         if not known and structure.bounds(name)[0] == 0.0 and np.isfinite(error) and error > _UNTOLD * abs(value):
             unit = structure.units[name]
             notes.append(
-                f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is hardly told by these data"
+                f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is poorly determined by these "
+                "data"
             )
     begun, free_run, predictions = {}, {}, {}
     said = [
@@ -101,7 +102,7 @@ def made_estimate(
         method=method,
         parameters=parameters,
         covariance=covariance,
-        untold=tuple(notes),
+        unidentifiable=tuple(notes),
         initial_state=begun,
         free_run=free_run,
         ahead=predictions,

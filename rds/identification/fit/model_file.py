@@ -53,7 +53,7 @@ class ModelFile:
     method: str = ""
     logs: tuple[Mapping[str, Any], ...] = ()  # as in the file: name, source, sha256, first, end, command, ...
     warnings: tuple[str, ...] = ()
-    untold: tuple[str, ...] = ()
+    unidentifiable: tuple[str, ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
     structure_sha256: str = ""  # of the student's file
     path: str = ""
@@ -116,7 +116,7 @@ def model_text(estimate: Estimate, path: Path) -> str:
         "options": list(estimate.options),
         "method": estimate.method,
         "warnings": list(estimate.warnings),
-        "untold": list(estimate.untold),
+        "unidentifiable": list(estimate.unidentifiable),
         "parameters": {
             name: {"value": p.value, "unit": p.unit, "std_error": p.std_error, "low": p.low, "high": p.high}
             for name, p in estimate.parameters.items()
@@ -193,7 +193,7 @@ MODEL_FILE = Table(
         "command_unit": Text("unit of what commands it", "V"),
         "method": Text("how it was fitted", ""),
         "warnings": Items("what was noticed", Text("sentence"), "a list of texts"),
-        "untold": Items("parameters that the data do not determine", Text("name"), "a list of texts"),
+        "unidentifiable": Items("parameters that the data do not determine", Text("name"), "a list of texts"),
         "parameters": Table("parameters by name", others=_PARAMETER),
         "covariance": Table(
             "covariance of the parameters",
@@ -241,7 +241,7 @@ def read_model(path: str | Path) -> ModelFile:
         method=words.read("method"),
         logs=logs,
         warnings=_texts(words, "warnings"),
-        untold=_texts(words, "untold"),
+        unidentifiable=_texts(words, "unidentifiable"),
         versions={name: versions.read(name) for name in versions.table} if versions else {},
         structure_sha256=sha256,
         path=str(path),

@@ -19,7 +19,7 @@ _LONGEST = 0.1  # of the rows: the longest lag
 
 @dataclass(frozen=True)
 class Regression:
-    """Coefficients in the order of the columns; those in `untold` have no information and infinite error."""
+    """Coefficients in the order of the columns; those in `unidentifiable` have no information and infinite error."""
 
     values: np.ndarray
     covariance: np.ndarray
@@ -28,7 +28,7 @@ class Regression:
     condition: float  # of the scaled columns
     autocorrelation: float  # of the residual at one row's distance
     lag: int  # rows over which the correlation was counted
-    untold: tuple[int, ...]
+    unidentifiable: tuple[int, ...]
     relative_percent: float  # 100 |y - X θ| / |y|
 
 
@@ -61,7 +61,7 @@ def regress(X: np.ndarray, y: np.ndarray, lengths: Sequence[int]) -> Regression:
         condition=float(size[0] / size[-1]) if size[-1] > 0.0 else float("inf"),
         autocorrelation=correlation,
         lag=lag,
-        untold=tuple(int(i) for i in np.flatnonzero(hidden)),
+        unidentifiable=tuple(int(i) for i in np.flatnonzero(hidden)),
         relative_percent=100.0 * float(np.linalg.norm(residual)) / size_y if size_y > 0.0 else float("inf"),
     )
 

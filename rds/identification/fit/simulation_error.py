@@ -28,7 +28,7 @@ from rds.identification.fit.smoothing import encoder_step
 from rds.identification.fit.solve import EVALUATIONS, first_state
 from rds.identification.fit.suspicions import suspicions
 from rds.identification.fit.uncertainty import Uncertainty, uncertainty_of
-from rds.identification.fit.unidentifiable import untold_by
+from rds.identification.fit.unidentifiable import unidentifiable_by
 from rds.identification.logs.log import Log
 from rds.identification.structures import SIMULATION_ERROR
 from rds.identification.structures.structure import Start, Structure
@@ -85,12 +85,12 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
         values,
         covariance,
         uncertainty.effective - problem.size,
-        untold=[
+        unidentifiable=[
             *(sentence for name, (_, sentence) in held.items()),
-            *untold_by(structure, problem.names, values, uncertainty, found.unmoved),
+            *unidentifiable_by(structure, problem.names, values, uncertainty, found.unmoved),
             *(
                 f"{name}: {values[name]:.4g} {structure.units[name]}".rstrip()
-                + " is a guess; values far from it explain these data as well, the other parameters with them"
+                + " is assumed; values far from it explain these data as well, the other parameters with them"
                 for name in open_ended
             ),
         ],

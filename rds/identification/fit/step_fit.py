@@ -51,8 +51,8 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     is_rate = structure.name == "spindle"
     windows = [(log, window) for log in logs for window in find_windows(log, is_rate)]
     _check_windows(logs, windows, is_rate)
-    untold = [] if is_rate else _missing(windows)
-    names = [name for name in structure.parameters if name not in untold]
+    unidentifiable = [] if is_rate else _missing(windows)
+    names = [name for name in structure.parameters if name not in unidentifiable]
     readings = [reading for log, window in windows if (reading := read_step(log, window, is_rate))]
     values, residual, jacobian, lengths = _solve(windows, names, readings, is_rate)
     spread = regress(jacobian, residual, lengths)
@@ -60,19 +60,19 @@ def estimate(logs: Sequence[Log], structure: Structure, options: Mapping[str, An
     covariance = np.zeros((len(order), len(order)))
     places = [order.index(name) for name in names]
     covariance[np.ix_(places, places)] = spread.covariance
-    for name in untold:
+    for name in unidentifiable:
         covariance[order.index(name), order.index(name)] = np.inf
     way = {"friction_plus": "forward", "friction_minus": "backward"}
-    sentences = [f"{name}: no step ends in motion {way[name]}" for name in untold]
-    sentences += [f"{names[i]}: the steps do not tell it apart from the others" for i in spread.untold]
+    sentences = [f"{name}: no step ends in motion {way[name]}" for name in unidentifiable]
+    sentences += [f"{names[i]}: the steps do not tell it apart from the others" for i in spread.unidentifiable]
     return made_estimate(
         structure,
         "step",
         logs,
-        {**dict.fromkeys(untold, 0.0), **values},
+        {**dict.fromkeys(unidentifiable, 0.0), **values},
         covariance,
         max(len(residual) / (1 + 2 * spread.lag) - len(names), 1.0),
-        untold=sentences,
+        unidentifiable=sentences,
         warnings=_warnings(values, readings if is_rate else [], windows),
         details={
             "steps": len(windows),

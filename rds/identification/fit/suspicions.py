@@ -97,7 +97,7 @@ def _twins(names: Sequence[str], uncertainty: Uncertainty) -> list[str]:
     strongest = max(pairs, key=lambda pair: abs(pairs[pair]))
     together = [name for name in names if any(name in pair for pair in pairs)]
     return [
-        f"{', '.join(together[:-1])} and {together[-1]} are told together far better than each "
-        f"({strongest[0]} and {strongest[1]} are correlated {pairs[strongest]:+.4f}): a change of one makes up for a "
-        "change of the other; logs with other amplitudes and frequencies would narrow them (`rds excite`)"
+        f"{', '.join(together[:-1])} and {together[-1]} are strongly correlated "
+        f"({strongest[0]} and {strongest[1]} by {pairs[strongest]:+.4f}): the data determine their combination much "
+        "better than each alone. Add logs with other amplitudes and frequencies (`rds excite`)"
     ]

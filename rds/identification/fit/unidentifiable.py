@@ -12,7 +12,7 @@ from rds.identification.structures.structure import Structure
 _HARDLY = 0.5  # standard error over value
 
 
-def untold_by(
+def unidentifiable_by(
     structure: Structure,
     names: Sequence[str],
     values: Mapping[str, float],
@@ -26,10 +26,12 @@ def untold_by(
     said = []
     for name in (*unmoved, *(names[i] for i in uncertainty.without_effect if i < len(names))):
         why = structure.no_effect.get(name)
-        origin = "a guess at which that stays so" if name in unmoved else "only where the search began"
+        value = _with_unit(structure, name, values[name])
+        origin = "an assumption" if name in unmoved else "only the value that the search began with"
         said.append(
-            f"{name} changes nothing in the response to these commands{f' ({why})' if why else ''}: its value, "
-            f"{_with_unit(structure, name, values[name])}, is {origin}"
+            f"{name} has no effect on the response to these commands{f' ({why})' if why else ''}. The data do not "
+            f"determine it; {value} is {origin}. Record a motion that shows it (`rds excite`), or hold it with "
+            f"--fix {name}=VALUE"
         )
     for direction in uncertainty.directions:
         sentence = _together(names, direction)
@@ -40,8 +42,8 @@ def untold_by(
         size = abs(values[name])
         if np.isfinite(error[i]) and error[i] > _HARDLY * size:
             said.append(
-                f"{name} is hardly told by these data: {_with_unit(structure, name, values[name])} with a standard "
-                f"error of {_with_unit(structure, name, float(error[i]))}"
+                f"{name} is poorly determined by these data: {_with_unit(structure, name, values[name])} with a "
+                f"standard error of {_with_unit(structure, name, float(error[i]))}"
             )
     return said
 

@@ -17,7 +17,7 @@ _BEYOND_NOISE = 12.0  # standard deviations: noise alone spans 10.4 in 10^7 samp
 
 
 def excitation(log: Log, axis: Axis | None) -> list[Finding]:
-    """What the data leave untold, for want of excitation."""
+    """What the data leave unidentifiable, for want of excitation."""
     unit, volts = log.units.get("position", "mm"), log.units.get("command", "V")
     if np.ptp(log.command) == 0.0:
         what = f"the command is {log.command[0]:g} {volts} throughout: it excites nothing, and no gain can be told"

@@ -67,9 +67,9 @@ class MotionForm:
         hidden = np.isinf(np.diag(spread))
         finite = np.where(np.isfinite(spread), spread, 0.0)
         covariance = jacobian @ finite @ jacobian.T
-        untold = (jacobian[:, hidden] != 0.0).any(axis=1)
-        covariance[untold, :] = covariance[:, untold] = 0.0
-        covariance[untold, untold] = np.inf
+        unidentifiable = (jacobian[:, hidden] != 0.0).any(axis=1)
+        covariance[unidentifiable, :] = covariance[:, unidentifiable] = 0.0
+        covariance[unidentifiable, unidentifiable] = np.inf
         return np.asarray(covariance, dtype=float)
 
 

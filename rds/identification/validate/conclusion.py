@@ -16,12 +16,12 @@ DATA = "data-"  # how the kind of a reason begins that is a finding about the lo
 
 def conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
     """The word of the verdict, and what the model is valid for where that is only something."""
-    untold = {reason.kind for reason in reasons if reason.side is Side.UNTOLD}
-    if any(kind != "same-data" and not kind.startswith(DATA) for kind in untold):
+    unidentifiable = {reason.kind for reason in reasons if reason.side is Side.UNTOLD}
+    if any(kind != "same-data" and not kind.startswith(DATA) for kind in unidentifiable):
         return Word.UNTOLD, ""
     word, purpose = _from_errors(a, reasons, bands)
     # what fails even on its own data, or on faulty ones, has failed; what passes there has shown nothing
-    return (Word.UNTOLD, "") if untold and word is not Word.NOT else (word, purpose)
+    return (Word.UNTOLD, "") if unidentifiable and word is not Word.NOT else (word, purpose)
 
 
 def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:

@@ -144,9 +144,11 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
         elif measure.told:
             yield Reason(Side.FOR, measure.kind, what)
         elif measure.kind == "gain":
-            yield Reason(Side.UNTOLD, "gain-untold", f"this log does not tell the gain: {what}")
+            yield Reason(Side.UNTOLD, "gain-unidentifiable", f"this log does not tell the gain: {what}")
         else:
-            yield Reason(Side.NOTE, f"{measure.kind}-untold", f"this log does not tell the {measure.kind}: {what}")
+            yield Reason(
+                Side.NOTE, f"{measure.kind}-unidentifiable", f"this log does not tell the {measure.kind}: {what}"
+            )
 
 
 def _said_of(measure: Measure, frequency: float) -> str:

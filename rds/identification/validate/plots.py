@@ -143,7 +143,7 @@ def _interval(axes: Axes, model: Candidate, name: str, row: int) -> None:
         axes.plot([value], [row], "o", color=colour, markersize=5)
         return
     axes.plot([value], [row], "o", color=colour, markersize=5, markerfacecolor="none")
-    axes.annotate("a guess", (value, row), xytext=(0, 6), textcoords="offset points", ha="center", fontsize=7)
+    axes.annotate("assumed", (value, row), xytext=(0, 6), textcoords="offset points", ha="center", fontsize=7)
 
 
 def _pair(axes: Axes, t: np.ndarray, measured: np.ndarray, modelled: np.ndarray) -> None:

@@ -199,7 +199,7 @@ def _parameters(validation: Validation) -> str:
             known = model.parameters.get(name)
             spread = [known.std_error, known.low, known.high] if known and known.told else [None, None, None]
             if known is not None and not known.told:
-                name = f"{name} (a guess: not told by the fit's data)"
+                name = f"{name} (assumed: not determined by the fit's data)"
             rows.append([model.name, name, float(value), *spread, model.structure.units.get(name, "")])
     return table(["model", "parameter", "value", "standard error", "low", "high", "unit"], rows)
 

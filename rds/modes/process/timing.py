@@ -151,8 +151,8 @@ def judge(
         return Judgement(Verdict.MISSED, reason, evidence, count, alone, discarded)
     if silent >= LASTING and 2 * silent >= count + discarded:
         reason = (
-            f"a module of the machine was silent ({lost}). This says nothing about your code. "
-            "Check the machine and the program that serves it, and repeat the run"
+            f"a module of the machine did not answer in time ({lost}). This says nothing about your code. "
+            "Repeat it on a quieter computer; if it comes again, check the machine"
         )
         evidence = f"the loop waited for a silent module in {silent} periods"
         return Judgement(Verdict.VOID, reason, evidence, count, alone, discarded)

@@ -158,7 +158,7 @@ class DataView:
         from rds.identification.structures.structures import for_logs, structure
 
         self.text.value = in_fields(fragment(estimate))
-        kind = "warning" if estimate.warnings or estimate.untold else "good"
+        kind = "warning" if estimate.warnings or estimate.unidentifiable else "good"
         count = len(estimate.warnings)
         said = "fitted" if kind == "good" else f"fitted, with {count} warning{'s' * (count != 1)}: read them first"
         self.notice.say(said, kind)
