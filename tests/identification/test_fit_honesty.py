@@ -87,8 +87,7 @@ def test_a_direction_that_never_occurs_is_not_told() -> None:
     log = forward(2.5 + np.sin(9.0 * t) + np.sin(23.0 * t))
     found = fit([log], make())
     assert (
-        "friction_minus has no effect" in found.unidentifiable[0]
-        and "never moves backward" in found.unidentifiable[0]
+        "friction_minus has no effect" in found.unidentifiable[0] and "never moves backward" in found.unidentifiable[0]
     )
     assert np.isinf(found.parameters["friction_minus"].std_error)
     assert found.parameters["K"].value == pytest.approx(X["K"], rel=0.01)

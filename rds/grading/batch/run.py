@@ -15,6 +15,7 @@ from rds.core.errors import InputError
 from rds.core.parallel import Outcome, Scheduler, processors, spread
 from rds.core.parallel.spread import Progress
 from rds.grading.assignment.assignment import Assignment, read_assignment
+from rds.grading.assignment.late_rules import Late
 from rds.grading.batch.alike import alike
 from rds.grading.batch.journal import FILE as JOURNAL
 from rds.grading.batch.journal import Journal
@@ -82,6 +83,7 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
     )
     notes = [f"not a submission, and left alone: {name}" for name in intake.ignored]
     notes += _unlisted(listed, intake)
+    notes += _untimed(read, intake)
     with Journal(out / JOURNAL) as journal:  # from here on nobody else writes into this folder
         if (out / FILE).exists():
             _check_free(out, how.resume)
@@ -113,6 +115,17 @@ def _unlisted(listed: ClassList, intake: Intake) -> list[str]:
     groups = listed.groups()
     strangers = [r.student for r in intake.rows if r.student not in groups and listed.find(r.student, r.source) is None]
     return [f"not in the class list: {student}" for student in strangers]
+
+
+def _untimed(assignment: Assignment, intake: Intake) -> list[str]:
+    """That lateness costs points, and that nobody knows when some have handed in."""
+    unknown = [row.student for row in intake.rows if row.time is None]
+    if assignment.due is None or assignment.late == Late() or not unknown:
+        return []
+    return [
+        f"when they handed in is not known of {len(unknown)} of {len(intake.rows)} submissions, so nothing is deducted "
+        "for lateness there; timestamps.csv (student,timestamp) at the top of the submissions says it"
+    ]
 
 
 def _check_sandbox(jobs: int | None, scheduler: Address) -> None:

@@ -17,7 +17,7 @@ from rds.grading.cases.case import CaseRun
 from rds.grading.criteria.criterion import Criterion
 from rds.grading.feedback.chart import Chart, Panel, chart
 from rds.grading.feedback.plain_text import one_line
-from rds.grading.grade import Band, CriterionScore, Grade
+from rds.grading.grade import Band, CriterionScore, Grade, Status
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class Advice:
     caption: str = ""
 
 
+_NOTHING_RAN = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD)
 _OF_ERRORS, _OF_STEPS = "rds.grading.feedback.causes_of_errors", "rds.grading.feedback.causes_of_steps"
 _OF_LOOPS, _OF_OTHERS = "rds.grading.feedback.causes_of_loops", "rds.grading.feedback.causes_of_others"
 CAUSES: Mapping[str, str] = MappingProxyType(
@@ -60,12 +61,16 @@ def advice(assignment: Assignment, grade: Grade, runs: Sequence[CaseRun]) -> Adv
     """
     shows_all = assignment.feedback == "all"
     seen = [score for score in grade.criteria if (score.visible or shows_all) and score.band is not Band.REVIEW]
+    if grade.status in _NOTHING_RAN:
+        return Advice(f"Nothing could be run: {one_line(grade.reason, 600)}") if seen else None
     lost = max(seen, key=lambda score: score.max_score - score.score, default=None)
     if lost is None or lost.max_score - lost.score <= 1e-9 * lost.max_score:
         return None
     gate = next((score for score in seen if lost.gate and score.title == lost.gate), None)
     target = gate or lost
-    head = f"{lost.title} costs the most: {lost.max_score - lost.score:.4g} of {lost.max_score:.4g} points are lost"
+    most = max(score.max_score - score.score for score in grade.criteria)
+    which = "costs the most" if lost.max_score - lost.score >= most else "costs the most of what is explained here"
+    head = f"{lost.title} {which}: {lost.max_score - lost.score:.4g} of {lost.max_score:.4g} points are lost"
     head += f", because it needs {target.title}. " if gate is not None else ". "
     criterion = next((each for each in assignment.criteria if each.name == target.name), None)
     run = _worst(criterion, target, runs) if criterion is not None else None
