@@ -37,8 +37,8 @@ _ABOUT = """Runs that end badly, in real processes; `python -m benchmarks.ending
 page. Each is a run of three axes for two seconds at 100 Hz, by `rds run`; what is done to it is done at a random
 moment, most often while it starts or runs. *Right* means: the command ends within a minute with an exit code of
 [the documents](commands.md), the record opens or stderr says why there is none, and no process and no shared memory is
-left. Ctrl-C before Python has loaded the first line of ours is Python's own affair. A disk without room is a limit on
-the size of files, which every process of the run has.
+left. Ctrl-C before Python has loaded the first line of our program is Python's own affair. A disk without room is a
+limit on the size of files, which every process of the run has.
 """.splitlines()
 PATIENCE = 60.0  # s for a command to end
 LINGER = 20.0  # s for its hub and its machine to notice that nobody needs them
@@ -238,7 +238,9 @@ def _begin(room: int | None) -> None:
 
 def _judge(code: int, out: Path, said: str, runtime: Path) -> tuple[str, str]:
     killed = code == -signal.SIGKILL
-    if code in (1, -signal.SIGINT) and "Traceback" in said and f"{HERE}/rds/" not in said:
+    ours = set(re.findall(rf"{re.escape(str(HERE))}/(rds/[\w/]+\.py)", said))
+    is_early = (code == -signal.SIGINT and not said) or (code in (1, -signal.SIGINT) and "Traceback" in said)
+    if is_early and ours <= {"rds/__init__.py"}:  # whose imports Python makes before rds/__main__.py can heed Ctrl-C
         return "before Python had begun", ""
     if not killed and code not in CODES:
         return f"exit code {code}", f"exit code {code}: {said[-300:]}"

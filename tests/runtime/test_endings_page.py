@@ -17,6 +17,9 @@ from benchmarks.endings import HERE, Ended, _judge, page, read_trials
         (7, "", "exit code 7", False),
         (1, f'Traceback\n File "{HERE}/rds/cli/main.py"', "traceback", False),
         (-2, "Traceback\n <frozen runpy>", "before Python had begun", True),
+        (-2, f'Traceback\n File "{HERE}/rds/__init__.py"', "before Python had begun", True),
+        (-2, "", "before Python had begun", True),
+        (-2, f'Traceback\n File "{HERE}/rds/cli/main.py"', "exit code -2", False),
     ],
 )
 def test_what_is_right(code: int, said: str, ending: str, is_right: bool, tmp_path: Path) -> None:
