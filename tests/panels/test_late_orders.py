@@ -122,7 +122,7 @@ class Running:
     """A program that runs, for whoever changes its override."""
 
     operable = held = True
-    steps = False  # not line by line
+    steps = waits = False  # neither line by line nor for a confirmation
 
     def __init__(self) -> None:
         self.shares: list[float] = []

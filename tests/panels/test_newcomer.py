@@ -12,8 +12,8 @@ from tests.panels.conftest import App
 MOST = {  # presses (of the mouse, of Enter) of each step; what is typed and chosen from a list counts as one each
     "write": 3,
     "break and mend": 4,
-    "run in three modes": 5,
-    "change a gain live": 4,
+    "run in three modes": 6,  # one of them sets how long
+    "change a gain live": 5,  # as here
     "compare": 4,
 }
 
