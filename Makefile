@@ -2,7 +2,7 @@
 #
 # Packages are installed into $(VENV) with uv where it is installed, else with venv and pip, from requirements.lock.
 # Variables: PYTHON (interpreter), VENV (folder), UV (empty: do without uv), ARGS (of demo and test), JOBS (tests side by
-# side: one more than there are cores).
+# side: as many as there are cores).
 
 VENV ?= .venv
 UV   ?= $(shell command -v uv 2>/dev/null)
