@@ -9,7 +9,6 @@ import shutil
 import signal
 import tempfile
 import time
-import zlib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -36,20 +35,14 @@ settings.load_profile("same")
 pytest_plugins = ["held_up", "skipped"]
 
 HERE = Path(__file__).parent
-PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one, the second in lanes
-LANES = 2  # of those that wait for real time; they use less than a third of a processor each
+PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
 MARK = "pytest.mark.realtime"
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
 
-def pytest_xdist_auto_num_workers() -> int:
-    """One worker more than there are processors: half of the tests' time is waiting for other processes."""
-    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 1
-
-
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Files side by side; those that wait for real time in two lanes, and those in a browser one after the other: many
-    beside each other starve. (pytest-xdist's own groups need names of tests that pytest 9.2 does not let it change.)
+    """Files side by side; those that wait for real time one after the other, and those in a browser: beside each other
+    they starve. (pytest-xdist's own groups need names of tests that pytest 9.2 does not let it change.)
     """
     from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
 
@@ -61,17 +54,15 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 
 def group_of(nodeid: str) -> str:
-    """What a test runs one by one with: those in a browser, those of its lane that wait for real time, or its file."""
+    """What a test runs one by one with: those in a browser, those that wait for real time, or those of its file."""
     path, name = nodeid.partition("[")[0].split("::")[:2]
     if "/panels/" in path:
         return PANELS
-    if name not in waiting_for_real_time(path):
-        return path
-    return f"{REALTIME} {zlib.adler32(path.encode()) % LANES}"  # the same for a whole file, which may share processes
+    return REALTIME if name in _waiting_for_real_time(path) else path
 
 
 @cache
-def waiting_for_real_time(path: str) -> frozenset[str]:
+def _waiting_for_real_time(path: str) -> frozenset[str]:
     """The functions and classes of a file that are marked `realtime`: all of them where the file itself is."""
     text = (HERE.parent / path).read_text(encoding="utf-8")
     if MARK not in text:
