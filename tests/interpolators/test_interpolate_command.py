@@ -253,8 +253,8 @@ def test_the_fewest_steps_are_those_of_the_document_at_any_feed(method: str, lea
     for feed in (600, 1000):
         said = numbers(f"--arc 100,0:0,100:0,0 --feed {feed} -m {method}")["steps"]
         assert said["least"] == least <= said["count"]
-        if method == "euler":
-            assert f"{said['count']}, {'one' if feed == 600 else 'two'}" in document
+        if method.endswith("euler"):
+            assert said["count"] == least
     assert (
         numbers(f"--arc 100,0:0,100:0,0 --feed 600 -m {method} --option steps={least + 100}")["steps"]["least"] is None
     )
