@@ -39,7 +39,7 @@ def test_60_logs_of_a_slow_sine_all_settle_and_their_intervals_contain_the_truth
         values = mini_cnc("XYZ"[number % 3])
         noise = 0.002 * np.random.default_rng(number).standard_normal(len(t))
         found = fit([Log("sine", t, u, structure.respond(t, u, (0.0, 0.0), values) + noise)], structure)
-        assert not found.unidentifiable and all("told together" in warning for warning in found.warnings), number
+        assert not found.unidentifiable and all("strongly correlated" in warning for warning in found.warnings), number
         inside += [found.parameters[name].low <= value <= found.parameters[name].high for name, value in values.items()]
     assert 0.90 <= np.mean(inside) <= 0.99
 

@@ -64,7 +64,7 @@ def test_large_blocks_are_written_alike(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(canon_text, "LONG_TEXT", 0)
     items = [canon.Call("SELECT_PLANE", ("XY",)), canon.MotionBlock(rows), canon.Call("PROGRAM_END")]
     kernel()
-    fast = "\n".join(canon_text.text(items)).splitlines()
+    fast = list(canon_text.text(items))
     monkeypatch.setattr(canon_text, "_compiled", lambda number, rows: None)
     assert fast == list(canon_text.text(items))
     assert len(fast) == len(rows) + 2

@@ -96,7 +96,7 @@ def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
         if isinstance(item, MotionBlock) and (compiled := _compiled(number, len(item))) is not None:
             first = 0
             for count, written in compiled.written(item.rows, number):
-                yield written.rstrip("\n") or "\n".join(_numbered(_row_texts(item.rows[first : first + count]), number))
+                yield from written.splitlines() or _numbered(_row_texts(item.rows[first : first + count]), number)
                 first += count
                 number += count
         elif isinstance(item, Call) and item.name == "PRINT":

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from rds.nc.language.blocks import AXES
 from rds.nc.language.dialect import Dialect
+from rds.nc.language.expressions import Fault
 from rds.nc.language.parameters import Parameters
-from rds.nc.language.state import State
+from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, State
 from rds.nc.language.stream import Stream
 from rds.nc.language.tools import ToolTable
 
@@ -79,3 +80,18 @@ def rotate(vector: list[float], degrees: float) -> None:
 def given(words: dict[str, float]) -> list[tuple[int, float]]:
     """Index (X Y Z A B C) and value of the axis words of a block."""
     return [(index, words[letter]) for index, letter in enumerate(AXES) if letter in words]
+
+
+def check_feed(m: Context, words: dict[str, float], key: str) -> None:
+    """Raises Fault when a move by feed has no feed rate, and the machine's default is not to be taken."""
+    state = m.state
+    if state.feed_mode == INVERSE_TIME:
+        if "f" not in words:
+            raise Fault("in inverse time (G93) every move by feed needs F on its line, 1/minutes; add it", key)
+    elif state.feed_rate == 0.0:
+        if m.dialect.default_feed and state.feed_mode == PER_MINUTE:
+            return
+        unit = "units per revolution" if state.feed_mode == PER_REVOLUTION else "units per minute"
+        raise Fault(f"no feed rate is set; write F, in {unit}", key)
+    elif state.feed_mode == PER_REVOLUTION and state.speed == 0.0:
+        raise Fault("a feed per revolution (G95) and the spindle's speed is 0; write S", key)

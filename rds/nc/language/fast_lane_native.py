@@ -21,25 +21,22 @@ import numpy as np
 from llvmlite import __version__ as llvmlite_version
 from llvmlite import binding as llvm
 
-from rds.core.private_files import open_private
+from rds.core.private_files import make_folder, open_private
 from rds.nc.language.canon import MOTION
+from rds.nc.language.fast_lane_target import ENTRIES, target_machine
 
-ENTRIES = ("rds_read_lines", "rds_write_rows")
-_SOURCES = ("fast_lane_kernel.py", "fast_lane_object.py", "fast_lane_text.py", "arcs.py", "canon.py", "state.py")
+_SOURCES = (
+    "fast_lane_kernel.py",
+    "fast_lane_object.py",
+    "fast_lane_target.py",
+    "fast_lane_text.py",
+    "arcs.py",
+    "canon.py",
+    "state.py",
+)
 _OUT = 1 << 20  # bytes of text at once
+_IS_TRIED = sys.platform == "linux"  # elsewhere Python reads and writes the same, slower
 _POINTER = ctypes.c_void_p
-
-
-def target_machine() -> llvm.TargetMachine:
-    """What code is made for and loaded by: this machine's processor, addresses in full (objects may lie far apart)."""
-    triple = llvm.get_process_triple() + ("-elf" if sys.platform == "win32" else "")  # as numba has it
-    return llvm.Target.from_triple(triple).create_target_machine(
-        cpu=llvm.get_host_cpu_name(),
-        features=llvm.get_host_cpu_features().flatten(),
-        opt=3,
-        reloc="static",
-        jit=True,
-    )
 
 
 class Kernels:
@@ -115,6 +112,8 @@ class LineReader:
 
 def stored_kernels() -> Kernels | None:
     """The kernels from their object files; None where there are none."""
+    if not _IS_TRIED:
+        return None
     try:
         return Kernels({name: _file(name).read_bytes() for name in ENTRIES})
     except OSError:
@@ -122,7 +121,9 @@ def stored_kernels() -> Kernels | None:
 
 
 def compile_kernels() -> Kernels | None:
-    """The kernels, compiled now and kept where that can be. None without numba."""
+    """The kernels, compiled now and kept where that can be. None without numba, and where nobody has tried it."""
+    if not _IS_TRIED:
+        return None
     try:
         from rds.nc.language.fast_lane_object import compiled
     except ImportError:
@@ -142,7 +143,7 @@ def _file(name: str) -> Path:
 def _keep(objects: dict[str, bytes]) -> None:
     """Each file whole or not at all; those of earlier sources are removed."""
     folder = _file("").parent
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     for old in folder.glob("fast_lane.*.o"):
         old.unlink()
     for name, content in objects.items():

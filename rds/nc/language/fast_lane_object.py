@@ -9,7 +9,7 @@ from llvmlite import binding as llvm
 from numba import carray, njit, types
 
 from rds.nc.language.fast_lane_kernel import read_lines
-from rds.nc.language.fast_lane_native import target_machine
+from rds.nc.language.fast_lane_target import target_machine
 from rds.nc.language.fast_lane_text import write_rows
 
 _BYTES, _SMALL = types.CPointer(types.uint8), types.CPointer(types.int8)

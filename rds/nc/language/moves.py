@@ -8,12 +8,12 @@ from collections.abc import Callable
 from rds.nc.language.arcs import AXES_OF, by_centre, by_radius, centre_offsets, swept
 from rds.nc.language.blocks import AXES, CYCLES, NON_MODAL, PROBES, TURNING, Block
 from rds.nc.language.canon import ARC, FEED, TRAVERSE
-from rds.nc.language.context import Context, given, rotate
+from rds.nc.language.context import Context, check_feed, given, rotate
 from rds.nc.language.cycles import cycle
 from rds.nc.language.expressions import Fault
 from rds.nc.language.offsets import home_of, in_machine, minus, plus
 from rds.nc.language.parameters import PROBED
-from rds.nc.language.state import INVERSE_TIME, NO_MOTION, PER_MINUTE, PER_REVOLUTION, PLANES, XY, State
+from rds.nc.language.state import INVERSE_TIME, NO_MOTION, PER_REVOLUTION, PLANES, XY, State
 from rds.nc.language.threading_cycle import threading
 from rds.nc.language.tool_centre import check_placed
 
@@ -98,21 +98,6 @@ def in_machine_coordinates(m: Context, words: dict[str, float]) -> list[float]:
         if index > 1 and AXES[index] not in words:
             end[index] = value
     return end
-
-
-def check_feed(m: Context, words: dict[str, float], key: str) -> None:
-    """Raises Fault when a move by feed has no feed rate, and the machine's default is not to be taken."""
-    state = m.state
-    if state.feed_mode == INVERSE_TIME:
-        if "f" not in words:
-            raise Fault("in inverse time (G93) every move by feed needs F on its line, 1/minutes; add it", key)
-    elif state.feed_rate == 0.0:
-        if m.dialect.default_feed and state.feed_mode == PER_MINUTE:
-            return
-        unit = "units per revolution" if state.feed_mode == PER_REVOLUTION else "units per minute"
-        raise Fault(f"no feed rate is set; write F, in {unit}", key)
-    elif state.feed_mode == PER_REVOLUTION and state.speed == 0.0:
-        raise Fault("a feed per revolution (G95) and the spindle's speed is 0; write S", key)
 
 
 def _end(m: Context, block: Block) -> list[float]:

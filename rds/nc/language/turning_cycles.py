@@ -14,9 +14,8 @@ from itertools import pairwise
 
 from rds.nc.language.blocks import Block
 from rds.nc.language.canon import ARC, FEED, TRAVERSE
-from rds.nc.language.context import INCH, Context
+from rds.nc.language.context import INCH, Context, check_feed
 from rds.nc.language.expressions import Fault
-from rds.nc.language.moves import check_feed
 from rds.nc.language.state import INVERSE_TIME, XZ
 from rds.nc.language.turning_contour import (
     CHORD,
@@ -164,7 +163,7 @@ def _rough(m: Context, words: dict[str, float], pieces: list[Piece], start: Poin
     tool = _Tool(m, frame)
     layers = _layers(used, top, depth)
     if way == 2:
-        _contour_cut(tool, open_limit, u_start, top)
+        _contour_cut(tool, open_limit, u_start, top, in_material=True)
         layers = _pockets(layers)
     for layer in layers:
         tool.rapid(tool.at[0], max(top, tool.at[1]))
@@ -182,11 +181,11 @@ def _rough(m: Context, words: dict[str, float], pieces: list[Piece], start: Poin
         tool.cut(tool.at[0], top)
 
 
-def _contour_cut(tool: _Tool, points: list[Point], u_start: float, top: float) -> None:
-    """One cut along the chords, from the start of the cycle on."""
+def _contour_cut(tool: _Tool, points: list[Point], u_start: float, top: float, in_material: bool = False) -> None:
+    """One cut along the chords, from the start of the cycle on; `in_material`: an earlier cycle's rest may be there."""
     tool.rapid(tool.at[0], max(top, tool.at[1]))
     tool.rapid(u_start, tool.at[1])
-    tool.rapid(*points[0])
+    (tool.cut if in_material else tool.rapid)(*points[0])
     tool.along(points[1:])
 
 
