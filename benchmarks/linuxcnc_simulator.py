@@ -20,6 +20,7 @@ from rds.interpolators.motion import Limits
 
 PERIOD = 1e-3  # s
 MOVES = 1e-9  # mm in a period
+RESTS = 200  # periods: the drive waits longer before each program, and no program here rests so long
 DRIVE = Path(__file__).with_name("linuxcnc_drive.py")
 HAL = """\
 loadrt trivkins coordinates=XYZ
@@ -139,4 +140,7 @@ def _moving(file: Path) -> np.ndarray:
     rows = [line.split() for line in file.read_text().splitlines() if not line.startswith("overrun")]
     table = np.array([row for row in rows if len(row) == 3], dtype=float)
     moving = np.flatnonzero(np.abs(np.diff(table, axis=0)).max(axis=1) > MOVES)
-    return table[moving[0] : moving[-1] + 2]
+    # What the sampler had kept comes first, and in it the way to machine zero: the program begins after the last rest.
+    begins = np.flatnonzero(np.diff(moving) > RESTS)
+    first = moving[begins[-1] + 1] if len(begins) else moving[0]
+    return table[first : moving[-1] + 2]
