@@ -163,22 +163,22 @@ def check(cycle: str, contour: str, start: tuple[float, float], depth: float, di
 @pytest.mark.parametrize("distance", [0.0, 0.4])
 @pytest.mark.parametrize("contour", [SHAFT, POCKETS])
 def test_roughing_along_z_takes_all_above_the_contour(contour: str, distance: float) -> None:
-    check(f"G71 Q100 D{distance} I0.7 R0.3", contour, (2.0, 16.0), 0.7 + 2.6 * distance, distance, along_z=True)
+    check(f"G71 Q100 D{distance} I0.7 R0.3", contour, (2.0, 16.0), 0.7, distance, along_z=True)
 
 
 def test_facing_takes_all_in_front_of_the_contour() -> None:
     contour = "O100 SUB\nG0 X12 Z-8\nG1 X10\nX8 Z-6\nX6 Z-6\nG2 X4 Z-4 R2\nG1 Z-1\nX0 Z0\nO100 ENDSUB\n"
-    check("G72 Q100 D0.2 I0.5", contour, (1.0, 13.0), 1.2, 0.2, along_z=False)
+    check("G72 Q100 D0.2 I0.5", contour, (1.0, 13.0), 0.5, 0.2, along_z=False)
 
 
 def test_a_bore_is_turned_from_within() -> None:
     contour = "O100 SUB\nG0 X9 Z1\nG1 Z-4\nX7 Z-6\nZ-10\nX5\nZ-12\nO100 ENDSUB\n"
-    check("G71 Q100 D0.1 I0.4", contour, (1.0, 4.0), 0.8, 0.1, along_z=True, inside=True)
+    check("G71 Q100 D0.1 I0.4", contour, (1.0, 4.0), 0.4, 0.1, along_z=True, inside=True)
 
 
 def test_random_contours_are_kept() -> None:
     rng = random.Random(5)
-    for _ in range(4):
+    for number in range(10):
         x, z, words = rng.uniform(3, 8), 1.0, []
         for _ in range(rng.randint(3, 7)):
             wall = rng.random() < 0.3
@@ -188,20 +188,25 @@ def test_random_contours_are_kept() -> None:
             z -= rng.uniform(0.2, 3.0)
             words.append(f"G1 X{x:.3f} Z{z:.3f}")
         contour = f"O100 SUB\nG0 X{rng.uniform(3, 8):.3f} Z1\n" + "\n".join(words) + f"\nZ{z - 1:.3f}\nO100 ENDSUB\n"
-        distance = rng.choice((0.0, 0.3))
-        check(f"G71 Q100 D{distance} I0.9 R0.4", contour, (1.5, 15.0), 14.0, distance, along_z=True)
+        distance = 0.3 * (number % 2)
+        check(f"G71 Q100 D{distance} I0.9 R0.4", contour, (1.5, 15.0), 0.9, distance, along_z=True)
 
 
 def test_71_1_leaves_pockets_and_71_2_cuts_them() -> None:
     start, contour = (1.5, 14.0), POCKETS
     without = Material("G71.1 Q100 D0.3 I0.5", contour, start, along_z=True)
-    without.cut(1.2, 0.3)
+    without.cut(0.5, 0.3)
     filled = np.maximum.accumulate(without.remains(0.3))
     assert without.all_is_gone(filled)
     assert (without.height >= filled - 0.1).mean() > 0.95
     both = Material("G71.1 Q100 D0.3 I0.5\nG71.2 Q100 X14 Z1.5 D0.1 I0.5", contour, start, along_z=True)
     both.cut(4.0, 0.1)  # along walls it takes 0.2 off, 3.9 high
     assert both.all_is_gone(both.remains(0.1))
+
+
+def test_71_2_goes_by_feed_to_where_an_earlier_cycle_has_left_more() -> None:
+    """Without X and Z it begins where the first cycle ends; a rapid went down into 0.2 mm of material there."""
+    Material("G71.1 Q100 D0.3 I0.5\nG71.2 Q100 D0.1 I0.5", POCKETS, (1.5, 14.0), along_z=True).cut(4.0, 0.1)
 
 
 @needs_rs274
