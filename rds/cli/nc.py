@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rds.cli import nc_bundled, nc_cut, nc_job, nc_make, nc_methods, nc_run, nc_step
+from rds.cli import nc_bundled, nc_cut, nc_job, nc_make, nc_methods, nc_operate, nc_run, nc_step
 from rds.cli.canon import print_canon
 from rds.cli.common import Json, declared, print_json, progress_bars, refusals, writes_files
 from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
 nc_make.app.command()(nc_job.job)
 app.add_typer(nc_make.app, name="make")
-for _command in (*nc_run.COMMANDS, nc_methods.methods, nc_bundled.bundled, nc_cut.cut, nc_step.step):
+for _command in (nc_run.run, nc_operate.operate, nc_methods.methods, nc_bundled.bundled, nc_cut.cut, nc_step.step):
     app.command()(_command)
 
 PICTURES = ("png", "svg", "pdf")

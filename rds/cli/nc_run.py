@@ -1,9 +1,7 @@
-"""`rds nc run` and `rds nc operate`: a part program on the machine's axes, and an operator's hand on it."""
+"""`rds nc run`: a part program on the machine's axes."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,20 +22,13 @@ from rds.cli.common import (
     writes_files,
 )
 from rds.cli.exchange import Events, Exchange, Yes, only_with_exchange, runs_json, through_exchanges
+from rds.cli.nc_operate import LEAST_OVERRIDE, operated
 from rds.cli.nc_options import MaxJumps, Parameters, ProfileName, Program, Tools, With, setup
 from rds.core.shared_quantities import FEED_OVERRIDE
 from rds.modes import DEFAULT, mode_names
 
 if TYPE_CHECKING:
-    from rds.cli.keys import Keys
-    from rds.nc.run.run import ProgramRun, Status
     from rds.results import Result
-
-_HELP = "space hold and go on, + and - feed, h home, q stop"
-_LOOK = 0.1  # s between two looks at a run
-_STEP = 0.1  # of the override, by one key
-_LEAST_OVERRIDE = 0.1  # per cent: an hour becomes six weeks
-_STATES = ("runs", "held", "stops", "waits for the tool", "dwells", "waits for the spindle", "goes home", "is over")
 
 
 @writes_files
@@ -179,8 +170,8 @@ def run(
 
         if exchange is None:
             only_with_exchange(yes, events)
-        if override < _LEAST_OVERRIDE:
-            said = f"--override {override:g} never moves, or as good as never; begin with {_LEAST_OVERRIDE:g} or more"
+        if override < LEAST_OVERRIDE:
+            said = f"--override {override:g} never moves, or as good as never; begin with {LEAST_OVERRIDE:g} or more"
             raise InputError(f"{said}, and hold with space or `rds nc operate --hold`")
         if out is not None:  # before the program is checked and planned, which may take a while
             require_writable(out)
@@ -209,13 +200,13 @@ def run(
 
         def go(part: Any, running: Any) -> Result:
             runs.append((part.prepared, running.folder))
-            return _operated(running)
+            return operated(running)
 
         if exchange is not None:
             results = through_exchanges(part, exchange, yes, events, json, mode, folder, go, changes)
             del runs[0]
         elif load_mode(plan.mode).real_time:
-            results = [_operated(part.start(out=folder, changes=changes))]
+            results = [operated(part.start(out=folder, changes=changes))]
         else:
             with progress_bars() as bar:
                 results = [part.run(out=folder, changes=changes, progress=bar(plan.mode))]
@@ -243,95 +234,6 @@ def _interpolator(name: str | None, options: list[str] | None, look_ahead: int |
         return None
     words: dict[str, Any] = {"interpolator": name, "params": dict(map(option_of, options or ()))}
     return words if look_ahead is None else words | {"look_ahead": look_ahead}
-
-
-def _operated(running: ProgramRun) -> Result:
-    """A real-time run with somebody at the keyboard, or a line on stderr for each change of state."""
-    from rds.cli.keys import keyboard
-
-    with keyboard() as keys:
-        if keys is None:
-            assert running.folder is not None
-            _watch(running, running.folder)
-        else:
-            _operate(running, keys)
-    return running.wait()
-
-
-def _watch(running: ProgramRun, folder: Path) -> None:
-    """Say when it waits for somebody, and how that somebody makes it go on."""
-    before = -1
-    try:
-        while not running.done:
-            time.sleep(_LOOK)
-            status = running.status()
-            if status is None or status.state == before:
-                continue
-            before = status.state
-            if _STATES[before] in ("stops", "waits for the tool", "held"):
-                typer.echo(
-                    f"rds: line {status.line}: {_STATES[before]}; `rds nc operate {folder} --resume` goes on", err=True
-                )
-    except KeyboardInterrupt:
-        running.stop()
-
-
-def _operate(running: ProgramRun, keys: Keys) -> None:
-    from rich.console import Console
-    from rich.live import Live
-
-    with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as line:
-        try:
-            while not running.done:
-                status = running.status()
-                if status is not None:
-                    line.update(_line(status, running), refresh=True)
-                for key in keys.pressed(_LOOK):
-                    _press(key, running)
-        except KeyboardInterrupt:
-            running.stop()
-
-
-def _press(key: str, running: ProgramRun) -> None:
-    """What a key does; nothing where the run has not begun or is over."""
-    from rds.core.errors import InputError
-
-    try:
-        if key == " ":
-            status = running.status()
-            stands = status is not None and _STATES[status.state] in ("held", "stops", "waits for the tool")
-            if stands or running.live_values["hold"]:
-                running.resume()
-            else:
-                running.hold()
-        elif key in "+=-_":
-            share = running.live_values["override"] + (_STEP if key in "+=" else -_STEP)
-            running.override(min(max(round(share, 2), 0.0), 2.0))
-        elif key in "hH":
-            running.home()
-        elif key in "qQ":
-            running.stop()
-    except InputError:
-        return
-
-
-def _line(status: Status, running: ProgramRun) -> str:
-    """The live line: where, what, how fast, how far."""
-    axes = "  ".join(
-        f"{name} {value:.0f} rev/min" if running.units.get(f"{name}_measured") == "rev/min" else f"{name} {value:.3f}"
-        for name, value in status.measured.items()
-    )
-    if status.tip:
-        axes += "  tip " + " ".join(f"{name}{value:.3f}" for name, value in status.tip.items())
-    predicted = running.plan.samples * running.plan.T
-    try:
-        override = f"{running.live_values['override']:.0%}"
-    except Exception:  # it has just ended
-        override = "–"
-    return (
-        f"line {status.line} {_STATES[status.state]}  {axes}  feed {status.feed:.0f} mm/min, override {override}  "
-        f"{status.share:.0%} of {predicted:.1f} s\n{_HELP}"
-    )
 
 
 def _show(result: Result, files: dict[str, Path]) -> None:
@@ -365,56 +267,3 @@ def _show(result: Result, files: dict[str, Path]) -> None:
         screen.print(verdict_line(result), markup=False, soft_wrap=True)
     for kind in ("program", "report", "csv"):
         screen.print(f"{kind}: {files[kind]}", markup=False, soft_wrap=True)
-
-
-def operate(
-    folder: Annotated[Path, typer.Argument(help="The folder of a run that goes on (--out of `rds nc run`).")],
-    hold: Annotated[bool, typer.Option("--hold", help="Come to rest on the path.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on after a hold, M0, M1 or a tool change.")] = False,
-    home: Annotated[bool, typer.Option("--home", help="End the program where it is, and move home.")] = False,
-    stop: Annotated[bool, typer.Option("--stop", help="Come to rest on the path, and end.")] = False,
-    override: Annotated[float | None, declared(FEED_OVERRIDE)] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Any live value, as X.Pgain=30.")
-    ] = None,
-    json: Json = False,
-) -> None:
-    """Change a run that goes on, from another terminal: hold, resume, override, home, stop, or a gain.
-
-    Without an option, say what its live values are.
-    """
-    with refusals():
-        from rds.core.errors import InputError
-        from rds.modes.loop.live_values_of_run import live_values_of
-
-        if hold + resume + home + stop > 1:
-            raise InputError("--hold, --resume, --home and --stop exclude each other; give one of them")
-        with live_values_of(folder) as live_values:
-            wanted = dict(map(_pair, set_ or ()))
-            wanted |= {} if override is None else {"override": override / 100.0}
-            if resume:
-                wanted |= {"hold": 0.0, "resume": live_values["resume"] + 1.0}
-            wanted |= {"home": 1.0, "hold": 0.0} if home else {}
-            wanted |= {name: 1.0 for name, on in (("hold", hold), ("stop", stop)) if on}
-            live_values.set_all(wanted)
-            values, units = live_values.values(), {name: channel.unit for name, channel in live_values.channels.items()}
-    if json:
-        print_json(values)
-    elif wanted:
-        typer.echo(", ".join(f"{name} = {value:g}" for name, value in wanted.items()))
-    else:
-        for name, value in values.items():
-            typer.echo(f"{name} = {value:g} {units[name]}".rstrip())
-
-
-def _pair(text: str) -> tuple[str, float]:
-    from rds.core.errors import InputError
-
-    name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        raise InputError(f"--set {text!r} must be NAME=VALUE with a number, as in --set X.Pgain=30") from None
-
-
-COMMANDS: tuple[Callable[..., Any], ...] = (run, operate)

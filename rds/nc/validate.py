@@ -6,11 +6,10 @@ the spindle within its range; both within what the tool bears; no move of an axi
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import only_rotary
 from rds.nc.path_block import DefaultFeed
 from rds.nc.tool_centre import slowed
+from rds.nc.tool_limits import ToolLimits, limits_of
 
 if TYPE_CHECKING:
     from rds.nc.language.tools import Tool
@@ -404,26 +404,3 @@ def plain(value: float) -> str:
     """A number as people write it: up to four decimals, and as many as it takes to be anything."""
     text = f"{value:.4f}".rstrip("0").rstrip(".")
     return text if float(text) or not value else f"{value:.2g}"
-
-
-_MAX = re.compile(r"\bmax((?:\s+[SF]\s*\d+(?:\.\d*)?)+)", re.IGNORECASE)
-_WORD = re.compile(r"([SF])\s*(\d+(?:\.\d*)?)", re.IGNORECASE)
-
-
-class ToolLimits(NamedTuple):
-    """The most that a tool bears; inf where nothing is said."""
-
-    speed: float = inf  # rev/min
-    feed: float = inf  # mm/min
-
-
-def tool_limits(comment: str) -> ToolLimits:
-    """The limits in the comment of a tool's line: after the word `max`, S in rev/min and F in mm/min."""
-    found = _MAX.search(comment)
-    words = {letter.upper(): float(value) for letter, value in _WORD.findall(found[1])} if found else {}
-    return ToolLimits(words.get("S", inf), words.get("F", inf))
-
-
-def limits_of(tools: Iterable[Tool]) -> dict[int, ToolLimits]:
-    """The limits of each tool by its number."""
-    return {tool.number: tool_limits(tool.comment) for tool in tools}

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 from rds.cli.keys import Keys
 from rds.cli.main import app
-from rds.cli.nc_run import _press
+from rds.cli.nc_operate import press
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import COLUMNS, program_channels
 from rds.nc.run.judge import WAITS
@@ -144,7 +144,7 @@ class Running:
 )
 def test_what_a_key_does(key: str, state: State, does: list[str]) -> None:
     running: Any = Running(state)
-    _press(key, running)
+    press(key, running)
     assert running.did == does
 
 

@@ -9,7 +9,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
 from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, STOP, Block, check, settle_motion
-from rds.nc.language.canon import FEED, TRAVERSE, Call, MotionBlock
+from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.context import Context
 from rds.nc.language.contour_reading import ContourReading, gathered
 from rds.nc.language.control import Control
@@ -19,7 +19,7 @@ from rds.nc.language.expressions import Fault
 from rds.nc.language.fast_lane import FastLane
 from rds.nc.language.left_over import LeftOver
 from rds.nc.language.modes import execute
-from rds.nc.language.moves import move, target
+from rds.nc.language.moves import move
 from rds.nc.language.names import known_names
 from rds.nc.language.offsets import start
 from rds.nc.language.owords import Word, spelled
@@ -27,7 +27,7 @@ from rds.nc.language.parameters import Parameters, read_parameters
 from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes, lines_to_restore, modes_now
 from rds.nc.language.source import LONGEST, open_source
-from rds.nc.language.state import PER_MINUTE, State
+from rds.nc.language.state import State
 from rds.nc.language.stream import Stream
 from rds.nc.language.tools import Tool, ToolTable, read_tools
 from rds.nc.language.words import column_of, fill, line_number, place_of, read_plain, read_words, recoded, tidy, word_at
@@ -258,49 +258,10 @@ class Interpreter:
             return None if word is None else False
         if control.skipping:
             return False
-        if line.simple and self._simple(line):
+        if line.simple and self._contour is None and self._repeated.move(line, self.context):
             return False
         block = self._repeated.block(line)
         return None if block is None else self._execute(block)
-
-    def _simple(self, line: Line) -> bool:
-        """Execute a kept line of settings, F and a straight move, where the modes make no more of it than that."""
-        context, out = self.context, self.out
-        state = context.state
-        motion = state.motion if line.motion == -1 else line.motion
-        if (
-            state.feed_mode != PER_MINUTE
-            or out.compensation is not None
-            or context.leaving is not None
-            or not state.arc_allowed
-            or state.unplaced
-            or state.tcp
-            or state.diameter
-            or self._contour is not None
-            or (line.axes and motion != 0 and (motion != 10 or state.feed_rate == 0.0))
-        ):
-            return False
-        found = self._repeated.values(line)
-        if found is None:
-            return False
-        words, settings = found
-        if "f" in words and words["f"] == 0.0:
-            return False  # a move by feed says that it is missing
-        if settings:
-            context.parameters.settle_now(settings)
-        if "f" in words:
-            state.feed_rate = words["f"]
-            out.rate(words["f"])
-        if line.axes:
-            get = words.get
-            if state.absolute:
-                state.x, state.y, state.z = get("x", state.x), get("y", state.y), get("z", state.z)
-                state.a, state.b, state.c = get("a", state.a), get("b", state.b), get("c", state.c)
-            else:
-                state.move_to(target(state, words))
-            out.straight(TRAVERSE if motion == 0 else FEED, (state.x, state.y, state.z, state.a, state.b, state.c))
-            state.motion, state.cycle_series = motion, 0
-        return True
 
     def _block(self, text: str) -> bool:
         if self.options.program_numbers and not self.control.skipping and self._program_number(text):

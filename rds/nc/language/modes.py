@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from rds.nc.compensation.compensation import LEFT, RIGHT, Compensation
-from rds.nc.language.arcs import AXES_OF
 from rds.nc.language.blocks import (
     ARC_DISTANCE,
     COMPENSATION,
@@ -30,9 +28,10 @@ from rds.nc.language.blocks import (
     Block,
 )
 from rds.nc.language.comment_values import expanded
+from rds.nc.language.compensation_words import compensate, hold_beside_contour
 from rds.nc.language.context import INCH, Context, rotate
 from rds.nc.language.expressions import Fault, whole
-from rds.nc.language.moves import draw_points, home, move
+from rds.nc.language.moves import home, move
 from rds.nc.language.offsets import (
     call_origin,
     g92_mode,
@@ -48,8 +47,10 @@ from rds.nc.language.offsets import (
     tell_tool,
 )
 from rds.nc.language.outside import active_comment
-from rds.nc.language.parameters import DEBUG_SHOWN, INPUT, SYSTEM, SYSTEMS
-from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES, XY, YZ
+from rds.nc.language.parameters import DEBUG_SHOWN, SYSTEM, SYSTEMS
+from rds.nc.language.signals import signal
+from rds.nc.language.splines import draw_points
+from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES, XY
 from rds.nc.language.tool_centre import check_words
 
 _ACTIVE_COMMENTS = ("pyrun,", "py,", "abort,")
@@ -81,7 +82,7 @@ def execute(m: Context, block: Block) -> bool:
     if block.motion != -1:
         move(m, block)
     if TOOL_CHANGE in block.m and m.leaving is not None:
-        stand_by_the_contour(m, m.leaving)
+        hold_beside_contour(m, m.leaving)
     if STOP in block.m:
         return stop(m, block.m[STOP])
     return False
@@ -275,43 +276,6 @@ def orient(m: Context, words: dict[str, float]) -> None:
         m.out.call("ORIENT_SPINDLE", 0, angle, int(way))
 
 
-def signal(m: Context, code: int, words: dict[str, float]) -> None:
-    """M62 to M65 P (digital outputs on and off, with motion or at once), M66 P or E (an input), M67 and M68 E Q (analog
-    outputs).
-    """
-    key = f"m{code}"
-    if m.state.comp_side:
-        raise Fault("inputs and outputs do not go with cutter compensation; write it after G40", key)
-    letter = "p" if code <= 65 else "e"
-    if code == 66:
-        _read_input(m, words)
-        return
-    if letter not in words:
-        raise Fault(f"M{code} needs {letter.upper()}, the number of the output; add it", key)
-    index = round(words[letter])
-    if index < 0:
-        raise Fault(f"{letter.upper()}{words[letter]:g} is no output; they count from 0", letter)
-    where = "AUX" if code in (64, 65, 68) else "MOTION"
-    if code <= 65:
-        m.out.call(f"{'SET' if code in (62, 64) else 'CLEAR'}_{where}_OUTPUT_BIT", index)
-    else:
-        m.out.call(f"SET_{where}_OUTPUT_VALUE", index, words.get("q", -1.0))
-
-
-def _read_input(m: Context, words: dict[str, float]) -> None:
-    """M66: nothing answers here, so #5399 keeps its value, as for `rs274`."""
-    if ("p" in words) == ("e" in words):
-        raise Fault("M66 reads one input; write P (digital) or E (analog) with its number", "m66")
-    letter = "p" if "p" in words else "e"
-    if words[letter] < 0.0:
-        raise Fault(f"{letter.upper()}{words[letter]:g} is no input; they count from 0", letter)
-    if words.get("l", 0.0) and (letter == "e" or words.get("q", 0.0) <= 0.0):
-        raise Fault("M66 waits (L1 to L4) only for a digital input P, with Q above 0, the seconds at most", "l")
-    m.out.call("WAIT", letter.upper(), round(words[letter]), int(words.get("l", 0.0)), words.get("q", 0.0))
-    if letter == "p":
-        m.parameters.numbers[INPUT] = float(m.parameters.numbers[INPUT] != 0.0)
-
-
 def override(m: Context, code: int, words: dict[str, float]) -> None:
     """M48 to M53: whether the operator's override, adaptive feed and feed hold work."""
     state, out = m.state, m.out
@@ -350,18 +314,6 @@ def set_retract(m: Context, code: int) -> None:
     m.state.retract_high = int(code == 980)
 
 
-def stand_by_the_contour(m: Context, compensation: Compensation) -> None:
-    """After G40 and M6 the program goes on from where the cutter is, beside the contour, as LinuxCNC does, which asks
-    the machine for its position after a change of tools: G0 Z5 alone then goes straight up.
-    """
-    beside = [0.0, 0.0, 0.0]
-    first, second, _ = AXES_OF[PLANES.index(compensation.plane)]
-    beside[first], beside[second] = compensation.beside()
-    rotate(beside, m.left_turned - m.state.rotation)
-    m.state.x, m.state.y, m.state.z = plus([m.state.x, m.state.y, m.state.z], beside)
-    m.leaving = None
-
-
 def select_plane(m: Context, code: int) -> None:
     """G17, G18, G19."""
     plane = {170: 0, 180: 1, 190: 2}[code]
@@ -369,63 +321,6 @@ def select_plane(m: Context, code: int) -> None:
         raise Fault("the plane cannot change while the cutter is compensated; write it after G40", f"g{code}")
     m.out.call("SELECT_PLANE", PLANES[plane])
     m.state.plane = plane
-
-
-def compensate(m: Context, code: int, words: dict[str, float]) -> None:
-    """G40, G41, G42, G41.1, G42.1."""
-    out, state = m.out, m.state
-    if code == 400:
-        out.comment("interpreter: cutter radius compensation off")
-        compensation, out.compensation = out.compensation, None
-        if compensation is not None:
-            entered = compensation.entered
-            out.put(compensation.off(out.line, (out.digits, out.n)))
-            if entered:
-                m.leaving, m.left_turned = compensation, state.rotation
-                state.arc_allowed = 0
-        state.comp_side = 0
-        return
-    if state.plane == YZ:
-        raise Fault("cutter compensation works in the planes of G17 and G18 only; write one of them before", f"g{code}")
-    if state.comp_side:
-        raise Fault("the cutter is compensated already; write G40 before", f"g{code}")
-    side = LEFT if code in (410, 411) else RIGHT
-    radius, orientation = _cutter(m, code, words)
-    if radius < 0.0:
-        side, radius = -side, -radius
-    out.comment(f"interpreter: cutter radius compensation on {'left' if side == LEFT else 'right'}")
-    state.comp_side = side
-    m.leaving = None
-    if radius > 0.0:
-        start = (state.x, state.y, state.z) if state.plane == XY else (state.z, state.x, state.y)
-        units = "INCHES" if state.inches else "MM"
-        out.compensation = Compensation(
-            side, radius, PLANES[state.plane], start, units=units, orientation=orientation, record=m.stretches
-        )
-
-
-def _cutter(m: Context, code: int, words: dict[str, float]) -> tuple[float, int]:
-    """Radius in program units (negative: the other side) and orientation of the cutter to compensate."""
-    if code in (411, 421):
-        if "d" not in words:
-            raise Fault("D is missing; write the cutter's diameter, for example D6", f"g{code}")
-        if "l" in words and m.state.plane == XY:
-            raise Fault("L, the orientation of a lathe tool, goes with the plane of G18 only; leave it away", "l")
-        return words["d"] / 2.0, int(words.get("l", 0))
-    slot = 0
-    if "d" in words:
-        try:
-            number = whole(words["d"])
-            if number < 0:
-                raise Fault(f"D{number} is negative; write the number of a tool")
-            slot = m.tools.find(number)
-        except Fault as fault:
-            fault.key = "d"
-            raise
-    tool = m.tools.slots[slot]
-    if m.state.plane == XY and tool.orientation not in (0, 9):
-        raise Fault(f"tool {tool.number} is a lathe tool, which is compensated in the plane of G18 only", f"g{code}")
-    return m.from_machine(tool.diameter) / 2.0, tool.orientation
 
 
 def control_path(m: Context, code: int, words: dict[str, float]) -> None:

@@ -7,13 +7,19 @@ line that it would fault, or that has anything rare, is left to it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rds.nc.language.blocks import AXIS_SET, MOTION, Block
+from rds.nc.language.canon import FEED, TRAVERSE
 from rds.nc.language.compiled_values import FAULTS, Compiler, Refused, names_of
 from rds.nc.language.owords import FANUC, GLOBAL, KIND, TESTS, Word, spelled
 from rds.nc.language.parameters import ARGUMENTS, Parameters
+from rds.nc.language.state import PER_MINUTE
+from rds.nc.language.targets import target
 from rds.nc.language.words import OTHERS, line_number, read_plain
+
+if TYPE_CHECKING:
+    from rds.nc.language.context import Context
 
 _OFTEN = 3  # executions after which a line is worth being taken apart
 _MOST = 20_000  # lines kept at once
@@ -44,9 +50,7 @@ class Line:
         self.plain = read_plain(text) is not None  # a line that the fast lane may take
         self.word: Word | None = None  # the O word that the line is
         self.ready, self.scope = Word(), ""  # that word with its name in a subroutine (the scope)
-        self.simple = (
-            False  # nothing but settings, F, and a straight move (its G word, or -1, and its axis words, if any)
-        )
+        self.simple = False  # nothing but settings, F, and a straight move: its G word, or -1, and its axis words
         self.motion, self.axes = -1, False
         self.code: Callable[..., Any] | None = None
 
@@ -75,13 +79,11 @@ class RepeatedLines:
 
     def block(self, line: Line) -> Block | None:
         """The block that a line with words is now, its settings noted; None where the reader says what is wrong."""
-        block, parameters = Block(), self._parameters
-        try:
-            assert line.code is not None
-            words, settings = line.code(parameters.numbers, parameters.locals[-1], parameters.globals)
-        except FAULTS:
+        found = self._values(line)
+        if found is None:
             return None
-        block.words, block.comment = words, line.comment
+        block, parameters = Block(), self._parameters
+        (block.words, settings), block.comment = found, line.comment
         if line.g:
             block.g = line.g.copy()
         if line.m:
@@ -90,8 +92,48 @@ class RepeatedLines:
             parameters.set_later(name, value)
         return block
 
-    def values(self, line: Line) -> tuple[dict[str, float], tuple[tuple[int | str, float], ...]] | None:
-        """The words of a simple line and its settings; None where the reader says what is wrong."""
+    def move(self, line: Line, m: Context) -> bool:
+        """Execute a simple line, where the modes make no more of it than settings, F and a straight move.
+
+        False, and nothing done, for any other, and where the reader is to say what is wrong.
+        """
+        state, out = m.state, m.out
+        motion = state.motion if line.motion == -1 else line.motion
+        if (
+            state.feed_mode != PER_MINUTE
+            or out.compensation is not None
+            or m.leaving is not None
+            or not state.arc_allowed
+            or state.unplaced
+            or state.tcp
+            or state.diameter
+            or (line.axes and motion != 0 and (motion != 10 or state.feed_rate == 0.0))
+        ):
+            return False
+        found = self._values(line)
+        if found is None:
+            return False
+        words, settings = found
+        if "f" in words and words["f"] == 0.0:
+            return False  # a move by feed says that it is missing
+        if settings:
+            m.parameters.settle_now(settings)
+        if "f" in words:
+            state.feed_rate = words["f"]
+            out.rate(words["f"])
+        if line.axes:
+            get = words.get
+            if state.absolute:
+                state.x, state.y, state.z = get("x", state.x), get("y", state.y), get("z", state.z)
+                state.a, state.b, state.c = get("a", state.a), get("b", state.b), get("c", state.c)
+            else:
+                state.move_to(target(state, words))
+            out.straight(TRAVERSE if motion == 0 else FEED, (state.x, state.y, state.z, state.a, state.b, state.c))
+            state.motion, state.cycle_series = motion, 0
+        return True
+
+    def _values(self, line: Line) -> tuple[dict[str, float], tuple[tuple[int | str, float], ...]] | None:
+        """The words and settings of a line as its code gives them; None where that is a fault."""
         parameters = self._parameters
         try:
             assert line.code is not None
