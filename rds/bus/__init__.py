@@ -15,11 +15,10 @@ __getattr__, __dir__ = face(
         "Statistics": "tools.statistics",
         "Watch": "modules.oacs.watch",
         "analyse_messages": "analysis.analysis_report",
-        "estop": "modules.oacs.host",
         "messages_of": "analysis.messages",
         "read_messages": "analysis.message_tables",
         "reset_everything": "tools.estop",
-        "scan": "modules.oacs.host",
+        "scan_all": "tools.scan",
         "stop_everything": "tools.estop",
     },
 )
