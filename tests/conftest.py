@@ -9,6 +9,7 @@ import shutil
 import signal
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -36,8 +37,25 @@ pytest_plugins = ["held_up", "skipped"]
 
 HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
+POLITE = 10  # niceness of the others
 MARK = "pytest.mark.realtime"
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One worker more than there are processors: the two kinds that run one by one wait for most of their time."""
+    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 1
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Side by side, what runs one by one begins first, as it ends last; then the files with the most tests."""
+    if not hasattr(config, "workerinput"):
+        return
+    sizes = Counter(group_of(item.nodeid) for item in items)
+    first = (REALTIME, PANELS)
+    rank = {group: (group not in first, -sizes[group], group) for group in sizes}
+    items.sort(key=lambda item: rank[group_of(item.nodeid)])
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
@@ -45,6 +63,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     they starve. (pytest-xdist's own groups need names of tests that pytest 9.2 does not let it change.)
     """
     from xdist.scheduler import LoadScopeScheduling  # type: ignore[import-untyped]
+
+    config.option.loadscopereorder = False  # the order is that of the collection
 
     class FilesOrGroups(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
@@ -82,6 +102,14 @@ def own_runtime_directory(worker_id: str) -> Iterator[None]:
     with tempfile.TemporaryDirectory(prefix="rds", dir="/tmp") as runtime, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", runtime)
         yield
+
+
+@pytest.fixture(autouse=True)
+def politeness(request: pytest.FixtureRequest, worker_id: str) -> None:
+    """Side by side, a test that only computes gives way to those that wait for real time or for a browser."""
+    is_served_first = group_of(request.node.nodeid) in (PANELS, REALTIME)
+    if worker_id != "master" and not is_served_first and hasattr(os, "nice") and os.nice(0) < POLITE:
+        os.nice(POLITE - os.nice(0))  # for good: a worker that took a file gets no test of the other kinds any more
 
 
 @pytest.fixture(autouse=True)
