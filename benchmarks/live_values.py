@@ -12,7 +12,7 @@ from rds.modes.loop.changes import LiveChanges, stop_channel
 from rds.modes.loop.execution import Execution
 from rds.modes.loop.laws import LiveReference
 from rds.modes.loop.live_values import Channel, LiveValues
-from rds.modes.loop.retimed import Retimed
+from rds.modes.loop.retimed import RetimedProgram
 from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.prepare import planned
 
@@ -64,7 +64,7 @@ def _program(override: float) -> float:
     T = 1e-3
     program = planned([block], load_machine("mini-cnc"), T, Path("benchmark.ngc")).program
     references = [LiveReference() for _ in range(3)]
-    execution = Execution(program, T, Retimed(program, T), references, None, 0.0, lambda names: True)
+    execution = Execution(program, T, RetimedProgram(program, T), references, None, 0.0, lambda names: True)
     execution.actions()["override"](override)
     row: list[float] = []
     started = perf_counter_ns()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import c_program, cyclictest, nc_peers
-from rds.modes.process.environment import surroundings
+from rds.modes.process.environment import describe_environment
 
 PACKAGES = ("mini-cnc-rds", "numpy", "numba", "llvmlite", "scipy", "control", "bdsim", "python-can", "canopen")
 
@@ -35,7 +35,7 @@ def versions() -> dict[str, str]:
 
 def machine() -> dict[str, Any]:
     """Processor, kernel, scheduler's circumstances, memory."""
-    return {"processor_model": _field("/proc/cpuinfo", "model name"), **surroundings()} | {
+    return {"processor_model": _field("/proc/cpuinfo", "model name"), **describe_environment()} | {
         "memory": _field("/proc/meminfo", "MemTotal"),
         "clock_source": _text("/sys/devices/system/clocksource/clocksource0/current_clocksource"),
     }

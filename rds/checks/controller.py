@@ -11,11 +11,11 @@ import numpy as np
 
 from rds.checks import clauses
 from rds.checks.answers import voltage_fault
+from rds.checks.checked_code import CheckedCode, checked_code
 from rds.checks.exercise import LinearAxis, references
 from rds.checks.memory import judge_memory
 from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
-from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
 from rds.checks.values import same, size
 from rds.core.adapt import as_controller, is_control_system
@@ -52,7 +52,7 @@ def check_controller(
         controller = as_controller(controller, sample_period)
     if coupled is None:
         coupled = isinstance(controller, Controller) and controller.coupled
-    subject = subject_of(controller, "control", initial_state, params)
+    subject = checked_code(controller, "control", initial_state, params)
     run = _Run(subject, sample_period, axes if coupled else 0, budget)
     run.check()
     return run.found.report("controller", subject.name, run.timing)
@@ -61,7 +61,7 @@ def check_controller(
 class _Run:
     """One check: the subject, and what is found of it."""
 
-    def __init__(self, subject: Subject, sample_period: float, axes: int, budget: float):
+    def __init__(self, subject: CheckedCode, sample_period: float, axes: int, budget: float):
         self.found = Findings()
         self.timing: Timing | None = None
         self.subject, self.source = subject, subject.student.source

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from rds.checks import clauses
+from rds.checks.checked_code import CheckedCode, checked_code
 from rds.checks.paths import ARC, CIRCLE, CLOCKWISE, LINE, LINE_BACK, LINE_OF_ONE, LINE_OF_THREE, name_of
 from rds.checks.places import changed, outside_sources, remembered
 from rds.checks.report import CheckReport, Findings, Timing
 from rds.checks.rows import Trace, alternate, trace
-from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
 from rds.checks.track import follows_chord, judge_track
 from rds.checks.values import same
@@ -42,7 +42,7 @@ def check_interpolator(
     lines or only arcs is as good, and the report's notes say so. Faults are in the report; InputError is raised
     for a file that cannot be loaded or holds no interpolator.
     """
-    subject = subject_of(interpolator, "interpolate", None, params)
+    subject = checked_code(interpolator, "interpolate", None, params)
     check = _Check(subject, sample_period, budget)
     check.check()
     return check.found.report("interpolator", subject.name, check.timing)
@@ -51,7 +51,7 @@ def check_interpolator(
 class _Check:
     """One check: the subject, and what is found of it."""
 
-    def __init__(self, subject: Subject, sample_period: float, budget: float):
+    def __init__(self, subject: CheckedCode, sample_period: float, budget: float):
         self.found = Findings()
         self.timing: Timing | None = None
         self.subject, self.source = subject, subject.student.source

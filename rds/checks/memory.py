@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rds.checks import clauses
+from rds.checks.checked_code import CheckedCode
 from rds.checks.places import changed, outside_sources, remembered
 from rds.checks.replay import Call, Difference, Replay
 from rds.checks.report import Findings
-from rds.checks.subject import Subject
 from rds.checks.values import is_plain
 
 REMEDIES = {
@@ -34,7 +34,7 @@ class Memory:
 
 @contextmanager
 def judge_memory(
-    found: Findings, what: str, subject: Subject, role: str, clause: str, budget: float
+    found: Findings, what: str, subject: CheckedCode, role: str, clause: str, budget: float
 ) -> Iterator[Memory]:
     """Around the recorded run of the function in `role`: note hidden memory and chance in `found` when it is over.
 

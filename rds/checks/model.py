@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from rds.checks import clauses
+from rds.checks.checked_code import CheckedCode, checked_code
 from rds.checks.memory import judge_memory
 from rds.checks.replay import Call
 from rds.checks.report import CheckReport, Findings, Timing
-from rds.checks.subject import Subject, subject_of
 from rds.checks.timing import judge_time
 from rds.checks.values import same
 from rds.checks.vectors import is_ragged, output_fault, vector_fault, vector_of
@@ -51,7 +51,7 @@ def check_model(
     """
     if is_control_system(model):
         model = as_model(model, sample_period)
-    subject = subject_of(model, _role_of(model), initial_state, params)
+    subject = checked_code(model, _role_of(model), initial_state, params)
     role = "advance" if "advance" in subject.student.functions else "derivatives"
     check = _Check(subject, role, isinstance(model, Model), sample_period, budget)
     check.check()
@@ -68,7 +68,7 @@ def _role_of(model: Any) -> str:
 class _Check:
     """One check: the subject, and what is found of it."""
 
-    def __init__(self, subject: Subject, role: str, scalar: bool, sample_period: float, budget: float):
+    def __init__(self, subject: CheckedCode, role: str, scalar: bool, sample_period: float, budget: float):
         self.found = Findings()
         self.timing: Timing | None = None
         self.subject, self.source, self.role = subject, subject.student.source, role

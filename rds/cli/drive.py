@@ -62,7 +62,7 @@ def setup(
     """
     with refusals(), ends_as_ctrl_c():
         from rds.bus.modules.cia402.commissioned import experiment_text, machine_text
-        from rds.bus.modules.cia402.commissioning import Declined, Wishes, commission
+        from rds.bus.modules.cia402.commissioning import CommissioningOptions, Declined, commission
         from rds.core.atomic import write_whole
         from rds.core.errors import InputError
         from rds.modes.process.environment import prepared
@@ -81,13 +81,13 @@ def setup(
                 raise InputError("there is such a file already; choose another name, or give --force", str(path))
         place = chosen_bus(interface, channel, experiment, bitrate)
         number = _the_node(place, node)
-        wishes = Wishes(
+        options = CommissioningOptions(
             number, axis, unit, lead, counts, travel, sample_period, mode, eds, torque, distance, keep_in_drive=store
         )
         try:
             # a drive bears no host that is held up for ten periods
             with _opened(place) as bus, prepared(PRIORITY, None):
-                made = commission(bus, wishes, out.stem, _Terminal(yes, json, direction, axis))
+                made = commission(bus, options, out.stem, _Terminal(yes, json, direction, axis))
         except Declined:
             typer.echo("rds: ended; what was changed on the drive has been written back", err=True)
             raise typer.Exit(1) from None

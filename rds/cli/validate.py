@@ -13,7 +13,7 @@ from rds.cli.logs import read_logs
 if TYPE_CHECKING:
     from rds.core.types import Model
     from rds.identification.logs.log import Log
-    from rds.identification.validate.cross_test import Crossed
+    from rds.identification.validate.cross_test import CrossTestResult
     from rds.identification.validate.in_loop import Loop
     from rds.identification.validate.validate import Validation
     from rds.results import Result
@@ -87,13 +87,13 @@ def _loop(path: Path) -> Loop:
     return simulate
 
 
-def _crossed(made: Validation, logs: list[Log]) -> list[Crossed]:
+def _crossed(made: Validation, logs: list[Log]) -> list[CrossTestResult]:
     from rds.identification.validate.cross_test import cross_test
 
     return cross_test(made.candidate, logs)
 
 
-def _show_crossed(crossed: list[Crossed]) -> None:
+def _show_crossed(crossed: list[CrossTestResult]) -> None:
     from rds.cli.console import show_table
 
     if not crossed:

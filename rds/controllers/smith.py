@@ -18,7 +18,7 @@ from rds.controllers import feedforward, modified_pid, pid, proportional, tracki
 from rds.controllers.axis_data import axis_data
 from rds.controllers.observer import held_axis
 from rds.core.errors import InputError
-from rds.core.quantities import Anything, Choice, Declaration, Quantity
+from rds.core.quantities import AnyValue, Choice, Declaration, Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "smith"
@@ -32,7 +32,7 @@ _INNER = {
 OPTIONS: Mapping[str, Declaration] = {
     "delay": Quantity("from a sampling instant until its voltage acts", "s", 0.0, 1000.0, default=0.0),
     "law": Choice("the law that is designed without delay", tuple(_INNER), "tracking"),
-    "options": Anything("its options, as in a table of its own"),
+    "options": AnyValue("its options, as in a table of its own"),
 }
 _LONGEST = 200  # samples of delay
 _ROUNDING = 1e-9  # of a sample

@@ -16,14 +16,14 @@ from rds.controllers import observer
 from rds.controllers.axis_data import SPINDLE_UNIT, AxisData, axis_data
 from rds.core.errors import InputError
 from rds.core.options import check_known
-from rds.core.quantities import Anything, Declaration, Items, Quantity
+from rds.core.quantities import AnyValue, Declaration, Items, Quantity
 from rds.core.types import Controller, Reference, Source
 
 NAME = "tracking"
 _REAL = Quantity("real pole", "1/s")
 _PAIR = Items("pole", Quantity("real or imaginary part", "1/s"), "[real, imaginary]", 2)
 OPTIONS: Mapping[str, Declaration] = {
-    "poles": Items("closed-loop poles, 1/s", Anything("pole", (_REAL, _PAIR)), "two poles", 2),
+    "poles": Items("closed-loop poles, 1/s", AnyValue("pole", (_REAL, _PAIR)), "two poles", 2),
     "observer_pole": observer.POLE,
     "gains": Items("in place of poles", Quantity("gain"), "[g1, g2], in 1/s² and 1/s", 2),
 }

@@ -252,7 +252,7 @@ class Items:
 
 
 @dataclass(frozen=True)
-class Anything:
+class AnyValue:
     """A value whose form is the business of the part that takes it. `forms` tells an editor what they may be."""
 
     meaning: str
@@ -310,7 +310,7 @@ class Table:
         if key in self.keys:
             return self.keys[key]
         if self.parts is not None:
-            return Choice(self.meaning, self.parts.names) if key == self.chosen_by else Anything(f"option {key}")
+            return Choice(self.meaning, self.parts.names) if key == self.chosen_by else AnyValue(f"option {key}")
         if self.others is None:
             raise KeyError(key)
         return self.others

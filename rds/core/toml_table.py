@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.core.quantities import Anything, Declaration, Quantity, Table, Tables, near, shortened
+from rds.core.quantities import AnyValue, Declaration, Quantity, Table, Tables, near, shortened
 from rds.core.toml_file import read_toml
 
 
@@ -158,7 +158,7 @@ class TomlTable:
     def _declared_under(self, key: str) -> Table | None:
         """The declaration of the table, or of each table, that `key` holds; None where it has none of its own."""
         declared = None if self.declared is None else self.declared.of(key)
-        if isinstance(declared, Anything):
+        if isinstance(declared, AnyValue):
             declared = next((form for form in declared.forms if isinstance(form, Table)), None)
         if isinstance(declared, Tables):
             declared = declared.table

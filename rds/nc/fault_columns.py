@@ -26,7 +26,7 @@ def find_word(text: str, letters: str) -> tuple[int, str]:
     return 0, ""
 
 
-def at_their_words(faults: Iterable[tuple[ProgramError, str]]) -> list[ProgramError]:
+def located_at_words(faults: Iterable[tuple[ProgramError, str]]) -> list[ProgramError]:
     """Faults with the columns and words that they are about, given the letters to look for.
 
     Each file is read once, line by line; where it cannot be read (a program that is no file), faults stay as they are.

@@ -17,7 +17,7 @@ from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.segments import AXES, JOINTS, MOVED
 from rds.machines import Machine
 from rds.nc.extent import extents
-from rds.nc.fault_columns import at_their_words
+from rds.nc.fault_columns import located_at_words
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.frame import only_rotary
 from rds.nc.path_block import DefaultFeed
@@ -378,7 +378,7 @@ class Validator:
     def result(self) -> Validation:
         """The faults found, at their words, and what was seen."""
         kept = [(fault, letters) for _, fault, letters in self._worst.values()]
-        faults = at_their_words(kept)
+        faults = located_at_words(kept)
         order = {file: at for file, at in self._files.items() if file != self._name} | {self._name: -1}
         faults.sort(key=lambda fault: (order.get(fault.file, 0), fault.line, fault.column))
         moved = np.flatnonzero(self._high - self._low > TOLERANCE)
@@ -396,7 +396,7 @@ class Validator:
             spindle=self._fastest,
             stopped=self.stopped,
             read_on=self.read_on,
-            warnings=tuple(at_their_words(self._warnings.values())),
+            warnings=tuple(located_at_words(self._warnings.values())),
         )
 
 

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 from rds import Experiment
 from rds.bus.modules.cia402 import first_motion
 from rds.bus.modules.cia402.commissioned import experiment_text
-from rds.bus.modules.cia402.commissioning import Commissioned, Declined, Wishes, commission
-from rds.bus.modules.cia402.examination import Units, gear_doubt
+from rds.bus.modules.cia402.commissioning import Commissioned, CommissioningOptions, Declined, commission
+from rds.bus.modules.cia402.examination import Units, gear_finding
 from rds.bus.modules.cia402.identity import Identity, check_eds, keep_eds, kept_eds
 from rds.bus.modules.cia402.lss import give_node_id
 from rds.bus.modules.cia402.node import DriveNode
@@ -66,7 +66,9 @@ def opened(channel: str) -> Iterator[can.BusABC]:
 
 def made(channel: str, folder: Path, operator: Operator | None = None, **wishes: object) -> Commissioned:
     with opened(channel) as bus:
-        return commission(bus, Wishes(node=2, period=T, **wishes), "bench", operator or Operator(), folder)  # type: ignore[arg-type]
+        return commission(
+            bus, CommissioningOptions(node=2, period=T, **wishes), "bench", operator or Operator(), folder
+        )  # type: ignore[arg-type]
 
 
 @pytest.mark.realtime
@@ -170,9 +172,9 @@ def test_units_come_from_the_objects_or_are_doubted() -> None:
     assert Units(10_000.0, 2.0, None).counts(5.0) == 4000.0
     assert Units(10_000.0, 1.0, 3600.0).counts(360.0) == 10.0
     assert Units(None, 1.0, None).counts(5.0) is None
-    assert gear_doubt(Units(1000.0, 1.0, 1000.0), 50, 51) is None
-    assert gear_doubt(Units(1000.0, 1.0, 500.0), 60, 30) is None
-    assert gear_doubt(Units(1000.0, 1.0, 500.0), 60, 60) is not None
+    assert gear_finding(Units(1000.0, 1.0, 1000.0), 50, 51) is None
+    assert gear_finding(Units(1000.0, 1.0, 500.0), 60, 30) is None
+    assert gear_finding(Units(1000.0, 1.0, 500.0), 60, 60) is not None
 
 
 def test_a_drive_without_a_node_id_gets_one_by_lss(served: Served) -> None:

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rds.bus.modules.cia402.commissioned import Choices, experiment_text
-from rds.bus.modules.cia402.commissioning import Declined, Wishes, commission
+from rds.bus.modules.cia402.commissioning import CommissioningOptions, Declined, commission
 from rds.bus.modules.cia402.configure import library, prepare
 from rds.bus.modules.cia402.eds_file import read_eds
 from rds.bus.modules.cia402.settings import read_settings
@@ -144,7 +144,7 @@ def test_a_mapping_that_is_an_array_is_written(served: Served, tmp_path: Path) -
     channel, nodes = served("X")
     operator = Operator(refused="switch the power on")
     with opened(channel) as bus, pytest.raises(Declined):
-        commission(bus, Wishes(node=2, period=0.01, eds=other), "bench", operator, tmp_path)
+        commission(bus, CommissioningOptions(node=2, period=0.01, eds=other), "bench", operator, tmp_path)
     assert "mode csp" in operator.said
     assert nodes[0].drive.receive_pdos[0].mapped == [(0x6040, 0), (0x607A, 0)]
 
@@ -161,7 +161,13 @@ def test_a_drive_of_another_eds_has_what_that_says(served: Served, machine: Mach
     }  # profile position, homing, interpolated position
     operator = Operator(refused="switch the power on")
     with opened(channel) as bus, pytest.raises(Declined):
-        commission(bus, Wishes(node=2, period=0.01, eds=other, counts=1000.0), "bench", operator, tmp_path / "kept")
+        commission(
+            bus,
+            CommissioningOptions(node=2, period=0.01, eds=other, counts=1000.0),
+            "bench",
+            operator,
+            tmp_path / "kept",
+        )
     assert "vendor 0x1a3, product 0x9" in operator.said[0] and any(
         said.startswith("mode pp: it moves by profiles") for said in operator.said
     )

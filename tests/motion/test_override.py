@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rds.interpolators.motion.deviation import allowed, deviation
 from rds.interpolators.motion.segments import BLEND, chain
 from rds.modes.loop.program import Program
-from rds.modes.loop.retimed import EXCESS, Retimed
+from rds.modes.loop.retimed import EXCESS, RetimedProgram
 
 from .chains import MACHINES, chains, planned, polygon
 
@@ -23,7 +23,7 @@ def followed(segments: np.ndarray, wanted: list[float], every: int) -> tuple[np.
     table = np.stack((LIMITS.velocity, LIMITS.acceleration, LIMITS.jerk))[:, :4]
     rows = {name: getattr(motion, name)[:, :4].copy() for name in ("position", "velocity", "acceleration")}
     program = Program(("X", "Y", "Z", "A"), None, **rows, line=motion.line, happenings=(), home=(), limits=table)
-    follower = Retimed(program, T)
+    follower = RetimedProgram(program, T)
     last = len(motion) - 1
     positions, places, rates = [follower.position], [0.0], [1.0]
     k = 0
@@ -101,7 +101,7 @@ def test_it_never_goes_back_at_a_long_sample_period() -> None:
     rows = {name: getattr(motion, name)[:, :4].copy() for name in ("position", "velocity", "acceleration")}
     program = Program(("X", "Y", "Z", "A"), None, **rows, line=motion.line, happenings=(), home=(), limits=table)
     for every in range(1, 30):
-        follower = Retimed(program, T)
+        follower = RetimedProgram(program, T)
         k = place = 0
         while follower.place < len(motion) - 1:
             follower.advance(float(k // every % 2 if k < 800 else 1.0), len(motion) - 1)

@@ -52,7 +52,7 @@ def test_the_modules_speak_the_same_bytes(kind: str, base: int) -> None:
 @pytest.mark.parametrize(
     "message, field, enum",
     [
-        ("Reply", "Code", words.Says),
+        ("Reply", "Code", words.MessageToHost),
         ("Reply", "Acknowledges", words.Acknowledges),
         ("Reply", "Result", words.Result),
         ("Command_X", "Move", words.Move),

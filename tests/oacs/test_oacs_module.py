@@ -105,7 +105,7 @@ def test_a_motion_is_accepted_then_carried_out_with_positions_between(bench: Ben
     rig.until_done()
     rig.run(0.1)
     assert rig.results() == [Result.CARRIED_OUT, Result.ACCEPTED, Result.CARRIED_OUT]
-    positions = [(at, m.fields) for at, m in rig.heard if m.fields.get("Code") == words.Says.POSITION]
+    positions = [(at, m.fields) for at, m in rig.heard if m.fields.get("Code") == words.MessageToHost.POSITION]
     assert [fields["Sequence"] for _, fields in positions] == [k % 256 for k in range(len(positions))]
     steps = [b - a for (a, _), (b, _) in pairwise(positions)]
     assert steps == pytest.approx([0.01] * len(steps), abs=1e-6)
@@ -121,7 +121,7 @@ def test_positions_do_not_depend_on_how_late_the_process_is(bench: Benches) -> N
             rig.module.mover.heard = rig.now
             rig.now += late
             rig._note(rig.module.expire(rig.now))
-        return [m.fields["Position"] for m in rig.said("Reply") if m.fields["Code"] == words.Says.POSITION]
+        return [m.fields["Position"] for m in rig.said("Reply") if m.fields["Code"] == words.MessageToHost.POSITION]
 
     assert positions(0.003) == positions(0.07)[: len(positions(0.003))] != []
 

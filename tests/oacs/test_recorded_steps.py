@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rds.bus.modules.oacs import Module, messages
-from rds.bus.modules.oacs.codes import Says
+from rds.bus.modules.oacs.codes import MessageToHost
 from rds.bus.modules.oacs.module_data import read_modules
 from rds.bus.modules.oacs.recording import PositionRecorder
 from rds.bus.modules.oacs.talk import Heard
@@ -36,7 +36,7 @@ def recorded(positions: Sequence[int], by: float = 1.0, lost: Sequence[int] = ()
             continue
         frame = messages.encode(
             "Reply",
-            Code=Says.POSITION,
+            Code=MessageToHost.POSITION,
             BoardID=4,
             Item=1,
             PositionAxis=ord("X"),

@@ -19,7 +19,7 @@ from rds.modes.loop.changes import LiveChanges, plan_changes, stop_channel
 from rds.modes.loop.execution import Execution, State
 from rds.modes.loop.laws import LiveReference
 from rds.modes.loop.program import program_channels
-from rds.modes.loop.retimed import EXCESS, Retimed
+from rds.modes.loop.retimed import EXCESS, RetimedProgram
 from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.contour import contour_error
 from rds.nc.run.prepare import Prepared, planned
@@ -54,7 +54,13 @@ def execute(program: Prepared, changes: Any = (), speed: Any = lambda k, wanted:
     channels = program_channels()
     references = [LiveReference() for _ in range(4)]
     execution = Execution(
-        program.program, T, Retimed(program.program, T), references, 3, 1.0, lambda names: live_changes.expects(names)
+        program.program,
+        T,
+        RetimedProgram(program.program, T),
+        references,
+        3,
+        1.0,
+        lambda names: live_changes.expects(names),
     )
     by_name = {channel.name: channel for channel in (*channels, STOP)}
     live_changes = LiveChanges(
@@ -245,7 +251,7 @@ def test_discarded_samples_are_not_lost_time() -> None:
     """A machine does not wait: where the loop was late, the path goes on."""
     program = WHOLE.program
     references = [LiveReference() for _ in range(4)]
-    execution = Execution(program, T, Retimed(program, T), references, 3, 1.0, lambda names: False)
+    execution = Execution(program, T, RetimedProgram(program, T), references, 3, 1.0, lambda names: False)
     for k in (0, 1, 2, 50, 51, 300):
         row: list[float] = []
         execution.law(k, [0.0] * 4, row, [])

@@ -79,3 +79,23 @@ def test_without_its_controller_a_closed_loop_is_judged_by_forces() -> None:
         found = validate(candidate(X | {"tau": factor * X["tau"]}), data)
         (sides[factor],) = [r.side for r in found.verdict.reasons if r.kind == "forces"]
     assert sides == {1.0: "for", 3.0: "against"}
+
+
+def test_a_load_that_the_loop_makes_up_for_does_not_pass_for_a_gain() -> None:
+    """A right model drifts from the log for want of the load; what it says of forces stands, and a wrong gain shows."""
+    rng = np.random.default_rng(4)
+    axis = X | {"tau": 0.5, "K": 30.0, "friction_plus": 0.3, "friction_minus": -0.3}
+    model = rds.library_model("linear-axis", **axis)
+    t = np.arange(8000) * T
+    wanted = 5.0 * np.sin(2 * np.pi * 0.7 * t) + 0.5 * np.sin(2 * np.pi * 6.0 * t)
+    x, u, y = (0.0, 0.0), np.zeros(len(t)), np.zeros(len(t))
+    for k in range(len(t)):
+        y[k] = np.rint((x[0] + 1e-4 * rng.standard_normal()) / STEP) * STEP
+        u[k] = np.clip(20.0 * (wanted[k] - x[0]) - 0.3 * x[1], -10.0, 10.0)
+        x = model.advance(x, u[k] + 0.09, T, axis)
+    data = log(u, y, closed_loop=True)
+    right, wrong = (validate(candidate(values), data) for values in (axis, axis | {"K": 36.0}))
+    assert right.verdict.purpose == "foretelling the force of a motion in a closed loop such as this"
+    (gain,) = [reason for reason in right.verdict.reasons if reason.kind == "gain"]
+    assert gain.side == "for" and float(gain.what.split()[3]) < 0.1  # %; the standard error is 0.002
+    assert wrong.verdict.word == "not valid" and "its gain is 20 % too high" in wrong.verdict.sentence

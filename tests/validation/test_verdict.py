@@ -96,7 +96,7 @@ def test_a_wrong_sign_or_unit_is_named(factor: float, kind: str, word: str) -> N
 def test_an_axis_that_never_moves_gives_no_verdict_and_no_fit() -> None:
     u = np.full(4000, 0.1)  # V: friction holds it
     found = validate(candidate(), log(u))
-    assert found.verdict.word is Word.UNTOLD
+    assert found.verdict.word is Word.CANNOT_TELL
     assert kinds(found, "cannot tell") == {"no-motion", "no-excitation"}
     numbers = found.to_json()["logs"]["log"]
     assert numbers["free_run"]["fit_percent"] is None  # not 0, not 100, and no NaN in JSON
@@ -108,12 +108,12 @@ def test_a_few_steps_of_the_encoder_are_too_few() -> None:
     y = moved(u)
     assert np.ptp(y) > 0 and np.ptp(np.rint(y / 0.05)) < 20
     found = validate(candidate(), log(u, np.rint(y / 0.05) * 0.05, resolution=0.05))
-    assert found.verdict.word is Word.UNTOLD and kinds(found, "cannot tell") == {"no-motion"}
+    assert found.verdict.word is Word.CANNOT_TELL and kinds(found, "cannot tell") == {"no-motion"}
 
 
 def test_a_short_log_is_too_short() -> None:
     found = validate(candidate(), log(square(0.5)))
-    assert found.verdict.word is Word.UNTOLD and "short" in kinds(found, "cannot tell")
+    assert found.verdict.word is Word.CANNOT_TELL and "short" in kinds(found, "cannot tell")
 
 
 def test_the_fit_s_own_data_prove_nothing_and_are_known_by_file_and_by_content() -> None:
@@ -123,7 +123,7 @@ def test_the_fit_s_own_data_prove_nothing_and_are_known_by_file_and_by_content()
     shifted = replace(log(FRESH, moved(FRESH) + 12.5, name="shifted"), sha256="")
     for data in (first, renamed, shifted, first.part(2000, 6000), renamed.part(1000, 8000)):
         found = validate(seen, data)
-        assert found.verdict.word is Word.UNTOLD, data.name
+        assert found.verdict.word is Word.CANNOT_TELL, data.name
         assert kinds(found, "cannot tell") == {"same-data"}
         assert "validate on another log" in str(found)
     other = validate(seen, log(square(8.0, 2.0, 0.9), sha256="ef" * 32))
@@ -143,7 +143,7 @@ def test_the_fit_s_own_data_are_known_with_noise_resampled_and_thinned_out() -> 
     later = replace(noisy, time=noisy.time + 100.0, name="later")
     for data in (noisy, half, resampled, later, noisy.part(1000, 7000)):
         found = validate(seen, data)
-        assert "same-data" in kinds(found, "cannot tell") and found.verdict.word is Word.UNTOLD, data.name
+        assert "same-data" in kinds(found, "cannot tell") and found.verdict.word is Word.CANNOT_TELL, data.name
         assert found.assessments[data.name].overlap.share > 0.9 and "the same motion" in str(found)
     other = square(8.0, 3.0, 0.72)
     assert "same-data" not in kinds(validate(seen, log(other, name="other")), "cannot tell")
@@ -165,12 +165,12 @@ def test_a_model_that_fails_on_its_own_data_has_failed() -> None:
 
 def test_the_model_s_own_output_is_no_measurement() -> None:
     found = validate(candidate(), log(FRESH, moved(FRESH, step=None), resolution=None))
-    assert found.verdict.word is Word.UNTOLD and kinds(found, "cannot tell") == {"own-output"}
+    assert found.verdict.word is Word.CANNOT_TELL and kinds(found, "cannot tell") == {"own-output"}
 
 
 def test_an_error_below_the_encoder_s_rounding_is_too_good() -> None:
     found = validate(candidate(), log(FRESH, moved(FRESH, step=1e-4), resolution=1e-3))
-    assert found.verdict.word is Word.UNTOLD and kinds(found, "cannot tell") == {"too-good"}
+    assert found.verdict.word is Word.CANNOT_TELL and kinds(found, "cannot tell") == {"too-good"}
 
 
 def test_an_error_that_grows_on_new_data_is_overfitting() -> None:
@@ -197,7 +197,9 @@ def test_a_closed_loop_hides_no_delay() -> None:
     assert estimate.parameters["tau"].low > 1.1 * X["tau"]
     assert any("predictions 100 samples ahead are" in warning for warning in estimate.warnings)
     found = validate(estimate, logs[1])
-    assert {"structure-held", "delay"} <= kinds(found, "against") and "delay is 2.9" in found.verdict.sentence
+    assert {"structure-held", "delay"} <= kinds(
+        found, "against"
+    ) and "delay is 3 ms too short" in found.verdict.sentence
     assert found.verdict.word is Word.NOT and found.exit_code == 1
     right = validate(fit(logs[:1], axis), logs[1])
     assert "structure-held" not in kinds(right, "against")
@@ -208,7 +210,7 @@ def test_a_sign_or_unit_that_model_and_log_share_is_not_valid(tmp_path: Path) ->
     fitted, fresh = (with_findings(log(-u, moved(u))) for u in (square(6.0, 2.5, 1.0), FRESH))
     estimate = fit([fitted], structure("axis"))
     found = validate(estimate, fresh)
-    assert found.verdict.word is Word.UNTOLD and "data-sign" in kinds(found, "cannot tell")
+    assert found.verdict.word is Word.CANNOT_TELL and "data-sign" in kinds(found, "cannot tell")
     assert "fit" in kinds(found, "against")
     assert "fit" in kinds(validate(write_model(tmp_path / "reversed.toml", estimate), fresh), "against")
     slow = [replace(log(u, moved(u)), time=np.arange(len(u)) * 1.0) for u in (square(6.0, 2.5, 1.0), FRESH)]
@@ -273,7 +275,7 @@ def _unstable(x, u, T, params):  # type: ignore[no-untyped-def]
     return [x[0] + T * x[1], 1.1 * x[1] + u]
 
 
-@pytest.mark.parametrize(("closed", "word"), [(False, Word.NOT), (True, Word.UNTOLD)])
+@pytest.mark.parametrize(("closed", "word"), [(False, Word.NOT), (True, Word.CANNOT_TELL)])
 def test_an_unstable_free_run_has_its_instant(closed: bool, word: Word) -> None:
     model = Model(_unstable, (0.0, 0.0), {}, source=Source("wild"))
     found = validate(model, log(FRESH, closed_loop=closed))

@@ -22,7 +22,7 @@ import can
 from rds.bus.hub import connect, wire
 from rds.bus.hub.address import Address, channels
 from rds.bus.hub.bus_settings import read_settings
-from rds.bus.hub.error_states import Glance
+from rds.bus.hub.error_states import ErrorStateReader
 from rds.bus.hub.wire_messages import filters_of, message_of, record_of
 from rds.bus.medium.confinement import ErrorState
 
@@ -85,7 +85,9 @@ class BuiltinBus(can.BusABC):
         self._pid = os.getpid()
         try:
             connection = connect.join(self._channel, bool(receive_own_messages), wanted, settings)
-            self._glance = Glance(Address(self._channel).board_path, connection.node) if connection.bitrate else None
+            self._error_states = (
+                ErrorStateReader(Address(self._channel).board_path, connection.node) if connection.bitrate else None
+            )
         except OSError as error:
             raise can.CanInitializationError(f"{self.channel_info}: {error}") from error
         self._sock = connection.sock
@@ -200,7 +202,7 @@ class BuiltinBus(can.BusABC):
             raise ValueError(f"{self.channel_info}: opened with fd=False, it sends no CAN FD frames; leave fd away")
         if self._lost is not None:
             raise can.CanOperationError(self._lost)
-        if self._glance is not None:
+        if self._error_states is not None:
             self._check_state(msg)
         with self._sending:
             try:
@@ -218,10 +220,10 @@ class BuiltinBus(can.BusABC):
                 raise self._lose(self._look_for_reason() or self._describe(error)) from error
 
     def _check_state(self, msg: can.Message) -> None:
-        assert self._glance is not None
+        assert self._error_states is not None
         if msg.is_error_frame:
             raise ValueError("error frames can't be sent on a bus with bit timing; inject a fault (rds.bus.hub.faults)")
-        if self._glance.state() == ErrorState.OFF:
+        if self._error_states.state() == ErrorState.OFF:
             raise can.CanOperationError(
                 f"{self.channel_info}: this node is bus off: too many of its frames met errors. Mend the "
                 "fault and start the run again ([bus] restart_ms lets it come back by itself); in Python, call "
@@ -230,9 +232,9 @@ class BuiltinBus(can.BusABC):
 
     def _obstacle(self) -> str:
         """Why frames wait."""
-        if self._glance is None:
+        if self._error_states is None:
             return "a node does not read its frames"
-        if self._glance.state() == ErrorState.PASSIVE:
+        if self._error_states.state() == ErrorState.PASSIVE:
             return "the node is error passive: nobody acknowledges its frames, or all are disturbed"
         return "the bus is busy with other frames, or a node does not read its frames"
 
@@ -240,7 +242,7 @@ class BuiltinBus(can.BusABC):
     def state(self) -> can.BusState:
         """ACTIVE, PASSIVE, or ERROR for bus off; always ACTIVE on a bus without bit timing."""
         states = (can.BusState.ACTIVE, can.BusState.PASSIVE, can.BusState.ERROR)
-        return states[0 if self._glance is None else self._glance.state()]
+        return states[0 if self._error_states is None else self._error_states.state()]
 
     @state.setter
     def state(self, new_state: can.BusState) -> None:
@@ -345,9 +347,9 @@ class BuiltinBus(can.BusABC):
                         pass
                 self._sock.shutdown(socket.SHUT_RD)  # wakes a thread that waits in recv()
         self._sock.close()
-        if self._glance is not None:
-            self._glance.close()
-            self._glance = None
+        if self._error_states is not None:
+            self._error_states.close()
+            self._error_states = None
         for stand_in in self._stand_in or ():
             stand_in.close()
 

@@ -44,7 +44,7 @@ class Board:
             self._path.unlink(missing_ok=True)
 
 
-class Glance:
+class ErrorStateReader:
     """A node's end: its own state on the board at `path`. OSError if there is none."""
 
     def __init__(self, path: Path, number: int):

@@ -87,7 +87,7 @@ class Injector(Generic[Node]):
             self._until(node, fault, owner, now, partial(medium.wake, node))
         else:
             medium.babble(node, fault.identifier or 0, now)
-            self._until(node, fault, owner, now, partial(medium.hush, node))
+            self._until(node, fault, owner, now, partial(medium.silence, node))
 
     def _until(self, node: Node, fault: Fault, owner: object, now: int, lift: Callable[[int], None]) -> None:
         """Lift the fault of a node when its time is over, or when it is withdrawn, whichever comes first."""

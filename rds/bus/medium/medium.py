@@ -119,9 +119,9 @@ class Medium(ABC, Generic[Node]):
         """The node sends frames with this identifier without a pause."""
         raise FaultRefused("babble needs a bus with bit timing: without it, a flood has no rate; give a bitrate")
 
-    def hush(self, node: Node, now: int) -> None:
+    def silence(self, node: Node, now: int) -> None:
         """It stops."""
-        self.stations[node].hush()
+        self.stations[node].silence()
 
     def restart(self, node: Node, now: int) -> None:
         """Ask the node's controller to come back from bus off."""

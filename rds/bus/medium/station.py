@@ -89,7 +89,7 @@ class Station:
         self.queue.clear()
         self.babbling = False
 
-    def hush(self) -> None:
+    def silence(self) -> None:
         """Babble no more."""
         self.babbling = False
         self.queue = sorted(frame for frame in self.queue if not frame.endless)

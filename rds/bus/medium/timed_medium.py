@@ -71,7 +71,7 @@ class TimedMedium(ConfinedMedium[Node]):
         """`node` has gone. What it sent before still goes over the bus, if somebody else is there."""
         self._advance(now, False)
         station = self.stations[node]
-        station.hush()
+        station.silence()
         others = any(its.on_bus for other, its in self.stations.items() if other != node and other not in self._left)
         if others and station.on_bus and (station.queue or self._is_sending(node)):
             self._left.add(node)
@@ -290,7 +290,7 @@ class TimedMedium(ConfinedMedium[Node]):
         station = self.stations[node]
         if station.dead or station.counters.state is ErrorState.OFF:
             return
-        station.hush()
+        station.silence()
         station.babbling = True
         flags = wire.EXTENDED if identifier > 0x7FF else 0
         record = wire.HEADER.pack(0, identifier, wire.FRAME, flags, 8, 8) + bytes(wire.DATA)

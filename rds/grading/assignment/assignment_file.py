@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from math import inf
 
-from rds.core.quantities import Anything, Choice, Declaration, Flag, Items, Parts, Quantity, Table, Tables, Text
+from rds.core.quantities import AnyValue, Choice, Declaration, Flag, Items, Parts, Quantity, Table, Tables, Text
 from rds.core.shared_quantities import FEED_RATE
 from rds.grading.criteria import KINDS
 from rds.grading.sandbox.limits import Limits
@@ -34,8 +34,8 @@ _TEST = Table(
     "a test of a function",
     {
         "function": Text("its name"),
-        "args": Anything("list of its arguments"),
-        "expected": Anything("what it must return"),
+        "args": AnyValue("list of its arguments"),
+        "expected": AnyValue("what it must return"),
         "tolerance": Quantity("how far numbers may be off, in the unit of the answer", "", 0.0, 1e300, default=0.0),
     },
     needed=("function", "expected"),
@@ -52,12 +52,12 @@ _CRITERION: Mapping[str, Declaration] = {
     "unit": Text("unit of full and none"),
     "full": Quantity("value that earns all points"),
     "none": Quantity("value that earns none"),
-    "partial": Anything(
+    "partial": AnyValue(
         'points between full and none: "linear", or a share of the points',
         (Choice("in proportion", ("linear",)), Quantity("share of the points", "", 0.0, 1.0)),
     ),
     "visible": Flag("students see it", True),
-    "requires": Anything(
+    "requires": AnyValue(
         "criteria that must have earned points", (Text("name"), Items("names", Text("name"), "names"))
     ),
     "test": Tables("tests of functions", _TEST),
@@ -80,10 +80,10 @@ _CASE = Table(
         "coupled": Flag("one law for all axes", False),
         "noise": Quantity("standard deviation of the measured value, in the axis's unit", "", 0.0, 1e9, default=0.0),
         "plant": Choice("what stands for the machine", ("model", "machine"), "model"),
-        "params": Table("values over those of the submission's own `params`", others=Anything("parameter")),
+        "params": Table("values over those of the submission's own `params`", others=AnyValue("parameter")),
         "vary": Table(
             "ranges from which each student's plant is drawn",
-            others=Anything('range: "±10 %", "±0.001", or [lowest, highest]'),
+            others=AnyValue('range: "±10 %", "±0.001", or [lowest, highest]'),
         ),
         "disturbance": Table(
             "voltage beside the controller's",
@@ -106,7 +106,7 @@ _CASE = Table(
                 "centre": _POSITION,
                 "feed_rate": FEED_RATE,
                 "clockwise": Flag("which way round an arc goes", False),
-                "plane": Anything("two axes by index", default=[0, 1]),
+                "plane": AnyValue("two axes by index", default=[0, 1]),
             },
             needed=("start", "end", "feed_rate"),
         ),
@@ -138,8 +138,8 @@ ASSIGNMENT = Table(
         "title": Text("heading; by default the folder's name"),
         "kind": Choice("what students hand in", tuple(READERS)),
         "machine": Text("a machine of the package, or a file in the assignment's folder", "mini-cnc"),
-        "files": Anything("names that the file may have", (Text("name"), Items("names", Text("name"), "names"))),
-        "due": Anything("when it is due: date, time and time zone"),
+        "files": AnyValue("names that the file may have", (Text("name"), Items("names", Text("name"), "names"))),
+        "due": AnyValue("when it is due: date, time and time zone"),
         "secret": Text("8 characters or more that students do not know: their plants are drawn from it"),
         "solution": Text("file of the solution"),
         "template": Text("file of the template"),

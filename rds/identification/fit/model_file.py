@@ -24,7 +24,7 @@ import numpy as np
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.core.installed import version
-from rds.core.quantities import Anything, Declaration, Items, Quantity, Table, Tables, Text
+from rds.core.quantities import AnyValue, Declaration, Items, Quantity, Table, Tables, Text
 from rds.core.toml_table import TomlTable
 from rds.core.toml_text import toml_text
 from rds.identification.fit.estimate import UNUSABLE, Errors, Estimate, Parameter, said_of_guesses
@@ -155,7 +155,7 @@ def _errors_table(errors: Errors) -> dict[str, Any]:
 
 _MAY_BE_UNKNOWN = "a number (nan where it is not known)"
 _FIGURES: Mapping[str, Declaration] = {
-    **{key: Anything(_MAY_BE_UNKNOWN) for key in _ERRORS},
+    **{key: AnyValue(_MAY_BE_UNKNOWN) for key in _ERRORS},
     "unit": Text("unit of rmse and maximum"),
 }
 _PARAMETER = Table(
@@ -163,7 +163,7 @@ _PARAMETER = Table(
     {
         "value": Quantity("value of the parameter"),
         "unit": Text('unit of the parameter; "" for a pure number'),
-        **{key: Anything(_MAY_BE_UNKNOWN) for key in _SPREAD},
+        **{key: AnyValue(_MAY_BE_UNKNOWN) for key in _SPREAD},
     },
     needed=("value", "unit"),
 )
@@ -174,7 +174,7 @@ _LOG = Table(
         **{key: Text(f"{key} of the log") for key in _LOG_TEXTS},
         "first": _SAMPLE,
         "end": _SAMPLE,
-        **{key: Anything(f"{key} of the log, numbers") for key in (*_LOG_RANGES, "initial_state")},
+        **{key: AnyValue(f"{key} of the log, numbers") for key in (*_LOG_RANGES, "initial_state")},
         "resolution": Quantity("step of the encoder, in the unit of the position", "", above=0.0),
         "free_run": Table("errors of a free run", _FIGURES),
         "ahead": Table("errors so many samples ahead", others=Table("errors", _FIGURES)),
@@ -197,7 +197,7 @@ MODEL_FILE = Table(
         "parameters": Table("parameters by name", others=_PARAMETER),
         "covariance": Table(
             "covariance of the parameters",
-            {"order": Items("names", Text("name"), "a list of texts"), "rows": Anything("rows of the matrix")},
+            {"order": Items("names", Text("name"), "a list of texts"), "rows": AnyValue("rows of the matrix")},
         ),
         "logs": Tables("logs that it was fitted to", _LOG),
         "versions": Table("versions of programs", others=Text("version")),

@@ -22,7 +22,8 @@ _STEP = 1e-4  # of a number's size: for differences where a structure has no der
 class Problem:
     """`structure` on `logs`, with `fixed` parameters held at their values.
 
-    `names` are the free parameters; a point (n) holds them and then the states of each log in turn.
+    `names` are the free parameters; a point (n) holds them and then the states of each log in turn. The first `skip`
+    samples of each log leave no residual: what was commanded before them still acts there, and is not known.
     """
 
     def __init__(
@@ -31,7 +32,9 @@ class Problem:
         structure: Structure,
         fixed: Mapping[str, float],
         tick: Callable[[], None] = lambda: None,
+        skip: int = 0,
     ):
+        self.skip = skip
         self.logs, self.structure, self.fixed = tuple(logs), structure, dict(fixed)
         self.names = tuple(name for name in structure.parameters if name not in fixed)
         self.size = len(self.names) + structure.states * len(self.logs)
@@ -94,11 +97,14 @@ class Problem:
                 keep += range(len(self._order), len(self._order) + self.structure.states)
                 by = all_by if len(keep) == all_by.shape[1] else all_by[:, keep]
         self._tick()
-        return one.position - y, by
+        error = one.position - y
+        error[: self.skip] = 0.0
+        by[: self.skip] = 0.0
+        return error, by
 
     def rms(self, squares: float) -> float:
         """The root mean square of residuals with this sum of squares, in the output's unit."""
-        return float(np.sqrt(squares / sum(len(log) for log in self.logs)))
+        return float(np.sqrt(squares / sum(len(log) - self.skip for log in self.logs)))
 
     def triangle(self, point: np.ndarray) -> np.ndarray:
         """R (n + 1, n + 1) of [J r]; NaN where the free run leaves the finite numbers."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import inf
 
-from rds.core.quantities import Anything, Choice, Declaration, Flag, Items, Quantity, Table, Text
+from rds.core.quantities import AnyValue, Choice, Declaration, Flag, Items, Quantity, Table, Text
 from rds.identification.logs.csv_layout import DELIMITERS
 from rds.identification.logs.log import QUANTITIES
 
@@ -39,26 +39,26 @@ _COLUMN = Table(
         "scale": _SCALE,
         "offset": _OFFSET,
         "wrap": _WRAP,
-        "sign": Anything("1 or -1", default=1),
+        "sign": AnyValue("1 or -1", default=1),
         "second": Flag("it is in the second file", False),
     },
 )
 _AXIS = Table(
     "an axis of the log",
     {
-        **{name: Anything(f"column of the {name}", (Text("its heading"), _COLUMN)) for name in QUANTITIES},
+        **{name: AnyValue(f"column of the {name}", (Text("its heading"), _COLUMN)) for name in QUANTITIES},
         "machine_axis": Text("the machine's axis that it is"),
         "resolution": Quantity("of the encoder", "mm (or the axis's unit) per count", 1e-12, 1e9),
         "counts_per_unit": Quantity("of the encoder", "counts per mm (or the axis's unit)", 1e-9, 1e12),
         "closed_loop": Flag("a controller was at work"),
         **{
-            key: Anything(
+            key: AnyValue(
                 f"{what} that the command makes, per unit of it; a text names a constant of the file",
                 (FORCE_GAIN, Text("a constant of the file")),
             )
             for key, what in (("force_gain", "force, N,"), ("torque_gain", "torque, Nm,"))
         },
-        "voltage_range": Anything(
+        "voltage_range": AnyValue(
             "range of the command, V: one number for both directions, or two",
             (
                 Quantity("to both sides of 0", "V", above=0.0),
@@ -92,7 +92,7 @@ MAP = Table(
         "table": Table("how the file is laid out", _LAYOUT),
         "bus": Table(
             "of a bus log",
-            {"dbc": Anything("DBC files", (Text("file"), Items("files", Text("file"), "names of files")))},
+            {"dbc": AnyValue("DBC files", (Text("file"), Items("files", Text("file"), "names of files")))},
         ),
         "time": _TIME,
         "axis": Table("axes by name", others=_AXIS),

@@ -16,12 +16,12 @@ DATA = "data-"  # how the kind of a reason begins that is a finding about the lo
 
 def conclude(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
     """The word of the verdict, and what the model is valid for where that is only something."""
-    unidentifiable = {reason.kind for reason in reasons if reason.side is Side.UNTOLD}
-    if any(kind != "same-data" and not kind.startswith(DATA) for kind in unidentifiable):
-        return Word.UNTOLD, ""
+    cannot_tell = {reason.kind for reason in reasons if reason.side is Side.CANNOT_TELL}
+    if any(kind != "same-data" and not kind.startswith(DATA) for kind in cannot_tell):
+        return Word.CANNOT_TELL, ""
     word, purpose = _from_errors(a, reasons, bands)
     # what fails even on its own data, or on faulty ones, has failed; what passes there has shown nothing
-    return (Word.UNTOLD, "") if unidentifiable and word is not Word.NOT else (word, purpose)
+    return (Word.CANNOT_TELL, "") if cannot_tell and word is not Word.NOT else (word, purpose)
 
 
 def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Word, str]:
@@ -33,7 +33,7 @@ def _from_errors(a: Assessment, reasons: list[Reason], bands: Bands) -> tuple[Wo
         if a.log.closed_loop and any(r.kind == "forces" and r.side is Side.FOR for r in reasons):
             return Word.PARTLY, " ".join(["foretelling the force of a motion", *_limits(a, bands)])
         if a.log.closed_loop and "voltage" not in against and a.voltage and a.voltage.relative_percent is not None:
-            return Word.UNTOLD, ""
+            return Word.CANNOT_TELL, ""
         foreseen = foreseen_at(a, bands)
         if foreseen and "voltage" not in against:
             return Word.PARTLY, f"predicting {_and([str(k) for k in foreseen])} samples ahead"
@@ -75,7 +75,7 @@ def _limits(a: Assessment, bands: Bands) -> Iterator[str]:
 def sentence_of(candidate: Candidate, a: Assessment, word: Word, purpose: str, reasons: list[Reason]) -> str:
     """The verdict in a sentence."""
     name, log = candidate.name, f"{a.log.name} ({_tried(a)})"
-    if word is Word.UNTOLD:
+    if word is Word.CANNOT_TELL:
         return f"Cannot tell whether {name} is valid, from {log}."
     if word is Word.NOT:
         wrong = [r.what.split(":")[0] for r in reasons if r.side is Side.AGAINST and r.kind in WRONG]
@@ -113,7 +113,7 @@ def overall(verdicts: dict[str, Verdict], between: tuple[Reason, ...] = ()) -> V
     """
     if len(verdicts) == 1:
         return next(iter(verdicts.values()))
-    for word in (Word.NOT, Word.PARTLY, Word.VALID, Word.UNTOLD):
+    for word in (Word.NOT, Word.PARTLY, Word.VALID, Word.CANNOT_TELL):
         chosen = {name: verdict for name, verdict in verdicts.items() if verdict.word is word}
         if chosen:
             break

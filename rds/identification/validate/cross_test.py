@@ -26,7 +26,7 @@ PUBLISHED: Mapping[tuple[str, str, tuple[str, ...]], tuple[float, str]] = {
 
 
 @dataclass(frozen=True)
-class Crossed:
+class CrossTestResult:
     """One log: what the model leaves of its force (%), beside what the same structure leaves that is fitted to it."""
 
     log: str
@@ -46,7 +46,9 @@ class Crossed:
         return asdict(self)
 
 
-def cross_test(candidate: Candidate, logs: Sequence[Log], settings: Mapping[str, Any] | None = None) -> list[Crossed]:
+def cross_test(
+    candidate: Candidate, logs: Sequence[Log], settings: Mapping[str, Any] | None = None
+) -> list[CrossTestResult]:
     """The force errors of the model on these logs; `settings` are those of inverse dynamics (cutoff, hold, ...).
 
     InputError for a structure whose equation is not linear, or a log that the filters cannot take.
@@ -60,5 +62,5 @@ def cross_test(candidate: Candidate, logs: Sequence[Log], settings: Mapping[str,
         own = regress_logs([log], candidate.structure, settings or {}).regression.relative_percent
         key = (log.name, candidate.structure.name, candidate.structure.options)
         published, by = PUBLISHED.get(key, (None, ""))
-        found.append(Crossed(log.name, percent, own, rows, published, by))
+        found.append(CrossTestResult(log.name, percent, own, rows, published, by))
     return found

@@ -6,7 +6,7 @@ far below a per cent of the way. So two measures are taken, each with a standard
 - as the axis: the structure `axis` with the model's options and a delay of either sign is fitted to the log by its
   free run, from the model's values and, where that explains too little, from those that the data say. In a closed loop
   the log is cut into stretches, each with an initial state of its own, so that a disturbance that the controller made
-  up for does not add up. Model and fit are compared as frequency responses K e^(-jωd) / (1 + jωτ) at the intended
+  up for does not add up. A constant load counts as friction that differs by direction. Model and fit are compared as frequency responses K e^(-jωd) / (1 + jωτ) at the intended
   bandwidth.
 - as motion, whatever the model is: the measured position over a constant, the modelled one ŷ, its velocity and its
   acceleration, and the times for which it has moved forward and backward, by least squares (stretches of a closed loop
@@ -88,7 +88,7 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
     logs = _stretches(part, values["tau"]) if log.closed_loop else [part]
     begun = {**values, "delay": values.get("delay", 0.0) + early * T}
     held = {name: begun[name] for name in ("viscous",) if name in begun}
-    problem = Problem(logs, made, held)
+    problem = Problem(logs, made, held, skip=early)
 
     def search(point: np.ndarray) -> Solution | None:
         try:
@@ -98,7 +98,7 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
 
     states = [first_state(made, one) for one in logs]
     try:
-        own = Problem(logs, made, begun)
+        own = Problem(logs, made, begun, skip=early)
         left = least_squares(own, own.point(begun, states), _RUNS)
     except InputError:
         return None
@@ -211,6 +211,10 @@ def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
         return None
     elif made.name != "axis":
         options = ()
+    if "offset" not in options and values["K"] != 0.0:  # friction that differs by direction, without bounds to its sign
+        forward, backward = values.pop("friction_plus"), -values.pop("friction_minus")
+        values |= {"friction": (forward + backward) / 2.0, "offset": (backward - forward) / (2.0 * values["K"])}
+        options = (*options, "offset")
     own = structure("axis", tuple({*options, "delay"}), *signals)
     return own, {name: float(value) for name, value in values.items()}
 

@@ -59,10 +59,10 @@ def judge(candidate: Candidate, a: Assessment, bands: Bands, more: Iterable[Reas
         *more,
     ]
     word, purpose = conclude(a, reasons, bands)
-    if word is Word.UNTOLD and all(reason.side is not Side.UNTOLD for reason in reasons):
+    if word is Word.CANNOT_TELL and all(reason.side is not Side.CANNOT_TELL for reason in reasons):
         reasons.append(
             Reason(
-                Side.UNTOLD,
+                Side.CANNOT_TELL,
                 "closed-loop",
                 "in a closed loop, the free run drifts away while the voltage it needs is right: only a log without "
                 "feedback tells which is at fault",
@@ -76,7 +76,7 @@ def _unstable(candidate: Candidate, a: Assessment) -> Iterator[Reason]:
         return
     if a.log.closed_loop:
         yield Reason(
-            Side.UNTOLD,
+            Side.CANNOT_TELL,
             "unstable",
             f"the free run is unstable from {a.unstable_at:.4g} s on, which in a closed loop may be the axis's own way",
         )
@@ -144,7 +144,7 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
         elif measure.told:
             yield Reason(Side.FOR, measure.kind, what)
         elif measure.kind == "gain":
-            yield Reason(Side.UNTOLD, "gain-unidentifiable", f"this log does not tell the gain: {what}")
+            yield Reason(Side.CANNOT_TELL, "gain-unidentifiable", f"this log does not tell the gain: {what}")
         else:
             yield Reason(
                 Side.NOTE, f"{measure.kind}-unidentifiable", f"this log does not tell the {measure.kind}: {what}"

@@ -20,7 +20,7 @@ def of_data(a: Assessment, bands: Bands) -> Iterator[Reason]:
     log, resolution = a.log, a.log.resolution or 0.0
     if a.overlap.share > bands.seen:
         yield Reason(
-            Side.UNTOLD,
+            Side.CANNOT_TELL,
             "same-data",
             f"{100 * a.overlap.share:.0f} % of the log was seen by the fit ({a.overlap.how}): how well the model "
             "repeats it says nothing of other data; validate on another log",
@@ -28,25 +28,27 @@ def of_data(a: Assessment, bands: Bands) -> Iterator[Reason]:
     elif not a.overlap.known:
         yield Reason(Side.NOTE, "provenance", f"{a.overlap.how}; make sure that they are others")
     if a.motion == 0.0:
-        yield Reason(Side.UNTOLD, "no-motion", f"the axis never moves ({a.measured[0]:.6g} {a.unit} throughout)")
+        yield Reason(Side.CANNOT_TELL, "no-motion", f"the axis never moves ({a.measured[0]:.6g} {a.unit} throughout)")
     elif a.motion < bands.least_steps * resolution:
         steps = a.motion / resolution
         yield Reason(
-            Side.UNTOLD,
+            Side.CANNOT_TELL,
             "no-motion",
             f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of its encoder; {bands.least_steps:.0f} are "
             "needed to tell a model from none",
         )
     elif a.changes < bands.least_changes:
         yield Reason(
-            Side.UNTOLD,
+            Side.CANNOT_TELL,
             "short",
             f"in {a.time[-1] - a.time[0]:.3g} s the velocity changes between fast and slow, or forward and back, "
             f"{a.changes} times; {bands.least_changes:.0f} are needed to see any dynamics",
         )
     if float(log.command.min()) == float(log.command.max()):
         yield Reason(
-            Side.UNTOLD, "no-excitation", f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics"
+            Side.CANNOT_TELL,
+            "no-excitation",
+            f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics",
         )
     for finding in log.findings:
         if finding.gravity is not Gravity.NOTE:
@@ -61,7 +63,7 @@ def _side_of(finding: Finding) -> Side:
     """
     if finding.kind not in _MISLEADING:
         return Side.NOTE
-    return Side.UNTOLD if finding.gravity is Gravity.FAULT else Side.AGAINST
+    return Side.CANNOT_TELL if finding.gravity is Gravity.FAULT else Side.AGAINST
 
 
 def _too_good(a: Assessment, bands: Bands) -> Iterator[Reason]:
@@ -69,13 +71,13 @@ def _too_good(a: Assessment, bands: Bands) -> Iterator[Reason]:
         return
     if a.free_run.rmse <= _IDENTICAL * a.motion:
         yield Reason(
-            Side.UNTOLD,
+            Side.CANNOT_TELL,
             "own-output",
             f"the model repeats the log to {a.free_run.rmse:.1g} {a.unit}: the log is this model's own output",
         )
     elif a.log.resolution and a.free_run.rmse < bands.floor * a.log.resolution / sqrt(12.0):
         yield Reason(
-            Side.UNTOLD,
+            Side.CANNOT_TELL,
             "too-good",
             f"the RMSE of {a.free_run.rmse:.2g} {a.unit} is below the encoder's own rounding "
             f"({a.log.resolution / sqrt(12.0):.2g} {a.unit}): the log is not what this encoder measured, or the "

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rds.identification.validate.validate import Validation
 
 PAGE, NUMBERS = "validation.html", "validation.json"
-_LOOK = {Word.VALID: "met", Word.PARTLY: "void", Word.NOT: "missed", Word.UNTOLD: "void"}
+_LOOK = {Word.VALID: "met", Word.PARTLY: "void", Word.NOT: "missed", Word.CANNOT_TELL: "void"}
 
 
 def write(validation: Validation, folder: Path) -> list[Path]:

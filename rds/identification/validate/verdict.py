@@ -25,7 +25,7 @@ class Word(StrEnum):
     VALID = "valid"
     PARTLY = "valid for"
     NOT = "not valid"
-    UNTOLD = "cannot tell"
+    CANNOT_TELL = "cannot tell"
 
 
 class Side(StrEnum):
@@ -33,7 +33,7 @@ class Side(StrEnum):
 
     FOR = "for"
     AGAINST = "against"
-    UNTOLD = "cannot tell"
+    CANNOT_TELL = "cannot tell"
     NOTE = "note"
 
 
@@ -64,7 +64,7 @@ class Verdict:
 
     def ranked(self) -> list[Reason]:
         """The reasons, those that decide first: what nobody can tell, what speaks against, what for, and notes."""
-        order = (Side.UNTOLD, Side.AGAINST, Side.FOR, Side.NOTE)
+        order = (Side.CANNOT_TELL, Side.AGAINST, Side.FOR, Side.NOTE)
         return [reason for side in order for reason in self.reasons if reason.side is side]
 
     def __str__(self) -> str:

@@ -9,7 +9,7 @@ from rds.bus.hub.bus_settings import BITRATE, DATA_BITRATE, RESTART
 from rds.bus.modules.dialects import DEFAULT, dialect_names
 from rds.controllers import controller_module, controller_names
 from rds.core.integrate import SUBSTEPS
-from rds.core.quantities import Anything, Choice, Declaration, Flag, Items, Parts, Quantity, Table, Text
+from rds.core.quantities import AnyValue, Choice, Declaration, Flag, Items, Parts, Quantity, Table, Text
 from rds.core.registry import Registry
 from rds.core.shared_quantities import DURATION, SAMPLE_PERIOD
 from rds.models import model_module, model_names
@@ -33,7 +33,7 @@ def _model(name: str) -> Table:
     return Table(f"model {name}", model_module(name).PARAMETERS)
 
 
-_PARAMS = Table("values over those of the file's own `params`", others=Anything("parameter of the file"))
+_PARAMS = Table("values over those of the file's own `params`", others=AnyValue("parameter of the file"))
 SIGNAL = Table("how the value changes over time", chosen_by="kind", parts=Parts(signal_kinds, signal_options))
 
 
@@ -82,11 +82,11 @@ _MODEL = Table(
 )
 _NAME_OR_FILE = Text("name of the library, or path of a file")
 _OF_AN_AXIS: Mapping[str, Declaration] = {
-    "reference": Anything("what the axis is to follow, in its unit", (REFERENCE,)),
-    "signal": Anything("voltage that drives the axis without a controller, V", (SIGNAL,)),
-    "controller": Anything("the law that answers with a voltage", (_CONTROLLER, _NAME_OR_FILE)),
+    "reference": AnyValue("what the axis is to follow, in its unit", (REFERENCE,)),
+    "signal": AnyValue("voltage that drives the axis without a controller, V", (SIGNAL,)),
+    "controller": AnyValue("the law that answers with a voltage", (_CONTROLLER, _NAME_OR_FILE)),
     "error_compensation": COMPENSATION,
-    "model": Anything("what stands for the axis in simulation; by default the machine's own", (_MODEL, _NAME_OR_FILE)),
+    "model": AnyValue("what stands for the axis in simulation; by default the machine's own", (_MODEL, _NAME_OR_FILE)),
 }
 INTERFACE = Table(
     "the computer-system interface: what stands between the controller and the machine",
@@ -110,22 +110,22 @@ BUS = Table(
     "keyword arguments of python-can's can.Bus; which there are depends on the interface",
     {
         "interface": Text("interface of python-can; rds is the built-in bus", "rds"),
-        "channel": Anything("name or number of the channel"),
+        "channel": AnyValue("name or number of the channel"),
         "dialect": Choice("what the modules speak", dialect_names, DEFAULT),
         "bitrate": BITRATE,
         "data_bitrate": DATA_BITRATE,
         "restart_ms": RESTART,
         "faults": Text("on the built-in bus: a TOML file of faults to inject while the run goes on"),
-        "cia402": Anything("the drives of dialect cia402", (Table("drives", others=Anything("setting of a drive")),)),
+        "cia402": AnyValue("the drives of dialect cia402", (Table("drives", others=AnyValue("setting of a drive")),)),
     },
-    others=Anything("option of the interface"),
+    others=AnyValue("option of the interface"),
 )
 EXPERIMENT = Table(
     "An experiment: which axes of which machine, driven by what, in which mode.",
     {
         "title": Text("heading of the report; by default the file's name"),
         "machine": Text("a machine of the package, or the path of a machine file that ends in .toml", "mini-cnc"),
-        "axis": Anything(
+        "axis": AnyValue(
             "the axis that runs, or tables of single axes",
             (Text("name of the axis"), Table("tables of single axes", others=Table("of one axis", _OF_AN_AXIS))),
         ),

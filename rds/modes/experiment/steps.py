@@ -16,7 +16,7 @@ from rds.core.errors import InputError
 from rds.core.types import Controller, Reference, Source
 from rds.modes import DEFAULT, load_mode
 from rds.modes.experiment.experiment import Experiment
-from rds.modes.loop.asked import PATIENCE, Asked, answer, question
+from rds.modes.loop.asked import PATIENCE, CallerControl, answer, question
 from rds.results import Result
 
 _POLL = 0.05  # s
@@ -50,7 +50,7 @@ class Steps:
         key = secrets.token_bytes(32)
         self._listener = Listener(backlog=1, authkey=key)  # a socket in a folder that only its user may enter
         self.controller = Controller(
-            Asked(self._listener.address, key, axes, patience),
+            CallerControl(self._listener.address, key, axes, patience),
             source=Source("a for loop"),
             coupled=axes > 1,
             repeatable=False,

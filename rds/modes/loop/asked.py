@@ -24,7 +24,7 @@ def answer(n: int) -> Struct:
     return Struct(f"<{n}d")
 
 
-class Asked:
+class CallerControl:
     """`control` of such a run. It connects at its first call, wherever that is: it travels to the target's process."""
 
     def __init__(self, address: Any, key: bytes, n: int, patience: float | None):
@@ -46,4 +46,4 @@ class Asked:
         return (voltages[0] if self._n == 1 else voltages), state
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Asked, (self._address, self._key, self._n, self._patience)
+        return CallerControl, (self._address, self._key, self._n, self._patience)

@@ -23,9 +23,9 @@ from rds.modes.loop.program import (
     RESUME,
     SINGLE_STEP,
     STEP,
-    Happening,
     InterpolatedProgram,
     Program,
+    ProgramEvent,
     dwell_samples,
 )
 
@@ -58,7 +58,7 @@ class Follower(Protocol):
     last: int  # the last sample of the path, as far as it is known
 
     @property
-    def happenings(self) -> Sequence[Happening]:
+    def happenings(self) -> Sequence[ProgramEvent]:
         """What happens along the path, in order, as far as it is known."""
 
     def line(self, sample: int) -> int:
@@ -222,7 +222,7 @@ class Execution:
         if self._next >= len(happenings) and self._follower.place >= self._follower.last:
             self._end(Ending.DONE, "")
 
-    def _takes_time(self, happening: Happening) -> bool:
+    def _takes_time(self, happening: ProgramEvent) -> bool:
         kind, value = happening.kind, happening.value
         if kind == "dwell":
             self._left = dwell_samples(value, self._T)

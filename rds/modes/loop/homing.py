@@ -11,7 +11,7 @@ import numpy as np
 from rds.modes.loop.ramp import SHARPEST, STEEPEST, Ramp
 
 
-class Now(NamedTuple):
+class AxisMotion(NamedTuple):
     """What the axes should do at a sample: mm, mm/s, mm/s² (degrees), in their order."""
 
     position: list[float]
@@ -40,7 +40,7 @@ class Homing:
         if first != last:
             self.legs.append((first, last, leg(first, last, limits)))
 
-    def advance(self, is_wanted: bool) -> Now:
+    def advance(self, is_wanted: bool) -> AxisMotion:
         """One sample period, towards rest or on; only while there are legs."""
         start, end, lasts = self.legs[0]
         T, slope = self._T, 0.0
@@ -57,14 +57,14 @@ class Homing:
         if place >= lasts:
             self.legs.pop(0)
             self._place, self._from = 0.0, -T * self._ramp.passed(self._k)  # the axes rest here: the ramp may go on
-            return Now(end, [0.0] * len(end), [0.0] * len(end))
+            return AxisMotion(end, [0.0] * len(end), [0.0] * len(end))
         self._place = place
         q, rate = place / lasts, self.rate
         part = q * q * q * (10.0 + q * (6.0 * q - 15.0))
         speed = 30.0 * q * q * (1.0 - q) * (1.0 - q) / lasts
         push = 60.0 * q * (1.0 - q) * (1.0 - 2.0 * q) / (lasts * lasts)
         ways = [b - a for a, b in zip(start, end, strict=True)]
-        return Now(
+        return AxisMotion(
             [a + way * part for a, way in zip(start, ways, strict=True)],
             [way * speed * rate for way in ways],
             [way * (push * rate * rate + speed * slope) for way in ways],

@@ -18,7 +18,7 @@ from math import ceil, floor
 import numpy as np
 
 from rds.core.errors import ContractError
-from rds.modes.loop.program import Happening, InterpolatedProgram, Row, dwell_samples
+from rds.modes.loop.program import InterpolatedProgram, ProgramEvent, Row, dwell_samples
 from rds.modes.loop.ramp import (
     EXTRA_SHARPEST,
     EXTRA_STEEPEST,
@@ -26,8 +26,8 @@ from rds.modes.loop.ramp import (
     SHARPEST,
     SHORTEST,
     STEEPEST,
-    Paced,
     Ramp,
+    VariableRate,
     in_steps,
 )
 
@@ -45,7 +45,7 @@ _ROTARY = "ABC"
 _UNKNOWN = 1 << 50  # samples: the end is not in sight
 
 
-class Interpolated(Paced):
+class Interpolated(VariableRate):
     """Implements `execution.Follower` for rows that are made on the way; `place` counts rows.
 
     ContractError for a row that no axis could go to: out of its travel, or much faster than it moves.
@@ -71,11 +71,11 @@ class Interpolated(Paced):
         zero = [0.0] * len(program.axes)
         self._rows: deque[Row] = deque([(list(program.start), zero, zero, 0)])
         self._first = 0  # the number of the first row that is kept
-        self.happenings: list[Happening] = []
+        self.happenings: list[ProgramEvent] = []
         self.last = _UNKNOWN
         self._left = iter(program.stretches)
         self._stretch: Iterator[Row] | None = None
-        self._due: tuple[Happening, ...] = program.first
+        self._due: tuple[ProgramEvent, ...] = program.first
         self._rests()
         self.position: list[float] = list(program.start)
         self.velocity, self.acceleration = zero, zero

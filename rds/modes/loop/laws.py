@@ -36,7 +36,7 @@ class ReferenceSamples:
         return self.position.tolist(), self.velocity.tolist(), self.acceleration.tolist()
 
 
-class Now(Sequence[float]):
+class CurrentValue(Sequence[float]):
     """A column whose value is made as the run goes on: whichever sample is asked for, it is the one of now."""
 
     __slots__ = ("value",)
@@ -55,7 +55,7 @@ class LiveReference:
     """The reference of one axis, made while it runs: what drives it sets the values of now before the laws ask."""
 
     def __init__(self, position: float = 0.0):
-        self.position, self.velocity, self.acceleration = Now(position), Now(), Now()
+        self.position, self.velocity, self.acceleration = CurrentValue(position), CurrentValue(), CurrentValue()
 
     def columns(self) -> tuple[Sequence[float], Sequence[float], Sequence[float]]:
         """Position, velocity and acceleration of now."""

@@ -25,7 +25,7 @@ from rds.modes.loop.laws import LiveReference, ReferenceSamples, controlled, cou
 from rds.modes.loop.live_values import Channel
 from rds.modes.loop.loop import Law
 from rds.modes.loop.program import InterpolatedProgram, Program, program_channels, program_columns
-from rds.modes.loop.retimed import Retimed
+from rds.modes.loop.retimed import RetimedProgram
 from rds.modes.loop.tuning import Tuning
 from rds.network.delays import Network
 
@@ -137,7 +137,9 @@ class Plan:
             return Drive(self._laws(params, references), LiveChanges(self.channels(), actions, self.changes))
         live = {name: LiveReference() for name in self.names}
         spindle = None if program.spindle is None else self.names.index(program.spindle)
-        follower: Follower = Retimed(program, self.T) if isinstance(program, Program) else Interpolated(program, self.T)
+        follower: Follower = (
+            RetimedProgram(program, self.T) if isinstance(program, Program) else Interpolated(program, self.T)
+        )
         execution = Execution(
             program,
             self.T,

@@ -22,7 +22,7 @@ COLUMNS = {"program_line": "", "program_sample": "", "program_override": "", "pr
 INTERPOLATED_COLUMNS = {"program_segment": "", "program_buffer": ""}
 
 
-class Happening(NamedTuple):
+class ProgramEvent(NamedTuple):
     """What happens at a planned sample, by a line of the program.
 
     Kinds and values: "dwell" s; "spindle" rev/min, + clockwise (0: it stops); "stop" 0 (M0), 1 (M1, optional)
@@ -51,7 +51,7 @@ class Program:
     velocity: np.ndarray
     acceleration: np.ndarray
     line: np.ndarray
-    happenings: tuple[Happening, ...]
+    happenings: tuple[ProgramEvent, ...]
     home: tuple[float, ...]
     limits: np.ndarray
     name: str = ""
@@ -86,7 +86,7 @@ class Stretch:
     """Motion from rest to rest: what makes its rows, one sample period apart, and what happens where they end."""
 
     rows: Callable[[], Iterator[Row]]
-    happenings: tuple[Happening, ...] = ()  # their `sample` is not known before the rows are made
+    happenings: tuple[ProgramEvent, ...] = ()  # their `sample` is not known before the rows are made
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class InterpolatedProgram:
     axes: tuple[str, ...]
     spindle: str | None
     start: tuple[float, ...]
-    first: tuple[Happening, ...]
+    first: tuple[ProgramEvent, ...]
     stretches: tuple[Stretch, ...]
     line: tuple[int, ...]
     feed: float

@@ -74,7 +74,7 @@ def in_steps(change: float, seconds: Callable[[float], float], T: float) -> tupl
     return change, samples
 
 
-class Paced:
+class VariableRate:
     """What passes samples at a rate: `place` in samples, and the ramp that `rate` is on, if it is on one."""
 
     def __init__(self) -> None:

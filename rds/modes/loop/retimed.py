@@ -24,8 +24,8 @@ from rds.modes.loop.ramp import (
     SHARPEST,
     SHORTEST,
     STEEPEST,
-    Paced,
     Ramp,
+    VariableRate,
     in_steps,
 )
 
@@ -39,7 +39,7 @@ _AHEAD = 0.2  # s of the plan whose speed says how long a ramp will have to be
 _TRIES = ((1.0, 1.05), (1.0, 1.5), (1.0, 2.2), (1.0, 3.5), (0.3, 1.5), (0.3, 3.5), (0.05, 2.0), (0.05, 5.0))
 
 
-class Retimed(Paced):
+class RetimedProgram(VariableRate):
     """Implements `execution.Follower` for a program; `place` counts samples, and is exact at a rate of 1."""
 
     def __init__(self, program: Program, T: float):

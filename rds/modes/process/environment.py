@@ -44,7 +44,7 @@ def prepared(priority: int, cpu: int | None) -> Iterator[dict[str, Any]]:
         set_timer_slack(0)  # back to the default
 
 
-def surroundings() -> dict[str, Any]:
+def describe_environment() -> dict[str, Any]:
     """What the system says of itself."""
     available = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
     return {

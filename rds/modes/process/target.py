@@ -30,7 +30,7 @@ from rds.modes.loop.live_values import LiveValues
 from rds.modes.loop.plan import Plan, load
 from rds.modes.loop.stopwatch import Stopwatch, quiet_memory
 from rds.modes.process.blame import fault
-from rds.modes.process.environment import prepare, stolen_ticks, surroundings
+from rds.modes.process.environment import describe_environment, prepare, stolen_ticks
 from rds.modes.process.record import write_whole
 from rds.modes.process.recorder import ASK_WHERE, PLAN, READY, REPORT, TRACE
 from rds.modes.process.ring import Ring
@@ -45,7 +45,7 @@ def run(plan: Plan, ring: Ring, live_values: LiveValues) -> dict[str, Any]:
     from rds.bus.modules.dialects import DEFAULT, open_drivers
 
     mode = load_mode(plan.mode)
-    environment = surroundings() | prepare(plan.priority, plan.cpu)
+    environment = describe_environment() | prepare(plan.priority, plan.cpu)
     clock = RealTimeClock(round(plan.T * 1e9), plan.late)
     report: dict[str, Any] = {"ending": Ending.FAULT, "reason": "", "environment": environment}
     stolen = stolen_ticks()

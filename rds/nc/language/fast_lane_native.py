@@ -34,6 +34,7 @@ _SOURCES = (
     "canon.py",
     "state.py",
 )
+_DIGEST = hashlib.sha256().digest_size
 _OUT = 1 << 20  # bytes of text at once
 _IS_TRIED = sys.platform == "linux"  # elsewhere Python reads and writes the same, slower
 _POINTER = ctypes.c_void_p
@@ -111,12 +112,12 @@ class LineReader:
 
 
 def stored_kernels() -> Kernels | None:
-    """The kernels from their object files; None where there are none."""
+    """The kernels from their object files; None where there are none, or damaged ones."""
     if not _IS_TRIED:
         return None
     try:
-        return Kernels({name: _file(name).read_bytes() for name in ENTRIES})
-    except OSError:
+        return Kernels({name: _whole(_file(name).read_bytes()) for name in ENTRIES})
+    except (OSError, ValueError):
         return None
 
 
@@ -137,28 +138,42 @@ def compile_kernels() -> Kernels | None:
 
 
 def _file(name: str) -> Path:
-    return Path(__file__).parent / "__pycache__" / f"fast_lane.{_key()}.{name}.o"
+    return Path(__file__).parent / "__pycache__" / f"fast_lane.{_environment()}.{_sources()}.{name}.o"
+
+
+def _whole(content: bytes) -> bytes:
+    """The object file behind its digest; ValueError if it is damaged, which LLVM would end the process for."""
+    digest, object_file = content[:_DIGEST], content[_DIGEST:]
+    if hashlib.sha256(object_file).digest() != digest:
+        raise ValueError("the object file is damaged")
+    return object_file
 
 
 def _keep(objects: dict[str, bytes]) -> None:
-    """Each file whole or not at all; those of earlier sources are removed."""
+    """Each file whole or not at all; those that this Python made from earlier sources are removed."""
     folder = _file("").parent
     make_folder(folder)
-    for old in folder.glob("fast_lane.*.o"):
-        old.unlink()
+    for old in folder.glob(f"fast_lane.{_environment()}.*.o"):
+        old.unlink(missing_ok=True)
     for name, content in objects.items():
         new = folder / f"{name}.{os.getpid()}"
         with open_private(new, "wb", is_own=True) as stream:
-            stream.write(content)
+            stream.write(hashlib.sha256(content).digest() + content)
         new.replace(_file(name))
 
 
 @cache
-def _key() -> str:
-    """Of everything that the machine code depends on."""
-    folder = Path(__file__).parent
+def _environment() -> str:
+    """Of what compiles and runs the machine code: Python, LLVM and the processor."""
     about = f"{sys.version} {llvmlite_version} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-    digest = hashlib.sha256(about.encode())
+    return hashlib.sha256(about.encode()).hexdigest()[:16]
+
+
+@cache
+def _sources() -> str:
+    """Of the text that it was compiled from."""
+    folder = Path(__file__).parent
+    digest = hashlib.sha256()
     for name in _SOURCES:
         digest.update((folder / name).read_bytes())
     return digest.hexdigest()[:16]

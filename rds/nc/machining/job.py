@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rds.core.errors import InputError
-from rds.core.quantities import Anything, Choice, Items, Quantity, Table, Tables, Text
+from rds.core.quantities import AnyValue, Choice, Items, Quantity, Table, Tables, Text
 from rds.core.toml_table import TomlTable
 from rds.core.types import Segment
 from rds.nc.language.tool_library import read_library
@@ -43,7 +43,7 @@ JOB = Table(
         "clearance": Quantity("above the material, where feeding down begins", "mm", above=0.0, default=0.5),
         "tolerance": Quantity("of the ways from the drawing", "mm", above=0.0, default=0.01),
         "blend": BLEND,
-        "operation": Tables("operations, in their order", Table("an operation", others=Anything("see its kind")), 1),
+        "operation": Tables("operations, in their order", Table("an operation", others=AnyValue("see its kind")), 1),
     },
     needed=("tools",),
 )

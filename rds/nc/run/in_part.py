@@ -11,7 +11,7 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.interpolators.motion.segments import AXES, EXACT_STOP, JOINTS, line
-from rds.modes.loop.program import STEP, Happening, Program
+from rds.modes.loop.program import STEP, Program, ProgramEvent
 from rds.nc.path_block import Event, PathBlock
 
 _KEPT = ("tool", "spindle", "coolant")  # events of what was left out that hold at the line where it begins
@@ -81,9 +81,9 @@ def stepwise(program: Program) -> Program:
     """The same, waiting after each line that moves, until somebody lets it go on. The motion rests there."""
     lines = program.line
     ends = np.flatnonzero(lines[:-1] != lines[1:])
-    steps = [Happening(int(k), "stop", STEP, int(lines[k])) for k in ends if lines[k]]
+    steps = [ProgramEvent(int(k), "stop", STEP, int(lines[k])) for k in ends if lines[k]]
 
-    def order(each: Happening) -> tuple[int, bool, bool]:
+    def order(each: ProgramEvent) -> tuple[int, bool, bool]:
         """What a line does itself comes before its end."""
         return each.sample, each.line != lines[each.sample], each in steps
 

@@ -17,7 +17,7 @@ from rds.core.errors import InputError
 from rds.core.geometry import length
 from rds.core.last_made import LastMade
 from rds.core.load import StudentFile, from_function
-from rds.core.quantities import Anything, Choice, Flag, Items, Quantity, Table, Text
+from rds.core.quantities import AnyValue, Choice, Flag, Items, Quantity, Table, Text
 from rds.core.toml_table import TomlTable
 from rds.core.types import ArcSegment, LineSegment, Segment
 from rds.interpolators import DEFAULT, LIBRARY
@@ -31,7 +31,7 @@ from rds.interpolators.path import check_chain
 from rds.interpolators.segment_rows import SEGMENTS, read_segments, segments_of
 from rds.machines import Machine
 from rds.modes.loop.interpolated import LEAST_AHEAD
-from rds.modes.loop.program import Happening, InterpolatedProgram, Program, Row, Stretch, dwell_samples
+from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent, Row, Stretch, dwell_samples
 from rds.nc.check import Setup, motion
 from rds.nc.interpolator_segments import program as moves_of
 from rds.nc.path_block import PathBlock
@@ -53,11 +53,11 @@ WORDS = Table(
         "feed": SEGMENTS.keys["feed"],
         "feed_unit": SEGMENTS.keys["feed_unit"],
         "segment": SEGMENTS.keys["segment"],
-        "interpolator": Anything(
+        "interpolator": AnyValue(
             "what makes the samples", (Choice("of the library", LIBRARY.names), Text("your .py file")), DEFAULT
         ),
-        "params": Table("options of the interpolator", others=Anything("option, or parameter of the file")),
-        "acceleration": Anything(
+        "params": Table("options of the interpolator", others=AnyValue("option, or parameter of the file")),
+        "acceleration": AnyValue(
             "a filter on top of it: its name, or a table with its options",
             (
                 Choice("of the library", FILTERS.names),
@@ -148,7 +148,7 @@ def program(
         )
     first: Segment = LineSegment((0.0,) * len(axes), segments[0].start, max(each.feed_rate for each in segments))
     lines: list[int] = list(range(1, len(segments) + 1))
-    rests: dict[int, tuple[Happening, ...]] = {}
+    rests: dict[int, tuple[ProgramEvent, ...]] = {}
     if is_led := any(segments[0].start):
         segments, lines, rests = [first, *segments], [0, *lines], {0: ()}
     if method is not None:
@@ -220,9 +220,9 @@ def of_part_program(
     notes: list[str] = []
     programmed = moves_of(motion(file, machine, setup or Setup(), progress, notes), machine, T, MOST_SAMPLES, every)
     axes, segments = without_idle(every, programmed.segments)
-    due: dict[int, tuple[Happening, ...]] = {}
+    due: dict[int, tuple[ProgramEvent, ...]] = {}
     for after, event in programmed.events:
-        due[after] = (*due.get(after, ()), Happening(0, event.kind, float(event.value), event.line))
+        due[after] = (*due.get(after, ()), ProgramEvent(0, event.kind, float(event.value), event.line))
     first = due.pop(-1, ())
     made = program_of(file.name, segments, programmed.lines, due, first, method, machine, axes, T, spindle=True)
     return replace(made, notes=(*notes, *made.notes))
@@ -282,8 +282,8 @@ def program_of(
     name: str,
     segments: Sequence[Segment],
     lines: Sequence[int],
-    due: Mapping[int, tuple[Happening, ...]],
-    first: tuple[Happening, ...],
+    due: Mapping[int, tuple[ProgramEvent, ...]],
+    first: tuple[ProgramEvent, ...],
     method: Method,
     machine: Machine,
     axes: Sequence[str],

@@ -20,7 +20,7 @@ from rds.interpolators.motion.samples import SampleBlock
 from rds.interpolators.motion.segments import AXES, JOINTS, SEGMENT
 from rds.machines import Machine
 from rds.machines.kinematics.tip import Tip
-from rds.modes.loop.program import Happening, InterpolatedProgram, Program
+from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent
 from rds.nc.check import Setup, check_program, compiled_if_current
 from rds.nc.compiled_file import Compiled, open_compiled
 from rds.nc.configuration import configured
@@ -158,7 +158,7 @@ def planned(
         acceleration=acceleration,
         line=line,
         happenings=tuple(
-            Happening(sample, event.kind, float(event.value), event.line)
+            ProgramEvent(sample, event.kind, float(event.value), event.line)
             for sample, event in rows.events
             if event.kind not in PASSING
         ),

@@ -50,7 +50,7 @@ class Operator(Protocol):
 
 
 @dataclass(frozen=True)
-class Wishes:
+class CommissioningOptions:
     """What a user has said beforehand; None: find out."""
 
     node: int
@@ -84,9 +84,9 @@ class Commissioned:
 
 
 def commission(
-    bus: can.BusABC, wishes: Wishes, name: str, operator: Operator, eds_folder: Path | None = None
+    bus: can.BusABC, options: CommissioningOptions, name: str, operator: Operator, eds_folder: Path | None = None
 ) -> Commissioned:
-    """Make the drive with node-ID `wishes.node` ready.
+    """Make the drive with node-ID `options.node` ready.
 
     Declined after a no; MachineError and InputError say what is wrong.
     What is changed on the drive for the set-up alone is written back at its end, whatever the end is.
@@ -94,29 +94,29 @@ def commission(
     before: dict[tuple[int, int], bytes] = {}
     made: Commissioned | None = None
     try:
-        made = _commission(bus, wishes, name, operator, before, eds_folder)
+        made = _commission(bus, options, name, operator, before, eds_folder)
         return made
     finally:
         keep = set() if made is None else {(index, subindex) for index, subindex, _ in made.choices.write}
-        _take_back(bus, wishes.node, {key: data for key, data in before.items() if key not in keep})
+        _take_back(bus, options.node, {key: data for key, data in before.items() if key not in keep})
 
 
 def _commission(
     bus: can.BusABC,
-    wishes: Wishes,
+    options: CommissioningOptions,
     name: str,
     operator: Operator,
     before: dict[tuple[int, int], bytes],
     eds_folder: Path | None,
 ) -> Commissioned:
     with library(bus) as network:
-        identity, eds = _recognize(network, wishes, operator, eds_folder)
-        units = examination.read_units(_bare(network, wishes.node))
-        choices = _units(wishes, name, units, eds, operator)
+        identity, eds = _recognize(network, options, operator, eds_folder)
+        units = examination.read_units(_bare(network, options.node))
+        choices = _units(options, name, units, eds, operator)
         with _machine(choices) as machine:
-            _mapping(network, machine, choices, identity, wishes, operator)
-        _limits(_bare(network, wishes.node), choices, wishes, operator, before)
-    motion = _move(bus, choices, wishes, units, operator, before)
+            _mapping(network, machine, choices, identity, options, operator)
+        _limits(_bare(network, options.node), choices, options, operator, before)
+    motion = _move(bus, choices, options, units, operator, before)
     choices.direction = operator.choose_direction(motion.moved)
     worst, whole = motion.exchange_worst * 1e3, motion.loop_delay(choices.period) * 1e3
     operator.say(
@@ -127,13 +127,13 @@ def _commission(
         operator.say(
             f"that is more than the sample period of {choices.period * 1e3:g} ms: give a longer one (--sample-period)"
         )
-    if wishes.keep_in_drive:
+    if options.keep_in_drive:
         if not operator.agree(
             "store the drive's parameters in its memory (0x1010); the way back is `rds drive restore`"
         ):
             raise Declined
         with library(bus) as network:
-            store(_bare(network, wishes.node))
+            store(_bare(network, options.node))
     return Commissioned(identity, choices, units, motion)
 
 
@@ -141,65 +141,72 @@ def _commission(
 
 
 def _recognize(
-    network: canopen.Network, wishes: Wishes, operator: Operator, folder: Path | None
+    network: canopen.Network, options: CommissioningOptions, operator: Operator, folder: Path | None
 ) -> tuple[Identity, Path | None]:
     """Identity and EDS."""
-    network.send_message(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, wishes.node]))
-    node = _bare(network, wishes.node)
+    network.send_message(0x000, bytes([NmtCommand.ENTER_PRE_OPERATIONAL, options.node]))
+    node = _bare(network, options.node)
     if number(node, 0x1000) is None:
         raise MachineError(
-            f"no device answers as node {wishes.node}; `rds scan` lists those that do, and `rds drive node-id` gives "
+            f"no device answers as node {options.node}; `rds scan` lists those that do, and `rds drive node-id` gives "
             "one to a drive that has none"
         )
     identity = identify(node)
     operator.say(str(identity))
-    eds = wishes.eds or kept_eds(identity, folder)
+    eds = options.eds or kept_eds(identity, folder)
     if eds is None:
         if identity.vendor or identity.product != 0x402:  # not our simulated drive
             operator.say(
                 "no EDS of this drive is kept here: the objects of CiA 402 are assumed; give its own by --eds FILE"
             )
         return identity, None
-    doubts = check_eds(eds, identity)
-    for doubt in doubts:
-        operator.say(f"note: {doubt}")
-    if doubts and not operator.agree(f"use {eds} all the same"):
+    findings = check_eds(eds, identity)
+    for finding in findings:
+        operator.say(f"note: {finding}")
+    if findings and not operator.agree(f"use {eds} all the same"):
         raise Declined
-    if wishes.eds is not None and not doubts and identity.vendor:
+    if options.eds is not None and not findings and identity.vendor:
         eds = keep_eds(eds, identity, folder)
         operator.say(f"its EDS is kept for the next time: {eds}")
     return identity, eds
 
 
-def _units(wishes: Wishes, name: str, units: examination.Units, eds: Path | None, operator: Operator) -> Choices:
+def _units(
+    options: CommissioningOptions, name: str, units: examination.Units, eds: Path | None, operator: Operator
+) -> Choices:
     operator.say(str(units))
-    counts = wishes.counts or units.counts(wishes.lead)
+    counts = options.counts or units.counts(options.lead)
     if counts is None:
         raise InputError(
             "the drive does not say how it counts (0x6092, 0x608F): give the position units per axis unit by --counts "
             "(mostly four times the encoder's lines, times the gear, divided by the lead)"
         )
     proposal = (
-        f"take {counts:g} counts per {wishes.unit} ({wishes.lead:g} {wishes.unit} per revolution of the shaft), travel "
-        f"±{wishes.travel:g} {wishes.unit} from where the axis stands at the start"
+        f"take {counts:g} counts per {options.unit} ({options.lead:g} {options.unit} per revolution of the shaft), "
+        f"travel ±{options.travel:g} {options.unit} from where the axis stands at the start"
     )
     if not operator.agree(proposal):
         raise Declined
     return Choices(
         name=name,
-        axis=wishes.axis,
-        unit=wishes.unit,
-        travel=(-wishes.travel, wishes.travel),
-        period=wishes.period,
-        mode=wishes.mode or ORDER[0],
-        node=wishes.node,
+        axis=options.axis,
+        unit=options.unit,
+        travel=(-options.travel, options.travel),
+        period=options.period,
+        mode=options.mode or ORDER[0],
+        node=options.node,
         counts=counts,
         eds=None if eds is None else str(eds),
     )
 
 
 def _mapping(
-    network: canopen.Network, machine: Machine, choices: Choices, identity: Identity, wishes: Wishes, operator: Operator
+    network: canopen.Network,
+    machine: Machine,
+    choices: Choices,
+    identity: Identity,
+    options: CommissioningOptions,
+    operator: Operator,
 ) -> None:
     """The first mode that the drive has and that can be commanded in process data."""
     if not operator.agree(
@@ -207,7 +214,7 @@ def _mapping(
         "it off and on"
     ):
         raise Declined
-    wished = (wishes.mode,) if wishes.mode else ORDER
+    wished = (options.mode,) if options.mode else ORDER
     modes = [mode for mode in wished if identity.has(Command[mode.upper()].mode)]
     refused = f"it has no mode {' or '.join(wished)} (0x6502 = {identity.modes or 0:#x})"
     for mode in modes:
@@ -232,20 +239,20 @@ def _mapping(
 def _limits(
     node: canopen.RemoteNode,
     choices: Choices,
-    wishes: Wishes,
+    options: CommissioningOptions,
     operator: Operator,
     before: dict[tuple[int, int], bytes],
 ) -> None:
-    for doubt in examination.limits(node, choices.torque_limit):
-        if doubt.stops:
-            raise MachineError(doubt.text)
-        if not doubt.write:
-            operator.say(doubt.text)
+    for finding in examination.limits(node, choices.torque_limit):
+        if finding.stops:
+            raise MachineError(finding.text)
+        if not finding.write:
+            operator.say(finding.text)
             continue
-        what = ", ".join(f"0x{index:04X}:{subindex:02X} = {value}" for index, subindex, value in doubt.write)
-        if not operator.agree(f"{doubt.text}: write {what} before each run"):
+        what = ", ".join(f"0x{index:04X}:{subindex:02X} = {value}" for index, subindex, value in finding.write)
+        if not operator.agree(f"{finding.text}: write {what} before each run"):
             raise Declined
-        choices.write += doubt.write
+        choices.write += finding.write
     for key in {(index, subindex) for index, subindex, _ in choices.write} | {(0x6072, 0)}:
         data = node.sdo.upload(*key) if number(node, *key) is not None else None
         if data is not None:
@@ -255,23 +262,23 @@ def _limits(
 def _move(
     bus: can.BusABC,
     choices: Choices,
-    wishes: Wishes,
+    options: CommissioningOptions,
     units: examination.Units,
     operator: Operator,
     before: Mapping[tuple[int, int], bytes],
 ) -> FirstMotion:
-    distance = wishes.distance / choices.counts
+    distance = options.distance / choices.counts
     pushes = not choices.fixed_mapping and _has_torque(bus, choices.node)
-    how = f"by a torque that rises to {wishes.torque} ‰ at most" if pushes else "by its position loop"
+    how = f"by a torque that rises to {options.torque} ‰ at most" if pushes else "by its position loop"
     if not operator.agree(
-        f"switch the power on and move {choices.axis} by {wishes.distance} counts ({distance:.3g} {choices.unit}) and "
+        f"switch the power on and move {choices.axis} by {options.distance} counts ({distance:.3g} {choices.unit}) and "
         f"back, {how}; the axis must be free, and a hand on the emergency stop"
     ):
         raise Declined
-    limit = [(0x6072, 0, wishes.torque)] if (0x6072, 0) in before else []
+    limit = [(0x6072, 0, options.torque)] if (0x6072, 0) in before else []
     writes = [entry for entry in choices.write if entry[0] != 0x6072] + limit
     trial = replace(
-        choices, mode="cst" if pushes else choices.mode, write=writes, torque_limit=wishes.torque if pushes else 1000
+        choices, mode="cst" if pushes else choices.mode, write=writes, torque_limit=options.torque if pushes else 1000
     )
     with _machine(trial) as machine:
         motion = first_motion(
@@ -280,8 +287,8 @@ def _move(
             bus,
             cia402_table(trial, write=[*map(list, writes)]),
             choices.period,
-            wishes.distance,
-            wishes.torque,
+            options.distance,
+            options.torque,
         )
     if motion.torque is not None:
         operator.say(f"{choices.axis} moved by {motion.moved} counts, at a torque of {motion.torque:.0f} ‰")
@@ -292,10 +299,10 @@ def _move(
             "a positive torque moves the position downwards: closed loops would run away. Swap two phases of the motor "
             "or the encoder's tracks, or correct the drive's motor direction (see its manual, and 0x607E)"
         )
-    if wishes.counts is None and motion.increments is not None:
-        doubt = examination.gear_doubt(units, motion.increments, motion.moved)
-        if doubt is not None:
-            raise MachineError(doubt.text)
+    if options.counts is None and motion.increments is not None:
+        finding = examination.gear_finding(units, motion.increments, motion.moved)
+        if finding is not None:
+            raise MachineError(finding.text)
     return motion
 
 

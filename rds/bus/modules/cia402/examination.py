@@ -1,4 +1,4 @@
-"""What a drive's parameters say before anything moves: units, mapping, limits, inputs; each doubt with its remedy."""
+"""What a drive's parameters say before anything moves: units, mapping, limits, inputs; each finding with its remedy."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def read_units(node: canopen.RemoteNode) -> Units:
 
 
 @dataclass(frozen=True)
-class Doubt:
+class ExaminationFinding:
     """Something that is not as it should be, and what to do; `write` are the values that would mend it."""
 
     text: str
@@ -56,20 +56,20 @@ class Doubt:
     stops: bool = False  # nothing may move with it
 
 
-def limits(node: canopen.RemoteNode, torque: int) -> list[Doubt]:
+def limits(node: canopen.RemoteNode, torque: int) -> list[ExaminationFinding]:
     """Limits that leave no motion, switches that are active, faults that stay. `torque` is the ‰ that are wanted."""
     found = []
     largest = number(node, 0x6072)
     if largest is not None and 0 < largest < torque / 2:
         found.append(
-            Doubt(
+            ExaminationFinding(
                 f"the largest torque, 0x6072, is {largest} ‰ of the rated one: an axis that needs more falls behind "
                 "(following error); raise it in the drive once its motor's data are in"
             )
         )
     if largest == 0:
         found.append(
-            Doubt(
+            ExaminationFinding(
                 f"the largest torque, 0x6072, is 0: the drive would never move; it is to be {torque} ‰",
                 ((0x6072, 0, torque),),
             )
@@ -77,7 +77,7 @@ def limits(node: canopen.RemoteNode, torque: int) -> list[Doubt]:
     low, high = (number(node, 0x607D, place, signed=True) for place in (1, 2))
     if low is not None and high is not None and low >= high:
         found.append(
-            Doubt(
+            ExaminationFinding(
                 f"the software limits, 0x607D, are {low} and {high}, which leave no way; they are to be taken off. Set "
                 "yours once the axis is homed",
                 ((0x607D, 1, _LOWEST), (0x607D, 2, _HIGHEST)),
@@ -87,7 +87,7 @@ def limits(node: canopen.RemoteNode, torque: int) -> list[Doubt]:
     for bit, name in _SWITCHES.items():
         if inputs & bit:
             found.append(
-                Doubt(
+                ExaminationFinding(
                     f"the {name} is active (0x60FD = {inputs:#x}): release it, connect it, or configure its polarity",
                     stops=True,
                 )
@@ -96,21 +96,21 @@ def limits(node: canopen.RemoteNode, torque: int) -> list[Doubt]:
     if status is not None and state_of(status) in (State.FAULT, State.FAULT_REACTION_ACTIVE):
         code = number(node, 0x603F) or 0
         found.append(
-            Doubt(
+            ExaminationFinding(
                 f"the drive is in fault: {error_text(code)}; it is reset before the axis moves; if it stays, "
                 "see the manual"
             )
         )
     if status is not None and not status & codes.VOLTAGE_ENABLED:
         found.append(
-            Doubt(
+            ExaminationFinding(
                 f"the power stage has no supply (statusword {status_text(status)}): switch the drive's motor supply on",
             )
         )
     return found
 
 
-def gear_doubt(units: Units, increments: int, moved: int) -> Doubt | None:
+def gear_finding(units: Units, increments: int, moved: int) -> ExaminationFinding | None:
     """Whether a motion of `increments` (0x6063) and `moved` position units (0x6064) contradicts the objects."""
     said = units.per_increment
     if said is None or abs(increments) < 10:
@@ -118,7 +118,7 @@ def gear_doubt(units: Units, increments: int, moved: int) -> Doubt | None:
     was = moved / increments
     if abs(was - said) <= 0.2 * abs(said) + 2.0 / abs(increments):
         return None
-    return Doubt(
+    return ExaminationFinding(
         f"the objects 0x608F, 0x6091 and 0x6092 say {said:g} position units per increment, and the motion showed "
         f"{was:g}: {units}. Correct the one that is not your motor's or gear's, or give the units yourself by --counts",
         stops=True,

@@ -42,7 +42,7 @@ class Code(IntEnum):
     IDENTITY = 9  # reply with the serial number
 
 
-class Says(IntEnum):
+class MessageToHost(IntEnum):
     """First byte of what a module says to the host."""
 
     CALL_ONE = 1

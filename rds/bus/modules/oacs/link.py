@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import can
 
 from rds.bus.modules.oacs import messages, talk
-from rds.bus.modules.oacs.codes import Acknowledges, Code, Move, Parameter, Result, Says, check_node
+from rds.bus.modules.oacs.codes import Acknowledges, Code, MessageToHost, Move, Parameter, Result, check_node
 from rds.bus.modules.oacs.messages import Decoded
 from rds.bus.modules.oacs.refusals import reason
 from rds.core.errors import MachineError
@@ -133,7 +133,7 @@ def acknowledgement(answers: Acknowledges, last: bool = False) -> Callable[[Deco
         fields = message.fields
         return (
             message.kind == "Reply"
-            and fields["Code"] == Says.ACKNOWLEDGEMENT
+            and fields["Code"] == MessageToHost.ACKNOWLEDGEMENT
             and fields["Acknowledges"] in known
             and not (last and fields["Result"] == Result.ACCEPTED)
         )

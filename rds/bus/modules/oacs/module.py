@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from rds.bus.modules.oacs import codes as words
 from rds.bus.modules.oacs import messages
-from rds.bus.modules.oacs.codes import Acknowledges, Code, Mode, Parameter, Result, Says
+from rds.bus.modules.oacs.codes import Acknowledges, Code, MessageToHost, Mode, Parameter, Result
 from rds.bus.modules.oacs.iso_tp import Sender
 from rds.bus.modules.oacs.messages import Frame
 from rds.bus.modules.oacs.module_data import ModuleData
@@ -170,14 +170,14 @@ class OacsModule:
         if code == Code.CALL_ONE:
             reply = messages.encode(
                 "Reply",
-                Code=Says.CALL_ONE,
+                Code=MessageToHost.CALL_ONE,
                 BoardID=self.node,
                 **messages.letters("KindText", self.data.kind_text, 5),
             )
         elif code == Code.CALL_TWO:
             reply = messages.encode(
                 "Reply",
-                Code=Says.CALL_TWO,
+                Code=MessageToHost.CALL_TWO,
                 BoardID=self.node,
                 **messages.letters("TypeText", self.data.type_text, 6),
             )
@@ -263,7 +263,7 @@ class OacsModule:
         """Tell the host what became of a command."""
         frame = messages.encode(
             "Reply",
-            Code=Says.ACKNOWLEDGEMENT,
+            Code=MessageToHost.ACKNOWLEDGEMENT,
             BoardID=self.node,
             Acknowledges=answers,
             AcknowledgeAxis=ord(self.data.letter),

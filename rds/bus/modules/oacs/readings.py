@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rds.bus.modules.oacs import messages
-from rds.bus.modules.oacs.codes import SLOT_GRID, Quantity, Says
+from rds.bus.modules.oacs.codes import SLOT_GRID, MessageToHost, Quantity
 from rds.bus.modules.oacs.sensors import gravities, motor_current, vibrating
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Readings:
         sequence, self._sequence = self._sequence, (self._sequence + 1) & 0xFF
         return messages.encode(
             "Reply",
-            Code=Says.POSITION,
+            Code=MessageToHost.POSITION,
             BoardID=module.node,
             Item=1,
             PositionAxis=ord(module.data.letter),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.bus.modules.oacs.codes import Says
+from rds.bus.modules.oacs.codes import MessageToHost
 from rds.bus.modules.oacs.talk import Heard
 from rds.bus.modules.oacs.transfer import ModuleDescription
 from rds.core.errors import MachineError
@@ -69,7 +69,7 @@ class PositionRecorder:
     def take(self, heard: Heard) -> None:
         """A message of the module."""
         fields = heard.message.fields
-        if heard.message.kind == "Reply" and fields["Code"] == Says.POSITION:
+        if heard.message.kind == "Reply" and fields["Code"] == MessageToHost.POSITION:
             self._keep(self._numbers.number(fields["Sequence"]), fields["Position"])
 
     def _keep(self, number: int, counts: int) -> None:

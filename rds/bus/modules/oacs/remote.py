@@ -16,10 +16,10 @@ from rds.bus.modules.oacs.codes import (
     Acknowledges,
     Code,
     Kind,
+    MessageToHost,
     Move,
     Parameter,
     Quantity,
-    Says,
     Select,
 )
 from rds.bus.modules.oacs.codes import Result as Ended
@@ -282,7 +282,7 @@ class Module:
 
         def listen(heard: Heard) -> None:
             fields = heard.message.fields
-            if heard.message.kind == "Reply" and fields["Code"] == Says.POSITION:
+            if heard.message.kind == "Reply" and fields["Code"] == MessageToHost.POSITION:
                 progress(fields["Position"] * self.description.resolution)
 
         self._link.listen = listen

@@ -95,7 +95,7 @@ class AnswerOrder:
         self.seen = True
         return lost
 
-    def take_for_want_of_better(self, answer: Answer) -> None:
+    def take_doubtful(self, answer: Answer) -> None:
         """Nothing better came in the period: the module lost a tick, or is slow, which its next answers tell."""
         behind = max(0, -self.ahead(answer)) + self.behind
         self.take(answer)

@@ -244,7 +244,7 @@ class AxisDrivers(CanDrivers[_Module]):
         if module.doubtful is None:
             module.order.owed += 1
             return False
-        module.order.take_for_want_of_better(module.doubtful)
+        module.order.take_doubtful(module.doubtful)
         module.counts = module.doubtful.counts
         return True
 

@@ -16,7 +16,7 @@ from rds.core.types import Controller, Model
 
 
 @dataclass(frozen=True)
-class Subject:
+class CheckedCode:
     """The student's functions, and where they come from a file, how to load a second copy that remembers nothing."""
 
     student: StudentFile
@@ -34,16 +34,18 @@ class Subject:
         return self.student.functions[role]
 
 
-def subject_of(thing: Any, role: str, initial_state: Any = None, params: Mapping[str, Any] | None = None) -> Subject:
-    """`thing` as a subject; a bare function plays `role`. `initial_state` and `params` go before its own.
+def checked_code(
+    thing: Any, role: str, initial_state: Any = None, params: Mapping[str, Any] | None = None
+) -> CheckedCode:
+    """`thing` as code to check; a bare function plays `role`. `initial_state` and `params` go before its own.
 
     Raises what `rds.core.load` raises for what cannot be loaded; arguments and params are left to the check.
     """
     student = _with(_student(thing, role), initial_state, params)
     path = student.source.path
     if path is None or isinstance(thing, Model) or not _is_unchanged(path, student.source.sha256):
-        return Subject(student)  # a Model's functions are not those of its file
-    return Subject(student, lambda: _with(load_student(path, validate=False), initial_state, params))
+        return CheckedCode(student)  # a Model's functions are not those of its file
+    return CheckedCode(student, lambda: _with(load_student(path, validate=False), initial_state, params))
 
 
 def _is_unchanged(path: str, sha256: str | None) -> bool:
@@ -63,7 +65,7 @@ def _with(student: StudentFile, initial_state: Any, params: Mapping[str, Any] | 
 
 
 def _student(thing: Any, role: str) -> StudentFile:
-    if isinstance(thing, Subject):
+    if isinstance(thing, CheckedCode):
         return thing.student
     if isinstance(thing, StudentFile):
         return thing
