@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -350,3 +351,22 @@ if sys.argv[1:2] == ["grade"]:
     names += group.commands["grade"].commands
 print(*names)
 """
+
+
+def test_no_help_loses_a_word_in_brackets() -> None:
+    """Rich takes `[word]` for markup and prints nothing of it; `\\[word]` and `[0, 1]` stand as they are."""
+    from typer.main import get_command
+
+    from rds.cli.main import app
+
+    markup = re.compile(r"(?<!\\)\[[a-z#/@][^\[\]]*\]")
+    known = re.compile(r"\[/?(bold|dim|italic)\]")
+    seen, lost = 0, []
+    open_ = [("rds", get_command(app))]
+    while open_:
+        name, command = open_.pop()
+        open_ += [(f"{name} {key}", inner) for key, inner in getattr(command, "commands", {}).items()]
+        texts = [command.help, command.epilog, *(getattr(parameter, "help", None) for parameter in command.params)]
+        seen += 1
+        lost += [f"{name}: {found[0]}" for text in texts for found in markup.finditer(known.sub("", text or ""))]
+    assert seen > 60 and not lost, lost

@@ -7,9 +7,8 @@ from typing import Any
 import can
 
 from rds.bus.modules.rds import frames
-from rds.bus.tools.link import BUILTIN, bus_name, default_channel, open_bus
+from rds.bus.tools.link import BUILTIN, bus_failed, bus_name, default_channel, open_bus
 from rds.bus.tools.listening import frames_within
-from rds.core.errors import MachineError
 from rds.machines.machine import Machine
 
 
@@ -32,7 +31,7 @@ def find_machine(
                 if len(found) == len(names):
                     break
     except can.CanError as error:
-        raise MachineError(f"bus {bus_name(interface, channel)} failed: {error}") from error
+        raise bus_failed(bus_name(interface, channel), error) from error
     finally:
         bus.shutdown()
     return [name for name in machine.axes if name in found]

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from math import inf
 from typing import Any, Generic, TypeVar
 
+from rds.bus.tools.link import bus_failed
 from rds.core.contracts import Counters, Limits, Watch, unwatched
 from rds.core.errors import MachineError
 
@@ -262,7 +263,7 @@ class DriversBase(ABC, Generic[M, Frame]):
         )
 
     def _failed(self, error: Exception) -> MachineError:
-        return MachineError(f"bus {self._bus_name} failed: {error}")
+        return bus_failed(self._bus_name, error)
 
     @contextlib.contextmanager
     def _failing(self) -> Iterator[Any]:

@@ -11,6 +11,7 @@ from rds.bus.modules.cia402 import emergency as drives
 from rds.bus.modules.oacs.host import estop as stop_oacs
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Status
+from rds.bus.tools.link import bus_failed
 from rds.bus.tools.listening import frames_within
 from rds.core.errors import MachineError
 
@@ -70,7 +71,7 @@ def reset_everything(bus: can.BusABC) -> list[int]:
     except can.CanTimeoutError:  # nobody acknowledges where nobody is
         return []
     except (can.CanError, OSError) as error:
-        raise MachineError(f"bus {bus.channel_info} failed: {error}") from error
+        raise bus_failed(bus.channel_info, error) from error
     reports = _reports(bus)
     held = [str(node) for node, status in sorted(reports.items()) if status & Status.EMERGENCY]
     if held:
@@ -89,7 +90,7 @@ def _reports(bus: can.BusABC) -> dict[int, int]:
             if node in frames.NODES and len(message.data) == 8:
                 found[node] = frames.decode_answer(message.arbitration_id, message.data).status
     except (can.CanError, OSError) as error:
-        raise MachineError(f"bus {bus.channel_info} failed: {error}") from error
+        raise bus_failed(bus.channel_info, error) from error
     return found
 
 

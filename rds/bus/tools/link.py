@@ -22,6 +22,11 @@ def bus_name(interface: str, channel: str | None) -> str:
     return interface if channel in (None, "") else f"{interface}:{channel}"
 
 
+def bus_failed(name: str, error: Exception) -> MachineError:
+    """The error of a bus that failed while it was used."""
+    return MachineError(f"bus {name} failed: {error}; check power, cable and adapter, then open it again")
+
+
 def bus_options(table: Mapping[str, Any]) -> dict[str, Any]:
     """What of a `[bus]` table goes to can.Bus beside interface and channel, such as the bit rate."""
     return {key: value for key, value in table.items() if key not in _NO_OPTIONS}

@@ -19,8 +19,9 @@ import can
 from rds.bus.modules import dialects
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Kind
+from rds.bus.tools.link import bus_failed
 from rds.bus.tools.listening import frames_within
-from rds.core.errors import InputError, MachineError
+from rds.core.errors import InputError
 
 LISTEN = 0.3  # s for modules to answer a call
 UNUSED = range(0x780, 0x800)  # above all that machines send
@@ -78,7 +79,7 @@ def live_modules(bus: can.BusABC, listen: float = LISTEN) -> list[str]:
         for message in frames_within(bus, listen):
             found |= _senders(message)
     except (can.CanError, OSError) as error:
-        raise MachineError(f"the bus failed: {error}") from error
+        raise bus_failed(bus.channel_info, error) from error
     return _named(found)
 
 

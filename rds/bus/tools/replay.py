@@ -15,9 +15,10 @@ from typing import Any
 import can
 
 from rds.bus.modules.rds import frames
+from rds.bus.tools.link import bus_failed
 from rds.bus.tools.live_machine import acts_on_machine, heard_now, live_modules, refusal
 from rds.bus.tools.selection import Selection
-from rds.core.errors import InputError, MachineError
+from rds.core.errors import InputError
 
 _LOOK = 0.1  # s after which a waiting replay looks whether it shall stop
 _EXACT = 1e-6  # s, to which times in a log are exact
@@ -171,7 +172,7 @@ def _listen(part: _Part, bus: can.BusABC, with_commands: bool) -> None:
     try:
         modules = heard_now(bus)
     except (can.CanError, OSError) as error:
-        raise MachineError(f"the bus failed: {error}") from error
+        raise bus_failed(bus.channel_info, error) from error
     if modules and part.acts is not None and not with_commands:
         raise refusal(part.acts, part.acting - 1, modules)
 
@@ -193,6 +194,6 @@ def _send(bus: can.BusABC, message: can.Message) -> None:
     try:
         bus.send(message, _PATIENCE)
     except (can.CanError, OSError) as error:
-        raise MachineError(f"the bus failed: {error}") from error
+        raise bus_failed(bus.channel_info, error) from error
     except ValueError as error:
         raise InputError(f"this bus can't carry a frame of the log: {error}") from error

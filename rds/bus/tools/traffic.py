@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import can
 
+from rds.bus.tools.link import bus_failed
 from rds.bus.tools.listening import frames_within
 from rds.bus.tools.statistics import Statistics
 from rds.core.errors import MachineError
@@ -28,7 +29,7 @@ def refuse_taken(bus: can.BusABC, seconds: float = LISTENING) -> None:
             heard.add(message)
         is_quiet_now = bus.recv(0.0) is None
     except (can.CanError, OSError) as error:
-        raise MachineError(f"bus {bus.channel_info} failed: {error}; check the cable and the interface") from error
+        raise bus_failed(bus.channel_info, error) from error
     # whoever reads more slowly than they come knows nothing of the time after the last that it has read
     spanned = max(heard.snapshot().seconds, seconds * _LEAST if is_quiet_now else _SHORTEST)
     found = heard.snapshot(spanned)

@@ -59,11 +59,6 @@ class Assignment:
         """Points in all."""
         return float(f"{sum(criterion.max_score for criterion in self.criteria):.9g}")
 
-    @property
-    def is_hand_out(self) -> bool:
-        """Whether this is the students' copy, without what is hidden from them."""
-        return self.hidden.criteria > 0
-
     def seed(self, student: str) -> int:
         """Of a student's plants and noise."""
         return student_seed(self.secret, student)

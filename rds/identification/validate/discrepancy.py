@@ -6,8 +6,8 @@ far below a per cent of the way. So two measures are taken, each with a standard
 - as the axis: the structure `axis` with the model's options and a delay of either sign is fitted to the log by its
   free run, from the model's values and, where that explains too little, from those that the data say. In a closed loop
   the log is cut into stretches, each with an initial state of its own, so that a disturbance that the controller made
-  up for does not add up. A constant load counts as friction that differs by direction. Model and fit are compared as frequency responses K e^(-jωd) / (1 + jωτ) at the intended
-  bandwidth.
+  up for does not add up. A constant load counts as friction that differs by direction. Model and fit are compared as
+  frequency responses K e^(-jωd) / (1 + jωτ) at the intended bandwidth.
 - as motion, whatever the model is: the measured position over a constant, the modelled one ŷ, its velocity and its
   acceleration, and the times for which it has moved forward and backward, by least squares (stretches of a closed loop
   have a drift of their own). y ≈ g ŷ - L dŷ/dt + Q d²ŷ/dt² is a gain and phase, too; friction that is off adds a

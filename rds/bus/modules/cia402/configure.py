@@ -23,6 +23,7 @@ from rds.bus.modules.cia402.eds_file import read_eds
 from rds.bus.modules.cia402.mapping import Layout, find_fixed, map_dynamically
 from rds.bus.modules.cia402.presence import refuse_clashes
 from rds.bus.modules.cia402.settings import Command, DriveSettings, Settings
+from rds.bus.tools.link import bus_failed
 from rds.bus.tools.listening import pause
 from rds.core.contracts import Limits, Watch, unwatched
 from rds.core.errors import InputError, MachineError
@@ -369,4 +370,4 @@ def _naming(drive: DriveSettings) -> Iterator[None]:
     except (KeyError, AttributeError) as error:
         raise MachineError(f"{drive.name}: the EDS {drive.eds} lacks what is needed: {error}") from error
     except (can.CanError, OSError) as error:
-        raise MachineError(f"{drive.name}: the bus failed: {error}") from error
+        raise bus_failed(f"of {drive.name}", error) from error

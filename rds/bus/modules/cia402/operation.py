@@ -25,7 +25,6 @@ from rds.bus.modules.cia402.state_machine import Command, StateMachine, command
 _ON = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STAYING = (5, 6)  # quick stop option codes that stay in QUICK STOP ACTIVE
 _LONGEST_STOP = 2.0  # s after a ramp's end for an axis to stand still; then the voltage is cut anyway
-_PROFILED = (0x6083, 0x6084)
 
 
 class Operation:

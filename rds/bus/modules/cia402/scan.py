@@ -15,9 +15,8 @@ from canopen.sdo import SdoAbortedError, SdoCommunicationError
 from rds.bus.modules.cia402.codes import State, state_of
 from rds.bus.modules.cia402.configure import library
 from rds.bus.modules.cia402.presence import refuse_clashes
-from rds.bus.tools.link import BUILTIN, bus_name, open_bus
+from rds.bus.tools.link import BUILTIN, bus_failed, bus_name, open_bus
 from rds.bus.tools.listening import pause
-from rds.core.errors import MachineError
 
 _WAIT = 0.3  # s for the devices to answer
 _ANSWERS_IN = 1.0  # s for one that was heard to answer a question: a busy computer's drive is no silent device
@@ -72,7 +71,7 @@ def scan(interface: str = BUILTIN, channel: str | None = None, timeout: float = 
     except can.CanTimeoutError:  # with bit timing, nobody acknowledges where nobody is
         return []
     except (can.CanError, OSError) as error:
-        raise MachineError(f"bus {bus_name(interface, channel)} failed: {error}") from error
+        raise bus_failed(bus_name(interface, channel), error) from error
     finally:
         bus.shutdown()
 

@@ -240,11 +240,3 @@ def _reset(host: Host, unit: int) -> MachineError:
     return MachineError(
         f"{host.title(unit)} has been reset in the middle of the motion; its position is lost: home it, and start again"
     )
-
-
-def stepwise_time(steps: int, units: int, baud: float) -> float:
-    """s that the thesis's way takes for so many steps: filling, and three bytes' worth of synchronization a step."""
-    byte = frames.byte_time(baud)
-    rounds = -(-steps // BUFFER)
-    fill = units * ((BUFFER + 4) * byte + 2 * commands.TURN_ROUND)
-    return rounds * (fill + BUFFER * (BYTE_TIME + 2 * byte))

@@ -30,6 +30,7 @@ from rds.bus.modules.oacs.recording import PositionRecorder, ReadingsRecorder
 from rds.bus.modules.oacs.refusals import REASONS, reason
 from rds.bus.modules.oacs.talk import Heard
 from rds.bus.modules.oacs.transfer import ModuleDescription, decode_description
+from rds.bus.tools.link import bus_failed
 from rds.core.errors import InputError, MachineError
 from rds.results import Result
 
@@ -79,7 +80,7 @@ class Module:
         try:
             self._description = decode_description(fetch(self._bus, self.number, request, timeout))
         except (can.CanError, OSError) as error:
-            raise MachineError(f"bus {self._bus.channel_info} failed: {error}; check the cable") from error
+            raise bus_failed(self._bus.channel_info, error) from error
         except MachineError as error:
             raise MachineError(f"{self._link.name}: {error}") from error
         return self._description

@@ -10,6 +10,7 @@ import can
 
 from rds.bus.modules.oacs import messages
 from rds.bus.modules.oacs.messages import Decoded, Frame
+from rds.bus.tools.link import bus_failed
 from rds.bus.tools.listening import frames_within
 from rds.core.errors import MachineError
 
@@ -28,7 +29,7 @@ def send(bus: can.BusABC, frame: Frame) -> None:
     try:
         bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=extended), timeout=0.5)
     except (can.CanError, OSError) as error:
-        raise broken(bus, error) from error
+        raise bus_failed(bus.channel_info, error) from error
 
 
 def hear(bus: can.BusABC, until: float) -> Heard | None:
@@ -41,7 +42,7 @@ def hear(bus: can.BusABC, until: float) -> Heard | None:
         try:
             frame = bus.recv(max(left, 0.0))
         except (can.CanError, OSError) as error:
-            raise broken(bus, error) from error
+            raise bus_failed(bus.channel_info, error) from error
         if frame is None:
             if left <= 0.0:
                 return None
@@ -57,7 +58,7 @@ def hear_all(bus: can.BusABC, seconds: float) -> Iterator[Heard]:
             if (heard := _heard(frame)) is not None:
                 yield heard
     except (can.CanError, OSError) as error:
-        raise broken(bus, error) from error
+        raise bus_failed(bus.channel_info, error) from error
 
 
 def _heard(frame: can.Message) -> Heard | None:
@@ -71,8 +72,3 @@ def _heard(frame: can.Message) -> Heard | None:
     except MachineError:
         return None
     return Heard(message, frame.timestamp, time.monotonic())
-
-
-def broken(bus: can.BusABC, error: Exception) -> MachineError:
-    """The error that the bus has failed."""
-    return MachineError(f"bus {bus.channel_info} failed: {error}; check the cable and the interface, open it again")

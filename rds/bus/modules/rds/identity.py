@@ -13,6 +13,7 @@ import can
 
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.frames import Identity
+from rds.bus.tools.link import bus_failed
 from rds.bus.tools.listening import frames_within
 from rds.core.errors import MachineError
 
@@ -47,7 +48,7 @@ def listen(bus: can.BusABC, wait: float = WAIT) -> Heard:
     except can.CanTimeoutError:  # nobody acknowledges where nobody is
         pass
     except (can.CanError, OSError) as error:
-        raise MachineError(f"bus {bus.channel_info} failed: {error}") from error
+        raise bus_failed(bus.channel_info, error) from error
     heard.modules = sorted(found)
     return heard
 

@@ -18,7 +18,7 @@ import can
 from rds.bus.medium.bits import INTERFRAME, frame_bits
 from rds.bus.modules.rds import motion_frames
 from rds.bus.modules.rds.module import AxisModule
-from rds.core.errors import MachineError
+from rds.bus.tools.link import bus_failed
 
 _SEND = 0.5  # s for a frame to go out
 EXTENDED = 0x800  # identifiers from here on are extended ones
@@ -74,7 +74,7 @@ class CanPort:
         try:
             self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data), _SEND)
         except (can.CanError, OSError) as error:
-            raise MachineError(f"the bus failed: {error}; check power, cable and adapter") from error
+            raise bus_failed(self._bus.channel_info, error) from error
         self.bits += bits_of(identifier, data)
         self.sent_bytes += len(data)
 
@@ -85,7 +85,7 @@ class CanPort:
             try:
                 message = self._bus.recv(max(0.0, deadline - time.monotonic()))
             except (can.CanError, OSError) as error:
-                raise MachineError(f"the bus failed: {error}; check power, cable and adapter") from error
+                raise bus_failed(self._bus.channel_info, error) from error
             if message is None:
                 return None
             if message.is_error_frame or message.is_remote_frame:
