@@ -124,7 +124,9 @@ def parameters(
 @app.command()
 @writes_files
 def fit(
-    data: Annotated[Path, typer.Argument(help="CSV with columns force \\[N], and depth \\[mm], speed \\[m/min], feed \\[mm].")],
+    data: Annotated[
+        Path, typer.Argument(help="CSV with columns force \\[N], and depth \\[mm], speed \\[m/min], feed \\[mm].")
+    ],
     fix: Annotated[
         list[str] | None, typer.Option(metavar="NAME=EXPONENT", help="An exponent that is known, as in speed=0.")
     ] = None,
