@@ -136,7 +136,7 @@ def unknown(sheet: Sheet, known: Collection[int], column: str) -> tuple[str, ...
     more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
     return (
         f"{len(names)} of the gradebook have no grade here, and their cells stay as they are: "
-        f"{'; '.join(names[:_MOST_NAMES])}{more}. Give `rds grade run` the class list, and who handed in nothing gets 0",
+        f"{'; '.join(names[:_MOST_NAMES])}{more}. Give `rds grade run` the class list, and it is 0",
     )
 
 
