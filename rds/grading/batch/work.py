@@ -19,9 +19,8 @@ from rds.core.private_files import make_folder, write_private
 from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
 from rds.grading.batch.grade_one import grade_with_runs
 from rds.grading.batch.scratch import scratch
-from rds.grading.batch.warm_worker import shared_pool
+from rds.grading.batch.warm_worker import own_fault, shared_pool
 from rds.grading.feedback.feedback import feedback_page
-from rds.grading.sandbox import available
 from rds.results.arrow import repeated, to_arrow
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ def setup_of(assignment: Assignment, jobs: int | None, shared: bool) -> Setup:
 
 def graded(setup: Setup, task: Task) -> Answer:
     """The grade of a task. An exception is ours, and no fault of the submission."""
-    if not setup.folder and (fault := available()):  # on this computer the walls were tried before any work began
+    if not setup.folder and (fault := own_fault()):  # on this computer the walls were tried before any work began
         return Answer(missing=fault)
     pool = shared_pool(setup.jobs)  # it starts while the assignment is read
     assignment, solution = _assignment(setup)
