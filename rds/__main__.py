@@ -13,11 +13,12 @@ _INTERRUPTED = 130  # the exit code of what Ctrl-C ended, by the shell's custom
 def main() -> None:
     """Run the command line; Ctrl-C in the middle of an import is no traceback."""
     try:
-        from rds.cli.canon import canon_alone
+        if sys.argv[1:3] == ["nc", "canon"]:
+            from rds.cli.canon import canon_alone
 
-        code = canon_alone(sys.argv[1:])
-        if code is not None:
-            sys.exit(code)
+            code = canon_alone(sys.argv[1:])
+            if code is not None:
+                sys.exit(code)
         if sys.argv[1:3] == ["grade", "run"] and sys.platform == "linux" and not _ELSEWHERE & {*sys.argv}:
             from rds.grading.batch.warm_worker import begun
 

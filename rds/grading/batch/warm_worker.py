@@ -17,6 +17,7 @@ from rds.core.parallel.process import Work, WorkerProcess
 if TYPE_CHECKING:
     from rds.grading.sandbox import Pool
 
+_NEEDED = ("rds.grading.batch.work", "pyarrow.parquet", "rds.grading.cases.control", "rds.modes.simulation")
 _NOTHING = pickle.dumps(None)  # an item that says nothing
 
 
@@ -43,7 +44,7 @@ def _tried(_: None) -> str | None:
 
     with suppress(SandboxError):  # `own_fault` says it
         pool()
-    for name in ("rds.grading.batch.work", "pyarrow.parquet"):  # while the interpreter starts
+    for name in _NEEDED:  # while the interpreter starts
         import_module(name)
     return own_fault()
 
