@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 
+_ELSEWHERE = {"--help", "--container", "--scheduler"}  # with which `rds grade run` has no worker here
 _INTERRUPTED = 130  # the exit code of what Ctrl-C ended, by the shell's custom
 
 
 def main() -> None:
     """Run the command line; Ctrl-C in the middle of an import is no traceback."""
     try:
-        from rds.cli.canon import canon_alone
+        if sys.argv[1:3] == ["nc", "canon"]:
+            from rds.cli.canon import canon_alone
 
-        code = canon_alone(sys.argv[1:])
-        if code is not None:
-            sys.exit(code)
+            code = canon_alone(sys.argv[1:])
+            if code is not None:
+                sys.exit(code)
+        if sys.argv[1:3] == ["grade", "run"] and sys.platform == "linux" and not _ELSEWHERE & {*sys.argv}:
+            from rds.grading.batch.warm_worker import begun
+
+            begun()  # it gets ready on another processor, while all else is imported here
+            from rds.cli.grade_run import run_alone
+
+            code = run_alone(sys.argv[1:])
+            gc.freeze()  # or Python would go through all that was imported once more before it ends
+            if code is not None:
+                sys.exit(code)
         from rds.cli.main import main as run
 
         run()

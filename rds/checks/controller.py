@@ -86,7 +86,7 @@ class _Run:
         self.signals = tuple(student.signals)
         try:
             self.params = copy.deepcopy(dict(student.params))
-            self.initial_state = () if student.initial_state is None else copy.deepcopy(student.initial_state)
+            self.initial_state = copy.deepcopy(student.first_state)
         except Exception as error:
             said = f"{error}: keep numbers, lists, dicts and arrays in initial_state and params"
             return found.fault(clauses.SAVED_STATE, said)
@@ -190,7 +190,8 @@ class _Run:
         )
 
     def _is_for_want_of_state(self, error: BaseException, before: tuple[Any, ...]) -> bool:
-        if self.subject.student.initial_state is not None or not _is_about_form(error):
+        student = self.subject.student
+        if student.initial_state is not None or student.starts_with_none or not _is_about_form(error):
             return False
         params = copy.deepcopy(self.params)
         return wants_state(error, lambda state: self.function(*before[:3], state, params), self.source)

@@ -80,7 +80,9 @@ def check(
 
         read = read_assignment(assignment)
         with Pool() as pool, progress_bars() as bar:
-            found = check_assignment(read, pool, seeds, bar("students"))
+            found = check_assignment(
+                read, pool, seeds, bar("students"), announce=lambda text: typer.echo(f"rds: {text}", err=True)
+            )
     if json:
         print_json(found.to_json())
     else:

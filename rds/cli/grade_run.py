@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rds.cli import cluster_options
-from rds.cli.common import Json, ends_as_ctrl_c, print_json, progress_bars, refusals, stdout_kept, writes_files
+from rds.cli.common import (
+    Json,
+    ends_as_ctrl_c,
+    print_json,
+    progress_bars,
+    refusals,
+    say_notices,
+    stdout_kept,
+    writes_files,
+)
 from rds.cli.grade import needs_sandbox
 from rds.core.errors import InputError
+from rds.core.private_files import keep_process_private
 
 if TYPE_CHECKING:
+    from rds.core.parallel.process import WorkerProcess
     from rds.grading.batch.outcome import BatchOutcome
 
 _INTERRUPTED = 130  # by the shell's custom
@@ -56,7 +71,7 @@ def run(
             from rds.grading.batch.run import run_batch
 
             cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)
-            with progress_bars() as bar:
+            with progress_bars() as bar, _worker(cluster is None) as first:
                 found = run_batch(
                     assignment,
                     submissions,
@@ -68,6 +83,7 @@ def run(
                     against=tuple(against or ()),
                     progress=bar("submissions"),
                     announce=lambda text: typer.echo(f"rds: {text}", err=True),
+                    first=first,
                 )
     except KeyboardInterrupt:
         typer.echo(f"rds: ended; what is graded is kept: go on with --resume -o {out}", err=True)
@@ -81,6 +97,23 @@ def run(
     else:
         _show(found)
     raise typer.Exit(1 if found.grader_errors else 0)
+
+
+@contextmanager
+def _worker(is_local: bool) -> Iterator[WorkerProcess | None]:
+    """The first of the workers here, which `rds.__main__` has begun if it could."""
+    if not is_local:
+        yield None
+        return
+    from rds.grading.batch.warm_worker import begun
+
+    first = begun()
+    Thread(target=import_module, args=("rds.cli.console",), daemon=True).start()  # while the worker is busy
+    try:
+        yield first
+    finally:
+        first.end()
+        begun.cache_clear()
 
 
 def _in_container(
@@ -100,6 +133,27 @@ def _in_container(
     return run_in_container(
         assignment, submissions, out, options, mounted + [("--against", path) for path in against or ()]
     )
+
+
+def run_alone(words: Sequence[str]) -> int | None:
+    """The exit code of the command line `grade run ASSIGNMENT SUBMISSIONS -o OUT`, done here; None for any other.
+
+    The whole reader of command lines takes longer to import than one submission to grade.
+    """
+    if list(words[:2]) != ["grade", "run"] or len(words) != 6 or words[4] not in ("-o", "--out"):
+        return None
+    if any(word.startswith("-") for word in (words[2], words[3], words[5])):
+        return None
+    try:
+        keep_process_private()
+        say_notices()
+        run(Path(words[2]), Path(words[3]), Path(words[5]))
+    except InputError as error:
+        typer.echo(f"rds: {error}", err=True)
+        return 2
+    except typer.Exit as end:
+        return int(end.exit_code)
+    return 0
 
 
 def _show(found: BatchOutcome) -> None:

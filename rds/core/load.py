@@ -39,7 +39,8 @@ class StudentFile:
     `initial_state` is None where the student gave none, `signals` (names with their units) empty where a controller
     declares none. One `params` and one `initial_state` serve every function of a file; a model and a controller whose
     states differ belong in two files. `misfits` are functions that have the name but not the arguments of an interface,
-    such as a helper called `interpolate`, with the reason.
+    such as a helper called `interpolate`, with the reason. `starts_with_none` is set where `initial_state = None` is
+    written: its controller is given None at first, and not the empty state.
     """
 
     source: Source
@@ -48,6 +49,12 @@ class StudentFile:
     initial_state: Any = None
     signals: Mapping[str, str] = field(default_factory=dict)
     misfits: Mapping[str, str] = field(default_factory=dict)
+    starts_with_none: bool = False
+
+    @property
+    def first_state(self) -> Any:
+        """What its controller is given at first."""
+        return () if self.initial_state is None and not self.starts_with_none else self.initial_state
 
     @property
     def interfaces(self) -> tuple[str, ...]:
@@ -70,9 +77,9 @@ class StudentFile:
         if control is None:
             raise ContractError(f"no controller: it defines no {form('control')}", self.source.name)
         merged, where = self.parameters(params), self.source.path or self.source.name
-        if self.initial_state is None and not coupled:
+        if self.initial_state is None and not self.starts_with_none and not coupled:
             _needs_no_state(control, merged, self.source)
-        state = () if self.initial_state is None else own_copy(self.initial_state, "initial_state", where)
+        state = own_copy(self.first_state, "initial_state", where)
         return Controller(control, state, merged, self.source, coupled, signals=dict(self.signals))
 
 
@@ -118,8 +125,9 @@ def from_function(
     """
     name = getattr(function, "__name__", type(function).__name__)
     role = role or (name if name in INTERFACES else _role_of(function, name))
-    variables = {role: function, "params": {} if params is None else params, "initial_state": initial_state}
-    variables["signals"] = signals
+    variables: dict[str, Any] = {role: function, "params": {} if params is None else params, "signals": signals}
+    if initial_state is not None:
+        variables["initial_state"] = initial_state
     return _student(variables, _source(name, _source_text(function)), validate)
 
 
@@ -139,7 +147,8 @@ def _student(variables: Mapping[str, Any], source: Source, validate: bool) -> St
     params, state, signals = (variables.get(name) for name in ("params", "initial_state", "signals"))
     if not isinstance(signals, Mapping) or "control" not in fitting:
         signals = {}  # a variable of that name from before there were signals, or a model's
-    student = StudentFile(source, fitting, {} if params is None else params, state, signals, misfits)
+    starts_with_none = state is None and "initial_state" in variables
+    student = StudentFile(source, fitting, {} if params is None else params, state, signals, misfits, starts_with_none)
     if validate:
         _validate(student)
     return student

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -31,7 +32,7 @@ class Band(StrEnum):
     REVIEW = "review"  # it could not be measured: somebody has to look; never a zero
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class CriterionScore:
     """One criterion's answer. `value` is None where nothing could be measured; `sentence` says what it means."""
 
@@ -48,7 +49,7 @@ class CriterionScore:
     gate: str = ""  # the heading of the criterion that it requires, where that took points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Grade:
     """One row of a batch. Scores are after the late penalty; `before_penalty` is what the criteria add up to."""
 
@@ -79,6 +80,20 @@ class Grade:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Grade:
         """The grade that `to_json` was made from."""
-        criteria = tuple(CriterionScore(**{**each, "band": Band(each["band"])}) for each in data["criteria"])
+        criteria = tuple(CriterionScore(**{**_shared(each), "band": Band(each["band"])}) for each in data["criteria"])
+        data = {**data, "details": _shared(dict(data["details"]))}
         whole = {**data, "status": Status(data["status"]), "criteria": criteria, "notes": tuple(data["notes"])}
         return cls(**whole)
+
+
+def _shared(data: Any) -> Any:
+    """The same, with one copy of the keys, and of those texts that all students of a class have in common."""
+    if type(data) is not dict:
+        return [_shared(each) for each in data] if type(data) is list else data
+    return {
+        sys.intern(key): sys.intern(value) if key in _COMMON and type(value) is str else _shared(value)
+        for key, value in data.items()
+    }
+
+
+_COMMON = frozenset({"name", "title", "unit", "case", "gate", "assignment"})

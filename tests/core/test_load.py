@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rds.checks import check_controller
 from rds.core.errors import ContractError, InputError
 from rds.core.load import from_function, from_namespace, load_student, student_error
 from rds.core.types import Reference
@@ -169,6 +170,9 @@ def test_a_missing_initial_state_is_noticed_before_the_run(write):
     with pytest.raises(ContractError, match=r"no initial_state.*line 2, in control.*define initial_state"):
         load_student(write(text)).controller()
     assert load_student(write("initial_state = [0.0]\n" + text)).controller().initial_state == [0.0]
+    lazy = "initial_state = None\n" + text.replace("state[0], state", "0.0 if state is None else state[0], [y]")
+    assert load_student(write(lazy)).controller().initial_state is None  # and not the empty state: it is written there
+    assert check_controller(write(lazy)).ok
 
 
 @pytest.mark.parametrize("fails", ["r - y", "control.no_such", "len(params['gain'])", "float('x')"])

@@ -90,6 +90,11 @@ CAUSES = {
         PROPORTIONAL.format(gain=150.0, forward=0.0),
         ("more damping, a derivative",),
     ),
+    "makes voltage of noise": (
+        SINE.replace("duration", "noise = 0.02\nduration") + criterion("noise-voltage", "sine", 1e-4, 1.0, "V"),
+        PROPORTIONAL.format(gain=30.0, forward=0.567),
+        ("30 V/mm: |30.1 V/mm: |29.9 V/mm: ", "filter it more"),  # the proportional gain itself
+    ),
     "hardly acts": (SINE + RMS, PROPORTIONAL.format(gain=0.0, forward=0.0), ("hardly acts", "raise the gain")),
 }
 

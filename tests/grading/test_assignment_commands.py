@@ -107,7 +107,9 @@ def test_a_sound_assignment_passes_its_check(tmp_path: Path, pool: Pool) -> None
     assert ran.exit_code == 0 and told["ok"] is True and told["faults"] == []
     (row,) = told["criteria"]
     assert row["least"] == row["largest"] and row["margin"] > 100.0 and row["idle"] == 0.0
-    assert "the assignment can be given out" in rds("check", tmp_path, "--seeds", "1").output
+    shown = rds("check", tmp_path, "--seeds", "1").output
+    assert "the assignment can be given out" in shown
+    assert "rds: trying PI control with anti-windup" in shown  # it takes a minute, and says what it is at
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,14 @@ from typing import Any
 
 import pytest
 
+from rds.cli.grade_run import run_alone
 from rds.core.errors import InputError
 from rds.core.parallel import Outcome
 from rds.grading.batch import run as run_module
 from rds.grading.batch.journal import Journal, read_journal
 from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.run import run_batch
+from rds.grading.batch.warm_worker import _tried
 from rds.grading.grade import Grade, Status
 from rds.grading.sandbox import SandboxError, available
 from tests.grading.batches import ASSIGNMENT, law, notebook, put
@@ -294,3 +296,21 @@ def test_a_disk_that_is_full_loses_nothing(place: Path, tmp_path: Path, monkeypa
     assert [row["student"] for row in read_journal(out / "journal.jsonl")] == ["ada"]
     found = run_batch(place / "task", handed_in, out, jobs=1, resume=True)
     assert found.graded_now == 1 and found.grades["ben"].status is Status.FAILED_TO_LOAD
+
+
+def test_the_plain_command_line_needs_no_reader_of_command_lines(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put(tmp_path / "in", {"ada.py": law()})
+    words = ["grade", "run", str(place / "task"), str(tmp_path / "in"), "-o", str(tmp_path / "out")]
+    assert run_alone([*words, "--json"]) is None and run_alone(["grade", "run", "--help", *words[3:]]) is None
+    for name in ("keep_process_private", "say_notices"):  # these are for the whole process
+        monkeypatch.setattr(f"rds.cli.grade_run.{name}", lambda: None)
+    monkeypatch.setattr("rds.grading.batch.warm_worker._tried", len)  # which of None is no fault, but an error
+    monkeypatch.setattr("rds.grading.sandbox.available", lambda: "it does not hold")
+    assert run_alone(words) == 2 and "rds: it does not hold" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    monkeypatch.setattr("rds.grading.batch.warm_worker._tried", _tried)
+    assert run_alone(words) == 0 and "graded 1 in" in capsys.readouterr().out
+    assert read_journal(tmp_path / "out/journal.jsonl")[0]["grade"]["status"] == "ok"
+    assert run_alone(words) == 2 and "holds a batch already" in capsys.readouterr().err

@@ -158,7 +158,7 @@ def test_nbgrader_database_without_nbgrader_is_refused(tmp_path: Path) -> None:
         exported(tmp_path, "nbgrader", [grade()], Wanted(gradebook=tmp_path / "gradebook.db"))
 
 
-def test_canvas_keeps_the_lines_that_it_needs_and_no_other_grade(tmp_path: Path) -> None:
+def test_canvas_gets_every_student_back_and_no_other_grade(tmp_path: Path) -> None:
     book = tmp_path / "canvas-export.csv"
     book.write_text(CANVAS)
     grades = [
@@ -175,9 +175,11 @@ def test_canvas_keeps_the_lines_that_it_needs_and_no_other_grade(tmp_path: Path)
         ["    Points Possible", "", "", "", "", "30.0"],
         ["Lovelace, Ada", "101", "s-ada", "ada@x.edu", "M1", "26"],
         ["Hopper, Grace", "102", "s-grace", "grace@x.edu", "M1", "26"],
+        ["Twin, A", "103", "s-a", "a@x.edu", "M1", ""],
+        ["Twin, A", "104", "s-b", "b@x.edu", "M1", ""],
     ]
     assert set(done.left_out) == {"nobody_999", "A Twin"}
-    assert "2 lines" in done.left_out["A Twin"]
+    assert "2 lines" in done.left_out["A Twin"] and "2 of the gradebook have no grade here" in done.notes[0]
     assert book.read_text() == CANVAS
 
 
@@ -189,7 +191,8 @@ def test_canvas_asks_for_the_gradebook_and_for_the_same_points(tmp_path: Path) -
     with pytest.raises(InputError, match="--points 100"):
         exported(tmp_path / "b", "canvas", [grade("s-ada")], Wanted(gradebook=book))
     done = exported(tmp_path / "c", "canvas", [grade("s-ada")], Wanted(gradebook=book, points=100.0))
-    assert rows_of(Path(done.files[0]))[-1]["Tracking (77)"] == "86.6666667"
+    points = [row["Tracking (77)"] for row in rows_of(Path(done.files[0]))]
+    assert points == ["Manual Posting", "100", "86.6666667", "12", "", ""]  # hers is as it was entered by hand
 
 
 def test_canvas_new_column_gets_its_points(tmp_path: Path) -> None:
@@ -197,7 +200,7 @@ def test_canvas_new_column_gets_its_points(tmp_path: Path) -> None:
     book.write_text(CANVAS)
     done = exported(tmp_path, "canvas", [grade("s-ada")], Wanted(gradebook=book), title="Observer")
     rows = rows_of(Path(done.files[0]))
-    assert [row["Observer"] for row in rows] == ["", "30", "26"]
+    assert [row["Observer"] for row in rows] == ["", "30", "26", "", "", ""]
     assert "no column 'Observer'" in done.notes[0]
     with pytest.raises(InputError, match="no column 'Obsrver'"):
         exported(tmp_path / "x", "canvas", [grade("s-ada")], Wanted(gradebook=book, column="Obsrver"))

@@ -102,7 +102,9 @@ def test_blackboard_gets_its_own_file_back_with_one_column(tmp_path: Path) -> No
     assert made.splitlines() == [
         "Last Name\tFirst Name\tUsername\tStudent ID\tTracking [Total Pts: 30 Score] |77",
         "Lovelace\tAda\tada\t501\t26",
+        "Builder\tBob\tbob\t502\t",  # handed in nothing: his cell is as it was
     ]
+    assert "1 of the gradebook have no grade here, and their cells stay as they are: bob" in done.notes[0]
     assert set(done.left_out) == {"eve"}
     with pytest.raises(InputError, match="give --points 5"):
         exported(tmp_path / "2", "blackboard", [grade("ada")], wanted=Wanted(tmp_path / "down.xls", column="Other"))
@@ -118,11 +120,14 @@ def test_brightspace_gets_the_columns_of_its_sample(tmp_path: Path) -> None:
     ]
     item = "Tracking Points Grade <Numeric MaxPoints:30 Weight:10>"
     text = f"OrgDefinedId,Username,Email,{item},End-of-Line Indicator\n#501,#ada,ada@example.edu,,#\n"
+    text += "#502,#bob,bob@example.edu,7,#\n"
     (tmp_path / "down.csv").write_text(text)
     done = exported(tmp_path / "2", "brightspace", [grade("ada")], wanted=Wanted(tmp_path / "down.csv"))
     assert rows_of(Path(done.files[0])) == [
-        {"OrgDefinedId": "#501", "Username": "#ada", item: "26", "End-of-Line Indicator": "#"}
+        {"OrgDefinedId": "#501", "Username": "#ada", item: "26", "End-of-Line Indicator": "#"},
+        {"OrgDefinedId": "#502", "Username": "#bob", item: "7", "End-of-Line Indicator": "#"},
     ]
+    assert "#bob" in done.notes[0]
     (tmp_path / "down.csv").write_text(text.replace("MaxPoints:30", "MaxPoints:20"))
     with pytest.raises(InputError, match="give --points 20"):
         exported(tmp_path / "3", "brightspace", [grade("ada")], wanted=Wanted(tmp_path / "down.csv"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from typing import Any
 
@@ -54,3 +55,17 @@ def test_a_class_is_graded_and_exported(app: App, open_page: Callable[..., Any])
     page.click('button:text-is("Export")')
     page.wait_for_selector('.rds-notice:has-text("2 students: ")')
     assert (app.folder / "grades" / "grades.csv").is_file()
+    shutil.copytree(app.folder / "grades", app.folder / "first")
+    fill(page, "Other attempts", "first")
+    fill(page, "New folder", "best")
+    page.click('button:text-is("Best of attempts")')
+    page.wait_for_selector('.rds-notice:has-text("2 students, the best of 2 attempts")')
+    assert page.get_by_label("Grades", exact=True).input_value() == "best"
+    # a mended assignment: who changes and why, and the new folder is the one that is shown
+    (assignment / "assignment.toml").write_text(ASSIGNMENT.replace("none = 1.0", "none = 5.0"))
+    fill(page, "Grades", "grades")
+    fill(page, "New folder", "again")
+    page.click('button:text-is("Grade again")')
+    page.wait_for_selector('.rds-notice:has-text("2 students change; the grades are those of the new folder now")')
+    why = page.locator('table:has(caption:text-is("Changes")) tbody tr td:last-child').all_inner_texts()
+    assert len(why) == 2 and all("bands are others" in each for each in why)

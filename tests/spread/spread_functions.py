@@ -8,10 +8,17 @@ import sys
 import time
 from pathlib import Path
 
+from rds.core.parallel import worker_count, worker_number
+
 
 def square(x: float) -> float:
     """x²."""
     return x * x
+
+
+def number(_: str) -> tuple[int, int | None, int | None]:
+    """The process, and which of how many it is."""
+    return os.getpid(), worker_number(), worker_count()
 
 
 def picky(x: int) -> int:

@@ -9,8 +9,10 @@ import pytest
 import spread_functions
 
 import rds.core.parallel.process
+from rds.core.parallel.local import place
 from rds.core.parallel.outcome import Failure
 from rds.core.parallel.process import Work, WorkerProcess
+from rds.core.parallel.remote import places
 from rds.core.portable import portable
 
 LIMIT = 2.0  # s
@@ -35,3 +37,23 @@ def test_an_answer_that_meets_the_end_of_its_time_costs_the_next_item_nothing(mo
         process.end()
         process.close()
     assert (first.failure, second.failure, second.value) == (Failure.OVERDUE, None, 9.0)
+
+
+def test_a_process_that_was_started_ahead_does_other_work_afterwards() -> None:
+    process = WorkerProcess(Work.of(spread_functions.number, retries=0, time_limit=None), place(3, 8))
+    try:
+        process.ask_ahead(portable("first"))
+        first = process.answer(portable("first")).outcome(0).value
+        process.take(Work.of(spread_functions.square, retries=0, time_limit=None))
+        assert process.answer(portable(3.0)).outcome(1).value == 9.0
+        process.take(Work.of(spread_functions.number, retries=0, time_limit=None))
+        assert process.answer(portable("last")).outcome(2).value == first  # the same process still
+    finally:
+        process.end()
+        process.close()
+    assert first[1:] == (3, 8)
+
+
+def test_workers_of_a_cluster_are_counted_by_their_computers() -> None:
+    workers = {f"tcp://{host}:{n}": {"host": host, "nthreads": n} for host, n in (("a", 1), ("b", 2), ("a", 3))}
+    assert places(workers) == {"tcp://a:1": (0, 4), "tcp://b:2": (0, 2), "tcp://a:3": (1, 4)}

@@ -201,12 +201,13 @@ async def _has_workers(client: Any) -> bool:
 @asynccontextmanager
 async def _plugin(client: Any, work: Work, scheduler: Scheduler) -> AsyncIterator[str]:
     """The name of a plugin for this work on all workers; InputError if they cannot have one."""
-    from rds.core.parallel.remote import WorkPlugin
+    from rds.core.parallel.remote import WorkPlugin, places
 
     name = f"rds-{uuid.uuid4().hex}"
     try:
         try:
-            await client.register_plugin(WorkPlugin(work), name=name)
+            workers = (await client.scheduler.identity())["workers"]
+            await client.register_plugin(WorkPlugin(work, places(workers)), name=name)
         except Exception as error:
             raise InputError(
                 f"the workers of scheduler {scheduler!r} cannot take the work ({reason_of(error)}); they need the same "

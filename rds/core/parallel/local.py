@@ -13,16 +13,25 @@ from rds.core.parallel.outcome import Outcome
 from rds.core.parallel.process import Work, WorkerProcess
 from rds.core.portable import portable
 
-NUMBER = "RDS_WORKER"  # in its environment, which of its kind a process is
+_NUMBER, _COUNT = "RDS_WORKER", "RDS_WORKERS"  # in its environment, which of how many a process is
 
 
-def on_processes(work: Work, items: Sequence[Any], jobs: int) -> Iterator[Outcome]:
+def place(number: int, count: int | None = None) -> dict[str, str]:
+    """The environment of worker `number`, from 0, of `count` that are at work on its computer at the same time."""
+    return {_NUMBER: str(number)} | ({} if count is None else {_COUNT: str(count)})
+
+
+def on_processes(work: Work, items: Sequence[Any], jobs: int, first: WorkerProcess | None) -> Iterator[Outcome]:
     """The outcomes as they come; see `spread`."""
     todo: queue.SimpleQueue[int | None] = queue.SimpleQueue()
     for index in [*range(len(items)), *[None] * jobs]:
         todo.put(index)
     done: queue.SimpleQueue[Outcome | BaseException] = queue.SimpleQueue()
-    workers = [_Worker(WorkerProcess(work, {NUMBER: str(number)}), items, todo, done) for number in range(jobs)]
+    processes = [WorkerProcess(work, place(number, jobs)) for number in range(jobs)]
+    if first is not None:
+        first.take(work)
+        processes[0] = first
+    workers = [_Worker(process, items, todo, done) for process in processes]
     try:
         for worker in workers:
             worker.thread.start()
@@ -34,9 +43,18 @@ def on_processes(work: Work, items: Sequence[Any], jobs: int) -> Iterator[Outcom
 
 
 def worker_number() -> int | None:
-    """In a local worker its number, from 0: a process that takes the place of another has the same. Else None."""
-    number = os.environ.get(NUMBER, "")
-    return int(number) if number.isdecimal() else None
+    """In a worker its number, from 0: a process that takes the place of another has the same. Else None."""
+    return _said(_NUMBER)
+
+
+def worker_count() -> int | None:
+    """In a worker how many are at work on its computer at the same time; None where nobody knows."""
+    return _said(_COUNT)
+
+
+def _said(name: str) -> int | None:
+    text = os.environ.get(name, "")
+    return int(text) if text.isdecimal() else None
 
 
 def following(done: queue.SimpleQueue[Any]) -> Any:
@@ -79,4 +97,5 @@ class _Worker:
             if not self._ending:
                 self._done.put(error)
         finally:
+            self._process.end()  # it has nothing to do any more, and would take its time to end by itself
             self._process.close()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import IO
 
+FUNCTION, ITEM = b"f", b"i"  # what a message to a worker begins with
+
 
 def send(stream: IO[bytes], data: bytes) -> None:
     """Write one message."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rds.core.parallel.outcome import Failure, Outcome, reason_of
-from rds.core.parallel.pipe import receive, send
+from rds.core.parallel.pipe import FUNCTION, ITEM, receive, send
 from rds.core.portable import portable
 
 # Several processes share the processors already: threads of a matrix library would only get in each other's way.
@@ -66,7 +66,9 @@ class WorkerProcess:
     def __init__(self, work: Work, environment: Mapping[str, str]):
         self._work, self._environment = work, {**_ONE_THREAD, **environment}
         self._process: subprocess.Popen[bytes] | None = None
-        self._ready: subprocess.Popen[bytes] | None = None  # the process, once it has the function
+        self._told: Work | None = None  # whose function the process was sent
+        self._is_ready = False  # whether it has said that it has it
+        self._ahead: bytes | None = None  # the item that it was sent before anybody waits for the answer
         self._ending = False
         self._lock = threading.Lock()  # between starting a process and the end
 
@@ -84,6 +86,18 @@ class WorkerProcess:
                 break
         times = f", each of {tries} times it was tried" if tries > 1 else ""
         return Reply(failure=failure, reason=f"{reason}{times}", attempts=tries)
+
+    def ask_ahead(self, data: bytes) -> None:
+        """Start on a pickled item at once, of which `answer` is going to be asked first."""
+        with contextlib.suppress(OSError):
+            process = self._running()
+            assert process.stdin is not None
+            send(process.stdin, ITEM + data)
+            self._ahead = data
+
+    def take(self, work: Work) -> None:
+        """From the next item on do other work, in the same process."""
+        self._work = work
 
     def end(self) -> None:
         """End the process for good, whatever it is at; from any thread."""
@@ -115,9 +129,9 @@ class WorkerProcess:
         """The process's answer to an item. OSError or EOFError if the process ends."""
         process = self._running()
         assert process.stdin is not None and process.stdout is not None
-        if process is not self._ready:
+        if not self._is_ready:
             receive(process.stdout)  # what it takes to start, on a busy computer, is not the item's time
-            self._ready = process
+            self._is_ready = True
         timer = None
         if self._work.time_limit is not None:
 
@@ -127,7 +141,9 @@ class WorkerProcess:
 
             timer = threading.Timer(self._work.time_limit, late)
             timer.daemon = True
-        send(process.stdin, data)
+        if self._ahead != data:
+            send(process.stdin, ITEM + data)
+        self._ahead = None
         if timer is not None:
             timer.start()
         try:
@@ -160,7 +176,11 @@ class WorkerProcess:
                     env=os.environ | self._environment,
                     start_new_session=True,
                 )
+                self._told = self._ahead = None
                 assert self._process.stdin is not None
-                for part in (pickle.dumps(list(sys.path)), self._work.function):
-                    send(self._process.stdin, part)
+                send(self._process.stdin, pickle.dumps(list(sys.path)))
+            if self._told is not self._work:
+                assert self._process.stdin is not None
+                self._told, self._is_ready = self._work, False
+                send(self._process.stdin, FUNCTION + self._work.function)
             return self._process

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from rds.core.errors import InputError
 from rds.core.parallel.outcome import Outcome
-from rds.core.parallel.process import Work
+from rds.core.parallel.process import Work, WorkerProcess
 from rds.core.parallel.scheduler import Scheduler
 
 Item = TypeVar("Item")
@@ -34,6 +34,7 @@ def spread(
     time_limit: float | None = None,
     progress: Progress | None = None,
     in_order: bool = True,
+    first: WorkerProcess | None = None,
 ) -> Iterator[Outcome]:
     """The outcomes of `function(item)` as they become known: by rising index, or as they come if not `in_order`.
 
@@ -45,7 +46,8 @@ def spread(
     An exception becomes an outcome with its reason. Each item is at work in a process of its own, one at a time, also
     on a cluster: one that dies is replaced, and its item tried again `retries` times; so it is after `time_limit` s.
     What was on a computer of the cluster that is lost is done again. `progress(done, of)` is called in this thread.
-    Closing the iterator, and Ctrl-C, end what is still at work.
+    Closing the iterator, and Ctrl-C, end what is still at work. `first` is a local process that was started before, and
+    is one of them.
 
     InputError if jobs and scheduler are both given, a number will not do, or no scheduler answers there within
     seconds; MachineError if the cluster loses all its workers for good.
@@ -65,7 +67,7 @@ def spread(
     else:
         from rds.core.parallel.local import on_processes
 
-        found = on_processes(work, todo, min(jobs or processors(), max(len(todo), 1)))
+        found = on_processes(work, todo, min(jobs or processors(), max(len(todo), 1)), first)
     return (_in_order if in_order else _as_they_come)(found, len(todo), progress)
 
 

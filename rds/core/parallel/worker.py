@@ -1,4 +1,4 @@
-"""A worker process: `python -m rds.core.parallel.worker`. Folders and the function first, then items, over stdin.
+"""A worker process: `python -m rds.core.parallel.worker`. Folders first, then a function and its items, over stdin.
 
 Whatever the function prints goes to stderr, because stdout is for answers. It ends when stdin does, and on Linux at
 once when who started it is killed: an item may take long, and nobody would read what comes of it.
@@ -13,7 +13,7 @@ from typing import Any
 
 from rds.core.errors import RdsError
 from rds.core.parallel.outcome import reason_of
-from rds.core.parallel.pipe import receive, send
+from rds.core.parallel.pipe import FUNCTION, receive, send
 from rds.core.portable import portable
 from rds.core.private_files import keep_process_private
 from rds.core.scheduling import end_with_parent
@@ -27,10 +27,14 @@ def main() -> None:
     questions = sys.stdin.buffer
     try:
         sys.path += [folder for folder in pickle.loads(receive(questions)) if folder not in sys.path]
-        function = _function(receive(questions))
-        send(answers, b"ready")
+        function: Any = None
         while True:
-            send(answers, _answer(function, receive(questions)))
+            message = receive(questions)
+            if message[:1] == FUNCTION:
+                function = _function(message[1:])
+                send(answers, b"ready")
+            else:
+                send(answers, _answer(function, message[1:]))
     except (EOFError, BrokenPipeError):
         return
 

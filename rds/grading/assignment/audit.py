@@ -7,7 +7,7 @@ nothing, only where no margin is measured.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rds.grading.assignment.assignment import Assignment
@@ -139,13 +139,18 @@ def control(t, r, y, state, params):
 """
 
 
-def audit(assignment: Assignment, pool: Opener, reference: Grade) -> tuple[list[str], list[str]]:
-    """Faults and notes. `reference` is the solution's grade; work, which takes long to count, is not counted."""
+def audit(
+    assignment: Assignment, pool: Opener, reference: Grade, announce: Callable[[str], None] = lambda text: None
+) -> tuple[list[str], list[str]]:
+    """Faults and notes. `reference` is the solution's grade; work, which takes long to count, is not counted.
+
+    `announce` gets a sentence before each design, some of which take seconds.
+    """
     solution = assignment.path(assignment.solution)
     cases: list[Any] = list(assignment.cases)
     if solution is None or solution.suffix != ".py" or assignment.kind not in ("controller", "interpolator"):
         return [], _tables(assignment.criteria)
-    tried = Tried(assignment, pool, [each for each in assignment.criteria if COUNTS not in each.needs])
+    tried = Tried(assignment, pool, [each for each in assignment.criteria if COUNTS not in each.needs], announce)
     if assignment.kind == "interpolator":
         return of_interpolators(tried, solution, reference), []
     if any(case.is_coupled for case in cases):

@@ -93,11 +93,12 @@ def check_assignment(
     seeds: int = SEEDS,
     progress: Callable[[int, int], None] | None = None,
     audited: bool = True,
+    announce: Callable[[str], None] = lambda text: None,
 ) -> AssignmentCheck:
     """Grade the reference solution for `seeds` students, and what does nothing. InputError without a solution.
 
     Work is counted for `WORK_SEEDS` of them. Where it is `audited`, honest designs and cheats are tried as well,
-    which takes a minute and more.
+    which takes a minute and more: `announce` gets a sentence before each.
     """
     solution = assignment.path(assignment.solution)
     if solution is None:
@@ -107,6 +108,7 @@ def check_assignment(
         )
     found = _Found()
     grades: list[Grade] = []
+    announce(f"trying the reference solution on the plants of {seeds} students")
     for number in range(seeds):
         grades.append(_of_student(assignment, solution, number + 1, grades, pool))
         if progress:
@@ -115,12 +117,13 @@ def check_assignment(
     if again.to_json() != grades[0].to_json():
         found.faults.append("the reference solution, graded twice, earned different values: it is not deterministic")
     _judge_solution(assignment, grades, found)
+    announce("trying what does nothing")
     idle = _idle(assignment, pool, grades[0], found)
     if progress:
         progress(seeds + 1, seeds + 1)
     _notes(assignment, found)
     if audited and not found.faults:  # else the designs would be blamed for what the solution is
-        faults, notes = audit(assignment, pool, grades[0])
+        faults, notes = audit(assignment, pool, grades[0], announce)
         found.faults += faults
         found.notes += notes
     rows = tuple(_row(assignment, number, grades, idle) for number in range(len(assignment.criteria)))

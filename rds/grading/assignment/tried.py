@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from rds.core.private_files import write_private
@@ -19,15 +20,21 @@ _MOST = 1 / 3  # of all points: what students see may be known by heart, and mus
 class Tried:
     """Designs graded for the first student of a check."""
 
-    def __init__(self, assignment: Assignment, pool: Opener, criteria: list[Criterion]):
-        self._assignment, self._pool, self._criteria = assignment, pool, criteria
+    def __init__(
+        self,
+        assignment: Assignment,
+        pool: Opener,
+        criteria: list[Criterion],
+        announce: Callable[[str], None] = lambda text: None,
+    ):
+        self._assignment, self._pool, self._criteria, self._announce = assignment, pool, criteria, announce
 
     def zeroed(self, name: str, text: str, reference: Grade) -> list[str]:
         """Criteria in which a design earns nothing, and the solution does."""
         full = {score.name for score in reference.criteria if score.band is Band.FULL and score.max_score}
         return [
             f"{score.title}: an honest design earns nothing ({name}): {score.sentence}"
-            for score in self._graded(text).grade.criteria
+            for score in self._graded(name, text).grade.criteria
             if score.name in full and not score.score
         ]
 
@@ -37,13 +44,13 @@ class Tried:
         linear = {each.name for each in self._criteria if LINEAR in each.needs}
         return [
             f"{score.title}: an honest design earns nothing ({name}), and so nothing that requires it: {score.sentence}"
-            for score in self._graded(text).grade.criteria
+            for score in self._graded(name, text).grade.criteria
             if score.name in gates & linear and score.band is Band.NONE
         ]
 
     def paid(self, name: str, text: str, cases: set[str]) -> list[str]:
         """Criteria of these cases alone that pay a cheat."""
-        scores = {score.name: score for score in self._graded(text).grade.criteria}
+        scores = {score.name: score for score in self._graded(name, text).grade.criteria}
         return [
             f"{each.title}: {name} earns {scores[each.name].score:.4g} of {each.max_score:.4g} points; let it require "
             "a margin that is measured in its own cases, or a criterion that such a loop does not pass"
@@ -53,7 +60,7 @@ class Tried:
 
     def bought(self, name: str, text: str) -> list[str]:
         """Whether a cheat that has only what students see earns more than a third of all points."""
-        found, most = self._graded(text).grade.score, self._assignment.max_score
+        found, most = self._graded(name, text).grade.score, self._assignment.max_score
         if found <= _MOST * most:
             return []
         said = f"{name} earns {found:.4g} of {most:.4g} points: more than a third is for what students see beforehand"
@@ -73,7 +80,8 @@ class Tried:
         runs = [run for run in found.runs if run.case in cases and len(run.result) > DECIDES]
         return [float(run.result[f"{axis}_reference"][DECIDES]) for run in runs for axis in run.result.axes]
 
-    def _graded(self, text: str) -> Graded:
+    def _graded(self, name: str, text: str) -> Graded:
+        self._announce(f"trying {name}")
         with scratch("audit") as folder:
             path = folder / "submission.py"
             write_private(path, text.encode(), is_own=True)

@@ -10,7 +10,7 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -77,9 +77,9 @@ class Journal:
         self.close()
 
 
-def read_journal(path: Path) -> list[dict[str, Any]]:
-    """Its rows, while whoever writes it goes on. InputError if a line in it is damaged."""
-    return _whole_lines(path)[0] if path.exists() else []
+def read_journal(path: Path, of: Callable[[dict[str, Any]], Any] = lambda row: row) -> list[Any]:
+    """Its rows, while whoever writes it goes on, or what `of` makes of each. InputError if a line in it is damaged."""
+    return _whole_lines(path, of)[0] if path.exists() else []
 
 
 def line(row: Mapping[str, Any]) -> bytes:
@@ -88,23 +88,22 @@ def line(row: Mapping[str, Any]) -> bytes:
     return f"{_sum(text)} {text}\n".encode()
 
 
-def _whole_lines(path: Path) -> tuple[list[dict[str, Any]], int]:
-    """The rows, and how many bytes they take."""
-    data = path.read_bytes()
-    rows: list[dict[str, Any]] = []
-    good = 0
-    *lines, _ = data.split(b"\n")
-    for number, text in enumerate(lines, 1):
-        row = _row(text)
-        if row is None:
-            if number == len(lines) and good + len(text) + 1 == len(data):  # the power went while it was written
-                break
-            raise InputError(
-                "is damaged: its check sum is wrong; restore the file, or grade into a new folder",
-                f"{path}: line {number}",
-            )
-        rows.append(row)
-        good += len(text) + 1
+def _whole_lines(path: Path, of: Callable[[dict[str, Any]], Any] = lambda row: row) -> tuple[list[Any], int]:
+    """What `of` makes of the rows, and how many bytes they take. Read line by line: a class's may be long."""
+    rows: list[Any] = []
+    good, size = 0, path.stat().st_size
+    with open(path, "rb") as file:
+        for number, text in enumerate(file, 1):
+            row = _row(text[:-1]) if text.endswith(b"\n") else None
+            if row is None:
+                if good + len(text) >= size:  # the power went while it was written
+                    break
+                raise InputError(
+                    "is damaged: its check sum is wrong; restore the file, or grade into a new folder",
+                    f"{path}: line {number}",
+                )
+            rows.append(of(row))
+            good += len(text)
     return rows, good
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from rds.core.atomic import write_files, write_whole
 from rds.core.errors import InputError
 from rds.core.parallel import Outcome, Scheduler, processors, spread
+from rds.core.parallel.process import WorkerProcess
 from rds.core.parallel.spread import Progress
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.late_rules import Late
@@ -23,6 +24,7 @@ from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.queue import Queued, keep, queued, ungraded
 from rds.grading.batch.record import FILE, check_same, read_record, record_of
 from rds.grading.batch.similarity_table import alike_json
+from rds.grading.batch.warm_worker import fault_of
 from rds.grading.batch.work import CODE, FEEDBACK, Answer, Task, graded, setup_of
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
@@ -50,6 +52,7 @@ class How:
     against: tuple[Path, ...] = ()  # what submissions are compared with, besides each other
     progress: Progress | None = None
     announce: Callable[[str], None] = lambda text: None
+    first: WorkerProcess | None = None  # a local worker that was begun ahead, see `warm_worker`
 
 
 def run_batch(assignment: str | Path, submissions: str | Path, out: str | Path, **how: Any) -> BatchOutcome:
@@ -72,7 +75,7 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
     kept = out / CLASS
     place = how.class_list or (kept if kept.exists() else None)
     listed = ClassList() if place is None else read_class_list(place)
-    _check_sandbox(how.jobs, how.scheduler)
+    _check_sandbox(how)
     intake = by_group(handed_in(), listed)
     rows = queued(read, intake, out / STUDENTS, how.jobs if how.scheduler is None else None)
     record = record_of(
@@ -96,15 +99,15 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
                 "the last line of the journal was only half written, and was cut off: that submission is graded again"
             )
         keep(rows)
-        batch = _Batch(read, rows, journal)
+        batch = _Batch(read, rows, journal, how)
         todo = batch.todo()
         if len(todo) < len(rows):
             how.announce(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
-        batch.go(todo, how.jobs, how.scheduler, how.progress)
-        grades = batch.grades()
-        found = alike(read, rows, grades, how.against, how.jobs, how.scheduler)
+        batch.go(todo)
+        found = alike(read, rows, batch.grades(), how.against, how.jobs, how.scheduler)
         write_whole(out / SIMILARITY, alike_json(found.pairs, found.identical, found.loops))
-        publish(out, read)
+        del batch, found  # or a class would be in memory twice
+        grades = publish(out, read).measured
     return BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
 
 
@@ -128,15 +131,15 @@ def _untimed(assignment: Assignment, intake: Intake) -> list[str]:
     ]
 
 
-def _check_sandbox(jobs: int | None, scheduler: Address) -> None:
+def _check_sandbox(how: How) -> None:
     """InputError where submissions cannot be run, before anything is written."""
-    if scheduler is None:
-        if fault := available():
+    if how.scheduler is None:
+        if fault := available() if how.first is None else fault_of(how.first):
             raise InputError(fault)
         return
-    for outcome in spread(_missing, [0], jobs=jobs, scheduler=scheduler):
+    for outcome in spread(_missing, [0], jobs=how.jobs, scheduler=how.scheduler):
         if not outcome.ok:
-            raise InputError(f"scheduler {scheduler!r}: a worker cannot grade: {outcome.reason}; install rds there")
+            raise InputError(f"scheduler {how.scheduler!r}: a worker cannot grade: {outcome.reason}; install rds there")
         _answer(outcome)
 
 
@@ -165,8 +168,8 @@ def _is_empty_journal(path: Path) -> bool:
 class _Batch:
     """Rows, and what the journal says of them."""
 
-    def __init__(self, assignment: Assignment, rows: Sequence[Queued], journal: Journal):
-        self._assignment, self._journal = assignment, journal
+    def __init__(self, assignment: Assignment, rows: Sequence[Queued], journal: Journal, how: How):
+        self._assignment, self._journal, self._how = assignment, journal, how
         self._rows = {each.row.student: each for each in rows}
         self._grades = {row["student"]: Grade.from_json(row["grade"]) for row in journal.rows}
         self.seconds: dict[str, float] = {row["student"]: row["seconds"] for row in journal.rows}
@@ -179,14 +182,14 @@ class _Batch:
         """By student, in the order of their names."""
         return {student: self._grades[student] for student in sorted(self._rows)}
 
-    def go(self, todo: Sequence[Queued], jobs: int | None, scheduler: Address, progress: Progress | None) -> None:
+    def go(self, todo: Sequence[Queued]) -> None:
         """Grade all of `todo`; what fails by our fault once more, and then it is listed."""
         for each in todo:
             if each.grade is not None:
                 self._finish(each, each.grade, {})
         real = [each for each in todo if each.grade is None]
-        failed = self._round(real, jobs, scheduler, progress)
-        again = self._round([each for each, _ in failed], jobs, scheduler, None)
+        failed = self._round(real, self._how.progress, self._how.first)
+        again = self._round([each for each, _ in failed])
         for each, reason in again:
             self._finish(each, ungraded(self._assignment, each, Status.GRADER_ERROR, reason), {})
 
@@ -195,11 +198,12 @@ class _Batch:
         return grade is not None and grade.status is not Status.GRADER_ERROR
 
     def _round(
-        self, rows: Sequence[Queued], jobs: int | None, scheduler: Address, progress: Progress | None
+        self, rows: Sequence[Queued], progress: Progress | None = None, first: WorkerProcess | None = None
     ) -> list[tuple[Queued, str]]:
         """One try for each of `rows`; those that failed, with the reason."""
         if not rows:
             return []
+        jobs, scheduler = self._how.jobs, self._how.scheduler
         shared = scheduler is None
         count = min(jobs or processors(), len(rows)) if shared else None
         work = partial(graded, setup_of(self._assignment, count, shared))
@@ -207,9 +211,14 @@ class _Batch:
         limits = self._assignment.limits
         limit = _PATIENCE + _LONGEST * (limits.cpu_seconds + limits.wall_seconds)
         failed = []
-        for outcome in spread(
-            work, tasks, jobs=jobs, scheduler=scheduler, progress=progress, in_order=False, time_limit=limit
-        ):
+        many: dict[str, Any] = {
+            "jobs": jobs,
+            "scheduler": scheduler,
+            "progress": progress,
+            "time_limit": limit,
+            "first": first,
+        }
+        for outcome in spread(work, tasks, in_order=False, **many):
             each = rows[outcome.index]
             answer = _answer(outcome)
             if answer is None:

@@ -15,13 +15,12 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
-from rds.core.parallel import worker_number
 from rds.core.private_files import make_folder, write_private
 from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
 from rds.grading.batch.grade_one import grade_with_runs
 from rds.grading.batch.scratch import scratch
+from rds.grading.batch.warm_worker import own_fault, shared_pool
 from rds.grading.feedback.feedback import feedback_page
-from rds.grading.sandbox import Pool, available
 from rds.results.arrow import repeated, to_arrow
 
 if TYPE_CHECKING:
@@ -78,9 +77,9 @@ def setup_of(assignment: Assignment, jobs: int | None, shared: bool) -> Setup:
 
 def graded(setup: Setup, task: Task) -> Answer:
     """The grade of a task. An exception is ours, and no fault of the submission."""
-    if not setup.folder and (fault := available()):  # on this computer the walls were tried before any work began
+    if not setup.folder and (fault := own_fault()):  # on this computer the walls were tried before any work began
         return Answer(missing=fault)
-    pool = _pool(setup.jobs)  # it starts while the assignment is read
+    pool = shared_pool(setup.jobs)  # it starts while the assignment is read
     assignment, solution = _assignment(setup)
     began = time.monotonic()
     if task.path:
@@ -170,11 +169,4 @@ def _expected(setup: Setup) -> tuple[CaseRun, ...]:
     with scratch("solution") as folder:
         path = folder / CODE
         write_private(path, code, is_own=True)
-        return grade_with_runs(assignment, path, _SOLUTION, _pool(setup.jobs)).runs
-
-
-@lru_cache(maxsize=1)
-def _pool(jobs: int | None) -> Pool:
-    """The worker's pool, which ends with its process."""
-    number = worker_number()
-    return Pool(is_tried=True) if jobs is None or number is None else Pool(jobs, slot=number, is_tried=True)
+        return grade_with_runs(assignment, path, _SOLUTION, shared_pool(setup.jobs)).runs

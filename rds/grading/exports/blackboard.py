@@ -12,7 +12,7 @@ import re
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source
+from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source, unknown
 
 FILE = "blackboard.xls"
 USES = ("gradebook", "column", "points")
@@ -40,11 +40,12 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     _check_points(sheet.columns[at], finished, factor, wanted)
     found, unmatched = find(finished.to_hand_on, sheet, _KEYS)
     kept = [place for name in _PEOPLE if (place := sheet.at(name)) is not None]
-    rows = [[*(sheet.rows[row][k] for k in kept), scaled(found[row].score, factor)] for row in sorted(found)]
+    points = {row: scaled(grade.score, factor) for row, grade in found.items()}
+    rows = [[*(row[k] for k in kept), points.get(number, row[at])] for number, row in enumerate(sheet.rows)]
     heads = [*(sheet.columns[k] for k in kept), sheet.columns[at]]
     # Blackboard asks for quotation marks around every cell between commas, and for none between tabs
     made = Sheet(heads, rows, sheet.has_mark, sheet.form, quotes_all=sheet.form[1] == ",")
-    return Exported({FILE: made.to_bytes()}, unmatched, students=len(found))
+    return Exported({FILE: made.to_bytes()}, unmatched, unknown(sheet, found, "Username"), len(found))
 
 
 def _column(sheet: Sheet, name: str, wanted: Wanted) -> int:

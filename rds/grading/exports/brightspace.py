@@ -12,7 +12,7 @@ import re
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source
+from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source, unknown
 
 FILE = "brightspace.csv"
 USES = ("gradebook", "column", "points")
@@ -48,10 +48,18 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
         raise InputError(f"has neither {_IDS[0]} nor {_IDS[1]}; export the grades with both", str(wanted.gradebook))
     heading = _heading(sheet, item, finished, factor, wanted)
     found, unmatched = find(finished.to_hand_on, sheet, _KEYS)
-    rows = [[*(sheet.rows[row][at] for at in kept), scaled(found[row].score, factor), _MARK] for row in sorted(found)]
+    own = sheet.at(heading)
+    points = {row: scaled(grade.score, factor) for row, grade in found.items()}
+    rows = [
+        [*(row[at] for at in kept), points.get(number, "" if own is None else row[own]), _MARK]
+        for number, row in enumerate(sheet.rows)
+    ]
     made = Sheet([*(sheet.columns[at] for at in kept), heading, _END], rows, sheet.has_mark)
     known = any(_ITEM.fullmatch(name) and heading == name for name in sheet.columns)
-    notes = () if known else (f"the gradebook has no item {item!r}: Brightspace will offer to create it",)
+    notes: tuple[str, ...] = (
+        () if known else (f"the gradebook has no item {item!r}: Brightspace will offer to create it",)
+    )
+    notes += unknown(sheet, points, sheet.columns[kept[-1]])
     return Exported({FILE: made.to_bytes()}, unmatched, notes, len(found))
 
 

@@ -11,7 +11,7 @@ import re
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source
+from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source, unknown
 
 FILE = "canvas.csv"
 USES = ("gradebook", "column", "points")
@@ -59,10 +59,13 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     points = {number: scaled(grade.score, factor) for number, grade in found.items()}
     excused, _ = find(finished.excused, people, _KEYS)
     points |= dict.fromkeys(excused, _EXCUSED)
-    rows += [[*(people.rows[number][k] for k in kept), points[number]] for number in sorted(points)]
+    for number, row in enumerate(people.rows):  # a cell that is as it was changes nothing there
+        rows.append([*(row[k] for k in kept), points.get(number, "" if at is None else row[at])])
     made = Sheet([*(sheet.columns[k] for k in kept), heading], rows, sheet.has_mark)
-    notes = () if at is not None else (f"the gradebook has no column {heading!r}: Canvas will ask what it is",)
-    return Exported({FILE: made.to_bytes()}, unmatched, notes, len(found))
+    notes: tuple[str, ...] = (
+        () if at is not None else (f"the gradebook has no column {heading!r}: Canvas will ask what it is",)
+    )
+    return Exported({FILE: made.to_bytes()}, unmatched, notes + unknown(people, points, "Student"), len(found))
 
 
 def _column(sheet: Sheet, name: str, wanted: Wanted) -> int | None:

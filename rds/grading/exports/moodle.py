@@ -11,7 +11,7 @@ from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import csv_text
 from rds.grading.exports.exported import Exported, Wanted, scale, scaled
-from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source
+from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source, unknown
 from rds.grading.exports.said import comment
 from rds.grading.grade import Grade
 
@@ -50,7 +50,8 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
         row[at] = scaled(grade.score, factor)
         if comments is not None:
             row[comments] = comment(grade).replace(_ESCAPE, "&#92;")
-    return Exported({FILE: sheet.to_bytes()}, unmatched, students=len(found))
+    name = "Full name" if sheet.at("Full name") is not None else "Email address"
+    return Exported({FILE: sheet.to_bytes()}, unmatched, unknown(sheet, found, name), len(found))
 
 
 def _column(sheet: Sheet, finished: Finished, wanted: Wanted, is_worksheet: bool) -> int:

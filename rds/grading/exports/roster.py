@@ -5,14 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rds.core.errors import InputError
+from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import Grade
 
 _LARGEST = 64 << 20  # bytes
+_MOST_NAMES = 10
 _MARK = "\ufeff"  # byte order mark
 Row = list[str]
 
@@ -123,6 +125,19 @@ def _rows_of(grade: Grade, tables: Sequence[tuple[Key, Mapping[str, list[int]]]]
             if rows := table.get(_compared(key.of_row(value))):
                 return rows, key.column
     return [], ""
+
+
+def unknown(sheet: Sheet, known: Collection[int], column: str) -> tuple[str, ...]:
+    """A note on the students of the gradebook who are not `known`, by row; `column` has their names."""
+    at = sheet.at(column) or 0
+    names = [one_line(row[at], 60) for number, row in enumerate(sheet.rows) if number not in known]
+    if not names:
+        return ()
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return (
+        f"{len(names)} of the gradebook have no grade here, and their cells stay as they are: "
+        f"{'; '.join(names[:_MOST_NAMES])}{more}. Give `rds grade run` the class list, and it is 0",
+    )
 
 
 def source(grade: Grade, *names: str) -> list[str]:

@@ -118,7 +118,8 @@ def _said(part: Part, axis: str, unit: str) -> str:
             f"{-1e3 * part.factor:.3g} ms ahead. The velocity feedforward is too large: take less of it."
         )
     if part.name == "acceleration":
-        way = "Add acceleration feedforward" if part.factor > 0.0 else "Take less acceleration feedforward"
+        more = "Add acceleration feedforward, or raise it where there is some"
+        way = more if part.factor > 0.0 else "Take less acceleration feedforward"
         return f"{share} of the squared error of axis {axis} is in proportion to the reference's acceleration. {way}."
     if part.name == "direction":
         return (

@@ -42,6 +42,20 @@ def _of_voltage(run: CaseRun, score: CriterionScore) -> Cause:
     return Cause(said, (voltage_panel(run, axis),))
 
 
+def _of_noise(run: CaseRun, score: CriterionScore) -> Cause:
+    """What the law makes of the error's changes from sample to sample, most of which are noise."""
+    axis = max(run.result.axes, key=lambda each: float(np.mean(np.diff(_voltage(run, each)) ** 2)))
+    error = run.result[f"{axis}_reference"] - run.result[f"{axis}_measured"]
+    changes, made = (float(np.sqrt(np.mean(np.diff(each) ** 2))) for each in (error, _voltage(run, axis)))
+    unit = run.result.units.get(f"{axis}_measured", "mm")
+    gain = f", {made / changes:.3g} V/{unit}" if changes else ""
+    said = (
+        f"The error of axis {axis} changes by {changes:.3g} {unit} (RMS) from sample to sample, and the voltage by "
+        f"{made:.3g} V{gain}: estimate the velocity by an observer or filter it more, and take less derivative or gain."
+    )
+    return Cause(said, (voltage_panel(run, axis),))
+
+
 def _voltage(run: CaseRun, axis: str) -> np.ndarray:
     name = f"{axis}_command" if f"{axis}_command" in run.result else f"{axis}_voltage"
     return np.asarray(np.nan_to_num(run.result[name]))
@@ -117,7 +131,8 @@ def _of_rows(run: CaseRun, score: CriterionScore) -> Cause:
 
 
 _BY_KIND: Mapping[str, Callable[[CaseRun, CriterionScore], Cause]] = {
-    **dict.fromkeys(("effort", "noise-voltage", "saturation-time"), _of_voltage),
+    **dict.fromkeys(("effort", "saturation-time"), _of_voltage),
+    "noise-voltage": _of_noise,
     "work": _of_work,
     "model-fit": _of_model,
 }

@@ -7,12 +7,11 @@ batch and the graders left.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from rds.core.atomic import write_files
+from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.batch.finished import FEEDBACK, STUDENTS, Finished, read_finished
@@ -49,19 +48,19 @@ def publish(out: Path, assignment: Assignment | None = None) -> Finished:
     """Write `grades.csv`, `index.html` and what has changed of the students' pages; the grades as they count."""
     finished = read_finished(out)
     read = assignment or assignment_of(finished)
-    seconds = {row["student"]: float(row["seconds"]) for row in read_journal(out / JOURNAL)}
+    seconds = dict(read_journal(out / JOURNAL, lambda row: (row["student"], float(row["seconds"]))))
     about = f"{len(finished.grades)} students, handed in as {finished.record.get('layout', 'submissions')}"
     similar = found_html(_similar(out / SIMILARITY))
     write_class_files(
         out, read.title, finished.grades, seconds=seconds, similar=similar, about=about, review=finished.review
     )
-    write_files({path: partial(_write, data) for path, data in _pages(finished, read).items()})
+    for path, page in _pages(finished, read):  # one by one: a class's pages together need not have room in memory
+        write_whole(path, page)
     return finished
 
 
-def _pages(finished: Finished, assignment: Assignment) -> dict[Path, bytes]:
+def _pages(finished: Finished, assignment: Assignment) -> Iterator[tuple[Path, bytes]]:
     """The pages that are not on the disk as they should be."""
-    changed: dict[Path, bytes] = {}
     for grade in finished.grades:
         path = finished.folders[grade.student] / FEEDBACK
         source = finished.folder / STUDENTS / safe_id(finished.of[grade.student]) / FEEDBACK
@@ -75,8 +74,7 @@ def _pages(finished: Finished, assignment: Assignment) -> dict[Path, bytes]:
         }
         made = with_parts(page, parts).encode("utf-8", "replace")
         if not path.is_file() or path.read_bytes() != made:
-            changed[path] = made
-    return changed
+            yield path, made
 
 
 def _similar(path: Path) -> Mapping[str, Any]:
@@ -87,7 +85,3 @@ def _similar(path: Path) -> Mapping[str, Any]:
     except ValueError as error:
         raise InputError(f"is damaged ({error}); grade again with --resume", str(path)) from error
     return found if isinstance(found, dict) else {}
-
-
-def _write(data: bytes, stream: Any) -> None:
-    stream.write(data)

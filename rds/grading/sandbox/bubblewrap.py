@@ -8,8 +8,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from rds.grading.sandbox.packages import package_paths
-
 PROGRAM = "bwrap"
 SITE, SOURCES = "/opt/packages", "/opt/rds"
 PREFIX = "/opt/python"
@@ -55,6 +53,8 @@ class View(NamedTuple):
 
 def view() -> View:
     """Everything that is visible inside: interpreter, system libraries, fixed interfaces, packages of submissions."""
+    from rds.grading.sandbox.packages import package_paths  # takes long to import, and `launch` needs none of it
+
     packages = [Bind(path, f"{SITE}/{name}") for name, path in package_paths().items()]
     interpreter = _interpreter()
     return View([*interpreter.binds, *_sources(), *packages], interpreter.hidden)

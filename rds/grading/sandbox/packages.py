@@ -25,12 +25,28 @@ def package_paths(names: tuple[str, ...] = ALLOWED) -> dict[str, Path]:
             found = metadata.distribution(name)
         except metadata.PackageNotFoundError:
             continue  # an optional requirement, or one of another system
-        for file in found.files or ():
-            top = file.parts[0]
+        for top in _tops(found):
             if top not in ("..", "__pycache__") and top not in paths:
                 paths[top] = Path(str(found.locate_file(top)))
-        waiting += [_name(line) for line in found.requires or () if "extra ==" not in line]
+        waiting += [_name(line) for line in _required(found) if "extra ==" not in line]
     return {top: path for top, path in sorted(paths.items()) if path.exists()}
+
+
+def _tops(found: metadata.Distribution) -> set[str]:
+    """The first parts of the names of its files. `files` makes a path of each, of which scipy has thousands."""
+    record = found.read_text("RECORD")
+    if record is None:
+        return {file.parts[0] for file in found.files or ()}
+    return {line.split("/", 1)[0].split(",", 1)[0].strip('"') for line in record.splitlines() if line}
+
+
+def _required(found: metadata.Distribution) -> list[str]:
+    """What it requires, as it says. `requires` reads the whole description as an e-mail, which takes much longer."""
+    said = found.read_text("METADATA")
+    if said is None:
+        return list(found.requires or ())
+    head = said.replace("\r\n", "\n").partition("\n\n")[0]
+    return [line.partition(":")[2].strip() for line in head.splitlines() if line.startswith("Requires-Dist:")]
 
 
 def _name(requirement: str) -> str:

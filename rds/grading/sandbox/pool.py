@@ -11,7 +11,7 @@ from rds.grading.sandbox.errors import SandboxError
 from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.limits import Limits
 from rds.grading.sandbox.place import Place
-from rds.grading.sandbox.requirements import available, missing
+from rds.grading.sandbox.requirements import available, fault_of, missing
 from rds.grading.sandbox.subject import Subject
 from rds.grading.sandbox.submission import read_submission
 from rds.grading.sandbox.supervise import Supervisor
@@ -50,6 +50,14 @@ class Pool:
             raise
 
     counts_work = True
+
+    def share(self, jobs: int, slot: int | None) -> None:
+        """From now on `jobs` run at the same time, and this pool's are in `slot`."""
+        self._jobs, self._slot = jobs, slot
+
+    def fault(self) -> str | None:
+        """As `available`, tried on an interpreter of this pool."""
+        return fault_of(lambda: self._interpreter(KITS[0]))
 
     def open(self, path: str | Path, limits: Limits | None = None, kind: str = "controller") -> Subject:
         """The submission at `path`, loaded in a fresh cell: a context manager that ends its processes.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,6 +39,17 @@ def available() -> str | None:
     The walls are tried, which takes about a second; the answer is kept for this process.
     """
     return missing() or _trial_fault()
+
+
+def fault_of(interpreter: Callable[[], Interpreter]) -> str | None:
+    """The same of an interpreter that goes on after the trial."""
+    try:
+        holes = _holes(interpreter())
+    except SandboxError as error:
+        return f"{error}; {_remedy(str(error))}"
+    except SubmissionError as error:
+        return f"the sandbox was tried, and did not work: {error.reason}"
+    return f"the sandbox does not hold on this computer: {'; '.join(holes)}; use Linux 5.14 or newer" if holes else None
 
 
 def missing() -> str | None:
@@ -76,14 +88,9 @@ def _trial_fault() -> str | None:
     except SandboxError as error:
         return f"{error}; {_remedy(str(error))}"
     try:
-        holes = _holes(interpreter)
-    except SandboxError as error:
-        return f"{error}; {_remedy(str(error))}"
-    except SubmissionError as error:
-        return f"the sandbox was tried, and did not work: {error.reason}"
+        return fault_of(lambda: interpreter)
     finally:
         interpreter.close()
-    return f"the sandbox does not hold on this computer: {'; '.join(holes)}; use Linux 5.14 or newer" if holes else None
 
 
 def _remedy(said: str) -> str:
