@@ -274,6 +274,8 @@ def orient(m: Context, words: dict[str, float]) -> None:
         raise Fault("Q says how many seconds the spindle may take; write more than 0", "q")
     if "r" in words or "p" in words:
         m.out.call("ORIENT_SPINDLE", 0, angle, int(way))
+    if "q" in words:
+        m.out.call("WAIT_SPINDLE_ORIENT_COMPLETE", words["q"])
 
 
 def override(m: Context, code: int, words: dict[str, float]) -> None:
@@ -290,8 +292,10 @@ def override(m: Context, code: int, words: dict[str, float]) -> None:
         state.speed_override = int(on)
         out.call(f"{does}_SPEED_OVERRIDE", 0)
     if code == 52:
+        state.adaptive_feed = int(on)
         out.call(f"{does}_ADAPTIVE_FEED")
     elif code == 53:
+        state.feed_hold = int(on)
         out.call(f"{does}_FEED_HOLD")
 
 
