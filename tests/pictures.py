@@ -37,7 +37,7 @@ def plate_path(folder: Path) -> Path:
 def plate_cut(folder: Path) -> Path:
     """The plate, cut."""
     _plate(folder)
-    _rds(folder, "nc", "cut", "plate.ngc", "--tools", "cutters.toml", "--save", "plate.npz")
+    _rds(folder, "nc", "cut", "plate.ngc", "--tools", "cutters.toml", "--cell", "0.05", "--save", "plate.npz")
     return folder / "plate-cut.png"
 
 
@@ -46,7 +46,9 @@ def plate_left(folder: Path) -> Path:
     plate_cut(folder)
     _rds(folder, "nc", "run", "plate.ngc", "--tools", "cutters.toml", "--out", "measured")
     measured = ("--part", "plate.npz", "--measured", "measured")
-    _rds(folder, "nc", "cut", "plate.ngc", "--tools", "cutters.toml", *measured, code=1)  # not to 0.02 mm
+    _rds(
+        folder, "nc", "cut", "plate.ngc", "--tools", "cutters.toml", "--cell", "0.05", *measured, code=1
+    )  # not to 0.02 mm
     return folder / "plate-cut.png"
 
 

@@ -109,7 +109,7 @@ def _joined(lines: list[np.ndarray]) -> list[np.ndarray]:
         if first not in left:
             continue
         k, backwards = first, (first, False) in joins and (first, True) not in joins
-        whole = []
+        whole: list[np.ndarray] = []
         while k in left:
             left.discard(k)
             part = lines[k][::-1] if backwards else lines[k]
