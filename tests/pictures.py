@@ -27,7 +27,42 @@ def first_sine(folder: Path) -> Path:
     return folder / "first" / "X.png"
 
 
-PICTURES: dict[str, Callable[[Path], Path]] = {"first-sine": first_sine}
+def plate_path(folder: Path) -> Path:
+    """The path of the plate in docs/from-drawing-to-part.md."""
+    _plate(folder)
+    _rds(folder, "nc", "plot", "plate.ngc", "--tools", "cutters.toml")
+    return folder / "plate-path.png"
+
+
+def plate_cut(folder: Path) -> Path:
+    """The plate, cut."""
+    _plate(folder)
+    _rds(folder, "nc", "cut", "plate.ngc", "--tools", "cutters.toml", "--cell", "0.05", "--save", "plate.npz")
+    return folder / "plate-cut.png"
+
+
+def plate_left(folder: Path) -> Path:
+    """The plate as measured, and what differs from the one that was meant."""
+    plate_cut(folder)
+    _rds(folder, "nc", "run", "plate.ngc", "--tools", "cutters.toml", "--out", "measured")
+    measured = ("--part", "plate.npz", "--measured", "measured")
+    _rds(
+        folder, "nc", "cut", "plate.ngc", "--tools", "cutters.toml", "--cell", "0.05", *measured, code=1
+    )  # not to 0.02 mm
+    return folder / "plate-cut.png"
+
+
+def _plate(folder: Path) -> None:
+    save(blocks("docs/from-drawing-to-part.md"), folder)
+    _rds(folder, "nc", "make", "job", "plate.toml", "--out", "plate.ngc")
+
+
+PICTURES: dict[str, Callable[[Path], Path]] = {
+    "first-sine": first_sine,
+    "plate-path": plate_path,
+    "plate-cut": plate_cut,
+    "plate-left": plate_left,
+}
 
 
 def path(name: str) -> Path:
@@ -52,8 +87,9 @@ def kept_and_drawn(name: str) -> tuple[Any, Any]:
     return Image.open(path(name)), drawn(name)
 
 
-def _rds(folder: Path, *words: str) -> None:
-    subprocess.run([sys.executable, "-m", "rds", *words], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+def _rds(folder: Path, *words: str, code: int = 0) -> None:
+    done = subprocess.run([sys.executable, "-m", "rds", *words], cwd=folder, stdout=subprocess.DEVNULL)
+    assert done.returncode == code, words
 
 
 if __name__ == "__main__":

@@ -26,7 +26,8 @@ from rds.nc.passed_over import Report
 from rds.nc.path_block import PathBlock
 from rds.nc.tool_centre import ToolCentre, has_tool_centre
 from rds.nc.toolpath import raise_it, toolpath
-from rds.nc.validate import Validation, Validator
+from rds.nc.validate import Validator
+from rds.nc.validation import Validation
 
 Item = MotionBlock | Call
 Progress = Callable[[int, int], None]

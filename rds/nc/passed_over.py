@@ -40,6 +40,11 @@ OVERRIDES_OFF = {"ENABLE_FEED_OVERRIDE": "DISABLE_FEED_OVERRIDE", "ENABLE_SPEED_
 # Why no machine here does what a call wants, and what to write instead.
 BEYOND = {
     "ORIENT_SPINDLE": "the spindle here cannot stop at an angle (M19, G87); leave it out, or bore with G85 or G86",
+    "WAIT_SPINDLE_ORIENT_COMPLETE": "the spindle here cannot stop at an angle (M19); leave it out",
+    "RETRACT_BY_HAND": (
+        "G88 leaves the tool in the hole for the operator to take it out by hand, and no hand moves the axes in a run"
+        " here; bore with G85, G86 or G89"
+    ),
     "RIGID_TAP": "the axes here do not follow the spindle back (G33.1); tap with G84, or cut the thread with G33",
 }
 

@@ -10,7 +10,8 @@ from rds.core.figure import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, Pictur
 from rds.interpolators.motion.segments import AXES
 from rds.machines import Machine
 from rds.nc.trace import CURVED, RAPID, STRAIGHT, Trace
-from rds.nc.validate import TOLERANCE, plain
+from rds.nc.validate import TOLERANCE
+from rds.nc.validation import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,10 +6,9 @@ the spindle within its range; both within what the tool bears; no move of an axi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from rds.nc.language.frame import only_rotary
 from rds.nc.path_block import DefaultFeed
 from rds.nc.tool_centre import slowed
 from rds.nc.tool_limits import ToolLimits, limits_of
+from rds.nc.validation import UNITS_OF_AXES, Validation, plain
 
 if TYPE_CHECKING:
     from rds.nc.language.tools import Tool
@@ -35,90 +35,6 @@ MOST_WARNINGS = 100  # are kept
 RUNAWAY = 1000  # times that a line has left the travel, each time farther out: its loop is not followed further
 _FASTER = 1.0 + 1e-9  # a feed is too fast by more than rounding
 LINEAR, ROTARY = slice(0, 3), slice(3, 6)  # of the axes
-_UNITS = ("mm", "mm", "mm", "degrees", "degrees", "degrees")
-
-
-@dataclass(frozen=True)
-class Validation:
-    """What became of a program: `faults` in the order of files and lines; `more` of them were counted only.
-
-    `low` and `high` are how far the path reaches along the axes that move (machine coordinates, mm and degrees);
-    lengths are in mm. `stopped`: the fault that ended the program; the lines after it, if any, were only read.
-    """
-
-    program: str
-    machine: str
-    faults: tuple[ProgramError, ...] = ()
-    more: int = 0
-    segments: int = 0
-    cutting: float = 0.0
-    rapid: float = 0.0
-    low: Mapping[str, float] = field(default_factory=dict)
-    high: Mapping[str, float] = field(default_factory=dict)
-    tools: tuple[int, ...] = ()
-    spindle: float = 0.0  # rev/min, the fastest
-    stopped: ProgramError | None = None
-    read_on: bool = False  # there are lines after that
-    warnings: tuple[ProgramError, ...] = ()  # what is no fault and worth a look
-
-    @property
-    def ok(self) -> bool:
-        """Whether the machine can run it."""
-        return not self.faults
-
-    def to_json(self) -> dict[str, Any]:
-        """As plain dicts, lists, strings and numbers."""
-        return {
-            "program": self.program,
-            "machine": self.machine,
-            "ok": self.ok,
-            "faults": [_to_json(fault) for fault in self.faults],
-            "warnings": [_to_json(warning) for warning in self.warnings],
-            "more_faults": self.more,
-            "segments": self.segments,
-            "cutting_mm": self.cutting,
-            "rapid_mm": self.rapid,
-            "reach": {axis: [self.low[axis], self.high[axis]] for axis in self.low},
-            "tools": list(self.tools),
-            "fastest_spindle_rev_min": self.spindle,
-            "stopped": self.stopped and {"file": self.stopped.file, "line": self.stopped.line},
-        }
-
-    def __str__(self) -> str:
-        lines = [_as_warning(warning) for warning in self.warnings]
-        if self.ok:
-            reach = ", ".join(
-                f"{axis} {plain(self.low[axis])} to {plain(self.high[axis])} {_UNITS[AXES.index(axis)]}"
-                for axis in self.low
-            )
-            lines.append(
-                f"{self.program}: {self.machine} can run it: {self.segments} move{'s' * (self.segments != 1)}, "
-                f"{self.cutting:.6g} mm at feed, {self.rapid:.6g} mm rapid; {reach or 'nothing moves'}"
-            )
-            return "\n".join(lines)
-        lines += [str(fault) for fault in self.faults]
-        if self.more:
-            lines.append(f"and {self.more} faults more")
-        count = len(self.faults) + self.more
-        if self.stopped and self.stopped.line and self.read_on:
-            lines.append(f"{self.program}: not run from line {self.stopped.line} on: the words after it were only read")
-        lines.append(f"{self.program}: {self.machine} can't run it: {count} fault{'s' * (count > 1)}")
-        return "\n".join(lines)
-
-
-def _to_json(fault: ProgramError) -> dict[str, Any]:
-    return {
-        "file": fault.file,
-        "line": fault.line,
-        "column": fault.column,
-        "word": fault.word,
-        "message": fault.reason,
-    }
-
-
-def _as_warning(found: ProgramError) -> str:
-    said = f"{found.word}: warning" if found.word else "warning"
-    return str(ProgramError(f"{said}: {found.reason}", file=found.file, line=found.line, column=found.column))
 
 
 class Validator:
@@ -269,7 +185,7 @@ class Validator:
             raise ProgramError(message, file=block.file or self._name, line=line)
 
     def _travel_message(self, axis: int, value: float, arc: bool) -> str:
-        name, unit = AXES[axis], _UNITS[axis]
+        name, unit = AXES[axis], UNITS_OF_AXES[axis]
         least, most = self._machine.axes[name].travel
         virtual = any(link.axis == name and link.limits == (least, most) for link in self._machine.links)
         beyond = max(least - value, value - most)
@@ -398,9 +314,3 @@ class Validator:
             read_on=self.read_on,
             warnings=tuple(located_at_words(self._warnings.values())),
         )
-
-
-def plain(value: float) -> str:
-    """A number as people write it: up to four decimals, and as many as it takes to be anything."""
-    text = f"{value:.4f}".rstrip("0").rstrip(".")
-    return text if float(text) or not value else f"{value:.2g}"

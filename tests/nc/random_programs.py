@@ -24,7 +24,7 @@ _MODES = _words(
 )
 _MORE_MODES = _words(
     "G98 G99 G98 G99 G7 G8 G96S50D200 G96S20 G97S300 M48 M49 M50P0 M51P1 M52P1 M53P0 M19R30 M62P1 M63P2 M64P0 M65P3"
-    " M67E1Q2 M68E0Q-3 M66P1L0 M66E1 M70 M71 M70 M72 G43.2H1 G5.3 G10L1P2Z3"
+    " M19Q1 M19R9P2Q.5 M67E1Q2 M68E0Q-3 M66P1L0 M66E1 M70 M71 M70 M72 G43.2H1 G5.3 G10L1P2Z3"
 )
 _WRONG = _words(
     "X Y1Y2 G0G1 G90G91 M3M4 X+-5 X1.2.3 X. X1e5 D5 H1 Q1 L2 P1 R5 I1 K2 G1.5 G2.05 M99999 M-1 G-1 T99 T2.5 S-1 F-1"
@@ -46,6 +46,8 @@ _COMMENTS = [
         "X1 (a) Y2 (b)",
     ),
     *("G0 ; c", "()", "(é)"),
+    "(print, #<_lathe_diameter_mode> #<_retract_old_z> #<_spindle_css_mode> #<_speed_override> #<_feed_override>)",
+    "(print, #<_adaptive_feed> #<_feed_hold> #<_lathe_radius_mode> #<_retract_r_plane> #<_task> #<_vmajor> #<_u>)",
 ]
 
 
@@ -152,7 +154,8 @@ def rare(r: Random) -> str:
             ["G5 X1 Y2 I1 J1 P-1 Q1", "G5.1 X3 Y1 I2 J0", "G5.2 X1 Y1 P1\nX2 Y0 P2\nX3 Y3 P1\nG5.3"]
         )
     if way == 6:
-        return line(r, [r.choice(["G38.2", "G38.3", "G38.4", "G38.5"]), *axes(r, "XYZ", 0.5)])
+        place = "G49 G94 F100\nG0 X1 Y2 Z3\n"  # rs274 backs off towards where its last move without an offset ended
+        return place + line(r, [r.choice(["G38.2", "G38.3", "G38.4", "G38.5"]), *axes(r, "XYZ", 0.5)])
     return line(r, [r.choice(_MORE_MODES) for _ in range(r.choice([1, 1, 2]))])
 
 
@@ -226,7 +229,8 @@ def flow(r: Random, units: bool, depth: int, labels: Iterator[int], breaks: bool
     if depth < 3:
         return [straight(r)]
     name = r.choice([label, f"o<s{label[1:]}>", f"o<S {label[1:]}>"])
-    lines = [f"{name} sub", "g0 x#1 y#2", *inside()]
+    saves = r.choice([[], [], [], ["M73"], ["M70"], ["M73", "G91", "M70"]])
+    lines = [f"{name} sub", *saves, "g0 x#1 y#2", *inside()]
     if r.random() < 0.2:
         lines += [f"{name} return [#1]", *inside()]
     lines += [f"{name} endsub{r.choice(['', ' [3]'])}", *inside()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
@@ -255,14 +256,24 @@ def test_mutated_bytes(program: bytes, data: st.DataObject) -> None:
     same(bytes(mutant))
 
 
-@settings(max_examples=300, deadline=None)
-@given(st.lists(numbers, min_size=20, max_size=60))
-def test_numbers_are_those_of_float(spelled: list[str]) -> None:
-    lines = "".join(f"X{number}\n" for number in spelled if any(map(str.isdigit, number)))
+def _spelled(r: Random) -> str:
+    """A number of up to 9 digits before its point and 12 behind it; with a sign, without a point, or of many digits."""
+    before, behind = r.choice([0, 1, 2, 3, 9]), r.choice([0, 1, 4, 12])
+    digits = [str(r.randrange(10)) for _ in range(max(before + behind, 1))]
+    point = "." if behind else r.choice(["", "."])
+    return r.choice(["", "", "-", "+"]) + "".join((*digits[: before or 1 - bool(behind)], point, *digits[before:]))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_numbers_are_those_of_float(seed: int) -> None:
+    r = Random(seed)
+    spelled = ["0", "-0", "+0.", ".0", "00005", "9007199254740993", "0.3", "1.10000000000000008882"]
+    spelled += [_spelled(r) for _ in range(4000)] + [f"{r.uniform(-1e4, 1e4):.12f}" for _ in range(1000)]
+    r.shuffle(spelled)
+    lines = "".join(f"X{number}\n" for number in spelled)
     found = [item for item in same(HEAD + b"G0\n" + lines.encode() + b"M2\n")["items"] if isinstance(item, tuple)]
-    values = [np.frombuffer(row[-1])[0] for row in found[-len(lines.splitlines()) - 1 : -1]] if lines else []
-    expected = [float(number) for number in spelled if any(map(str.isdigit, number))]
-    assert [repr(float(value)) for value in values] == [repr(value) for value in expected]
+    values = [np.frombuffer(row[-1])[0] for row in found[-len(spelled) - 1 : -1]]
+    assert [repr(float(value)) for value in values] == [repr(float(number)) for number in spelled]
 
 
 @settings(max_examples=300, deadline=None)

@@ -51,6 +51,7 @@ STRICTER = {
     "a character 0": "G0 X1 \x00Y2\nM2",
     "another subroutine's end": "o1 sub\no2 endsub\no1 endsub\no1 call\nM2",
     "RETURN under another subroutine's name": "o1 sub\no1 endsub\no2 sub\no1 return\no2 endsub\no2 call\nM2",
+    "a probing move in inverse time without F": "G94 F100\nG93\nG38.3 X1\nM2",
     "a plane of axes that there are not": "G17.1\nM2",
     "an active comment": "(py,1)\nM2",
 }

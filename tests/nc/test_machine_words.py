@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,6 +51,22 @@ def test_outputs_that_a_machine_names_are_switched_where_the_program_says(tmp_pa
     assert at == sorted(at) and at[0] < at[1] < at[2]
     x = prepared.program.position[at[1], 0]
     assert x == pytest.approx(5.0, abs=0.1)  # where the first move ends
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("G88 X5 Y5 Z-2 R1 P.1", "G88 leaves the tool in the hole"),
+        ("M19 Q1", "the spindle here cannot stop at an angle"),
+        ("G71 U1.5 R0.5", r"U1.5: U goes with the form .* that Fanuc's lathes have.*G71 Q100 I1.5 D0.2 R0.5"),
+        ("G18 G71 P10 Q20 D0.2", r"P10: P goes with the form .* that Fanuc's lathes have"),
+    ],
+)
+def test_what_no_machine_here_does_is_refused_with_what_to_write(tmp_path: Path, words: str, says: str) -> None:
+    part = program(tmp_path, f"G21 G90 F300 S500 M3\n{words}\nM5\nM2\n")
+    result, _ = check_program(part, load_machine("mini-cnc"), Setup())
+    assert [fault.line for fault in result.faults] == [2]
+    assert re.search(says, str(result.faults[0]))
 
 
 def test_an_output_without_a_name_is_refused_by_line(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from rds.cli.main import app
 from rds.cli.nc_options import DIALECT
 from rds.nc.compiled_file import MAGIC
-from rds.nc.validate import Validation
+from rds.nc.validation import Validation
 from tests.nc.rs274 import PROGRAMS
 
 BLOCKS = blocks("docs/part-programs.md")

@@ -267,7 +267,7 @@ def test_diameters_are_halved_once() -> None:
         ("G71 Q7 X16 Z2", SHAFT, "the subroutine 7 is not defined"),
         ("G71 Q100 X10 Z2", SHAFT, "between the contour's ends, 4 and 14"),
         ("G71 Q100 X16 Z2 I0", SHAFT, "must be above 0"),
-        ("G71 Q100 X16 Z2 P2", SHAFT, "nothing on the line uses P"),
+        ("G71 Q100 X16 Z2 P2", SHAFT, "P goes with the form"),
         ("G17 G71 Q100 X16 Z2", SHAFT, "write G18"),
         ("G71 Q100 X16 Z2", SHAFT.replace("Z-8", "Z1"), "line 5 of the contour turns back along Z"),
         ("G71 Q100 X16 Z2", SHAFT.replace("G2 X14 Z-18 R2", "G33 Z-18 K1"), "no part of a contour"),

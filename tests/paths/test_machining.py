@@ -231,6 +231,23 @@ def test_centre_lines_run_along_the_middle_of_a_stroke() -> None:
     assert np.ptp(long[:, 0]) > 8.5 and (len(inner) == 0 or abs(inner[:, 1] - 0.5).max() < 0.1)
 
 
+def test_centre_lines_are_smooth_and_go_on_through_branchings() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 200, endpoint=False)
+    around = np.column_stack((np.cos(turn), np.sin(turn)))
+    ring = [curve for r in (4.5, 5.5) if (curve := polyline_curve(r * around, True, "")) is not None]
+    (line,) = centre_lines(ring, 0.05, 0.03)
+    assert (line[0] == line[-1]).all()
+    assert np.abs(np.hypot(*line.T) - 5.0).max() < 0.06
+    ways = np.diff(line, axis=0)
+    turns = np.angle(np.exp(1j * np.diff(np.unwrap(np.arctan2(ways[:, 1], ways[:, 0])))))
+    assert np.abs(np.degrees(turns)).max() < 15.0  # the grid's steps turn by 45°
+    corners = [(-5, -0.5), (-0.5, -0.5), (-0.5, -5), (0.5, -5), (0.5, -0.5), (5, -0.5)]
+    cross = polyline_curve([*corners, *((-x, -y) for x, y in corners)], True, "")
+    assert cross is not None
+    strokes = [line for line in centre_lines([cross], 0.05, 0.03) if np.ptp(line, axis=0).max() > 1.0]
+    assert len(strokes) == 2 and all(np.ptp(line, axis=0).max() > 8.5 for line in strokes)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_what_a_photograph_leaves_never_hangs_together_at_a_corner(seed: int) -> None:
     cells = np.random.default_rng(seed).random((60, 60)) < 0.55

@@ -43,6 +43,23 @@ def test_commands_and_code_do_what_is_shown(
     assert (tmp_path / "key.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_drawing_becomes_a_part_as_its_page_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = blocks("docs/from-drawing-to-part.md")
+    save(page, tmp_path)
+    called = [command for block in page if block.language == "console" for command in commands(block)]
+    assert [command[1] for command, _ in called] == ["make", "make", "check", "plot", "time", "cut", "run", "cut"]
+    for command, shown in called:
+        done = CliRunner().invoke(app, command)
+        compared = "--measured" in command
+        assert done.exit_code == compared, f"{command}: {done.output}"
+        assert set(shown) <= set(done.stdout.splitlines()), f"{command}: {done.stdout}"
+        if compared:
+            volumes = re.findall(r"(?:left above|cut below) the part: ([\d.]+) mm³", done.stdout)
+            assert len(volumes) == 2 and all(0.0 < float(volume) < 20.0 for volume in volumes), done.stdout
+    agreed((tmp_path / "plate.ngc").read_text())
+
+
 def test_every_option_is_named() -> None:
     named = set(re.findall(r"--[a-z-]+", TEXT))
     for command in ("line", "quad", "arc", "cone", "points", "outline", "job"):

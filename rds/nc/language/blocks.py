@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rds.nc.language.expressions import Fault, whole
-from rds.nc.language.outside import no_such_g, no_such_m
+from rds.nc.language.outside import FANUC_CONTOUR, no_such_g, no_such_m
 from rds.nc.language.state import NO_MOTION, XY, State
 
 AXES = "xyzabc"
@@ -282,6 +282,8 @@ def check(block: Block, state: State) -> None:
                 " (`--with program-numbers`) or leave it away",
                 letter,
             )
+        if not used and letter == "p" and turning:
+            raise Fault(f"P {FANUC_CONTOUR}", letter)
         if not used:
             raise Fault(f"nothing on the line uses {letter.upper()}; it goes with {by}", letter)
     if "@" in words or "^" in words:

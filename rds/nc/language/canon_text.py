@@ -42,7 +42,8 @@ _SHORTENED = {
     "RIGID_TAP": (3, ""),
     "CHANGE_TOOL_NUMBER": (1, ""),
 }
-_UNWRITTEN = frozenset(("WAIT",))  # calls that `rs274 -g` does not print
+_RENAMED = {"WAIT_SPINDLE_ORIENT_COMPLETE": "SPINDLE.0.WAIT_ORIENT_COMPLETE"}
+_UNWRITTEN = frozenset(("WAIT", "RETRACT_BY_HAND"))  # calls that `rs274 -g` does not print
 
 
 def _call_text(call: Call) -> str:
@@ -55,7 +56,7 @@ def _call_text(call: Call) -> str:
         args = args[:count]
     if pattern is None:
         pattern = ", ".join("%.4f" if isinstance(value, float) else "%s" for value in args)
-    return f"{call.name}({pattern % args}{rest})"
+    return f"{_RENAMED.get(call.name, call.name)}({pattern % args}{rest})"
 
 
 _STRAIGHT = "(%.4f, %.4f, %.4f, %.4f, %.4f, %.4f)"

@@ -282,6 +282,7 @@ def _bore_by_hand(m: Context, hole: _Hole, code: int) -> None:
     m.out.call("DWELL", m.state.cycle_dwell)
     m.out.call("STOP_SPINDLE_TURNING", 0)
     m.out.call("PROGRAM_STOP")
+    m.out.call("RETRACT_BY_HAND")
     _spin(m, m.state.spindle)
 
 

@@ -369,7 +369,8 @@ class Interpreter:
                 raise Fault("no modes are saved here; write M70, or M73 in a subroutine, before", "m72")
             self._restore(self.control.saved)
         else:
-            again = code == 73 and self.control.depth > 0
+            before = self.control.saved
+            again = (code == 73 and self.control.depth > 0) or (before is not None and before.again)
             self.control.saved = None if code == 71 else modes_now(m.state, m.parameters, again)
 
     def _restore(self, saved: SavedModes) -> None:

@@ -29,15 +29,12 @@ from rds.nc.language.blocks import (
 )
 from rds.nc.language.comment_values import expanded
 from rds.nc.language.compensation_words import compensate, hold_beside_contour
-from rds.nc.language.context import INCH, Context, rotate
+from rds.nc.language.context import INCH, Context
 from rds.nc.language.expressions import Fault, whole
 from rds.nc.language.moves import home, move
 from rds.nc.language.offsets import (
-    call_origin,
     g92_mode,
     keep_home,
-    minus,
-    plus,
     select_system,
     set_g92,
     set_system,
@@ -47,10 +44,11 @@ from rds.nc.language.offsets import (
     tell_tool,
 )
 from rds.nc.language.outside import active_comment
-from rds.nc.language.parameters import DEBUG_SHOWN, SYSTEM, SYSTEMS
+from rds.nc.language.parameters import DEBUG_SHOWN
+from rds.nc.language.program_end import stop
 from rds.nc.language.signals import signal
 from rds.nc.language.splines import draw_points
-from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES, XY
+from rds.nc.language.state import INVERSE_TIME, PER_MINUTE, PER_REVOLUTION, PLANES
 from rds.nc.language.tool_centre import check_words
 
 _ACTIVE_COMMENTS = ("pyrun,", "py,", "abort,")
@@ -274,6 +272,8 @@ def orient(m: Context, words: dict[str, float]) -> None:
         raise Fault("Q says how many seconds the spindle may take; write more than 0", "q")
     if "r" in words or "p" in words:
         m.out.call("ORIENT_SPINDLE", 0, angle, int(way))
+    if "q" in words:
+        m.out.call("WAIT_SPINDLE_ORIENT_COMPLETE", words["q"])
 
 
 def override(m: Context, code: int, words: dict[str, float]) -> None:
@@ -290,8 +290,10 @@ def override(m: Context, code: int, words: dict[str, float]) -> None:
         state.speed_override = int(on)
         out.call(f"{does}_SPEED_OVERRIDE", 0)
     if code == 52:
+        state.adaptive_feed = int(on)
         out.call(f"{does}_ADAPTIVE_FEED")
     elif code == 53:
+        state.feed_hold = int(on)
         out.call(f"{does}_FEED_HOLD")
 
 
@@ -349,61 +351,3 @@ def _arc_distance(m: Context, absolute: bool) -> None:
     if m.state.arc_absolute != absolute:
         m.out.comment(f"interpreter: IJK distance mode changed to {'absolute' if absolute else 'incremental'}")
         m.state.arc_absolute = int(absolute)
-
-
-def stop(m: Context, code: int) -> bool:
-    """M0, M1, M60 (the program pauses), M2, M30 (it ends: True)."""
-    out = m.out
-    if out.compensation is not None:
-        out.put(out.compensation.stop(out.line, (out.digits, out.n)))
-    if code == 1:
-        out.call("OPTIONAL_PROGRAM_STOP")
-    elif code in (0, 60):
-        if code == 60:
-            out.call("PALLET_SHUTTLE")
-        out.call("PROGRAM_STOP")
-    else:
-        _end(m, code)
-        return True
-    return False
-
-
-def _end(m: Context, code: int) -> None:
-    """The state after M2 and M30: G54, G17, G90, G94, F0, G40, spindle and coolant off, G1."""
-    state, out = m.state, m.out
-    out.compensation = None
-    position = state.position()
-    rotate(position, state.rotation)
-    position = plus(position, state.origin)
-    state.origin_index = 1
-    m.parameters.numbers[SYSTEM] = 1.0
-    state.origin = m.vector_from_machine(SYSTEMS + 21)
-    state.rotation = m.parameters.numbers[SYSTEMS + 30]
-    position = minus(position, state.origin)
-    rotate(position, -state.rotation)
-    state.move_to(position)
-    call_origin(m)
-    out.call("SET_XY_ROTATION", state.rotation)
-    if state.plane != XY:
-        out.call("SELECT_PLANE", PLANES[XY])
-        state.plane = XY
-    state.absolute = 1
-    state.feed_mode, state.feed_rate = PER_MINUTE, 0.0
-    out.call("SET_FEED_MODE", 0, 0)
-    out.rate(0.0)
-    if not state.feed_override:
-        out.call("ENABLE_FEED_OVERRIDE")
-    state.feed_override = state.speed_override = 1
-    state.comp_side, state.arc_allowed = 0, 1
-    out.call("STOP_SPINDLE_TURNING", 0)
-    out.call("SET_SPINDLE_MODE", 0, 0.0)
-    state.spindle = 0
-    state.motion = 10
-    if state.mist:
-        out.call("MIST_OFF")
-    if state.flood:
-        out.call("FLOOD_OFF")
-    state.mist = state.flood = 0
-    if code == 30:
-        out.call("PALLET_SHUTTLE")
-    out.call("PROGRAM_END")

@@ -240,7 +240,7 @@ def set_tool(m: Context, block: Block) -> None:
         for index, value in axes.items():
             offset[index] = value
     else:
-        _offset_by_position(m, axes, 9 if kind == 11 else m.state.origin_index, offset)
+        _offset_by_position(m, axes, offset, fixture=kind == 11)
     orientation = tool.orientation
     if "q" in words:
         orientation = int(words["q"])
@@ -263,16 +263,18 @@ def set_tool(m: Context, block: Block) -> None:
     tell_tool(m)
 
 
-def _offset_by_position(m: Context, axes: dict[int, float], system: int, offset: list[float]) -> None:
-    """The offset with which the position in a system gets the values given; the part along an axis of the (perhaps
-    turned) system that is not given stays.
+def _offset_by_position(m: Context, axes: dict[int, float], offset: list[float], *, fixture: bool) -> None:
+    """The offset with which the position gets the values given, in the active system, or in that of the fixture (G59.3
+    without G92); the part along an axis of the (perhaps turned) system that is not given stays.
     """
-    state, rotation = m.state, m.parameters.numbers[SYSTEMS + 20 * system + 10]
+    state = m.state
+    system = 9 if fixture else state.origin_index
+    rotation = m.parameters.numbers[SYSTEMS + 20 * system + 10]
     here = plus(state.position(), state.axis_offset)
     rotate(here, state.rotation)
     here = minus(plus(plus(here, state.origin), state.tool_offset), m.vector_from_machine(SYSTEMS + 20 * system + 1))
     rotate(here, -rotation)
-    if system != 9 and m.parameters.numbers[G92_APPLIED]:
+    if not fixture and m.parameters.numbers[G92_APPLIED]:
         here = minus(here, m.vector_from_machine(G92))
     for index, value in axes.items():
         if index > 1:

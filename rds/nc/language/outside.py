@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 _G = {
     110: "G11 ends programmable data input of other controls; leave it away, G10 needs no end here",
     120: "G12 mills a circular pocket clockwise on other controls; write the circle as G2 with I and J",
@@ -74,8 +76,18 @@ def no_such_m(code: int) -> str:
     return _M.get(code, f"there is no M{code}; correct the word or leave it away")
 
 
-def no_such_letter(letter: str) -> str:
-    """Why no word can begin with this character."""
+FANUC_CONTOUR = (
+    "goes with the form of G70 to G73 that Fanuc's lathes have, two lines and the blocks from P to Q as the contour;"
+    " here the contour is a subroutine (O100 SUB, its moves, O100 ENDSUB) and the cycle one line: G71 Q100 I1.5 D0.2"
+    " R0.5 (I deep each cut, D left on the contour, R back out), then G70 Q100"
+)
+_FANUC_CYCLE = re.compile(r"g7[0-3](?![0-9])")
+
+
+def no_such_letter(letter: str, line: str = "") -> str:
+    """Why no word can begin with this character, on this line in lower case."""
+    if letter in "uw" and _FANUC_CYCLE.search(line):
+        return f"{letter.upper()} {FANUC_CONTOUR}"
     if letter >= "\x80":
         return "only letters, digits and signs of ASCII make words; remove it or put it into a comment ( )"
     return _LETTERS.get(letter, f"no word begins with {letter!r}; words are a letter and a number, comments ( ) or ;")

@@ -20,6 +20,7 @@ class State:
     __slots__ = (
         "a",
         "absolute",
+        "adaptive_feed",
         "arc_absolute",
         "arc_allowed",
         "axis_offset",
@@ -36,6 +37,7 @@ class State:
         "cycle_series",
         "cycle_start",
         "diameter",
+        "feed_hold",
         "feed_mode",
         "feed_override",
         "feed_rate",
@@ -77,7 +79,8 @@ class State:
         self.comp_side = 0  # 1 left (G41), -1 right (G42)
         self.arc_allowed = 1  # 0 between G40 and the straight move after it
         self.mist = self.flood = 0
-        self.feed_override = self.speed_override = 1
+        self.feed_override = self.speed_override = self.feed_hold = 1
+        self.adaptive_feed = 0
         self.origin_index = 1  # G54
         self.origin = [0.0] * 6
         self.axis_offset = [0.0] * 6  # G92

@@ -99,7 +99,7 @@ def fill(block: Block, words: list[tuple[str, str]], text: str) -> None:
             elif letter in OTHERS:
                 block.add(letter, float(digits))
             else:
-                raise Fault(no_such_letter(letter))
+                raise Fault(no_such_letter(letter, text))
     except Fault as fault:
         fault.at = [match.start() for match in _WORD.finditer(text) if match.groups() == (letter, digits)][-1]
         fault.key = ""
@@ -142,7 +142,7 @@ def read_words(text: str, at: int, block: Block, parameters: Parameters) -> dict
                 fault.at, fault.key = start, ""
                 raise
         else:
-            raise Fault(no_such_letter(letter), at=start)
+            raise Fault(no_such_letter(letter, text), at=start)
     return places
 
 

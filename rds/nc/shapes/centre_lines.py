@@ -9,14 +9,18 @@ from rds.nc.paths.needs import needed
 from rds.nc.shapes.curves import Curve
 
 MOST_CELLS = 16_000_000
+SMOOTHED = 3.0  # cells: standard deviation of the Gaussian that takes the grid's steps out of a line
+LOOKED = 8  # pixels from a branching, over which a line's direction is taken
 
 
 def centre_lines(curves: list[Curve], cell: float, tolerance: float) -> list[np.ndarray]:
     """The centre lines (n × 2, mm each) of the area within the closed curves (even-odd), found on a grid of `cell` mm.
 
-    The skeleton of the area (Zhang and Suen, scikit-image's `skeletonize`), as polylines from end or branching to end
-    or branching, from which points are left out within `tolerance` mm (Douglas and Peucker). A line is off the true
-    middle by up to about a cell. InputError without closed curves, and for a grid of more than 16 million cells.
+    The skeleton of the area (Zhang and Suen, scikit-image's `skeletonize`), as polylines from end to end that go
+    straight on through branchings where they can, so that the tool lifts seldom. The grid's steps are smoothed out
+    along their length, and points are left out within `tolerance` mm (Douglas and Peucker). A line is off the true
+    middle by up to about a cell, and rounds its corners. InputError without closed curves, and for a grid of more than
+    16 million cells.
     """
     closed = [curve for curve in curves if curve.closed and len(curve.points) > 2]
     if not closed:
@@ -35,7 +39,7 @@ def centre_lines(curves: list[Curve], cell: float, tolerance: float) -> list[np.
         filled[rows, columns] ^= True
     skeleton = needed("skimage.morphology").skeletonize(filled)
     simplify = needed("skimage.measure").approximate_polygon
-    lines = [simplify(line.astype(float), tolerance / cell) for line in _walked(skeleton)]
+    lines = [simplify(_smoothed(line.astype(float)), tolerance / cell) for line in _joined(_walked(skeleton))]
     return [(line[:, ::-1] + 0.5) * cell + low for line in lines if len(line) > 1]
 
 
@@ -80,3 +84,59 @@ def _walked(skeleton: np.ndarray) -> list[np.ndarray]:
         if place not in seen and (around_it := neighbours(place)):
             follow(place, around_it[0])
     return found
+
+
+def _joined(lines: list[np.ndarray]) -> list[np.ndarray]:
+    """Lines that meet at a branching made one, in pairs, the straightest first, where they turn by less than 90°."""
+    meeting: dict[tuple[int, ...], list[tuple[int, bool]]] = {}  # of each place the lines, and whether it is their end
+    for k, line in enumerate(lines):
+        if (line[0] != line[-1]).any():
+            meeting.setdefault(tuple(line[0].tolist()), []).append((k, False))
+            meeting.setdefault(tuple(line[-1].tolist()), []).append((k, True))
+    joins: dict[tuple[int, bool], tuple[int, bool]] = {}
+    for ends in meeting.values():
+        ways = [_direction(lines[k], last) for k, last in ends]
+        turns = [
+            (float(ways[i] @ ways[j]), i, j) for j in range(len(ends)) for i in range(j) if ends[i][0] != ends[j][0]
+        ]
+        for turn, i, j in sorted(turns):
+            if turn < 0.0 and ends[i] not in joins and ends[j] not in joins:
+                joins[ends[i]], joins[ends[j]] = ends[j], ends[i]
+    found: list[np.ndarray] = []
+    left = set(range(len(lines)))
+    ends_first = sorted(left, key=lambda k: (k, False) in joins and (k, True) in joins)
+    for first in ends_first:  # then those that are joined into rings
+        if first not in left:
+            continue
+        k, backwards = first, (first, False) in joins and (first, True) not in joins
+        whole: list[np.ndarray] = []
+        while k in left:
+            left.discard(k)
+            part = lines[k][::-1] if backwards else lines[k]
+            whole.append(part[1:] if whole else part)
+            onward = joins.get((k, not backwards))
+            if onward is None:
+                break
+            k, backwards = onward
+        found.append(np.concatenate(whole))
+    return found
+
+
+def _direction(line: np.ndarray, last: bool) -> np.ndarray:
+    """Of unit length, from one end of a line into it."""
+    inwards = line[::-1] if last else line
+    way = (inwards[min(LOOKED, len(line) - 1)] - inwards[0]).astype(float)
+    return way / np.hypot(*way)
+
+
+def _smoothed(line: np.ndarray) -> np.ndarray:
+    """A line of pixels without their steps; its ends stay where they are, and a ring closed."""
+    reach = int(3 * SMOOTHED)
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHED) ** 2)
+    weights /= weights.sum()
+    if (line[0] == line[-1]).all():
+        ring = np.pad(line[:-1], ((reach, reach), (0, 0)), "wrap")
+        smooth = np.column_stack([np.convolve(column, weights, "valid") for column in ring.T])
+        return np.vstack((smooth, smooth[:1]))
+    mirrored = np.pad(line, ((reach, reach), (0, 0)), "reflect", reflect_type="odd")
+    return np.column_stack([np.convolve(column, weights, "valid") for column in mirrored.T])

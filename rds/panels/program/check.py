@@ -19,7 +19,7 @@ from rds.nc.path_block import PathBlock
 from rds.nc.run.prepare import least_seconds, require_room
 from rds.nc.tool_centre import shown
 from rds.nc.trace import Trace
-from rds.nc.validate import Validation
+from rds.nc.validation import Validation
 from rds.panels.kit.field_names import in_fields
 from rds.panels.program.stock import Cut, cut, shapes
 from rds.panels.session.task import Task
