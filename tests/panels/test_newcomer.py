@@ -1,8 +1,11 @@
-"""A newcomer with nothing but the browser and an empty folder: from the first controller to two runs compared."""
+"""A newcomer with nothing but the browser and an empty folder: from the first controller to a part and a mail."""
 
 from __future__ import annotations
 
+import email
+import socket
 from collections.abc import Callable
+from email.policy import default
 from typing import Any
 
 import pytest
@@ -15,7 +18,15 @@ MOST = {  # presses (of the mouse, of Enter) of each step; what is typed and cho
     "run in three modes": 6,  # one of them sets how long
     "change a gain live": 5,  # as here
     "compare": 4,
+    "design by poles": 4,
+    "cut a part": 4,
+    "send the result": 3,
 }
+INSIDE = """() => {
+    const says = document.querySelector(".rds-code-says").getBoundingClientRect();
+    const seen = document.querySelector(".rds-code .cm-scroller").getBoundingClientRect();
+    return says.width > 150 && says.left >= seen.left && says.right <= Math.min(seen.right, innerWidth);
+}"""
 
 
 class Hand:
@@ -71,9 +82,21 @@ class Hand:
         self._saved.append(self.page.inner_text(':text("Saved with its report in"):visible code'))
 
 
-def test_a_newcomer_gets_from_an_empty_folder_to_two_runs_compared(
+class Box:
+    """A mail server's."""
+
+    def __init__(self) -> None:
+        self.mails: list[Any] = []
+
+    async def handle_DATA(self, server: Any, session: Any, envelope: Any) -> str:
+        self.mails.append(envelope.content)
+        return "250 taken"
+
+
+def test_a_newcomer_gets_from_an_empty_folder_to_a_part_and_a_mail(
     second_app: App, open_page: Callable[..., Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
+    aiosmtpd_controller = pytest.importorskip("aiosmtpd.controller", reason="aiosmtpd is not installed")
     for left in ("*.py", "*.ngc", "*.toml", "session.json"):
         for each in second_app.folder.glob(left):
             each.unlink()
@@ -97,6 +120,9 @@ def test_a_newcomer_gets_from_an_empty_folder_to_two_runs_compared(
     page.keyboard.type(" + r.positoin")
     page.wait_for_selector('.rds-code-says:has-text("Did you mean r.position?")')
     assert "r.positoin" in page.locator(".rds-code-bad").inner_text()
+    page.set_viewport_size({"width": 390, "height": 800})  # a telephone's: the fault is broken into lines, not cut off
+    page.wait_for_function(INSIDE)
+    page.set_viewport_size({"width": 1280, "height": 800})
     for _ in " + r.positoin":
         page.keyboard.press("Backspace")
     page.wait_for_selector(".rds-code-says", state="hidden")
@@ -131,6 +157,43 @@ def test_a_newcomer_gets_from_an_empty_folder_to_two_runs_compared(
         rows.nth(k).locator("input[type=checkbox]").check()
     hand.press("What differs")
     page.wait_for_selector('.rds-main td:text-is("changed while it ran"):visible')
+
+    hand.begin("design by poles")
+    hand.click('.rds-nav button:text-is("Design")')
+    page.wait_for_selector('.rds-title h1:text-is("Design")')
+    page.wait_for_selector('button:text-is("Write the file"):enabled')
+    hand.count()
+    page.locator("[role=slider][aria-valuetext]").first.press("ArrowLeft")
+    hand.press("Write the file")
+    page.wait_for_selector('.rds-notice-good:has-text("Try it runs it")')
+    hand.press("Try it")
+    page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
+
+    hand.begin("cut a part")
+    hand.click('.rds-nav button:text-is("Program")')
+    page.wait_for_selector('.rds-verdict .rds-notice-good:has-text("the machine can run it")')
+    hand.keys("Control+Enter")
+    page.wait_for_selector('.rds-main :text("against the part as programmed"):visible')
+    assert page.locator('.rds-main :text("as measured, by tool"):visible').count()
+
+    hand.begin("send the result")
+    hand.sees("Saved with its report in")
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    words = f'host = "127.0.0.1"\nport = {port}\nsecurity = "none"\nsender = "lab@example.edu"\n'
+    (second_app.folder / "email.toml").write_text(words)  # the laboratory's
+    box = Box()
+    server = aiosmtpd_controller.Controller(box, hostname="127.0.0.1", port=port)
+    server.start()
+    try:
+        hand.type("E-mail to", "me@example.edu")
+        hand.press("Send")
+        hand.sees("sent to me@example.edu: program.html, result.csv")
+    finally:
+        server.stop()
+    parts = email.message_from_bytes(box.mails[0], policy=default).iter_attachments()
+    assert [part.get_filename() for part in parts] == ["program.html", "result.csv"]
 
     with capsys.disabled():
         print("\npresses of a newcomer:", ", ".join(f"{step} {count}" for step, count in hand.presses.items()))

@@ -20,7 +20,9 @@ _EMPTY = "<p>No result yet: press Run.</p>"
 
 
 class ProgramResult:
-    """`show(work)` when the loop is over, `saved(work)` when its files are there, `clear()` before the next run."""
+    """`show(work)` when the loop is over, `show_cut()` when its cut is known, `saved(work)` when its files are there,
+    `clear()` before the next run.
+    """
 
     def __init__(self, shell: Any, go: Callable[[int], None]):
         """`go(line)` shows a line of the program."""
@@ -57,7 +59,11 @@ class ProgramResult:
         session, ticker = self._shell.session, self._shell.ticker
         self.path.draw(session, ticker, lambda: path(result, prepared))
         self.along.draw(session, ticker, lambda: along(result, prepared))
-        if (planned := work.cut) is None:
+
+    def show_cut(self, work: ProgramWork, planned: Cut | None) -> None:
+        """The part that was cut against the intended one, where the program cuts what is `planned`."""
+        result, prepared = work.result, work.prepared
+        if planned is None or result is None or prepared is None or "program" not in result.meta:
             return
         cuts: list[Cut] = []
 
@@ -73,7 +79,7 @@ class ProgramResult:
         def say() -> None:
             self.cut_words.value = cut_html(cuts[0], measured=True) if cuts else ""
 
-        self.cut.draw(session, ticker, make, then=say)
+        self.cut.draw(self._shell.session, self._shell.ticker, make, then=say)
 
     def saved(self, work: ProgramWork) -> None:
         """Its tables are written; pictures and reports follow."""

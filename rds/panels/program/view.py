@@ -46,6 +46,7 @@ class ProgramView:
         self.notice = Notice()
         self.work: ProgramWork | None = None
         self._traced = self._shown = False
+        self._uncut: ProgramWork | None = None  # a run that is over, until it is known what its program cuts
         self._ran: str | None = None  # the text whose run, or result, is shown
         self.editor = Editor(lambda: self.files.save())
         self.editor.text = self.program.text.text
@@ -170,6 +171,16 @@ class ProgramView:
         self.preview.show(look)
         if not self.program.looking:  # else the cut is still to come
             self._lay_stock(look)
+            self._show_cut()
+
+    def _show_cut(self) -> None:
+        """Of the run that is over: it may have begun, and ended, before it was known what its program cuts."""
+        if (work := self._uncut) is None or self.program.looking:
+            return
+        self._uncut = None
+        look = self.program.latest
+        if look is not None and work.file == self.program.text.path and self.program.text.text == self._ran:
+            self.result.show_cut(work, look.cut)
 
     # running
 
@@ -200,6 +211,7 @@ class ProgramView:
         self._latest = None
         self._ran = self.program.text.text
         self._traced = self._shown = False
+        self._uncut = None
         self.editor.locked = True
         self.result.clear()
         self.notice.say("the run begins")
@@ -259,6 +271,8 @@ class ProgramView:
         else:
             self.notice.say(f"done: {len(result)} samples", "good")
         self.result.show(work)
+        self._uncut = work
+        self._show_cut()
         if self.tabs.selected_index == PREVIEW:  # whoever looks at something else is left there
             self.tabs.selected_index = RESULT
 
