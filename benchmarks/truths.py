@@ -7,7 +7,7 @@ controller that sees what the encoder reads. What is wrong with each model is kn
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import exp, log
@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from rds.core.compiling import kernel
+from rds.core.errors import InputError
+from rds.identification.fit.estimate import Estimate
 from rds.identification.fit.fit import fit
 from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Log
@@ -180,15 +182,25 @@ def cases(number: int) -> Iterator[Case]:
     frictions = {n: values[n] * (2.0 if up > 0 else 0.3) for n in ("friction_plus", "friction_minus")}
     yield case("friction off", "friction", values | frictions)
     yield case("friction off, a file of one's own", "friction", candidate=_own(made, values | frictions))
-    estimate = fit([logged(made, 2)], structure("axis", made.options), "simulation")
-    wrong, lag = _wrong_in(made.values, estimate.values())
-    if not estimate.unusable() and wrong != "?":
-        yield case(f"fitted{', off' if wrong else ''}", wrong, candidate=as_candidate(estimate), lag=lag)
-    if made.options:
-        plain = fit([logged(made, 2)], structure("axis"), "simulation")
+    estimate = _fitted(made, made.options)
+    if estimate is not None:
+        wrong, lag = _wrong_in(made.values, estimate.values())
+        if wrong != "?":
+            yield case(f"fitted{', off' if wrong else ''}", wrong, candidate=as_candidate(estimate), lag=lag)
+    plain = _fitted(made, ()) if made.options else None
+    if plain is not None:
         wrong, lag = _wrong_in(made.values, plain.values())
-        if not plain.unusable() and wrong not in ("", "?"):
+        if wrong not in ("", "?"):
             yield case("fitted without options", wrong, candidate=as_candidate(plain), lag=lag)
+
+
+def _fitted(made: Machine, options: Sequence[str]) -> Estimate | None:
+    """The fit to another log; None where it is refused or cannot be used: without a model there is no verdict."""
+    try:
+        estimate = fit([logged(made, 2)], structure("axis", tuple(options)), "simulation")
+    except InputError:
+        return None
+    return None if estimate.unusable() else estimate
 
 
 def _own(made: Machine, values: Mapping[str, float]) -> Candidate:
