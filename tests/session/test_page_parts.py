@@ -184,3 +184,21 @@ def _within(widget: Any) -> Iterator[Any]:
     yield widget
     for child in getattr(widget, "children", ()):
         yield from _within(child)
+
+
+def test_a_picture_drawn_again_leaves_no_widget_behind() -> None:
+    """A kernel keeps every widget that is not closed, and all that hangs on it."""
+    from ipywidgets.widgets.widget import _instances
+    from matplotlib.figure import Figure
+
+    from rds.panels.kit.figure import FigureView
+
+    view = FigureView()
+    open_after = []
+    for _ in range(4):
+        view.show(Figure(), caption="the error in µm")
+        open_after.append(len(_instances))
+    assert len(set(open_after)) == 1
+    view.clear()
+    assert view.children == ()
+    assert len(_instances) < open_after[-1]

@@ -20,14 +20,16 @@ WIDTH = 7.6  # inches: as wide as what is beside the settings on a screen of 128
 class FigureView(widgets.VBox):
     """Empty until `show(figure)`; the figure before is closed."""
 
+    children: Any  # ipywidgets has no types
+
     def __init__(self, width: float = WIDTH) -> None:
         """`width` in inches of DPI pixels: wider figures are made narrower."""
         super().__init__([])
         self.add_class("rds-figure")
         self._width = width
         self.figure: Any = None
-        self._canvas: Any = None
         self._waiting: Any = None
+        self._shown: list[widgets.Widget] = []  # closed when something else is: a kernel keeps every open widget
 
     def show(self, figure: Any, caption: str = "") -> None:
         """Show a matplotlib figure that belongs to no pyplot; `caption` is read out in its place."""
@@ -36,10 +38,8 @@ class FigureView(widgets.VBox):
         if figure.get_figwidth() > self._width:
             figure.set_figwidth(self._width)
         self.figure = figure
-        self._canvas = _canvas(figure)
         words = [widgets.HTML(f"<p>{caption}</p>")] if caption else []
-        # in a box of its own, because a closed canvas does not leave a page by itself
-        self.children = [widgets.VBox([self._canvas, *words])]
+        self._put(_canvas(figure), *words)
 
     def draw(
         self,
@@ -54,7 +54,7 @@ class FigureView(widgets.VBox):
         `then()` is called once it is there.
         """
         self.clear()
-        self.children = [widgets.HTML('<p role="status">drawing …</p>')]
+        self._put(widgets.HTML('<p role="status">drawing …</p>'))
         task = self._waiting = session.work("a plot", lambda task: make())
 
         def look() -> None:
@@ -66,7 +66,8 @@ class FigureView(widgets.VBox):
             if task.error is not None:
                 if not isinstance(task.error, RdsError):
                     logging.getLogger(__name__).error("a plot could not be drawn", exc_info=task.error)
-                self.children = [widgets.HTML(f'<p role="alert">✖ no plot: {escape(str(task.error))}</p>')]
+                self.clear()
+                self._put(widgets.HTML(f'<p role="alert">✖ no plot: {escape(str(task.error))}</p>'))
                 return
             if task.result is None:
                 self.clear()
@@ -78,11 +79,19 @@ class FigureView(widgets.VBox):
 
     def clear(self) -> None:
         """Nothing to show."""
-        self._waiting = None
+        self._waiting = self.figure = None
         self.children = []
-        if self._canvas is not None:
-            self._canvas.close()
-        self.figure = self._canvas = None
+        for widget in self._shown:
+            for part in (getattr(widget, "style", None), widget.layout, widget):
+                if part is not None:
+                    part.close()
+        self._shown = []
+
+    def _put(self, *shown: widgets.DOMWidget) -> None:
+        # in a box of its own, because a closed canvas does not leave a page by itself
+        box = widgets.VBox(shown)
+        self._shown = [*shown, box]
+        self.children = [box]
 
 
 def _canvas(figure: Any) -> widgets.DOMWidget:
