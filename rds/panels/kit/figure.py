@@ -82,7 +82,14 @@ class FigureView(widgets.VBox):
         self._waiting = self.figure = None
         self.children = []
         for widget in self._shown:
-            for part in (getattr(widget, "style", None), widget.layout, widget):
+            toolbar = getattr(widget, "toolbar", None)  # an ipympl canvas has one
+            for part in (
+                getattr(widget, "style", None),
+                getattr(toolbar, "layout", None),
+                toolbar,
+                widget.layout,
+                widget,
+            ):
                 if part is not None:
                     part.close()
         self._shown = []
