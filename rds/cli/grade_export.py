@@ -33,9 +33,9 @@ def export(
     """Write the grades of a batch as a gradebook; who has no place in it is listed."""
     with refusals():
         from rds.grading.exports.export import export as write
-        from rds.grading.exports.exported import Wanted
+        from rds.grading.exports.exported import ExportOptions
 
-        done = write(out, to, file, Wanted(gradebook, column, points))
+        done = write(out, to, file, ExportOptions(gradebook, column, points))
     if json:
         print_json(done.to_json())
     else:

@@ -105,11 +105,11 @@ def regrade(
     """Grade a batch again by a mended assignment, and list who changes and why (changes.csv, changes.html)."""
     with refusals(), stdout_kept(json):
         needs_sandbox()
-        from rds.grading.batch.run import How
+        from rds.grading.batch.run import BatchOptions
         from rds.grading.review.regrade import regrade as again
 
         with progress_bars() as bar:
-            how = How(jobs, resume=resume, progress=bar("submissions"), announce=_announce)
+            how = BatchOptions(jobs, resume=resume, progress=bar("submissions"), announce=_announce)
             done, changes = again(out, assignment, new, how)
     if json:
         print_json(

@@ -19,7 +19,7 @@ from rds.grading.cases.case import CaseRun
 from rds.grading.cases.control import ControlCase
 from rds.grading.sandbox import Pool
 from rds.grading.sandbox.counts import Counts
-from rds.grading.sandbox.subject import Subject
+from rds.grading.sandbox.subject import LoadedSubmission
 from tests.grading.made import HEAD, RMS, SINE, SOLUTION, assignment_in
 
 BLIND = HEAD.replace("title", 'self_check = "blind"\ntitle')
@@ -151,13 +151,13 @@ def test_work_is_counted_for_the_first_students_only(
 ) -> None:
     case = SINE.replace("1.0\n\n", "0.1\n\n") + '[case.vary]\ntau = "±10 %"\n'
     work = RMS.replace("rms-error", "work").replace("0.05", "50").replace("0.5", "500").replace("mm", "events")
-    counts, count = [], Subject.count
+    counts, count = [], LoadedSubmission.count
 
-    def counted(subject: Subject) -> Counts:
+    def counted(subject: LoadedSubmission) -> Counts:
         counts.append(count(subject))
         return counts[-1]
 
-    monkeypatch.setattr(Subject, "count", counted)
+    monkeypatch.setattr(LoadedSubmission, "count", counted)
     assignment = read_assignment(assignment_in(tmp_path, HEAD + case + work))
     (row,) = check_assignment(assignment, pool, WORK_SEEDS + 3).criteria
     assert row.margin is not None and row.margin > 100.0

@@ -13,7 +13,7 @@ from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.assignment_file import SELF_CHECKS
-from rds.grading.assignment.late_rules import Late
+from rds.grading.assignment.late_rules import LateRules
 from rds.grading.criteria import KINDS
 from rds.grading.sandbox import Pool
 from rds.grading.sandbox.limits import Limits
@@ -72,7 +72,7 @@ def test_every_criterion_option_and_limit_is_named() -> None:
     for name in KINDS.names():
         assert name in NAMED
         assert set(getattr(KINDS.module(name), "OPTIONS", {})) <= NAMED
-    assert {field.name for kind in (Limits, Late) for field in fields(kind)} <= NAMED
+    assert {field.name for kind in (Limits, LateRules) for field in fields(kind)} <= NAMED
     assert set(SELF_CHECKS) <= NAMED
 
 

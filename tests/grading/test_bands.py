@@ -11,7 +11,7 @@ from hypothesis.strategies import floats, text
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
 from rds.grading.assignment.assignment_file import LATE
-from rds.grading.assignment.late_rules import Late, days_late, read_late
+from rds.grading.assignment.late_rules import LateRules, days_late, read_late_rules
 from rds.grading.assignment.seeds import part_seed, student_seed
 from rds.grading.criteria.bands import Bands
 from rds.grading.grade import Band
@@ -52,7 +52,7 @@ def test_no_number_earns_nothing() -> None:
     [(0.0, 0.0), (1.0, 0.0), (1.01, 0.1), (24.0, 0.1), (24.1, 0.2), (100.0, 0.5), (168.0, 0.5), (169, 1.0)],
 )
 def test_each_day_that_has_begun_costs_up_to_the_cap(hours: float, lost: float) -> None:
-    late = Late(percent_per_day=10.0, grace_hours=1.0, cap_percent=50.0, zero_after_days=7.0)
+    late = LateRules(percent_per_day=10.0, grace_hours=1.0, cap_percent=50.0, zero_after_days=7.0)
     assert late.lost(hours / 24.0) == pytest.approx(lost)
 
 
@@ -64,11 +64,11 @@ def test_lateness_knows_time_zones() -> None:
 
 
 def test_a_late_table_is_read_strictly() -> None:
-    assert read_late(TomlTable({"percent_per_day": 5}, LATE)) == Late(percent_per_day=5.0)
+    assert read_late_rules(TomlTable({"percent_per_day": 5}, LATE)) == LateRules(percent_per_day=5.0)
     with pytest.raises(InputError, match="did you mean 'percent_per_day'"):
-        read_late(TomlTable({"percent_a_day": 5}, LATE))
+        read_late_rules(TomlTable({"percent_a_day": 5}, LATE))
     with pytest.raises(InputError, match="from 0 to 100"):
-        read_late(TomlTable({"percent_per_day": 500}, LATE))
+        read_late_rules(TomlTable({"percent_per_day": 500}, LATE))
 
 
 def test_the_seed_of_a_student_is_written_down_here() -> None:

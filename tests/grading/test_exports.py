@@ -21,12 +21,12 @@ from rds.core.errors import InputError
 from rds.grading.batch.grades_table import csv_text, grades_csv
 from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.export import Written, export
-from rds.grading.exports.exported import Wanted
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.exports.one_json import LARGEST
 from rds.grading.grade import Grade, Status
 from tests.grading.grades import HOSTILE, batch_in, grade, score
 
-NOTHING = Wanted()
+NOTHING = ExportOptions()
 CANVAS = """Student,ID,SIS User ID,SIS Login ID,Section,Tracking (77),Essay (78),Current Score
 ,,,,,Manual Posting,,(read only)
     Points Possible,,,,,30.0,10.0,(read only)
@@ -129,7 +129,7 @@ def from_platform(platform: str, student: str, /, **about: str) -> Grade:
     return replace(grade(student), details={"source": {"platform": platform, **about}})
 
 
-def exported(tmp_path: Path, to: str, grades: list[Grade], wanted: Wanted = NOTHING, **record: Any) -> Written:
+def exported(tmp_path: Path, to: str, grades: list[Grade], wanted: ExportOptions = NOTHING, **record: Any) -> Written:
     return export(batch_in(tmp_path / "out", grades, **record), to, None, wanted)
 
 
@@ -155,7 +155,7 @@ def test_nbgrader_takes_the_name_from_its_folders(tmp_path: Path) -> None:
 @pytest.mark.skipif(find_spec("nbgrader") is not None, reason="nbgrader is installed")
 def test_nbgrader_database_without_nbgrader_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"install it with: .*pip install .*nbgrader"):
-        exported(tmp_path, "nbgrader", [grade()], Wanted(gradebook=tmp_path / "gradebook.db"))
+        exported(tmp_path, "nbgrader", [grade()], ExportOptions(gradebook=tmp_path / "gradebook.db"))
 
 
 def test_canvas_gets_every_student_back_and_no_other_grade(tmp_path: Path) -> None:
@@ -167,7 +167,7 @@ def test_canvas_gets_every_student_back_and_no_other_grade(tmp_path: Path) -> No
         from_platform("canvas", "nobody_999", id="999", name="nobody"),
         from_platform("other", "A Twin", name="Twin A"),
     ]
-    done = exported(tmp_path, "canvas", grades, Wanted(gradebook=book))
+    done = exported(tmp_path, "canvas", grades, ExportOptions(gradebook=book))
     lines = list(csv.reader(io.StringIO(Path(done.files[0]).read_text())))
     assert lines == [
         ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Tracking (77)"],
@@ -189,8 +189,8 @@ def test_canvas_asks_for_the_gradebook_and_for_the_same_points(tmp_path: Path) -
     book = tmp_path / "book.csv"
     book.write_text(CANVAS.replace("30.0", "100"))
     with pytest.raises(InputError, match="--points 100"):
-        exported(tmp_path / "b", "canvas", [grade("s-ada")], Wanted(gradebook=book))
-    done = exported(tmp_path / "c", "canvas", [grade("s-ada")], Wanted(gradebook=book, points=100.0))
+        exported(tmp_path / "b", "canvas", [grade("s-ada")], ExportOptions(gradebook=book))
+    done = exported(tmp_path / "c", "canvas", [grade("s-ada")], ExportOptions(gradebook=book, points=100.0))
     points = [row["Tracking (77)"] for row in rows_of(Path(done.files[0]))]
     assert points == ["Manual Posting", "100", "86.6666667", "12", "", ""]  # hers is as it was entered by hand
 
@@ -198,18 +198,18 @@ def test_canvas_asks_for_the_gradebook_and_for_the_same_points(tmp_path: Path) -
 def test_canvas_new_column_gets_its_points(tmp_path: Path) -> None:
     book = tmp_path / "book.csv"
     book.write_text(CANVAS)
-    done = exported(tmp_path, "canvas", [grade("s-ada")], Wanted(gradebook=book), title="Observer")
+    done = exported(tmp_path, "canvas", [grade("s-ada")], ExportOptions(gradebook=book), title="Observer")
     rows = rows_of(Path(done.files[0]))
     assert [row["Observer"] for row in rows] == ["", "30", "26", "", "", ""]
     assert "no column 'Observer'" in done.notes[0]
     with pytest.raises(InputError, match="no column 'Obsrver'"):
-        exported(tmp_path / "x", "canvas", [grade("s-ada")], Wanted(gradebook=book, column="Obsrver"))
+        exported(tmp_path / "x", "canvas", [grade("s-ada")], ExportOptions(gradebook=book, column="Obsrver"))
 
 
 def test_two_students_never_share_a_line(tmp_path: Path) -> None:
     book = tmp_path / "book.csv"
     book.write_text(CANVAS)
-    done = exported(tmp_path, "canvas", [grade("s-ada"), grade("ada@x.edu")], Wanted(gradebook=book))
+    done = exported(tmp_path, "canvas", [grade("s-ada"), grade("ada@x.edu")], ExportOptions(gradebook=book))
     assert set(done.left_out) == {"s-ada", "ada@x.edu"}
     assert done.students == 0
 
@@ -223,7 +223,7 @@ def test_moodle_worksheet_is_filled_in_and_otherwise_the_same(tmp_path: Path) ->
         replace(hostile, details={"source": {"platform": "moodle", "id": "502"}}),
         from_platform("moodle", "Else_777", id="777", name="Else"),
     ]
-    done = exported(tmp_path, "moodle", grades, Wanted(gradebook=sheet))
+    done = exported(tmp_path, "moodle", grades, ExportOptions(gradebook=sheet))
     text = Path(done.files[0]).read_text(encoding="utf-8")
     assert text.splitlines()[0] == WORKSHEET.splitlines()[0]
     ada, grace = rows_of(Path(done.files[0]))
@@ -241,7 +241,7 @@ def test_names_are_the_same_however_their_accents_are_written(tmp_path: Path) ->
     book.write_text(
         "Full name,ID number,Assignment: Tracking (Real)\nJos\u00e9 Pe\u00f1a,,-\nJose Pena,,-\n", encoding="utf-8"
     )
-    done = exported(tmp_path, "moodle", [grade("Jose\u0301 Pen\u0303a")], Wanted(gradebook=book))
+    done = exported(tmp_path, "moodle", [grade("Jose\u0301 Pen\u0303a")], ExportOptions(gradebook=book))
     assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["26", "-"]
 
 
@@ -249,7 +249,7 @@ def test_moodle_maximum_grade_is_kept_to(tmp_path: Path) -> None:
     sheet = tmp_path / "worksheet.csv"
     sheet.write_text(WORKSHEET.replace("30.00", "100.00"), encoding="utf-8")
     with pytest.raises(InputError, match="--points 100"):
-        exported(tmp_path, "moodle", [grade("ada@x.edu")], Wanted(gradebook=sheet))
+        exported(tmp_path, "moodle", [grade("ada@x.edu")], ExportOptions(gradebook=sheet))
 
 
 def test_moodle_gradebook_is_filled_in_by_title(tmp_path: Path) -> None:
@@ -258,7 +258,7 @@ def test_moodle_gradebook_is_filled_in_by_title(tmp_path: Path) -> None:
         "First name,Last name,ID number,Email address,Assignment: Tracking (Real),Course total (Real)\n"
         "Ada,Lovelace,s1,ada@x.edu,-,-\nGrace,Hopper,s2,grace@x.edu,-,-\n"
     )
-    done = exported(tmp_path, "moodle", [grade("s2")], Wanted(gradebook=book))
+    done = exported(tmp_path, "moodle", [grade("s2")], ExportOptions(gradebook=book))
     assert [row["Assignment: Tracking (Real)"] for row in rows_of(Path(done.files[0]))] == ["-", "26"]
 
 
@@ -341,7 +341,7 @@ def test_options_are_used_or_refused(to: str, tmp_path: Path) -> None:
     for option, value in (("gradebook", tmp_path / "no.csv"), ("column", "Else"), ("points", 50.0)):
         if option not in uses:
             with pytest.raises(InputError, match=f"--{option} has no meaning for {to}"):
-                export(out, to, None, Wanted(**{option: value}))
+                export(out, to, None, ExportOptions(**{option: value}))
 
 
 def test_refusals(tmp_path: Path) -> None:
@@ -351,15 +351,15 @@ def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="known gradebooks: nbgrader, moodle, moodle-feedback, canvas"):
         export(out, "webct", None, NOTHING)
     with pytest.raises(InputError, match="your own gradebook"):
-        export(out, "canvas", book, Wanted(gradebook=book))
+        export(out, "canvas", book, ExportOptions(gradebook=book))
     for text in ("", "a,b\n1,2\n", "Student,ID,Section\n1,2,3,4,5\n", '"unfinished'):
         book.write_text(text)
         for to in ("canvas", "moodle"):
             with pytest.raises(InputError, match=r"book\.csv"):
-                export(out, to, None, Wanted(gradebook=book))
+                export(out, to, None, ExportOptions(gradebook=book))
     book.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="UTF-8"):
-        export(out, "canvas", None, Wanted(gradebook=book))
+        export(out, "canvas", None, ExportOptions(gradebook=book))
     with pytest.raises(InputError, match=r"rds grade run"):
         export(tmp_path, "nbgrader", None, NOTHING)
     (out / "students/ada/grade.json").write_text("{}")

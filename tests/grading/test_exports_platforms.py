@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from rds.core.errors import InputError
-from rds.grading.exports.exported import Wanted
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.grade import Status
 from tests.grading.grades import grade
 from tests.grading.test_exports import CANVAS, exported, rows_of
@@ -58,7 +58,7 @@ def test_canvas_knows_its_headings_again(people: str, tmp_path: Path) -> None:
     lines += [f'"Lovelace, Ada",101{"," * (count - 1)},,9', f'"Hopper, Grace",102{"," * (count - 1)},,8']
     (tmp_path / "book.csv").write_text("\n".join(lines))
     grades = [grade("Lovelace, Ada"), grade("Hopper, Grace", Status.EXCUSED)]
-    done = exported(tmp_path, "canvas", grades, Wanted(gradebook=tmp_path / "book.csv"))
+    done = exported(tmp_path, "canvas", grades, ExportOptions(gradebook=tmp_path / "book.csv"))
     head, points, ada, grace = csv.reader(io.StringIO(Path(done.files[0]).read_text(), newline=""))
     assert head[_canvas_columns(head) :] == ["Tracking (77)"]  # and nothing that it takes for another assignment
     assert re.fullmatch(r".+ \((\d+)\)", head[-1])  # it knows the assignment by this number
@@ -69,14 +69,14 @@ def test_canvas_knows_its_headings_again(people: str, tmp_path: Path) -> None:
 def test_canvas_would_leave_out_what_is_called_as_its_own_columns(tmp_path: Path) -> None:
     (tmp_path / "book.csv").write_text(CANVAS.replace("Tracking (77)", "Final Score Project (77)"))
     with pytest.raises(InputError, match="leaves out every column with 'Final Score'"):
-        wanted = Wanted(gradebook=tmp_path / "book.csv", column="Final Score Project")
+        wanted = ExportOptions(gradebook=tmp_path / "book.csv", column="Final Score Project")
         exported(tmp_path, "canvas", [grade("s-ada")], wanted)
 
 
 def test_canvas_is_not_taken_to_have_semicolons(tmp_path: Path) -> None:
     """It looks at the first three lines: more cells by semicolons than by commas, in each as many, and it is wrong."""
     (tmp_path / "book.csv").write_text(CANVAS.replace("Tracking (77)", "Track; a; b; c; d; e; f (77)"))
-    wanted = Wanted(gradebook=tmp_path / "book.csv", column="Track; a; b; c; d; e; f (77)")
+    wanted = ExportOptions(gradebook=tmp_path / "book.csv", column="Track; a; b; c; d; e; f (77)")
     done = exported(tmp_path, "canvas", [grade("s-ada")], wanted)
     counts = {len(line.split(";")) for line in Path(done.files[0]).read_text().splitlines()[:3]}
     assert len(counts) > 1
@@ -85,7 +85,7 @@ def test_canvas_is_not_taken_to_have_semicolons(tmp_path: Path) -> None:
 def test_blackboard_between_commas_has_every_cell_in_quotation_marks(tmp_path: Path) -> None:
     heads = '"Last Name","First Name","Username","Tracking [Total Pts: 30 Score] |77"'
     (tmp_path / "down.csv").write_text(f'{heads}\n"Lovelace","Ada","ada",""\n', encoding="utf-8-sig")
-    done = exported(tmp_path, "blackboard", [grade("ada")], wanted=Wanted(tmp_path / "down.csv"))
+    done = exported(tmp_path, "blackboard", [grade("ada")], wanted=ExportOptions(tmp_path / "down.csv"))
     made = Path(done.files[0]).read_text(encoding="utf-8-sig")
     assert made.splitlines() == [heads, '"Lovelace","Ada","ada","26"']
 
@@ -97,7 +97,7 @@ def test_blackboard_gets_its_own_file_back_with_one_column(tmp_path: Path) -> No
     )
     text = f'{heads}\nLovelace\tAda\tada\t501\t""\t5\nBuilder\tBob\tbob\t502\t""\t4\n'
     (tmp_path / "down.xls").write_bytes("\ufeff".encode("utf-16-le") + text.encode("utf-16-le"))
-    done = exported(tmp_path, "blackboard", [grade("ada"), grade("eve")], wanted=Wanted(tmp_path / "down.xls"))
+    done = exported(tmp_path, "blackboard", [grade("ada"), grade("eve")], wanted=ExportOptions(tmp_path / "down.xls"))
     made = Path(done.files[0]).read_bytes().decode("utf-16")
     assert made.splitlines() == [
         "Last Name\tFirst Name\tUsername\tStudent ID\tTracking [Total Pts: 30 Score] |77",
@@ -107,7 +107,9 @@ def test_blackboard_gets_its_own_file_back_with_one_column(tmp_path: Path) -> No
     assert "1 of the gradebook have no grade here, and their cells stay as they are: bob" in done.notes[0]
     assert set(done.left_out) == {"eve"}
     with pytest.raises(InputError, match="give --points 5"):
-        exported(tmp_path / "2", "blackboard", [grade("ada")], wanted=Wanted(tmp_path / "down.xls", column="Other"))
+        exported(
+            tmp_path / "2", "blackboard", [grade("ada")], wanted=ExportOptions(tmp_path / "down.xls", column="Other")
+        )
     with pytest.raises(InputError, match="Work Offline"):
         exported(tmp_path / "3", "blackboard", [grade("ada")])
 
@@ -122,7 +124,7 @@ def test_brightspace_gets_the_columns_of_its_sample(tmp_path: Path) -> None:
     text = f"OrgDefinedId,Username,Email,{item},End-of-Line Indicator\n#501,#ada,ada@example.edu,,#\n"
     text += "#502,#bob,bob@example.edu,7,#\n"
     (tmp_path / "down.csv").write_text(text)
-    done = exported(tmp_path / "2", "brightspace", [grade("ada")], wanted=Wanted(tmp_path / "down.csv"))
+    done = exported(tmp_path / "2", "brightspace", [grade("ada")], wanted=ExportOptions(tmp_path / "down.csv"))
     assert rows_of(Path(done.files[0])) == [
         {"OrgDefinedId": "#501", "Username": "#ada", item: "26", "End-of-Line Indicator": "#"},
         {"OrgDefinedId": "#502", "Username": "#bob", item: "7", "End-of-Line Indicator": "#"},
@@ -130,7 +132,7 @@ def test_brightspace_gets_the_columns_of_its_sample(tmp_path: Path) -> None:
     assert "#bob" in done.notes[0]
     (tmp_path / "down.csv").write_text(text.replace("MaxPoints:30", "MaxPoints:20"))
     with pytest.raises(InputError, match="give --points 20"):
-        exported(tmp_path / "3", "brightspace", [grade("ada")], wanted=Wanted(tmp_path / "down.csv"))
+        exported(tmp_path / "3", "brightspace", [grade("ada")], wanted=ExportOptions(tmp_path / "down.csv"))
 
 
 def test_feedback_goes_back_to_moodle_by_the_participants_number(tmp_path: Path) -> None:
@@ -146,7 +148,7 @@ def test_feedback_goes_back_to_moodle_by_the_participants_number(tmp_path: Path)
     assert "grading worksheet" in done.left_out["bob"]
     heads = "Identifier,Full name,Email address,Grade,Last modified (grade)"
     (tmp_path / "sheet.csv").write_text(f"{heads}\nParticipant 502,Bob,bob,,-\nParticipant 501,Ada,ada,,-\n")
-    wanted = Wanted(tmp_path / "sheet.csv")
+    wanted = ExportOptions(tmp_path / "sheet.csv")
     done = exported(tmp_path / "2", "moodle-feedback", [ada, bob], pages=pages, wanted=wanted)
     with zipfile.ZipFile(done.files[0]) as archive:
         assert [each.split("_")[1] for each in sorted(archive.namelist())] == ["501", "502"]

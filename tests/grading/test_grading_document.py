@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from rds.cli.main import app
 from rds.grading.exports import GRADEBOOKS
-from rds.grading.exports.exported import Wanted
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.grade import Status
 from rds.grading.sandbox import available
 from tests.documents import ROOT, blocks
@@ -24,7 +24,7 @@ TEXT = (ROOT / GUIDE).read_text(encoding="utf-8")
 def test_every_gradebook_option_and_status_is_named() -> None:
     for name in GRADEBOOKS.names():
         assert f"`{name}" in TEXT and f"--to {name}" in TEXT
-    for option in Wanted.__dataclass_fields__:
+    for option in ExportOptions.__dataclass_fields__:
         assert f"`--{option}`" in TEXT
     for status in Status:
         assert str(status) in TEXT

@@ -18,7 +18,7 @@ import pytest
 
 from rds.core.errors import InputError
 from rds.grading.exports.export import export
-from rds.grading.exports.exported import Wanted
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.intake import collect
 from rds.grading.lti.registration import read_registration
 from tests.grading.grades import batch_in, grade
@@ -178,7 +178,7 @@ def test_a_student_hands_in_from_the_course_and_the_points_go_back(course: Cours
     assert row.read() == b"x = 1\r\n" and row.time is not None
     ada = grade(row.student)
     out = batch_in(course.folder / "out", [ada, grade("eve")])
-    done = export(out, "lti", None, Wanted(course.folder, points=60.0))
+    done = export(out, "lti", None, ExportOptions(course.folder, points=60.0))
     (score,) = course.platform.scores
     assert (score["scoreGiven"], score["scoreMaximum"], score["userId"]) == (52.0, 60.0, "user-7")
     assert done.students == 1 and set(done.left_out) == {"eve"}

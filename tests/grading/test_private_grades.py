@@ -14,7 +14,7 @@ from rds.grading.assignment.assignment import read_assignment
 from rds.grading.assignment.hand_out import hand_out
 from rds.grading.batch.run import run_batch
 from rds.grading.exports.export import export
-from rds.grading.exports.exported import Wanted
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.sandbox import available
 from rds.modes.loop.plan import load
 from tests.grading.batches import ASSIGNMENT, law, put
@@ -40,8 +40,8 @@ def test_a_batch_and_what_is_made_of_it(monkeypatch: pytest.MonkeyPatch, tmp_pat
                 found.extend(seen_by_another(made))
 
         run_batch(tmp_path / "task", tmp_path / "in", place / "out", jobs=1, progress=look)
-        export(place / "out", "nbgrader", place / "scores.csv", Wanted(None, None, None))
-        export(place / "out", "gradescope", None, Wanted(None, None, None))
+        export(place / "out", "nbgrader", place / "scores.csv", ExportOptions(None, None, None))
+        export(place / "out", "gradescope", None, ExportOptions(None, None, None))
         hand_out(read_assignment(tmp_path / "task"), place / "copies" / "first")
         look(0, 0)
         assert found == []

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from rds.cli.main import app
 from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
-from rds.grading.assignment.late_rules import Late
+from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.finished import read_finished
 from rds.grading.course.class_list import ClassList, Member
 from rds.grading.feedback.feedback import feedback_page
@@ -27,7 +27,7 @@ from rds.grading.review.say import marks_table, read_marks, say
 from tests.grading.grades import batch_in, grade, score
 from tests.grading.made import RMS, SINE, assignment_in
 
-LATE = Late(percent_per_day=10.0, free_days=2)
+LATE = LateRules(percent_per_day=10.0, free_days=2)
 HEAD = 'title = "Tracking"\nkind = "controller"\nsecret = "not told to anybody"\n'
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.core.toml_table import TomlTable
 from rds.grading.assignment.assignment_file import ASSIGNMENT, READERS
-from rds.grading.assignment.late_rules import Late, read_late
+from rds.grading.assignment.late_rules import LateRules, read_late_rules
 from rds.grading.assignment.seeds import student_seed
 from rds.grading.cases.case import Case
 from rds.grading.cases.words import inside
@@ -45,7 +45,7 @@ class Assignment:
     self_check: str
     feedback: str  # what a feedback page shows: what is visible, or what is hidden as well
     limits: Limits
-    late: Late
+    late: LateRules
     cases: tuple[Case, ...]
     criteria: tuple[Criterion, ...]
     solution: str | None
@@ -99,7 +99,7 @@ def read_assignment(path: str | Path) -> Assignment:
         self_check=words.read("self_check"),
         feedback=words.read("feedback"),
         limits=_limits(words.inner("limits")),
-        late=read_late(words.inner("late")),
+        late=read_late_rules(words.inner("late")),
         cases=tuple(cases.values()),
         criteria=criteria,
         hidden=_hidden(words.inner("hidden")),

@@ -13,7 +13,7 @@ _DAY = 86_400.0  # s
 
 
 @dataclass(frozen=True)
-class Late:
+class LateRules:
     """Each day that has begun after `due` and the hours of grace costs `percent_per_day` of the points earned.
 
     The loss is at most `cap_percent`. After `zero_after_days` days nothing is left. Within the grace nothing is lost;
@@ -54,10 +54,10 @@ def days_late(due: datetime | None, submitted: datetime | None) -> float:
     return max(0.0, (submitted - due).total_seconds() / _DAY)
 
 
-def read_late(words: TomlTable | None) -> Late:
+def read_late_rules(words: TomlTable | None) -> LateRules:
     """The table `[late]`; without one nothing is lost. InputError for a word or value that will not do."""
     if words is None:
-        return Late()
-    late = Late(**{key: words.read(key) for key in Late.__dataclass_fields__})
+        return LateRules()
+    late = LateRules(**{key: words.read(key) for key in LateRules.__dataclass_fields__})
     words.done()
     return late

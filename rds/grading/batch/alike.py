@@ -34,7 +34,7 @@ _RECORD, _STUDENTS = "batch.json", "students"
 
 
 @dataclass(frozen=True)
-class Alike:
+class SimilarityReport:
     """What was found. Names of others are those of their folders: "2024/ada"."""
 
     pairs: list[Pair] = field(default_factory=list)
@@ -68,7 +68,7 @@ def alike(
     against: Sequence[Path],
     jobs: int | None,
     scheduler: str | Scheduler | None = None,
-) -> Alike:
+) -> SimilarityReport:
     """All that is alike among `rows`, and between them and the files of `against`."""
     given = [(each.row.student, each.code) for each in rows if each.code]
     own = {
@@ -87,7 +87,7 @@ def alike(
     template = sources.pop(assignment.template or "", {})
     earlier = dict(zip(others, done[len(given) + len(parsed) :], strict=False))
     behaviours = {student: _behaviour(grade) for student, grade in grades.items()}
-    return Alike(
+    return SimilarityReport(
         similar_pairs(found, [template], sources, earlier),
         identical_files(given, own | others),
         same_loops(behaviours, _run(assignment, others, jobs, scheduler) | _solution(assignment, grades)),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.core.errors import InputError
-from rds.grading.assignment.late_rules import Late
+from rds.grading.assignment.late_rules import LateRules
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.course.class_list import ClassList, read_class_list
 from rds.grading.grade import Grade, Status
@@ -120,10 +120,10 @@ def read_finished(folder: str | Path) -> Finished:
     )
 
 
-def late_rules(record: Mapping[str, Any]) -> Late:
+def late_rules(record: Mapping[str, Any]) -> LateRules:
     """What the batch's record says of late submissions. InputError for words that this version does not know."""
     try:
-        return Late(**record.get("late", {}))
+        return LateRules(**record.get("late", {}))
     except TypeError as error:
         raise InputError(f"its late rules are of another version ({error}); grade into a new folder", RECORD) from error
 

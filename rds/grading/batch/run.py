@@ -16,7 +16,7 @@ from rds.core.parallel import Outcome, Scheduler, processors, spread
 from rds.core.parallel.process import WorkerProcess
 from rds.core.parallel.spread import Progress
 from rds.grading.assignment.assignment import Assignment, read_assignment
-from rds.grading.assignment.late_rules import Late
+from rds.grading.assignment.late_rules import LateRules
 from rds.grading.batch.alike import alike
 from rds.grading.batch.journal import FILE as JOURNAL
 from rds.grading.batch.journal import Journal
@@ -42,7 +42,7 @@ _LONGEST = 2.0 * (1.0 + 10.0)  # times the limits: where all is visible and wher
 
 
 @dataclass(frozen=True)
-class How:
+class BatchOptions:
     """How a batch is graded, whatever it is. `announce` gets sentences for whoever watches."""
 
     jobs: int | None = None  # local processes; default: one for each processor
@@ -58,17 +58,17 @@ class How:
 def run_batch(assignment: str | Path, submissions: str | Path, out: str | Path, **how: Any) -> BatchOutcome:
     """Grade all `submissions` (a folder or an exported zip) by the assignment in a folder, into the folder `out`.
 
-    `how` are the fields of `How`. Each finished submission is in the journal of `out` before the next is: `resume` goes
-    on after a kill at any point, with the same scores. What a submission does is in its row. Raises InputError for what
-    will not do, with nothing graded; also where the sandbox does not hold.
+    `how` are the fields of `BatchOptions`. Each finished submission is in the journal of `out` before the next is:
+    `resume` goes on after a kill at any point, with the same scores. What a submission does is in its row.
+    Raises InputError for what will not do, with nothing graded; also where the sandbox does not hold.
     """
     read = read_assignment(assignment)
     names = (read.title, read.folder.resolve().name)
     zone = read.due.tzinfo if read.due else None
-    return grade_all(read, lambda: collect(submissions, read.files, names, zone), Path(out), How(**how))
+    return grade_all(read, lambda: collect(submissions, read.files, names, zone), Path(out), BatchOptions(**how))
 
 
-def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how: How) -> BatchOutcome:
+def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how: BatchOptions) -> BatchOutcome:
     """As `run_batch`, whatever was handed in comes from; it is asked for when all else is known to be in order."""
     began = time.monotonic()
     _check_free(out, how.resume)
@@ -123,7 +123,7 @@ def _unlisted(listed: ClassList, intake: Intake) -> list[str]:
 def _untimed(assignment: Assignment, intake: Intake) -> list[str]:
     """That lateness costs points, and that nobody knows when some have handed in."""
     unknown = [row.student for row in intake.rows if row.time is None]
-    if assignment.due is None or assignment.late == Late() or not unknown:
+    if assignment.due is None or assignment.late == LateRules() or not unknown:
         return []
     return [
         f"when they handed in is not known of {len(unknown)} of {len(intake.rows)} submissions, so nothing is deducted "
@@ -131,7 +131,7 @@ def _untimed(assignment: Assignment, intake: Intake) -> list[str]:
     ]
 
 
-def _check_sandbox(how: How) -> None:
+def _check_sandbox(how: BatchOptions) -> None:
     """InputError where submissions cannot be run, before anything is written."""
     if how.scheduler is None:
         if fault := available() if how.first is None else fault_of(how.first):
@@ -168,7 +168,7 @@ def _is_empty_journal(path: Path) -> bool:
 class _Batch:
     """Rows, and what the journal says of them."""
 
-    def __init__(self, assignment: Assignment, rows: Sequence[Queued], journal: Journal, how: How):
+    def __init__(self, assignment: Assignment, rows: Sequence[Queued], journal: Journal, how: BatchOptions):
         self._assignment, self._journal, self._how = assignment, journal, how
         self._rows = {each.row.student: each for each in rows}
         self._grades = {row["student"]: Grade.from_json(row["grade"]) for row in journal.rows}

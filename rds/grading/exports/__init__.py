@@ -3,7 +3,7 @@
 - `FILE`: what is written if nobody says otherwise, counted from the batch's folder: a file, or a folder without an end;
 - `export(finished, wanted) -> Exported`.
 
-`wanted` are `Wanted`; an option that a gradebook has no use for is refused by the module's `USES`.
+`wanted` are `ExportOptions`; an option that a gradebook has no use for is refused by the module's `USES`.
 """
 
 from __future__ import annotations

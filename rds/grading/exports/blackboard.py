@@ -11,7 +11,7 @@ import re
 
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source, unknown
 
 FILE = "blackboard.xls"
@@ -24,7 +24,7 @@ _KEYS = (
 )
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """The file to upload. InputError without a download, or where its column has other points."""
     wanted.refuse_all_but(USES, "blackboard")
     if wanted.gradebook is None:
@@ -48,7 +48,7 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     return Exported({FILE: made.to_bytes()}, unmatched, unknown(sheet, found, "Username"), len(found))
 
 
-def _column(sheet: Sheet, name: str, wanted: Wanted) -> int:
+def _column(sheet: Sheet, name: str, wanted: ExportOptions) -> int:
     """The assignment's column, which must have its number."""
     found = [
         (place, match)
@@ -62,7 +62,7 @@ def _column(sheet: Sheet, name: str, wanted: Wanted) -> int:
     return found[0][0]
 
 
-def _check_points(heading: str, finished: Finished, factor: float, wanted: Wanted) -> None:
+def _check_points(heading: str, finished: Finished, factor: float, wanted: ExportOptions) -> None:
     match = _COLUMN.fullmatch(heading)
     number = re.match(r"[0-9]+(?:[.,][0-9]+)?", match["points"]) if match else None
     if number is None:  # "up to 40 Score" of calculated columns, and letters, say no points

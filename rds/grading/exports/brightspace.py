@@ -11,7 +11,7 @@ import re
 
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import Key, Sheet, find, read_sheet, source, unknown
 
 FILE = "brightspace.csv"
@@ -33,7 +33,7 @@ _KEYS = (
 )
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """The file. InputError for a gradebook that is none of Brightspace's, or whose item has other points."""
     wanted.refuse_all_but(USES, "brightspace")
     factor, item = scale(finished, wanted.points), wanted.column or finished.title
@@ -63,7 +63,7 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     return Exported({FILE: made.to_bytes()}, unmatched, notes, len(found))
 
 
-def _heading(sheet: Sheet, item: str, finished: Finished, factor: float, wanted: Wanted) -> str:
+def _heading(sheet: Sheet, item: str, finished: Finished, factor: float, wanted: ExportOptions) -> str:
     """The item's column as Brightspace wrote it, if it is there and its points are ours."""
     for name in sheet.columns:
         found = _ITEM.fullmatch(name)

@@ -10,7 +10,7 @@ import re
 
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source, unknown
 
 FILE = "canvas.csv"
@@ -28,7 +28,7 @@ _KEYS = (
 )
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """The file to import. InputError without a gradebook, or where its points are others."""
     wanted.refuse_all_but(USES, "canvas")
     if wanted.gradebook is None:
@@ -68,7 +68,7 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     return Exported({FILE: made.to_bytes()}, unmatched, notes + unknown(people, points, "Student"), len(found))
 
 
-def _column(sheet: Sheet, name: str, wanted: Wanted) -> int | None:
+def _column(sheet: Sheet, name: str, wanted: ExportOptions) -> int | None:
     """The assignment's column; Canvas writes its number behind the title: "Tracking (1234)"."""
     found = [
         place
@@ -102,7 +102,9 @@ def _head_cell(row: list[str], at: int | None, finished: Finished, factor: float
     return scaled(finished.max_score, factor) if _is_points(row) else ""
 
 
-def _check_points(finished: Finished, head: list[list[str]], at: int | None, factor: float, wanted: Wanted) -> None:
+def _check_points(
+    finished: Finished, head: list[list[str]], at: int | None, factor: float, wanted: ExportOptions
+) -> None:
     for row in head:
         if at is None or not _is_points(row):
             continue

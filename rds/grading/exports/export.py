@@ -12,7 +12,7 @@ from rds.core.atomic import write_files
 from rds.core.errors import InputError
 from rds.grading.batch.finished import read_finished
 from rds.grading.exports import GRADEBOOKS
-from rds.grading.exports.exported import Wanted
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.exports.one_json import NAME
 from rds.grading.feedback.plain_text import one_line
 
@@ -32,7 +32,7 @@ class Written:
         return asdict(self)
 
 
-def export(out: Path, to: str, file: Path | None, wanted: Wanted) -> Written:
+def export(out: Path, to: str, file: Path | None, wanted: ExportOptions) -> Written:
     """Write the grades in the folder `out` for the gradebook `to`, into `file` (default: a place of its own in `out`).
 
     Files appear whole or not at all. InputError for a folder that is no batch's, a name that is no gradebook, an

@@ -11,7 +11,7 @@ from rds.grading.batch.finished import Finished
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExportOptions:
     """What the instructor says. None: nothing."""
 
     gradebook: Path | None = None  # the instructor's own, as it was downloaded

@@ -11,7 +11,7 @@ from typing import Any
 
 from rds.grading.batch.finished import Finished
 from rds.grading.exports import one_json
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.pictures import Picture
 from rds.grading.exports.said import of_criterion, of_grade, printed
 from rds.grading.grade import Band, CriterionScore, Grade, Status
@@ -20,7 +20,7 @@ FILE = "gradescope"
 USES = ("points",)
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """A folder for each student with `results.json`."""
     wanted.refuse_all_but(USES, "gradescope")
     factor = scale(finished, wanted.points)

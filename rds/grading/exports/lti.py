@@ -12,7 +12,7 @@ from typing import Any
 from rds.core.errors import InputError
 from rds.core.extras import needed_for
 from rds.grading.batch.finished import Finished
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import source
 from rds.grading.exports.said import of_grade
 from rds.grading.grade import Grade
@@ -24,7 +24,7 @@ USES = ("gradebook", "points")
 _SCORE = "https://purl.imsglobal.org/spec/lti-ags/scope/score"
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """Send all points, one after the other; nothing is written here. InputError where the platform cannot be asked."""
     wanted.refuse_all_but(USES, "lti")
     folder = wanted.gradebook

@@ -10,7 +10,7 @@ from __future__ import annotations
 from rds.core.errors import InputError
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import csv_text
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import Key, Sheet, find, letters, platform, read_sheet, source, unknown
 from rds.grading.exports.said import comment
 from rds.grading.grade import Grade
@@ -27,7 +27,7 @@ KEYS = (
 )
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """The filled-in file. InputError where it is neither a worksheet nor a gradebook of Moodle."""
     wanted.refuse_all_but(USES, "moodle")
     if wanted.gradebook is None:
@@ -54,7 +54,7 @@ def export(finished: Finished, wanted: Wanted) -> Exported:
     return Exported({FILE: sheet.to_bytes()}, unmatched, unknown(sheet, found, name), len(found))
 
 
-def _column(sheet: Sheet, finished: Finished, wanted: Wanted, is_worksheet: bool) -> int:
+def _column(sheet: Sheet, finished: Finished, wanted: ExportOptions, is_worksheet: bool) -> int:
     """Where the points go. Moodle heads an assignment's column "Assignment: TITLE (Real)"."""
     if is_worksheet and wanted.column is None:
         at = sheet.at("Grade")
@@ -77,7 +77,7 @@ def _column(sheet: Sheet, finished: Finished, wanted: Wanted, is_worksheet: bool
     return alike[0]
 
 
-def _check_points(finished: Finished, sheet: Sheet, row: list[str], factor: float, wanted: Wanted) -> None:
+def _check_points(finished: Finished, sheet: Sheet, row: list[str], factor: float, wanted: ExportOptions) -> None:
     """Moodle refuses grades above its maximum."""
     at = sheet.at("Maximum Grade")
     if at is None or not row[at].strip():
@@ -94,7 +94,7 @@ def _check_points(finished: Finished, sheet: Sheet, row: list[str], factor: floa
         )
 
 
-def _plain(finished: Finished, wanted: Wanted) -> Exported:
+def _plain(finished: Finished, wanted: ExportOptions) -> Exported:
     factor = scale(finished, wanted.points)
     rows = [_plain_row(grade, factor) for grade in finished.to_hand_on if _ESCAPE not in grade.student]
     odd = [grade.student for grade in finished.to_hand_on if _ESCAPE in grade.student]

@@ -11,7 +11,7 @@ import zipfile
 
 from rds.core.errors import InputError
 from rds.grading.batch.finished import FEEDBACK, Finished
-from rds.grading.exports.exported import Exported, Wanted
+from rds.grading.exports.exported import Exported, ExportOptions
 from rds.grading.exports.moodle import KEYS
 from rds.grading.exports.roster import find, platform, read_sheet, source
 from rds.grading.grade import Grade
@@ -21,7 +21,7 @@ USES = ("gradebook",)
 _STAMP = (2000, 1, 1, 0, 0, 0)  # the same file for the same pages
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """One zip. InputError where the gradebook is no grading worksheet."""
     wanted.refuse_all_but(USES, "moodle-feedback")
     numbers = {grade.student: "".join(platform(grade, "moodle", "id")) for grade in finished.grades}

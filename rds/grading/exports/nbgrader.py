@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import csv_text
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.nbgrader_gradebook import assignment_name, into_gradebook, naive_utc
 from rds.grading.exports.roster import source
 from rds.grading.grade import Grade
@@ -29,7 +29,7 @@ COLUMNS = (
 )
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """`grades.csv`; or nothing but the changed database, if one is named."""
     wanted.refuse_all_but(USES, "nbgrader")
     if wanted.gradebook is not None:

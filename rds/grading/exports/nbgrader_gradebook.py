@@ -15,14 +15,14 @@ from rds.core.errors import InputError
 from rds.core.installed import pip_install
 from rds.grading.batch.finished import Finished
 from rds.grading.batch.grades_table import criteria_of
-from rds.grading.exports.exported import Exported, Wanted, scale, scaled
+from rds.grading.exports.exported import Exported, ExportOptions, scale, scaled
 from rds.grading.exports.roster import platform
 from rds.grading.grade import Grade
 
 NOTEBOOK = "rds"
 
 
-def into_gradebook(finished: Finished, wanted: Wanted) -> Exported:
+def into_gradebook(finished: Finished, wanted: ExportOptions) -> Exported:
     """Write the grades into the database `wanted.gradebook`, under the assignment `wanted.column`.
 
     By default that is called as in nbgrader's folders, else by the title.
@@ -50,7 +50,7 @@ def into_gradebook(finished: Finished, wanted: Wanted) -> Exported:
         raise InputError(f"nbgrader cannot write into it: {type(error).__name__}: {error}", str(path)) from error
 
 
-def _write(gradebook: Any, finished: Finished, wanted: Wanted) -> Exported:
+def _write(gradebook: Any, finished: Finished, wanted: ExportOptions) -> Exported:
     name, factor = assignment_name(finished, wanted), scale(finished, wanted.points)
     due = naive_utc(finished.due)
     gradebook.update_or_create_assignment(name, **({"duedate": due} if due else {}))
@@ -104,7 +104,7 @@ def _notebook(gradebook: Any, assignment: str, student: str) -> Any:
     return notebook
 
 
-def assignment_name(finished: Finished, wanted: Wanted) -> str:
+def assignment_name(finished: Finished, wanted: ExportOptions) -> str:
     """The instructor's word, else the name in nbgrader's folders from which the submissions came, else the title."""
     names = {name for grade in finished.grades for name in platform(grade, "nbgrader", "assignment")}
     return wanted.column or (names.pop() if len(names) == 1 else finished.title)

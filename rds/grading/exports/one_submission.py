@@ -26,7 +26,7 @@ from rds.grading.batch.run import run_batch
 from rds.grading.batch.scratch import scratch
 from rds.grading.exports import GRADEBOOKS
 from rds.grading.exports.export import export
-from rds.grading.exports.exported import Wanted
+from rds.grading.exports.exported import ExportOptions
 from rds.grading.grade import Grade, Status
 from rds.grading.intake.layouts import TIMES
 
@@ -88,7 +88,7 @@ def _grade(container: Container, platform: str, root: Path, target: Path) -> Non
             with open_private(work / "submissions" / TIMES, "w", newline="", encoding="utf-8") as stream:
                 csv.writer(stream).writerows([["student", "timestamp"], [student, time]])
         run_batch(root / container.assignment, work / "submissions", work / "out", jobs=1)
-        export(work / "out", platform, target, Wanted())
+        export(work / "out", platform, target, ExportOptions())
 
 
 def _copied(source: str, target: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from rds.grading.batch.finished import Finished
 from rds.grading.exports import one_json
-from rds.grading.exports.exported import Exported, Wanted
+from rds.grading.exports.exported import Exported, ExportOptions
 from rds.grading.exports.pictures import Picture
 from rds.grading.exports.said import of_criterion, of_grade, printed
 from rds.grading.feedback.plain_text import one_line
@@ -17,7 +17,7 @@ FILE = "prairielearn"
 _NOT_GRADABLE = (Status.MISSING, Status.REFUSED, Status.FAILED_TO_LOAD, Status.GRADER_ERROR)
 
 
-def export(finished: Finished, wanted: Wanted) -> Exported:
+def export(finished: Finished, wanted: ExportOptions) -> Exported:
     """A folder for each student with `results.json`."""
     wanted.refuse_all_but((), "prairielearn")
     return one_json.each_student(finished, results)

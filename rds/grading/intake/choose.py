@@ -8,35 +8,35 @@ from datetime import UTC, datetime
 
 from rds.grading.intake.archives import files_in_own
 from rds.grading.intake.items import Item, Refusal
-from rds.grading.intake.layouts import Heap
+from rds.grading.intake.layouts import StudentFiles
 from rds.grading.intake.names import shown
 
 _AGAIN = re.compile(r"(?P<stem>.+?)(?:-(?P<dash>\d{1,4})| ?\((?P<paren>\d{1,4})\))(?P<end>\.\w+)", re.DOTALL)
 _BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
 
 
-class Nothing(Exception):
+class NothingToGrade(Exception):
     """There is no file to grade: the reason."""
 
 
-def chosen(heap: Heap, accepted: Sequence[str]) -> Item:
-    """The file of `heap` to grade: of a name in `accepted`, best first; else the only one there is.
+def chosen(handed: StudentFiles, accepted: Sequence[str]) -> Item:
+    """The file of `handed` to grade: of a name in `accepted`, best first; else the only one there is.
 
     Nothing if there is none; Refusal if what there is may not be opened, or it cannot be told which one is meant.
     """
-    files = _with_unpacked(heap.items)
+    files = _with_unpacked(handed.items)
     if not files:
-        raise Nothing("nothing was handed in")
+        raise NothingToGrade("nothing was handed in")
     candidates = [item for item in files if item.is_code]
     if not candidates:
         if fault := next((item.fault for item in files if item.fault), ""):
             raise Refusal(fault)
         names = ", ".join(sorted(shown(item.name) for item in files)[:5])
-        raise Nothing(f"there is no .py or .ipynb file in what was handed in ({names})")
+        raise NothingToGrade(f"there is no .py or .ipynb file in what was handed in ({names})")
     outermost = min(len(item.parts) for item in candidates)
     named = [item for item in candidates if _name(item)[0] in accepted]
     among = named or [item for item in candidates if len(item.parts) == outermost]
-    keys = {id(item): _rank(item, heap, accepted) for item in among}
+    keys = {id(item): _rank(item, handed, accepted) for item in among}
     best = max(keys.values())
     found = [item for item in among if keys[id(item)] == best]
     if len(found) > 1:
@@ -44,7 +44,7 @@ def chosen(heap: Heap, accepted: Sequence[str]) -> Item:
         raise Refusal(f"{len(found)} files could be meant ({names}); hand in one")
     if len(among) > 1:
         others = ", ".join(sorted(shown("/".join(item.parts)) for item in among if item is not found[0])[:5])
-        heap.notes.append(f"{shown('/'.join(found[0].parts))} is graded, and not {others}")
+        handed.notes.append(f"{shown('/'.join(found[0].parts))} is graded, and not {others}")
     if found[0].fault:
         raise Refusal(found[0].fault)
     return found[0]
@@ -67,9 +67,9 @@ def _name(item: Item) -> tuple[str, int]:
     return (item.name, 0) if found is None else (found["stem"] + found["end"], int(found["dash"] or found["paren"]))
 
 
-def _rank(item: Item, heap: Heap, accepted: Sequence[str]) -> tuple[datetime, int, int]:
+def _rank(item: Item, handed: StudentFiles, accepted: Sequence[str]) -> tuple[datetime, int, int]:
     """Newer first; then the number of the attempt; then the better name."""
     name, number = _name(item)
-    when = item.time if heap.has_times and item.time is not None else _BEFORE_ALL
+    when = item.time if handed.has_times and item.time is not None else _BEFORE_ALL
     place = accepted.index(name) if name in accepted else len(accepted)
     return when if when.tzinfo else when.replace(tzinfo=UTC), number, -place

@@ -28,7 +28,7 @@ _CANVAS = re.compile(r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<id>\d+)_(?P<number>\d
 
 
 @dataclass
-class Heap:
+class StudentFiles:
     """All files of one student. `source` is what the export says of the student, for the gradebook's sake."""
 
     student: str
@@ -41,16 +41,16 @@ class Heap:
 
 @dataclass
 class Layout:
-    """The heaps, in the order of the students' names, and what belongs to nobody."""
+    """The files of each student, in the order of the students' names, and what belongs to nobody."""
 
     name: str
-    heaps: list[Heap]
+    by_student: list[StudentFiles]
     times: Item | None = None
     ignored: tuple[str, ...] = ()
 
 
 def sorted_out(items: Sequence[Item], folders: Sequence[str], assignments: Sequence[str], zipped: bool) -> Layout:
-    """The files as heaps of students. `assignments` are names by which nbgrader may know the assignment.
+    """The files by student. `assignments` are names by which nbgrader may know the assignment.
 
     `zipped`: whether they are in an export, whose times are the learning platform's. InputError if there are several
     assignments and none has such a name.
@@ -58,63 +58,63 @@ def sorted_out(items: Sequence[Item], folders: Sequence[str], assignments: Seque
     items, folders = _without_root(items, folders)
     times = next((item for item in items if item.parts == (TIMES,)), None)
     items = [item for item in items if item is not times]
-    sheaf = _Sheaf(zipped)
+    sorting = _Sorting(zipped)
     metadata = next((item for item in items if item.parts == (METADATA,)), None)
     if metadata is not None:
         submitters = read_metadata(metadata.read(_METADATA_LARGEST))
         for item in items:
             if item is not metadata:
-                sheaf.gradescope(item, submitters)
+                sorting.gradescope(item, submitters)
         for name in folders:
-            sheaf.heap_of_gradescope(name, submitters)
-        return sheaf.layout("gradescope", times)
+            sorting.files_of_gradescope(name, submitters)
+        return sorting.layout("gradescope", times)
     if _mostly(items, lambda item: _MOODLE.fullmatch(item.parts[0])):
         for item in items:
-            sheaf.moodle(item)
+            sorting.moodle(item)
         for name in folders:
-            sheaf.heap_of_moodle(name)
-        return sheaf.layout("moodle", times)
+            sorting.files_of_moodle(name)
+        return sorting.layout("moodle", times)
     if _mostly(items, lambda item: len(item.parts) == 1 and _CANVAS.fullmatch(item.name)):
         for item in items:
-            sheaf.canvas(item)
-        return sheaf.layout("canvas", times)
+            sorting.canvas(item)
+        return sorting.layout("canvas", times)
     if _is_nbgrader(items, assignments):
         name = _assignment(items, assignments)
         for item in items:
-            sheaf.nbgrader(item, name)
+            sorting.nbgrader(item, name)
         for student in folders:
-            sheaf.heap(student)
-        return sheaf.layout("nbgrader", times)
+            sorting.files_of(student)
+        return sorting.layout("nbgrader", times)
     for item in items:
-        sheaf.plain(item)
+        sorting.plain(item)
     for student in folders:
-        sheaf.heap(student)
-    return sheaf.layout("folders and files", times)
+        sorting.files_of(student)
+    return sorting.layout("folders and files", times)
 
 
-class _Sheaf:
-    """Heaps being made."""
+class _Sorting:
+    """The files by student while they are being sorted."""
 
     def __init__(self, zipped: bool):
         self._zipped = zipped
-        self._heaps: dict[str, Heap] = {}
+        self._by_student: dict[str, StudentFiles] = {}
         self._ignored: list[str] = []
 
     def layout(self, name: str, times: Item | None) -> Layout:
-        heaps = sorted(self._heaps.values(), key=lambda heap: heap.student)
-        return Layout(name, heaps, times, tuple(self._ignored))
+        by_student = sorted(self._by_student.values(), key=lambda handed: handed.student)
+        return Layout(name, by_student, times, tuple(self._ignored))
 
-    def heap(self, student: str, **source: Any) -> Heap:
+    def files_of(self, student: str, **source: Any) -> StudentFiles:
         student = shown(student)
-        return self._heaps.setdefault(student, Heap(student, source=source))
+        return self._by_student.setdefault(student, StudentFiles(student, source=source))
 
     def plain(self, item: Item) -> None:
         """A file in a student's folder, or one that is called like its student."""
         if len(item.parts) > 1:
-            self.heap(item.parts[0]).items.append(replace(item, parts=item.parts[1:]))
+            self.files_of(item.parts[0]).items.append(replace(item, parts=item.parts[1:]))
         elif item.is_code or item.is_archive or item.fault:
             stem = item.name[: item.name.rindex(".")] if item.is_code or item.is_archive else item.name
-            self.heap(stem or item.name).items.append(item)
+            self.files_of(stem or item.name).items.append(item)
         else:
             self._ignored.append(shown(item.name))
 
@@ -124,21 +124,23 @@ class _Sheaf:
             if len(item.parts) == 1:
                 self._ignored.append(shown(item.name))
             return
-        heap = self.heap(item.parts[0], platform="nbgrader", assignment=shown(assignment))
-        heap.source.update(platform="nbgrader", assignment=shown(assignment))
+        handed = self.files_of(item.parts[0], platform="nbgrader", assignment=shown(assignment))
+        handed.source.update(platform="nbgrader", assignment=shown(assignment))
         inner = replace(item, parts=item.parts[2:])
         if inner.parts == (STAMP,):
-            heap.stamp = inner
+            handed.stamp = inner
         else:
-            heap.items.append(inner)
+            handed.items.append(inner)
 
-    def heap_of_moodle(self, name: str) -> Heap:
+    def files_of_moodle(self, name: str) -> StudentFiles:
         found = _MOODLE.fullmatch(name)
         if found is None:
-            return self.heap(name)
-        heap = self.heap(f"{found['name']}_{found['id']}", platform="moodle", name=shown(found["name"]), id=found["id"])
-        heap.has_times = self._zipped
-        return heap
+            return self.files_of(name)
+        handed = self.files_of(
+            f"{found['name']}_{found['id']}", platform="moodle", name=shown(found["name"]), id=found["id"]
+        )
+        handed.has_times = self._zipped
+        return handed
 
     def moodle(self, item: Item) -> None:
         found, inside = _MOODLE.fullmatch(item.parts[0]), len(item.parts) > 1
@@ -146,33 +148,35 @@ class _Sheaf:
             self.plain(item)
             return
         parts = item.parts[1:] if inside else (str(found["file"]),)  # type: ignore[index]
-        self.heap_of_moodle(item.parts[0]).items.append(replace(item, parts=parts))
+        self.files_of_moodle(item.parts[0]).items.append(replace(item, parts=parts))
 
     def canvas(self, item: Item) -> None:
         found = _CANVAS.fullmatch(item.name) if len(item.parts) == 1 else None
         if found is None:
             self.plain(item)
             return
-        heap = self.heap(f"{found['name']}_{found['id']}", platform="canvas", name=shown(found["name"]), id=found["id"])
-        if found["late"] and not heap.notes:
-            heap.notes.append(f"Canvas marks it as late, and not by how much; {TIMES} beside the files can say when")
-        heap.items.append(replace(item, parts=(found["file"],)))
+        handed = self.files_of(
+            f"{found['name']}_{found['id']}", platform="canvas", name=shown(found["name"]), id=found["id"]
+        )
+        if found["late"] and not handed.notes:
+            handed.notes.append(f"Canvas marks it as late, and not by how much; {TIMES} beside the files can say when")
+        handed.items.append(replace(item, parts=(found["file"],)))
 
-    def heap_of_gradescope(self, folder: str, submitters: dict[str, Submitter]) -> Heap:
+    def files_of_gradescope(self, folder: str, submitters: dict[str, Submitter]) -> StudentFiles:
         who = submitters.get(folder)
         if who is None:
-            return self.heap(folder)
-        return self.heap(who.student, platform="gradescope", **who.source)
+            return self.files_of(folder)
+        return self.files_of(who.student, platform="gradescope", **who.source)
 
     def gradescope(self, item: Item, submitters: dict[str, Submitter]) -> None:
         if len(item.parts) == 1:
             self.plain(item)
             return
         who = submitters.get(item.parts[0])
-        heap = self.heap_of_gradescope(item.parts[0], submitters)
-        heap.has_times |= who is not None
+        handed = self.files_of_gradescope(item.parts[0], submitters)
+        handed.has_times |= who is not None
         when = None if who is None else who.time
-        heap.items.append(replace(item, parts=item.parts[1:], time=when))
+        handed.items.append(replace(item, parts=item.parts[1:], time=when))
 
 
 def _without_root(items: Sequence[Item], folders: Sequence[str]) -> tuple[list[Item], list[str]]:

@@ -17,10 +17,10 @@ from rds.core.errors import InputError
 from rds.grading.grade import Status
 from rds.grading.intake import notebooks
 from rds.grading.intake.archives import files_in
-from rds.grading.intake.choose import Nothing, chosen
+from rds.grading.intake.choose import NothingToGrade, chosen
 from rds.grading.intake.folders import files_below, read_regular
 from rds.grading.intake.items import CODE, Item, Refusal
-from rds.grading.intake.layouts import Heap, sorted_out
+from rds.grading.intake.layouts import StudentFiles, sorted_out
 from rds.grading.intake.names import shown
 from rds.grading.intake.times import listed_times, stamped_time, with_zone
 from rds.grading.sandbox.submission import LARGEST
@@ -81,10 +81,10 @@ def collect(
     else:
         raise InputError("is no folder, no .zip and no submission; name where the submissions are", str(path))
     layout = sorted_out(items, folders, assignments, zipped)
-    if not layout.heaps:
+    if not layout.by_student:
         raise InputError("holds no submissions: no .py, no .ipynb and no folder of a student", str(path))
     listed = listed_times(layout, zone)
-    rows = tuple(_row(heap, accepted, listed.get(heap.student), zone) for heap in layout.heaps)
+    rows = tuple(_row(handed, accepted, listed.get(handed.student), zone) for handed in layout.by_student)
     return Intake(layout.name, rows, layout.ignored)
 
 
@@ -92,20 +92,20 @@ def _single(path: Path) -> Item:
     return Item((path.name,), lambda most: read_regular(path, most))
 
 
-def _row(heap: Heap, accepted: Sequence[str], listed: datetime | None, zone: tzinfo | None) -> HandedIn:
-    when = listed or with_zone(stamped_time(heap), zone)
+def _row(handed: StudentFiles, accepted: Sequence[str], listed: datetime | None, zone: tzinfo | None) -> HandedIn:
+    when = listed or with_zone(stamped_time(handed), zone)
     status, reason, item = None, "", None
     try:
-        item = chosen(heap, accepted)
-    except Nothing as error:
+        item = chosen(handed, accepted)
+    except NothingToGrade as error:
         status, reason = Status.MISSING, str(error)
     except Refusal as error:
         status, reason = Status.REFUSED, str(error)
-    if when is None and item is not None and heap.has_times:
+    if when is None and item is not None and handed.has_times:
         when = with_zone(item.time, zone)
     name = "" if item is None else shown(item.name)
     read = bytes if item is None else _reader(item)
-    return HandedIn(heap.student, name, read, status, reason, when, tuple(heap.notes), heap.source)
+    return HandedIn(handed.student, name, read, status, reason, when, tuple(handed.notes), handed.source)
 
 
 def _reader(item: Item) -> Callable[[], bytes]:

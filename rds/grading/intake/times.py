@@ -10,7 +10,7 @@ from zoneinfo import ZoneInfo
 
 from rds.core.errors import InputError
 from rds.grading.intake.items import Refusal
-from rds.grading.intake.layouts import STAMP, TIMES, Heap, Layout
+from rds.grading.intake.layouts import STAMP, TIMES, Layout, StudentFiles
 
 _LARGEST = 4 << 20  # bytes
 
@@ -29,7 +29,7 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
     reader = csv.DictReader(io.StringIO(text))
     if not {"student", "timestamp"} <= set(reader.fieldnames or ()):
         raise InputError("must have the columns student and timestamp", f"{TIMES}: line 1")
-    known, found = {heap.student for heap in layout.heaps}, {}
+    known, found = {handed.student for handed in layout.by_student}, {}
     composed = {unicodedata.normalize("NFC", student): student for student in known}
     for row in reader:
         place, told = f"{TIMES}: line {reader.line_num}", (row["student"] or "").strip()
@@ -48,19 +48,19 @@ def listed_times(layout: Layout, zone: tzinfo | None) -> dict[str, datetime]:
     return found
 
 
-def stamped_time(heap: Heap) -> datetime | None:
+def stamped_time(handed: StudentFiles) -> datetime | None:
     """nbgrader's own `timestamp.txt`: date, time and the zone's name. None, with a note, if it cannot be understood."""
-    if heap.stamp is None:
+    if handed.stamp is None:
         return None
     try:
-        text = heap.stamp.read(_LARGEST).decode().strip()
+        text = handed.stamp.read(_LARGEST).decode().strip()
         date, clock, *zone = text.split()
         when = datetime.fromisoformat(f"{date} {clock}")
         if when.tzinfo is None:
             when = when.replace(tzinfo=UTC if not zone or zone[0] in ("UTC", "GMT") else ZoneInfo(zone[0]))
         return when
     except (Refusal, UnicodeDecodeError, ValueError, KeyError, OSError):
-        heap.notes.append(f"its {STAMP} cannot be understood, and so is taken for nothing")
+        handed.notes.append(f"its {STAMP} cannot be understood, and so is taken for nothing")
         return None
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from statistics import mean
 from typing import Any
 
-from rds.grading.assignment.late_rules import Late
+from rds.grading.assignment.late_rules import LateRules
 from rds.grading.course.class_list import Member
 from rds.grading.feedback.plain_text import one_line
 from rds.grading.grade import Band, CriterionScore, Grade, Status
@@ -17,7 +17,7 @@ REVIEW = "review"  # of a grade's details
 _DIGITS = 9
 
 
-def reviewed(grade: Grade, late: Late, member: Member | None, entries: Sequence[Entry]) -> Grade:
+def reviewed(grade: Grade, late: LateRules, member: Member | None, entries: Sequence[Entry]) -> Grade:
     """The grade that counts.
 
     Points of graders replace those of a criterion: of each grader the last ones. Where graders differ, the mean counts

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from rds.grading.assignment.late_rules import Late
+from rds.grading.assignment.late_rules import LateRules
 from rds.grading.course.class_list import ClassList, Member
 from rds.grading.grade import Grade
 from rds.grading.review.applied import reviewed
@@ -15,7 +15,9 @@ from rds.grading.review.entries import Review
 GROUP, SECTION = "group", "section"  # of a grade's details
 
 
-def everyone(grades: Iterable[Grade], listed: ClassList, review: Review, late: Late) -> dict[str, tuple[Grade, Grade]]:
+def everyone(
+    grades: Iterable[Grade], listed: ClassList, review: Review, late: LateRules
+) -> dict[str, tuple[Grade, Grade]]:
     """By student the grade that counts, and that of the batch which it is made from: of a group each member's."""
     groups = listed.groups()
     found: dict[str, tuple[Grade, Grade]] = {}

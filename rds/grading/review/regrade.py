@@ -16,7 +16,7 @@ from rds.core.errors import InputError
 from rds.grading.assignment.assignment import read_assignment
 from rds.grading.batch.finished import Finished, read_finished
 from rds.grading.batch.outcome import BatchOutcome
-from rds.grading.batch.run import How, grade_all
+from rds.grading.batch.run import BatchOptions, grade_all
 from rds.grading.batch.work import CODE
 from rds.grading.course.class_list import FILE as CLASS
 from rds.grading.feedback.plain_text import cell, one_line
@@ -43,7 +43,7 @@ class Change:
     why: tuple[str, ...]
 
 
-def regrade(old: Path, assignment: Path, out: Path, how: How) -> tuple[BatchOutcome, list[Change]]:
+def regrade(old: Path, assignment: Path, out: Path, how: BatchOptions) -> tuple[BatchOutcome, list[Change]]:
     """Grade what the batch in `old` kept by the `assignment` as it is now, into the new folder `out`.
 
     The class list and what graders have said go along. `changes.csv` and `changes.html` in `out` say who changes and

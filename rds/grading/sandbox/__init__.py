@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from rds.grading.sandbox.limits import Limits
     from rds.grading.sandbox.pool import Pool
     from rds.grading.sandbox.requirements import available
-    from rds.grading.sandbox.subject import Loaded, Subject
+    from rds.grading.sandbox.subject import Loaded, LoadedSubmission
 
-__all__ = ["Counts", "Limits", "Loaded", "Pool", "SandboxError", "Subject", "SubmissionError", "available"]
+__all__ = ["Counts", "Limits", "Loaded", "LoadedSubmission", "Pool", "SandboxError", "SubmissionError", "available"]
 
 _MODULES = {
     "Counts": "counts",
     "Limits": "limits",
     "Loaded": "subject",
+    "LoadedSubmission": "subject",
     "Pool": "pool",
     "SandboxError": "errors",
-    "Subject": "subject",
     "SubmissionError": "errors",
     "available": "requirements",
 }

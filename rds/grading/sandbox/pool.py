@@ -12,7 +12,7 @@ from rds.grading.sandbox.interpreter import Interpreter
 from rds.grading.sandbox.limits import Limits
 from rds.grading.sandbox.place import Place
 from rds.grading.sandbox.requirements import available, fault_of, missing
-from rds.grading.sandbox.subject import Subject
+from rds.grading.sandbox.subject import LoadedSubmission
 from rds.grading.sandbox.submission import read_submission
 from rds.grading.sandbox.supervise import Supervisor
 from rds.grading.sandbox.user import sandbox_user
@@ -59,7 +59,7 @@ class Pool:
         """As `available`, tried on an interpreter of this pool."""
         return fault_of(lambda: self._interpreter(KITS[0]))
 
-    def open(self, path: str | Path, limits: Limits | None = None, kind: str = "controller") -> Subject:
+    def open(self, path: str | Path, limits: Limits | None = None, kind: str = "controller") -> LoadedSubmission:
         """The submission at `path`, loaded in a fresh cell: a context manager that ends its processes.
 
         `kind` is "controller", "model", "interpolator" or "functions". SubmissionError if it cannot be loaded.
@@ -67,7 +67,9 @@ class Pool:
         submission = read_submission(Path(path))
         kit = _kit([name for name in KITS[-1] if submission.imports(name)])
         place = Place.of(self._jobs, self._slot)
-        return Subject(submission, kind, limits or Limits(), lambda: self._interpreter(kit), self._supervisor, place)
+        return LoadedSubmission(
+            submission, kind, limits or Limits(), lambda: self._interpreter(kit), self._supervisor, place
+        )
 
     def close(self) -> None:
         """End all processes."""

@@ -38,7 +38,7 @@ class Loaded:
     error: str = ""  # why params or initial_state could not be shown; the submission could be loaded all the same
 
 
-class Subject:
+class LoadedSubmission:
     """One loaded submission. Each run that is begun has a fresh cell: nothing of one case is left for another.
 
     Every method raises SubmissionError where the submission breaks its interface, exceeds a limit or ends its process,
@@ -218,7 +218,7 @@ class Subject:
         self._leave()
         os.sched_setaffinity(0, self._affinity)
 
-    def __enter__(self) -> Subject:
+    def __enter__(self) -> LoadedSubmission:
         return self
 
     def __exit__(

@@ -145,10 +145,10 @@ class GradingState:
     def export(self, to: str) -> Written:
         """Write a gradebook; see `rds grade export`."""
         from rds.grading.exports.export import export
-        from rds.grading.exports.exported import Wanted
+        from rds.grading.exports.exported import ExportOptions
 
         given = self.choices["gradebook"]
-        return export(self.out, to, None, Wanted(self.session.folder / given if given else None, None, None))
+        return export(self.out, to, None, ExportOptions(self.session.folder / given if given else None, None, None))
 
     def _jobs(self) -> list[str]:
         return [] if self.choices["jobs"] is None else ["--jobs", str(self.choices["jobs"])]
