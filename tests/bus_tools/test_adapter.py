@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ from rds.bus.modules.rds.drivers import AxisDrivers
 from rds.bus.modules.rds.server import serve
 from rds.bus.modules.shared_bus import opener_of
 from rds.bus.tools.adapter import AdapterFailure
-from rds.bus.tools.link import open_bus
+from rds.bus.tools.link import bus_failed, open_bus
 from rds.bus.tools.slcan_adapter import SlcanAdapter
 from rds.cli.main import app
 from rds.core.errors import AdapterError, MachineError
@@ -265,3 +266,17 @@ def test_own_frames_that_an_interface_gives_back_are_dropped() -> None:
     finally:
         bus.shutdown()
         other.shutdown()
+
+
+def test_a_bus_that_fails_says_once_what_to_do(alone: Path) -> None:
+    with can.Bus(interface="rds", channel="fails") as bus:
+        os.kill(bus.hub_pid, signal.SIGKILL)
+        with pytest.raises(can.CanError) as lost:
+            while True:
+                bus.recv(1.0)
+        said = str(bus_failed(bus.channel_info, lost.value))
+    assert said.count("open the bus again") == 1 and said.count("built-in bus") == 1
+    assert "cable" not in said, "there is none"
+    assert str(bus_failed("slcan:/dev/ttyACM0", OSError("no such device"))).endswith(
+        "no such device; check power, cable and adapter, then open it again"
+    )

@@ -23,7 +23,9 @@ def bus_name(interface: str, channel: str | None) -> str:
 
 
 def bus_failed(name: str, error: Exception) -> MachineError:
-    """The error of a bus that failed while it was used."""
+    """The error of a bus that failed while it was used. The built-in bus has no cable; its errors say what to do."""
+    if name.startswith(("built-in bus", BUILTIN)):
+        return MachineError(f"{name} failed: {str(error).removeprefix(f'{name}: ')}")
     return MachineError(f"bus {name} failed: {error}; check power, cable and adapter, then open it again")
 
 
