@@ -87,8 +87,8 @@ def bus_table_of(
     table: dict[str, Any] = {}
     if experiment is not None:
         from rds.core.toml_table import TomlTable
+        from rds.modes.experiment.bus_table import bus_table
         from rds.modes.experiment.experiment_file import EXPERIMENT
-        from rds.modes.experiment.resolve import bus_table
 
         table = bus_table(TomlTable.open(experiment, EXPERIMENT), experiment.parent)
         said = str(table.get("interface", BUILTIN))
