@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 if TYPE_CHECKING:
     from importlib.metadata import Distribution
@@ -77,13 +77,20 @@ def _origin(found: Distribution) -> dict[str, Any]:
 
 def _local(about: dict[str, Any]) -> Path | None:
     """The folder or file it was installed from, where that is still there."""
-    from urllib.request import url2pathname  # which brings the whole of HTTP along
-
     parts = urlsplit(about.get("url", ""))
     if parts.scheme != "file" or "vcs_info" in about:
         return None
-    path = Path(url2pathname(parts.path)) / about.get("subdirectory", "")
+    path = Path(_path_of(parts.path)) / about.get("subdirectory", "")
     return path if path.exists() else None
+
+
+def _path_of(path: str) -> str:
+    """The path of a file URL, as this system writes it."""
+    if os.name != "nt":
+        return unquote(path)
+    from urllib.request import url2pathname  # which brings the whole of HTTP along
+
+    return url2pathname(path)
 
 
 def _folder(about: dict[str, Any]) -> Path | None:
