@@ -39,6 +39,7 @@ HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
 POLITE = 10  # niceness of the others
 MARK = "pytest.mark.realtime"
+BENCHES = ("/oacs/", "/safety/")  # wait for modules' heartbeats, not for samples: they follow the panels
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
 
@@ -78,7 +79,9 @@ def group_of(nodeid: str) -> str:
     path, name = nodeid.partition("[")[0].split("::")[:2]
     if "/panels/" in path:
         return PANELS
-    return REALTIME if name in _waiting_for_real_time(path) else path
+    if name not in _waiting_for_real_time(path):
+        return path
+    return PANELS if any(bench in path for bench in BENCHES) else REALTIME
 
 
 @cache

@@ -9,11 +9,17 @@ from typing import Any
 
 import pytest
 from documents import ROOT, blocks
-from jsonschema import Draft7Validator
 
 from rds.cli.schema import KINDS, schema_text, shipped
 
 MADE = "`python -m rds schema --out rds/cli/schemas` renews them"
+
+
+def validator_of(schema: str) -> Any:
+    from jsonschema import Draft7Validator  # here, because it takes seconds that each worker would spend as it collects
+
+    Draft7Validator.check_schema(json.loads(schema))
+    return Draft7Validator(json.loads(schema))
 
 
 def files_of(kind: str) -> list[Path]:
@@ -35,12 +41,12 @@ def files_of(kind: str) -> list[Path]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_shipped_schema_is_that_of_the_declarations(kind: str) -> None:
     assert shipped(kind).read_text(encoding="utf-8") == schema_text(kind), MADE
-    Draft7Validator.check_schema(json.loads(schema_text(kind)))
+    validator_of(schema_text(kind))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_shipped_files_keep_their_schema(kind: str) -> None:
-    validator = Draft7Validator(json.loads(shipped(kind).read_text(encoding="utf-8")))
+    validator = validator_of(shipped(kind).read_text(encoding="utf-8"))
     found = files_of(kind)
     assert found or kind in ("map", "path", "faults", "model"), kind
     for path in found:
@@ -59,7 +65,7 @@ def plain(value: Any) -> Any:
 
 @pytest.mark.parametrize(("kind", "file"), [("experiment", "everything.toml"), ("machine", "my_machine.toml")])
 def test_the_files_of_the_document_keep_their_schema(kind: str, file: str) -> None:
-    validator = Draft7Validator(json.loads(schema_text(kind)))
+    validator = validator_of(schema_text(kind))
     (block,) = [block for block in blocks("docs/experiments.md") if block.file == file]
     assert not list(validator.iter_errors(tomllib.loads(block.text)))
 
@@ -78,4 +84,4 @@ def test_the_files_of_the_document_keep_their_schema(kind: str, file: str) -> No
     ],
 )
 def test_what_the_reader_refuses_the_schema_refuses(kind: str, wrong: str) -> None:
-    assert list(Draft7Validator(json.loads(schema_text(kind))).iter_errors(tomllib.loads(wrong)))
+    assert list(validator_of(schema_text(kind)).iter_errors(tomllib.loads(wrong)))
