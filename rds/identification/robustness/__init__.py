@@ -1,5 +1,1 @@
 """How a design fares over everything that an axis may be: closed loops with drawn parameters, thousands of them."""
-
-from rds.identification.robustness.study import Study, study
-
-__all__ = ["Study", "study"]
