@@ -12,7 +12,7 @@ import rds
 from benchmarks.figures import Figure
 from rds.identification.fit.estimate import Estimate, Parameter
 from rds.identification.fit.model_file import write_model
-from rds.identification.robustness import study
+from rds.identification.robustness.study import study
 from rds.machines import load_machine
 from rds.models.linear_axis import PARAMETERS
 

@@ -33,8 +33,8 @@ def robustness(
     The exit code is 1 if a loop is unstable or a run fails.
     """
     with refusals(), stdout_kept(json):
-        from rds.identification.robustness.study import study
         from rds.identification.robustness.report import write_study
+        from rds.identification.robustness.study import study
         from rds.identification.robustness.summary import to_json
 
         cluster = cluster_options.scheduler_of(scheduler, tls_ca, tls_cert, tls_key, insecure_cluster)

@@ -16,10 +16,10 @@ from typer.testing import CliRunner
 import rds
 from rds.cli.main import app
 from rds.core.errors import InputError
-from rds.identification.robustness import study
 from rds.identification.robustness.draws import Spread, draws
 from rds.identification.robustness.margins import law_about_rest, loop_margins
 from rds.identification.robustness.report import write_study
+from rds.identification.robustness.study import study
 from rds.identification.robustness.summary import sentences, summaries, to_json
 from rds.identification.robustness.uncertain import uncertain
 from rds.models import library_model
