@@ -28,7 +28,7 @@ def read_table(
         raise InputError("it is a folder; name the file of data in it", str(path))
     if not path.is_file():
         raise InputError("there is no such file; check the name and the folder", str(path))
-    from rds.identification.logs import mf4_channels
+    from rds.identification.logs import codesys_table, mf4_channels
 
     ending = path.suffix.lower()
     try:
@@ -40,6 +40,8 @@ def read_table(
             from rds.identification.logs.can_table import read_can
 
             table = read_can(path, dbc, progress)
+        elif ending in TEXTS and codesys_table.is_trace(path):
+            table = codesys_table.read_trace(path)
         elif ending in TEXTS:
             from rds.identification.logs.csv_table import read_csv
 
