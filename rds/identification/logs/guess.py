@@ -29,7 +29,8 @@ _WORDS: Mapping[str, frozenset[str]] = {
         ("measured", "position", "pos", "encoder", "enc", "y", "x", "q", "qm", "ist", "output", "angle", "counts")
     ).union(("istposition", "lageistwert", "lage")),
 }
-_OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration"))  # never what was measured
+# never what was measured
+_OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration", "accel", "acc"))
 _ACTING = (("voltage",), ("force", "torque"), ("current",))
 _RISING = 0.9  # of the steps of a time go up
 _NO_LOG = "it is no log over time"
@@ -106,7 +107,7 @@ def draft(table: Table) -> str:
         if any(c is not None and dimension(c.unit or "") == "counts" for c in parts.values()):
             chosen["resolution"] = UNKNOWN
             notes.append(f"resolution: give mm (or degrees) per encoder count for {UNKNOWN!r}, or name a machine.")
-        if parts["position"] is None and parts["velocity"] is not None:
+        if parts["velocity"] is not None and parts["position"] in (None, parts["velocity"]):
             del chosen["position"]  # the speed alone will do
         if {"command", "position", "velocity"} & {q for q, c in parts.items() if c is not None}:
             axes[name] = chosen
@@ -241,7 +242,8 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
             return {}, doubt + (f" (no unit: {', '.join(bare[:_TOLD])})" if bare else "")
         if len(fits) > 1:
             names = ", ".join(f"{c.name} [{c.unit}]" for c in fits)
-            return {}, f"{names} could each be the {quantity}"
+            are_speeds = all(dimension(c.unit or "") == "angular speed" for c in fits)
+            return {}, f"{names} could each be the {'speed' if are_speeds else quantity}"
         found[quantity] = fits[0]
     if "position" in found and dimension(found["position"].unit or "") == "counts":
         return {}, f"{found['position'].name!r} is in encoder counts; give the resolution (mm per count) or the machine"
