@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -219,3 +220,40 @@ def test_a_csp_log_has_its_reference_or_position_by_the_following_error(tmp_path
         assert logs[has].units["command"] == "%" and logs[has].command == pytest.approx(0.1 * made["voltage"])
     with pytest.raises(InputError, match=r"needs position .* or velocity; or reference and following_error"):
         LogMap.read(saved(tmp_path, text + error))
+
+
+@pytest.mark.parametrize(
+    ("headings", "expected"),
+    [
+        (
+            ("time_s", "commanded_deg", "feedback_deg", "error_abs_deg", "control_command"),
+            {"command": "control_command", "position": "feedback_deg", "reference": "commanded_deg"},
+        ),
+        (
+            ("time_s", "commanded_deg_s", "angle_deg", "feedback_deg_s"),  # a speed is not where a position is to go
+            {"command": "?", "position": "angle_deg", "velocity": "feedback_deg_s"},
+        ),
+        (
+            ("Time (s)", "AccX (g)", "Torque (N·m)", "Motor Optical Speed (RPM)"),
+            {"command": "Torque", "velocity": "Motor Optical Speed"},
+        ),
+        (
+            ("time [ms]", "Axis.SetPos [mm]", "Axis.ActPos [mm]", "Axis.ActVelo [mm/s]", "Axis.SetTorque [%]"),
+            {
+                "command": "Axis.SetTorque",
+                "position": "Axis.ActPos",
+                "velocity": "Axis.ActVelo",
+                "reference": "Axis.SetPos",
+            },
+        ),
+    ],
+)
+def test_a_draft_knows_what_was_wanted_from_what_was_measured(
+    headings: tuple[str, ...], expected: dict[str, str], tmp_path: Path
+) -> None:
+    """Headings of logs that others published: a test bench of propellers, a motor's student, a drive's trace."""
+    rows = [",".join(f"{k / 100 + (k if at == 0 else at)}" for at in range(len(headings))) for k in range(30)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(headings), *rows]) + "\n", encoding="utf-8")
+    (axis,) = tomllib.loads(draft(read_table(path)))["axis"].values()
+    assert {quantity: column["column"] for quantity, column in axis.items()} == expected

@@ -14,20 +14,35 @@ from rds.identification.logs.map import DIMENSIONS, SUFFIX, UNKNOWN, AxisMap, Co
 from rds.identification.logs.table import Column, Table, remedy
 from rds.identification.logs.units import dimension, known_units
 
+_DRIVING = frozenset(("torque", "force", "effort", "drehmoment", "kraft"))
+_ACTS = _DRIVING | {"voltage", "volt", "volts", "spannung", "current", "strom"}
 # words of names, lower case, that tell a quantity; the first that fits
 _WORDS: Mapping[str, frozenset[str]] = {
     "time": frozenset(("time", "t", "zeit", "timestamp", "timestamps", "elapsed", "seconds", "zeitstempel")),
     "reference": frozenset(
-        ("reference", "ref", "setpoint", "desired", "target", "soll", "demand", "qg", "sollposition", "lagesollwert")
-    ),
+        ("reference", "ref", "setpoint", "set", "desired", "target", "commanded", "soll", "demand", "qg")
+    ).union(("sollposition", "lagesollwert")),
     "velocity": frozenset(
-        ("velocity", "vel", "speed", "v", "rate", "geschwindigkeit", "drehzahl", "istdrehzahl", "drehzahlistwert")
+        (
+            "velocity",
+            "velo",
+            "vel",
+            "speed",
+            "v",
+            "rate",
+            "geschwindigkeit",
+            "drehzahl",
+            "istdrehzahl",
+            "drehzahlistwert",
+        )
     ),
     "current": frozenset(("current", "amps", "strom", "iststrom", "i", "amperage")),
-    "command": frozenset(("voltage", "command", "cmd", "volt", "volts", "u", "input", "control", "vir", "spannung")),
+    "command": frozenset(
+        ("voltage", "command", "cmd", "volt", "volts", "u", "input", "control", "vir", "spannung")
+    ).union(_DRIVING),
     "position": frozenset(
         ("measured", "position", "pos", "encoder", "enc", "y", "x", "q", "qm", "ist", "output", "angle", "counts")
-    ).union(("istposition", "lageistwert", "lage")),
+    ).union(("feedback", "actual", "act", "istposition", "lageistwert", "lage")),
 }
 # never what was measured
 _OTHERS = frozenset(("modelled", "simulated", "model", "error", "err", "acceleration", "accel", "acc"))
@@ -98,6 +113,8 @@ def draft(table: Table) -> str:
     axes: dict[str, object] = {}
     for name, columns in _groups(table, time).items():
         parts = {q: _likely(columns, q) for q in ("command", "position", "velocity", "current", "reference")}
+        if not _is_of(parts["reference"], parts["position"] or parts["velocity"]):
+            parts["reference"] = None
         chosen: dict[str, object] = {
             q: {"column": c.name, "unit": _unit(table, c.name, q)} for q, c in parts.items() if c is not None
         }
@@ -207,7 +224,11 @@ def _tokens(name: str) -> list[str]:
 
 def _role(name: str) -> str | None:
     words = [word.lower().rstrip("0123456789") or word for word in _tokens(name)]  # time1, u2
-    return next((role for role, known in _WORDS.items() if any(word in known for word in words)), None)
+    acts = bool(_ACTS & set(words))  # a target torque is what drives the axis, and not where it is to go
+    return next(
+        (r for r, known in _WORDS.items() if any(word in known for word in words) and not (acts and r == "reference")),
+        None,
+    )
 
 
 def _groups(table: Table, time: str | None) -> dict[str, list[Column]]:
@@ -249,9 +270,18 @@ def _axis(columns: Sequence[Column]) -> tuple[dict[str, Column], str]:
         return {}, f"{found['position'].name!r} is in encoder counts; give the resolution (mm per count) or the machine"
     for quantity in ("velocity", "current", "reference"):
         fits = [c for c in _fitting(measured, quantity) if c not in found.values()]
+        if quantity == "reference":
+            fits = [c for c in fits if _is_of(c, found.get("position") or found.get("velocity"))]
         if len(fits) == 1:
             found[quantity] = fits[0]
     return found, ""
+
+
+def _is_of(reference: Column | None, answer: Column | None) -> bool:
+    """Whether a reference can be that of what was measured: a speed is not where a position is to go."""
+    if reference is None or answer is None or reference.unit is None or answer.unit is None:
+        return True
+    return dimension(reference.unit) == dimension(answer.unit)
 
 
 def _is_strange(column: Column) -> bool:
@@ -290,6 +320,11 @@ def _likely(columns: Sequence[Column], quantity: str) -> Column | None:
     """The first column that may be the quantity, by unit or else by name."""
     measured = [c for c in columns if not _OTHERS & {word.lower() for word in _tokens(c.name)}]
     fits = _fitting(measured, quantity)
-    named = [c for c in measured if _role(c.name) == quantity and (c.unit is None or _is_strange(c))]
+    named = [
+        c
+        for c in measured
+        if _role(c.name) == quantity
+        and (c.unit is None or _is_strange(c) or (quantity == "command" and dimension(c.unit) == "ratio"))
+    ]
     chosen = [*fits, *named] if any(_role(c.name) == quantity for c in fits) else [*named, *fits]
     return next(iter(chosen), None)
