@@ -67,10 +67,13 @@ class Measure:
     kind: str  # gain, phase, delay, friction
     off: Off
     band: float
+    by_chance: bool = False  # what the model leaves is no more than chance makes the truth leave
 
     @property
     def wrong(self) -> bool:
         """Clearly beyond the band."""
+        if self.by_chance:
+            return False
         sure = _SURE_OF_DELAY if self.kind == "delay" else _SURE
         return abs(self.off.value) > max(self.band, sure * self.off.error)
 
@@ -105,18 +108,21 @@ def measures(a: Assessment, bands: Bands) -> list[Measure]:
     found = judged_by(a, bands)
     if found is None:
         return []
-    listed = [Measure("gain", found.gain, bands.gain_percent), Measure("phase", found.phase, bands.phase_degrees)]
+    listed = [
+        Measure("gain", found.gain, bands.gain_percent, found.by_chance),
+        Measure("phase", found.phase, bands.phase_degrees, found.by_chance),
+    ]
     if (motion := a.as_motion) is not None and found is not motion and motion.rmse <= AS_NOISE * a.noise:
         # the model leaves noise alone: what the parameters of an axis leave open, the motion itself may tell
         beside = (
-            Measure("gain", motion.gain, bands.gain_percent),
-            Measure("phase", motion.phase, bands.phase_degrees),
+            Measure("gain", motion.gain, bands.gain_percent, motion.by_chance),
+            Measure("phase", motion.phase, bands.phase_degrees, motion.by_chance),
         )
         listed = [b if not m.told and b.told and not b.wrong else m for m, b in zip(listed, beside, strict=True)]
     if found.delay is not None:
-        listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period)))
+        listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period), found.by_chance))
     if found.friction is not None:
-        listed.append(Measure("friction", found.friction, bands.friction_percent))
+        listed.append(Measure("friction", found.friction, bands.friction_percent, found.by_chance))
     return listed
 
 
