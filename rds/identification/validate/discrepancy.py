@@ -46,6 +46,7 @@ _PLAYS = (2.0, 6.0)  # times the residual: widths of a play that is tried
 _FAR_MORE = 0.5  # of the residual, at most, where play is what it lacks
 _CHANCE = 0.01
 _TOLD = 1.0  # %: standard error of a gain that the log tells
+_SAME = 0.1  # %: gains that differ by less are one
 _LINEAR = {"tau", "K", "friction_plus", "friction_minus"}
 
 
@@ -56,6 +57,7 @@ class Off:
     value: float
     error: float
     unit: str
+    at: float = 0.0  # Hz: of a gain that is not the one at rest
 
 
 @dataclass(frozen=True)
@@ -127,14 +129,14 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
 
     return Discrepancy(
         frequency=f,
-        gain=_gain_of(told("gain"), told("static")),
+        gain=_gain_of(told("static"), replace(told("gain"), at=f)),
         phase=told("phase"),
         lag=told("lag"),
         delay=told("delay"),
         friction=max((told(name) for name in ("forward", "backward")), key=clear),
         rmse=own.rms(left.squares),
         reached=problem.rms(best.squares),
-        by_chance=own.rms(left.squares) <= EXPLAINED * noise
+        by_chance=own.rms(left.squares) <= EXPLAINED * float(noise)
         and by_chance(left.squares, best.squares, _worth(problem, best), len(problem.names)),
     )
 
@@ -180,13 +182,14 @@ def by_chance(left: float, least: float, worth: float, free: int) -> bool:
     """
     from scipy.special import chdtri
 
-    return left <= least * (1.0 + float(chdtri(free, _CHANCE)) / worth)
+    return bool(left <= least * (1.0 + float(chdtri(free, _CHANCE)) / worth))
 
 
-def _gain_of(*both: Off) -> Off:
-    """The gain at the bandwidth or at rest: the one that the log tells better; of two that it tells, the worse."""
-    known = [off for off in both if off.error <= _TOLD]
-    return max(known, key=lambda off: abs(off.value)) if known else min(both, key=lambda off: off.error)
+def _gain_of(rest: Off, bandwidth: Off) -> Off:
+    """The gain at rest or at the bandwidth: the one that the log tells better; of two that it tells, the worse."""
+    if rest.error <= _TOLD and bandwidth.error <= _TOLD:
+        return bandwidth if abs(bandwidth.value) > abs(rest.value) + _SAME else rest
+    return min((rest, bandwidth), key=lambda off: off.error)
 
 
 def _sure_of_tau(problem: Problem, here: Mapping[str, float], covariance: np.ndarray, model: float) -> float:

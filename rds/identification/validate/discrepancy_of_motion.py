@@ -81,7 +81,7 @@ def as_motion(
         friction=_friction_of_ways(found, covariance, kept, K, float(np.abs(u).max())),
         rmse=sqrt(left / len(y)),
         reached=float(np.sqrt(np.mean(error**2))),
-        by_chance=left <= len(y) * (EXPLAINED * noise) ** 2
+        by_chance=left <= len(y) * (EXPLAINED * float(noise)) ** 2
         and by_chance(left, float(error @ error), worth, A.shape[1]),
     )
 
