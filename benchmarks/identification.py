@@ -51,12 +51,12 @@ def run(rounds: int = 7) -> list[Figure]:
     ]
 
 
-def made_log() -> Log:
-    """X of the mini CNC under a multisine, with 1 µm of noise and the encoder's steps of 1 µm."""
+def made_log(samples: int = 10_000) -> Log:
+    """X of the mini CNC at 1 kHz under a multisine, with 1 µm of noise and the encoder's steps of 1 µm."""
     axis = load_machine("mini-cnc").axes["X"]
     values = {name: float(axis.model[name]) for name in NAMES}
     draw = np.random.default_rng(1)
-    t = np.arange(10_000) * 0.001
+    t = np.arange(samples) * 0.001
     u = np.sum([np.sin(2.0 * np.pi * 0.7 * k * t + draw.uniform(0.0, 6.28)) for k in range(1, 13)], axis=0)
     u *= 4.0 / np.abs(u).max()
     y = make().respond(t, u, (0.0, 0.0), values) + 0.001 * draw.standard_normal(len(t))

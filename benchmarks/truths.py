@@ -234,6 +234,8 @@ def _suffices(made: Machine, data: Log) -> bool:
         information += J.T @ J
     scale = np.sqrt(np.diag(information))
     used = scale > 0.0
+    if not all(used[names.index(name)] for name in ("tau", "K")):
+        return False  # nothing of its motion comes out of the play
     bound = np.zeros_like(information)
     part = np.ix_(used, used)
     bound[part] = noise**2 * np.linalg.pinv(information[part] / np.outer(scale[used], scale[used]), rcond=1e-12)

@@ -93,7 +93,15 @@ def _rate(name: str, counted: Sequence[Row]) -> Figure:
     errors = [row for row in counted if row.error]
     which = ", ".join(f"{row.machine}: {row.kind}" for row in errors[:6])
     note = f"{len(errors)} of {len(counted)}" + (f" ({which})" if which else "")
+    note += f"; below {100.0 * _most(len(errors), len(counted)):.2f} % with 95 % confidence"
     return Figure(name, "%", (100.0 * len(errors) / max(len(counted), 1),), limit=LIMIT, note=note)
+
+
+def _most(errors: int, count: int) -> float:
+    """The largest rate at which so few errors come up by chance in one of 20 such counts (Clopper and Pearson)."""
+    from scipy.stats import beta
+
+    return float(beta.ppf(0.95, errors + 1, count - errors)) if errors < count else 1.0
 
 
 def run(machines: int = 300, first: int = 0, jobs: int = 2, keep: Path | None = None) -> Iterator[Row]:

@@ -74,6 +74,33 @@ def test_a_torque_needs_no_gain_and_a_current_without_one_says_so() -> None:
         fit([current], structure("axis-mass"))
 
 
+def test_the_motor_constant_is_given_or_follows_from_torque_and_current() -> None:
+    known = turning(1)
+    units = {"position": "deg", "command": "A"}
+    current = with_findings(replace(known, force_gain=None, units=units))
+    ratios = fit([current], structure("axis"))
+    assert any("known as ratios to that constant only" in sentence for sentence in ratios.unidentifiable)
+    held = fit([current], structure("axis-inertia"), "simulation", {"fixed": {"torque_gain": K_T}})
+    assert held.values()["J"] == pytest.approx(TURNS["J"], rel=0.01) and held.values()["torque_gain"] == K_T
+    with pytest.raises(InputError, match=r"torque_gain is given with the log \(0.4 Nm/A\) and cannot be held"):
+        fit([known], structure("axis-inertia"), "simulation", {"fixed": {"torque_gain": 0.5}})
+    torque = K_T * current.command + 0.005 * np.random.default_rng(0).standard_normal(len(current)) + 0.01
+    both = with_findings(replace(current, findings=(), extra={"force": torque}, units={**units, "force": "Nm"}))
+    assert both.force_gain == pytest.approx(K_T, rel=1e-3)
+    found = fit([both], structure("axis-inertia"), "simulation")
+    assert found.values()["T_c"] == pytest.approx(TURNS["T_c"], rel=0.01) and not found.unidentifiable
+    both = replace(both, findings=())
+    other = {"force": both.command[::-1].copy()}
+    driven = with_findings(
+        replace(both, command=torque, extra={"current": both.command}, units=units | {"command": "Nm"})
+    )
+    wrong = with_findings(replace(both, force_gain=0.5))
+    unlike = with_findings(replace(both, force_gain=None, extra=other))
+    said = [f.what for log in (driven, wrong, unlike) for f in log.findings if f.kind == "motor-constant"]
+    assert "motor constant: 0.4 ± 0.000" in said[0] and "where 0.5 Nm/A is stated" in said[1]
+    assert "hardly go together" in said[2] and unlike.force_gain is None
+
+
 def test_a_gain_in_degrees_per_ampere_and_its_verdict_and_model_file(tmp_path: Path) -> None:
     found = fit([turning(1)], structure("axis", ("offset",)))
     r = TURNS["B"] / TURNS["J"]  # 1/s

@@ -21,7 +21,7 @@ def test_on_200_logs_the_95_percent_intervals_contain_the_truth_in_90_to_99_perc
             values,
             ("square", "sine", "multisine")[number // 3 % 3],
             seed=number,
-            seconds=5.0,
+            seconds=3.0,
             noise=(0.0, 0.0005, 0.001, 0.002)[number // 9 % 4],
             rounding=(np.floor, np.round)[number // 36 % 2],
         )

@@ -18,6 +18,9 @@ from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import Finding, Gravity
 from rds.identification.structures.structures import structure
 from rds.identification.validate.assessment import assess
+from rds.identification.validate.candidate import as_candidate
+from rds.identification.validate.judge import judge
+from rds.identification.validate.same_data import overlap
 from rds.identification.validate.validate import Validation, validate
 from rds.identification.validate.verdict import Bands, Side, Word
 from tests.validation.validation_logs import STEP, T, X, candidate, log, moved, square
@@ -142,11 +145,11 @@ def test_the_fit_s_own_data_are_known_with_noise_resampled_and_thinned_out() -> 
     resampled = replace(first, time=t, command=FRESH[:-1], position=between, resolution=None, name="resampled")
     later = replace(noisy, time=noisy.time + 100.0, name="later")
     for data in (noisy, half, resampled, later, noisy.part(1000, 7000)):
-        found = validate(seen, data)
-        assert "same-data" in kinds(found, "cannot tell") and found.verdict.word is Word.CANNOT_TELL, data.name
-        assert found.assessments[data.name].overlap.share > 0.9 and "the same motion" in str(found)
-    other = square(8.0, 3.0, 0.72)
-    assert "same-data" not in kinds(validate(seen, log(other, name="other")), "cannot tell")
+        known = overlap(seen, data)
+        assert known.known and known.share > 0.9 and "the same motion" in known.how, data.name
+    found = validate(seen, half)
+    assert "same-data" in kinds(found, "cannot tell") and found.verdict.word is Word.CANNOT_TELL
+    assert overlap(seen, log(square(8.0, 3.0, 0.72), name="other")).share == 0.0
 
 
 def test_the_rest_of_a_file_of_which_a_part_was_fitted_is_new() -> None:
@@ -249,9 +252,10 @@ def test_what_the_structure_lacks_is_no_matter_of_wide_intervals() -> None:
         logs.append(log(u, y, name=f"slow-{number}"))
     estimate = fit(logs[:1], structure("axis"))
     assert abs(estimate.parameters["K"].value / X["K"] - 1.0) > 0.1
-    found = validate(estimate, logs[1])
-    assert found.verdict.word is Word.NOT and "its gain is" in found.verdict.sentence
-    (reason,) = [r for r in found.verdict.reasons if r.kind == "structure"]
+    model = as_candidate(estimate)
+    verdict = judge(model, assess(model, logs[1]), Bands())
+    assert verdict.word is Word.NOT and "its gain is" in verdict.sentence
+    (reason,) = [r for r in verdict.reasons if r.kind == "structure"]
     assert reason.side is Side.AGAINST and "times the measurement's noise" in reason.what
 
 

@@ -47,13 +47,29 @@ def fit(
             "--method simulation or inverse-dynamics, or --structure spindle",
             named[0].source or named[0].name,
         )
+    named, options = _with_gain(named, structure, dict(options or {}))
     structure = structure.prepare(named) if structure.prepare else structure
-    estimated: Estimate = METHODS.module(method or structure.default_method).estimate(
-        named, structure, dict(options or {})
-    )
+    estimated: Estimate = METHODS.module(method or structure.default_method).estimate(named, structure, options)
     if estimated.relative_error_percent is None:
         estimated = replace(estimated, relative_error_percent=voltage_error_percent(named, structure, estimated))
     return estimated
+
+
+def _with_gain(logs: list[Log], structure: Structure, options: dict[str, Any]) -> tuple[list[Log], dict[str, Any]]:
+    """A held force or torque gain is what the logs would state: theirs, where they state none."""
+    fixed = dict(options.get("fixed") or {})
+    for name, unit in (("force_gain", "N"), ("torque_gain", "Nm")):
+        if name not in fixed or name not in structure.parameters or structure.command_unit == unit:
+            continue
+        if stated := [log for log in logs if log.force_gain is not None]:
+            raise InputError(
+                f"{name} is given with the log ({stated[0].force_gain:g} {structure.units[name]}) and cannot be held "
+                "at another value; change it in the map beside the data, or leave --fix out",
+                stated[0].source or stated[0].name,
+            )
+        value = structure.parameters[name].check(fixed.pop(name), name, f"structure {structure.name}")
+        logs = [replace(log, force_gain=float(value), units={**log.units, "force": unit}) for log in logs]
+    return logs, {**options, "fixed": fixed} if "fixed" in options else options
 
 
 def voltage_error_percent(logs: Sequence[Log], structure: Structure, estimate: Estimate) -> float | None:

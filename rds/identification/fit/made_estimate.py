@@ -18,6 +18,7 @@ from rds.identification.fit.initial_state import estimate_start, initial_samples
 from rds.identification.fit.kstep import ahead, errors_of
 from rds.identification.logs.fingerprint import fingerprint
 from rds.identification.logs.log import Gravity, Log
+from rds.identification.logs.motor_constant import UNKNOWN
 from rds.identification.logs.trace import trace
 from rds.identification.structures import INVERSE_DYNAMICS
 from rds.identification.structures.structure import Structure
@@ -68,6 +69,7 @@ def made_estimate(
                 f"{name}: {value:.3g} {unit} with a standard error of {error:.3g} {unit} is poorly determined by these "
                 "data"
             )
+    notes += dict.fromkeys(f.what for log in logs for f in log.findings if f.kind == UNKNOWN)
     begun, free_run, predictions = {}, {}, {}
     said = [
         f"{UNUSABLE}: {log.name}: {finding.what}"

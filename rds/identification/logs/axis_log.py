@@ -12,7 +12,8 @@ from rds.identification.logs.columns import column_time, quantity
 from rds.identification.logs.csv_table import missing_samples
 from rds.identification.logs.findings import with_findings
 from rds.identification.logs.log import QUANTITIES, RATES, Clock, Finding, Gravity, Log
-from rds.identification.logs.map import GAINS, AxisMap, ColumnMap, LogMap
+from rds.identification.logs.map import LogMap
+from rds.identification.logs.map_axis import GAINS, AxisMap, ColumnMap
 from rds.identification.logs.second_file import Second
 from rds.identification.logs.table import Table
 from rds.identification.logs.time_base import TimeBase, time_base
@@ -53,8 +54,8 @@ def axis_logs(table: Table, mapping: LogMap, about: AxisMap, second: Second | No
         time, arrays = time[base.keep], {name: values[base.keep] for name, values in arrays.items()}
     gain, reach = _gain(table, about), about.voltage_range
     units = {"time": "s"} | {name: part.unit for name, part in parts.items()}
-    if gain is not None:
-        units["force"] = about.force_unit
+    if gain is not None and units.setdefault("force", about.force_unit) != about.force_unit:
+        raise InputError(f"{_gain_key(about)} is in {about.force_unit}, and force in {units['force']}", about.place)
     if reach is None and mapping.machine is not None and units["command"] == "V":
         reach = (-mapping.machine.converter.range, mapping.machine.converter.range)
     name = table.path.stem if len(mapping.axes) == 1 else f"{table.path.stem}:{about.name}"

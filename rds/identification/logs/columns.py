@@ -6,7 +6,8 @@ import numpy as np
 
 from rds.core.errors import InputError
 from rds.identification.logs.log import Finding, Gravity
-from rds.identification.logs.map import DIMENSIONS, ColumnMap, TimeMap
+from rds.identification.logs.map import TimeMap
+from rds.identification.logs.map_axis import DIMENSIONS, ColumnMap
 from rds.identification.logs.steps import BEYOND_MEASURE
 from rds.identification.logs.table import Column, Table
 from rds.identification.logs.units import base, check_unit, dimension, factor, plain

@@ -44,7 +44,7 @@ class Layout:
 def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) -> Layout:
     """The layout of a text file; what is given is not guessed. InputError where there is no table of numbers."""
     lines, encoding = _head(path)
-    choices = [delimiter] if delimiter else [*DELIMITERS.values()]
+    choices = [delimiter] if delimiter else _worth_trying(lines)
     quoted = any('"' in line for line in lines)  # a comma may then be both; "1,234" is 1234 to many, so never by itself
     best: tuple[float, int, str, str, int] | None = None
     for mark in choices:
@@ -81,6 +81,13 @@ def sniff(path: Path, delimiter: str | None = None, decimal: str | None = None) 
     return Layout(
         encoding, mark, point, first, names, units, words, dates, _announced(lines[:first]), paired or alternates(units)
     )
+
+
+def _worth_trying(lines: Sequence[str]) -> list[str]:
+    """The delimiters that are in the lines, and one that is not: all those find a single column."""
+    present = [mark for mark in DELIMITERS.values() if any(mark in line for line in lines)]
+    absent = [mark for mark in DELIMITERS.values() if mark not in present]
+    return [mark for mark in DELIMITERS.values() if mark in present or mark in absent[:1]]
 
 
 def split(line: str, delimiter: str) -> list[str]:

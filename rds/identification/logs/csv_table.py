@@ -250,12 +250,19 @@ def _lines_before(path: Path, offset: int) -> int:
 
 
 def _numbers(cells: Any) -> np.ndarray:
-    """A batch's cells as float64, NaN for blanks; dates as they are."""
+    """A batch's cells as float64, NaN for blanks; dates as they are.
+
+    From the buffers themselves: Arrow's own conversion imports pandas, where that is installed.
+    """
     import pyarrow as pa
 
-    if pa.types.is_timestamp(cells.type):
-        return np.asarray(cells.to_numpy(zero_copy_only=False), dtype="datetime64[ns]")
-    return np.asarray(cells.to_numpy(zero_copy_only=False), dtype=np.float64)
+    dates = pa.types.is_timestamp(cells.type)
+    numbers = cells.view(pa.int64()) if dates else cells
+    if numbers.null_count:
+        numbers = numbers.fill_null(np.iinfo(np.int64).min if dates else np.nan)  # the first is NumPy's "no date"
+    kind = np.int64 if dates else np.float64
+    found = np.frombuffer(numbers.buffers()[1], kind, len(numbers), numbers.offset * np.dtype(kind).itemsize)
+    return found.view("datetime64[ns]") if dates else found
 
 
 def _first_word(cells: Sequence[str | None], decimal: str) -> tuple[int, str] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from rds.identification.logs import excitation, plausibility, sampling, slips, steps
+from rds.identification.logs import excitation, motor_constant, plausibility, sampling, slips, steps
 from rds.identification.logs.log import Finding, Log
 from rds.machines.machine import Axis
 
@@ -18,17 +18,20 @@ _CHECKS: tuple[Callable[[Log, Axis | None], list[Finding]], ...] = (
     plausibility.loop,
     slips.leaps,
     sampling.slow,
+    motor_constant.motor_constant,
 )
 
 
 def with_findings(log: Log, axis: Axis | None = None) -> Log:
-    """The log with the findings about its data added, and with the resolution and the loop that were found.
+    """The log with the findings about its data added, and with resolution, motor constant and loop as found.
 
     What was stated stays: a resolution that the data contradict is a finding. `axis` gives travel and limits, where
     the machine is known.
     """
     if log.resolution is None:
         log = replace(log, resolution=steps.step_of(log.position))
+    if log.force_gain is None and (told := motor_constant.gain(log)) is not None:
+        log = replace(log, force_gain=told[0], units={**log.units, "force": told[1]})
     found = [finding for check in _CHECKS for finding in check(log, axis)]
     closed = log.closed_loop
     if closed is None and any(finding.kind == "closed-loop" for finding in found):

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from rds.core.toml_text import toml_text
-from rds.identification.logs.map import DIMENSIONS, SUFFIX, UNKNOWN, AxisMap, ColumnMap, LogMap, TimeMap
+from rds.identification.logs.map import SUFFIX, LogMap, TimeMap
+from rds.identification.logs.map_axis import DIMENSIONS, UNKNOWN, AxisMap, ColumnMap
 from rds.identification.logs.table import Column, Table, remedy
 from rds.identification.logs.units import dimension, known_units
 
@@ -112,7 +113,9 @@ def draft(table: Table) -> str:
             )
     axes: dict[str, object] = {}
     for name, columns in _groups(table, time).items():
-        parts = {q: _likely(columns, q) for q in ("command", "position", "velocity", "current", "reference")}
+        parts = {q: _likely(columns, q) for q in ("command", "position", "velocity", "current", "force", "reference")}
+        if parts["force"] is parts["command"]:
+            del parts["force"]
         if not _is_of(parts["reference"], parts["position"] or parts["velocity"]):
             parts["reference"] = None
         chosen: dict[str, object] = {

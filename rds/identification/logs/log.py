@@ -13,7 +13,7 @@ import numpy as np
 from rds.core.errors import InputError
 
 # what a column can be, beside time
-QUANTITIES = ("command", "position", "velocity", "current", "reference", "following_error")
+QUANTITIES = ("command", "position", "velocity", "current", "force", "reference", "following_error")
 RATES = ("rev/min", "mm/s")  # units of a position that is a speed: of a spindle, or of a log without a position
 
 

@@ -34,13 +34,13 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
     if around := _wraps(log):
         return [around]
     jump = {name: float(np.abs(np.diff(v)).max() / np.ptp(v)) for name, v in _both(log).items()}
-    if not log.is_rate and jump["position"] > _JUMP and jump["command"] < _SMOOTH:
+    seen = motion(log)
+    if jump["position"] > _JUMP and jump["command"] < _SMOOTH and not log.is_rate and not _noisy_or_led(log, seen):
         what = (
             f"the position jumps by {100 * jump['position']:.0f} % of its range in a sample, and the command by "
             f"{100 * jump['command']:.2g} %: they are swapped, as it seems"
         )
         return [Finding("columns", what, Gravity.FAULT)]
-    seen = motion(log)
     if log.units.get("command", "V") != "V":
         return _driven(seen)
     follows = _follows(seen)
@@ -57,6 +57,14 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
         )
         return [Finding("columns", what, Gravity.WARNING)]
     return []
+
+
+def _noisy_or_led(log: Log, seen: Motion) -> bool:
+    """Whether a position that jumps is one all the same: noise jumps all the time, and a slip leaves the rest to follow
+    its command.
+    """
+    jumps = np.abs(np.diff(log.position))
+    return float(np.median(jumps)) > _SMOOTH * float(jumps.max()) or _follows(seen) > _CLEAR
 
 
 def _driven(seen: Motion) -> list[Finding]:

@@ -113,8 +113,8 @@ def force_gain(form: Form, command: str, logs: Sequence[Log]) -> dict[str, float
         if log.force_gain is None:
             raise InputError(
                 f"{form.name} needs the {form.forces} that the command makes, and the log does not say; give "
-                f"`{name} = ...` ({form.force}/{command}) in the map beside the data, or fit the structure axis, which "
-                "needs none",
+                f"`{name} = ...` ({form.force}/{command}) in the map beside the data, or --fix {name}=...; without it, "
+                f"{form.moved} and friction are known as ratios to it only: fit the structure axis",
                 log.source or log.name,
             )
         if (has := log.units.get("force", "N")) != form.force:

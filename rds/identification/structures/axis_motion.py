@@ -143,36 +143,25 @@ def _take_along(state, tangent, p, where):
 
 
 @kernel
-def _force(u, p, where, by):
-    """K w for the voltage `u`, and its derivative by the columns into `by`."""
-    w = u + p[OFFSET]
-    d = p[DEAD_ZONE]
-    slope, narrower = 1.0, 0.0
-    if d > 0.0:
-        if w > d:
-            w, narrower = w - d, -1.0
-        elif w < -d:
-            w, narrower = w + d, 1.0
-        else:
-            w, slope = 0.0, 0.0
-    for i in range(len(where)):
-        by[i] = 0.0
-        if where[i] == K:
-            by[i] = w
-        elif where[i] == OFFSET:
-            by[i] = p[K] * slope
-        elif where[i] == DEAD_ZONE:
-            by[i] = p[K] * narrower
-    return p[K] * w
+def _driven(u, offset, dead):
+    """w for the voltage `u`, and its derivatives by the offset (0 or 1) and by the dead zone (0, 1 or -1)."""
+    w = u + offset
+    if dead > 0.0:
+        if w > dead:
+            return w - dead, 1.0, -1.0
+        if w < -dead:
+            return w + dead, 1.0, 1.0
+        return 0.0, 0.0, 0.0
+    return w, 1.0, 0.0
 
 
 @kernel
-def _change_at_sample(state, tangent, work, p, where, before, after):
+def _change_at_sample(state, tangent, p, where, before, after):
     """The voltage changes at the very instant of a sample: with a little more delay, the old one acts on after it."""
     for i in range(len(where)):
         if where[i] == DELAY:
-            tangent[1, i] += _acceleration(state[1], _force(before, p, where, work[3]), p)
-            tangent[1, i] -= _acceleration(state[1], _force(after, p, where, work[3]), p)
+            tangent[1, i] += _acceleration(state[1], p[K] * _driven(before, p[OFFSET], p[DEAD_ZONE])[0], p)
+            tangent[1, i] -= _acceleration(state[1], p[K] * _driven(after, p[OFFSET], p[DEAD_ZONE])[0], p)
 
 
 @kernel
@@ -218,8 +207,28 @@ def move(t, u, x0, p, where, y, by, rate_out):
     work, stretch = np.zeros((4, n)), np.zeros(n)
     _begin(x0, p, where, state, tangent)
     plain = p[STRIBECK] == 0.0 and p[BACKLASH] == 0.0
-    rate = (1.0 + p[VISCOUS]) / p[TAU]
-    periods, decays, reaches = np.full(2, -1.0), np.ones(2), np.zeros(2)  # of the last parts, before and after a change
+    gain, offset, dead, delay = p[K], p[OFFSET], p[DEAD_ZONE], p[DELAY]
+    damped = 1.0 + p[VISCOUS]
+    rate = damped / p[TAU]
+    force_by = work[3]
+    # which columns are these parameters'; of offset and dead zone, times the gain
+    columns = np.zeros((7, n))
+    of_side, of_viscous, of_delay = columns[:2], columns[2], columns[3]
+    of_gain, of_offset, of_dead = columns[4], columns[5], columns[6]
+    for i in range(n):
+        of_gain[i] = 1.0 if where[i] == K else 0.0
+        of_offset[i] = gain if where[i] == OFFSET else 0.0
+        of_dead[i] = gain if where[i] == DEAD_ZONE else 0.0
+        of_side[0, i] = 1.0 if where[i] == PLUS else 0.0
+        of_side[1, i] = 1.0 if where[i] == MINUS else 0.0
+        of_viscous[i] = 1.0 if where[i] == VISCOUS else 0.0
+        of_delay[i] = 1.0 if where[i] == DELAY else 0.0
+    delayed = of_delay.any()
+    # of the last parts, before and after a change; what the rate of decay makes of x and v, and a column by the rate
+    parts, gaps = np.zeros((3, 2)), np.zeros((4, n))
+    periods, decays, reaches = parts[0], parts[1], parts[2]
+    x_by_gap, v_by_gap = gaps[:2], gaps[2:]
+    periods[:] = -1.0
     acting = 0  # the command that acts now
     out = 1 if rate_out else 2 if p[BACKLASH] > 0.0 else 0
     for k in range(len(t)):
@@ -232,17 +241,20 @@ def move(t, u, x0, p, where, y, by, rate_out):
         moved = False  # whether `now` is an instant that moves with the delay
         while now < until:
             before = acting
-            while acting + 1 < len(t) and t[acting + 1] + p[DELAY] <= now + _SAME:
+            while acting + 1 < len(t) and t[acting + 1] + delay <= now + _SAME:
                 acting += 1
-            if acting > before and not moved:
-                _change_at_sample(state, tangent, work, p, where, u[before], u[acting])
+            if delayed and acting > before and not moved:
+                _change_at_sample(state, tangent, p, where, u[before], u[acting])
             end, moves = until, False
-            if acting + 1 < len(t) and t[acting + 1] + p[DELAY] < until - _SAME:
-                end, moves = t[acting + 1] + p[DELAY], True
-            force = _force(u[acting], p, where, work[3])
+            if acting + 1 < len(t) and t[acting + 1] + delay < until - _SAME:
+                end, moves = t[acting + 1] + delay, True
+            w, slope, narrower = _driven(u[acting], offset, dead)
+            force = gain * w
+            for i in range(n):
+                force_by[i] = of_gain[i] * w + of_offset[i] * slope + of_dead[i] * narrower
             v = state[1]
             side = PLUS if v > 0.0 or (v == 0.0 and force > 0.0) else MINUS
-            final = (force - p[side]) / (1.0 + p[VISCOUS])
+            final = (force - p[side]) / damped
             if plain and v != 0.0 and final * v > 0.0:
                 # the usual part of a sample: no crossing, and the same duration as this part had before
                 time = end - now
@@ -251,29 +263,21 @@ def move(t, u, x0, p, where, y, by, rate_out):
                     periods[part] = time
                     decays[part] = exp(-rate * time)
                     reaches[part] = -expm1(-rate * time) / rate
-                decay, reach = decays[part], reaches[part]
+                    for i in range(n):
+                        rate_by = 1.0 / p[TAU] if where[i] == VISCOUS else -rate / p[TAU] if where[i] == TAU else 0.0
+                        v_by_gap[part, i] = -decays[part] * rate_by * time
+                        x_by_gap[part, i] = -(v_by_gap[part, i] + reaches[part] * rate_by) / rate
+                decay, reach, gap = decays[part], reaches[part], v - final
                 longer = (1.0 if moves else 0.0) - (1.0 if moved else 0.0)  # d(time) by the delay
-                state[0] += final * time + (v - final) * reach
-                state[1] = final + (v - final) * decay
+                state[0] += final * time + gap * reach
+                state[1] = final + gap * decay
+                x_later, v_later = state[1] * longer, -gap * decay * rate * longer
+                row = 0 if side == PLUS else 1
                 for i in range(n):
-                    kind = where[i]
-                    final_by = work[3, i]
-                    if kind == side:
-                        final_by -= 1.0
-                    elif kind == VISCOUS:
-                        final_by -= final
-                    final_by /= 1.0 + p[VISCOUS]
-                    x_by = tangent[0, i] + final_by * time + (tangent[1, i] - final_by) * reach
-                    v_by = final_by + (tangent[1, i] - final_by) * decay
-                    if kind in (TAU, VISCOUS):
-                        rate_by = -rate / p[TAU] if kind == TAU else 1.0 / p[TAU]
-                        decay_by = -decay * rate_by * time
-                        x_by -= (v - final) * (decay_by + reach * rate_by) / rate
-                        v_by += (v - final) * decay_by
-                    elif kind == DELAY:
-                        x_by += (final + (v - final) * decay) * longer
-                        v_by -= (v - final) * decay * rate * longer
-                    tangent[0, i], tangent[1, i] = x_by, v_by
+                    final_by = (force_by[i] - of_side[row, i] - final * of_viscous[i]) / damped
+                    apart = tangent[1, i] - final_by
+                    tangent[0, i] += final_by * time + apart * reach + gap * x_by_gap[part, i] + x_later * of_delay[i]
+                    tangent[1, i] = final_by + apart * decay + gap * v_by_gap[part, i] + v_later * of_delay[i]
             else:
                 steps = 1
                 if p[STRIBECK] > 0.0:

@@ -20,7 +20,8 @@ from rds.identification.logs.log import Log
 from rds.identification.logs.motion import noise
 from rds.identification.validate.attainable import Attainable, attainable
 from rds.identification.validate.candidate import Candidate, check_units
-from rds.identification.validate.discrepancy import Discrepancy, as_axis, as_motion
+from rds.identification.validate.discrepancy import Discrepancy, as_axis
+from rds.identification.validate.discrepancy_of_motion import as_motion
 from rds.identification.validate.same_data import Overlap, overlap
 
 _MOVES = 1e-3  # of the measured motion
@@ -176,7 +177,9 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None, b
         voltage=_voltage(candidate, log, block),
         attainable=attainable(candidate, log, start, common["noise"]),
         as_axis=as_axis(candidate, log, common["noise"], bandwidth),
-        as_motion=as_motion(log, first, modelled, candidate.is_rate, rates, bandwidth, values.get("tau", 0.0)),
+        as_motion=as_motion(
+            log, first, modelled, candidate.is_rate, rates, bandwidth, values.get("tau", 0.0), common["noise"]
+        ),
         **common,
     )
 

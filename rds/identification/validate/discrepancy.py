@@ -28,17 +28,25 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.identification.fit.problem import Problem
 from rds.identification.fit.residuals import effective_samples
+from rds.identification.fit.solve import Solution, first_state, least_squares
+from rds.identification.fit.uncertainty import uncertainty_of
 from rds.identification.logs.log import Log
 from rds.identification.structures.structure import Start, Structure
 from rds.identification.validate.candidate import Candidate
 
-_LONGEST = 200_000  # samples
+LONGEST = 200_000  # samples
 _RUNS = 40  # free runs of a search, at most
 _STRETCH = (1.0, 40.0)  # s, time constants: of a stretch of a closed loop, at least
 _STRETCHES = 5
 _EARLY = (8, 64)  # samples by which a log's position may precede its command: at least, at most
 _SURE = 0.2  # standard error of a time constant over its value, at most, for the bandwidth to follow from it
-_EXPLAINED = 1.5  # times the noise
+EXPLAINED = 1.5  # times the noise
+_LACKING = 3.0  # times the noise: so much is left only where the axis does something that the structure lacks
+_PLAYS = (2.0, 6.0)  # times the residual: widths of a play that is tried
+_FAR_MORE = 0.5  # of the residual, at most, where play is what it lacks
+_CHANCE = 0.01
+_TOLD = 1.0  # %: standard error of a gain that the log tells
+_SAME = 0.1  # %: gains that differ by less are one
 _LINEAR = {"tau", "K", "friction_plus", "friction_minus"}
 
 
@@ -49,6 +57,7 @@ class Off:
     value: float
     error: float
     unit: str
+    at: float = 0.0  # Hz: of a gain that is not the one at rest
 
 
 @dataclass(frozen=True)
@@ -68,6 +77,7 @@ class Discrepancy:
     friction: Off | None = None  # % of the largest command
     rmse: float = 0.0
     reached: float = 0.0
+    by_chance: bool = False  # whether what the model leaves is as little as the truth itself may leave beside the fit
 
 
 def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0) -> Discrepancy | None:
@@ -75,42 +85,34 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
 
     `frequency` (Hz) is the intended bandwidth, 0: half of 1/τ; `noise` is the measurement's.
     """
-    from rds.identification.fit.solve import Solution, first_state, least_squares
-    from rds.identification.fit.uncertainty import uncertainty_of
-
     known = _axis_of(candidate)
     if known is None or not np.ptp(log.position) > 0.0:
         return None
     made, values = known
     T = log.sample_period
     early = int(min(max(_EARLY[0], ceil(values["tau"] / T)), _EARLY[1], len(log) // 10))
-    part = _advanced(log.part(0, _LONGEST), early)
-    logs = _stretches(part, values["tau"]) if log.closed_loop else [part]
+    part = _advanced(log.part(0, LONGEST), early)
+    logs = stretches(part, values["tau"]) if log.closed_loop else [part]
     begun = {**values, "delay": values.get("delay", 0.0) + early * T}
     held = {name: begun[name] for name in ("viscous",) if name in begun}
-    problem = Problem(logs, made, held, skip=early)
-
-    def search(point: np.ndarray) -> Solution | None:
-        try:
-            return least_squares(problem, point, _RUNS)
-        except InputError:  # the free run is not finite
-            return None
-
-    states = [first_state(made, one) for one in logs]
-    try:
-        own = Problem(logs, made, begun, skip=early)
-        left = least_squares(own, own.point(begun, states), _RUNS)
-    except InputError:
+    problem, own = Problem(logs, made, held, skip=early), Problem(logs, made, begun, skip=early)
+    left = _search(own, own.point(begun, [first_state(made, one) for one in logs]))
+    if left is None:
         return None
     states = [own.state(left.point, number) for number in range(len(logs))]
-    best = search(problem.point(begun, states))
-    unexplained = best is None or problem.rms(best.squares) > _EXPLAINED * noise
+    best = _search(problem, problem.point(begun, states))
+    unexplained = best is None or problem.rms(best.squares) > EXPLAINED * noise
     if unexplained and (start := _other_start(made, logs, early * T)) is not None:
-        other = search(problem.point({**start[0], **held}, start[1]))
+        other = _search(problem, problem.point({**start[0], **held}, start[1]))
         if other is not None and (best is None or other.squares < best.squares):
             best = other
     if best is None:
         return None
+    states = [problem.state(best.point, number) for number in range(len(logs))]
+    again = _search(own, own.point(begun, states))  # the initial states have places of their own to stand still at
+    left = left if again is None or left.squares <= again.squares else again
+    if "backlash" not in made.options and not made.is_rate and problem.rms(best.squares) > _LACKING * noise:
+        problem, best = _with_play(problem, best)
     covariance = uncertainty_of(problem, best).covariance[: len(problem.names), : len(problem.names)]
     here = problem.values(best.point)
     f = frequency or 1.0 / (4.0 * pi * max(_sure_of_tau(problem, here, covariance, begun["tau"]), T))
@@ -123,18 +125,71 @@ def as_axis(candidate: Candidate, log: Log, noise: float, frequency: float = 0.0
             )
 
         point = best.point[: len(problem.names)]
-        return Off(of(point), _error_of(of, point, covariance), _UNITS[measure])
+        return Off(of(point), error_of(of, point, covariance), _UNITS[measure])
 
     return Discrepancy(
         frequency=f,
-        gain=min((told("gain"), told("static")), key=lambda off: off.error),
+        gain=_gain_of(told("static"), replace(told("gain"), at=f)),
         phase=told("phase"),
         lag=told("lag"),
         delay=told("delay"),
-        friction=max((told(name) for name in ("forward", "backward")), key=_clear),
+        friction=max((told(name) for name in ("forward", "backward")), key=clear),
         rmse=own.rms(left.squares),
         reached=problem.rms(best.squares),
+        by_chance=own.rms(left.squares) <= EXPLAINED * float(noise)
+        and by_chance(left.squares, best.squares, _worth(problem, best), len(problem.names)),
     )
+
+
+def _search(problem: Problem, point: np.ndarray) -> Solution | None:
+    """The end of a search; None where the free run from its start is not finite."""
+    try:
+        return least_squares(problem, point, _RUNS)
+    except InputError:
+        return None
+
+
+def _with_play(problem: Problem, best: Solution) -> tuple[Problem, Solution]:
+    """The fit with play, where that explains far more and tells the gain: without, a time constant makes up for it."""
+    from rds.identification.structures.structures import structure
+
+    made = problem.structure
+    wider = structure("axis", (*made.options, "backlash"), made.output_unit, made.command_unit)
+    found = Problem(problem.logs, wider, problem.fixed, skip=problem.skip)
+    values, size = problem.values(best.point), problem.rms(best.squares)
+    states = [(*problem.state(best.point, number), 0.0) for number in range(len(problem.logs))]
+    starts = [({**values, "backlash": play * size}, states) for play in _PLAYS]
+    ends = [_search(found, found.point(*start)) for start in starts]
+    end = min((end for end in ends if end is not None), key=lambda end: end.squares, default=None)
+    if end is None or end.squares > _FAR_MORE**2 * best.squares:
+        return problem, best
+    at = found.names.index("K")
+    error = float(np.sqrt(uncertainty_of(found, end).covariance[at, at]))
+    return (found, end) if 100.0 * error <= _TOLD * abs(float(end.point[at])) else (problem, best)
+
+
+def _worth(problem: Problem, best: Solution) -> float:
+    """How many independent samples the residuals are worth."""
+    errors = [problem.residuals(best.point, number)[0][problem.skip :] for number in range(len(problem.logs))]
+    return sum(effective_samples(error) for error in errors)
+
+
+def by_chance(left: float, least: float, worth: float, free: int) -> bool:
+    """Whether a sum of squares `left` is above the `least` by no more than chance puts the truth's there, 99 %.
+
+    The least is over `free` parameters, and of residuals that are worth so many samples. Then nothing is wrong for
+    sure, whatever derivatives at the least say: in a narrow, bent valley they say too little.
+    """
+    from scipy.special import chdtri
+
+    return bool(left <= least * (1.0 + float(chdtri(free, _CHANCE)) / worth))
+
+
+def _gain_of(rest: Off, bandwidth: Off) -> Off:
+    """The gain at rest or at the bandwidth: the one that the log tells better; of two that it tells, the worse."""
+    if rest.error <= _TOLD and bandwidth.error <= _TOLD:
+        return bandwidth if abs(bandwidth.value) > abs(rest.value) + _SAME else rest
+    return min((rest, bandwidth), key=lambda off: off.error)
 
 
 def _sure_of_tau(problem: Problem, here: Mapping[str, float], covariance: np.ndarray, model: float) -> float:
@@ -147,7 +202,7 @@ def _sure_of_tau(problem: Problem, here: Mapping[str, float], covariance: np.nda
 _UNITS = {"gain": "%", "static": "%", "phase": "°", "lag": "s", "delay": "s", "forward": "%", "backward": "%"}
 
 
-def _clear(off: Off) -> float:
+def clear(off: Off) -> float:
     return abs(off.value) / off.error if isfinite(off.error) and off.error > 0.0 else 0.0
 
 
@@ -179,7 +234,7 @@ def _frictions(values: Mapping[str, float]) -> dict[str, float]:
     return {"forward": values["friction_plus"], "backward": -values["friction_minus"]}
 
 
-def _error_of(of: Callable[[np.ndarray], float], point: np.ndarray, covariance: np.ndarray) -> float:
+def error_of(of: Callable[[np.ndarray], float], point: np.ndarray, covariance: np.ndarray) -> float:
     slopes = np.zeros(len(point))
     for i, value in enumerate(point):
         step = 1e-5 * (abs(value) or 1.0)
@@ -211,7 +266,8 @@ def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
         return None
     elif made.name != "axis":
         options = ()
-    if "offset" not in options and values["K"] != 0.0:  # friction that differs by direction, without bounds to its sign
+    # friction that differs by direction, without bounds to its sign; a Stribeck part would not be each direction's own
+    if not {"offset", "stribeck"} & set(options) and values["K"] != 0.0:
         forward, backward = values.pop("friction_plus"), -values.pop("friction_minus")
         values |= {"friction": (forward + backward) / 2.0, "offset": (backward - forward) / (2.0 * values["K"])}
         options = (*options, "offset")
@@ -225,7 +281,7 @@ def _advanced(log: Log, samples: int) -> Log:
     return replace(part, command=log.command[samples:].copy())
 
 
-def _stretches(log: Log, tau: float) -> list[Log]:
+def stretches(log: Log, tau: float) -> list[Log]:
     seconds = max(_STRETCH[0], _STRETCH[1] * tau)
     count = int(np.clip((log.time[-1] - log.time[0]) / seconds, 1, _STRETCHES))
     ends = np.linspace(0, len(log), count + 1).astype(int)
@@ -241,124 +297,3 @@ def _other_start(made: Structure, logs: Sequence[Log], delay: float) -> Start | 
     except InputError:
         return None
     return {**values, "delay": delay}, list(states)
-
-
-def as_motion(
-    log: Log,
-    first: int,
-    modelled: np.ndarray,
-    is_rate: bool,
-    rates: Sequence[np.ndarray],
-    frequency: float = 0.0,
-    tau: float = 0.0,
-) -> Discrepancy | None:
-    """The measured motion over the modelled one, from sample `first` on; None where the model hardly moves.
-
-    `rates` are the measured and the modelled velocity over blocks, whose ratio is the gain; `tau` the time constant of
-    the model, where it has one by that name (else it is taken from how it moves).
-    """
-    T = log.sample_period
-    t, y, u = log.time[first:][:_LONGEST], log.position[first:][:_LONGEST], log.command[first:][:_LONGEST]
-    x = modelled[:_LONGEST]
-    rate = x if is_rate else np.gradient(x, t)
-    if not np.ptp(x) > 1e-6 * max(float(np.ptp(y)), 1e-300):
-        return None
-    K, tau_shown = _first_order(rate, np.gradient(rate, t), u, T)
-    tau = max(tau, T) if tau > 0.0 else tau_shown
-    f = frequency or 1.0 / (4.0 * pi * tau)
-    change = _backward(x, T)
-    ways = [sign.astype(float) for sign in _signs(x if is_rate else change)]
-    columns = [x, -change, _backward(change, T), *(ways if is_rate else [np.cumsum(way) * T for way in ways])]
-    stretches = len(_stretches(log.part(first, len(log)), tau)) if log.closed_loop else 1
-    A = np.stack(columns, axis=1)
-    residual = y.copy()
-    ends = np.linspace(0, len(y), stretches + 1).astype(int)
-    for a, b in pairwise(ends):  # what each stretch has of its own is taken out
-        own = np.stack([np.ones(b - a), t[a:b] - t[a]], axis=1)[:, : 2 if log.closed_loop else 1]
-        both = np.column_stack([A[a:b], residual[a:b]])
-        both -= own @ np.linalg.lstsq(own, both, rcond=None)[0]
-        A[a:b], residual[a:b] = both[:, :-1], both[:, -1]
-    scale = np.linalg.norm(A, axis=0)
-    kept = np.concatenate([np.ones(3, dtype=bool), scale[3:] > 1e-9 * np.linalg.norm(np.stack(columns[3:]), axis=1)])
-    A, scale = A[:, kept], scale[kept]
-    if not (scale > 0.0).all():
-        return None
-    found = np.linalg.lstsq(A / scale, residual, rcond=1e-10)[0] / scale
-    error = residual - A @ found
-    gram = np.linalg.pinv((A / scale).T @ (A / scale), rcond=1e-14) / np.outer(scale, scale)
-    covariance = gram * float(error @ error) / effective_samples(error)
-    slope = (1.0 - np.exp(-2j * pi * f * T)) / T  # of the backward difference at f
-
-    def phase(p: np.ndarray) -> float:
-        return -degrees(float(np.angle(p[0] - p[1] * slope + p[2] * slope**2)))
-
-    return Discrepancy(
-        frequency=f,
-        gain=min((_gain(*rates), _gain_of_way(found, covariance)), key=lambda off: off.error),
-        phase=Off(phase(found), _error_of(phase, found, covariance), "°"),
-        lag=Off(-float(found[1]), sqrt(max(float(covariance[1, 1]), 0.0)), "s"),
-        friction=_friction_of_ways(found, covariance, kept, K, float(np.abs(u).max())),
-        rmse=float(np.sqrt(np.mean((residual - A[:, 0]) ** 2))),
-        reached=float(np.sqrt(np.mean(error**2))),
-    )
-
-
-def _friction_of_ways(
-    found: np.ndarray, covariance: np.ndarray, kept: np.ndarray, K: float, largest: float
-) -> Off | None:
-    """What the velocities of each direction lack, as friction in % of the largest command; None where not known.
-
-    With v = K u - F of the model and v' = g v + c of the log, c is g F - F', and (F/K - F'/(g K)) = c / (g K).
-    """
-    scale = float(found[0]) * K * largest / 100.0
-    if not (kept[3:].all() and scale > 0.0):
-        return None
-    forward, backward = (
-        Off(sign * float(found[at]) / scale, sqrt(max(float(covariance[at, at]), 0.0)) / scale, "%")
-        for at, sign in ((3, 1.0), (4, -1.0))
-    )
-    return max(forward, backward, key=_clear)
-
-
-def _backward(x: np.ndarray, T: float) -> np.ndarray:
-    """The backward difference over T. No later sample is in it: in a closed loop the command at a sample answers the
-    noise that the encoder read there, and a central difference would explain that noise by itself.
-    """
-    return np.diff(x, prepend=2.0 * x[0] - x[1]) / T
-
-
-def _gain_of_way(found: np.ndarray, covariance: np.ndarray) -> Off:
-    """The same by the positions themselves, which tell more where noise hides the velocity."""
-    if not found[0] > 0.0:
-        return Off(0.0, float("inf"), "%")
-    spread = sqrt(max(float(covariance[0, 0]), 0.0))
-    return Off(100.0 * (1.0 / float(found[0]) - 1.0), 100.0 * spread / float(found[0]) ** 2, "%")
-
-
-def _signs(rate: np.ndarray) -> list[np.ndarray]:
-    """Where it is forward, and where backward, each (n,) of bool; at rest neither."""
-    least = 1e-6 * float(np.abs(rate).max())
-    return [rate > least, rate < -least]
-
-
-def _gain(measured: np.ndarray, modelled: np.ndarray) -> Off:
-    """By how many per cent the model's velocity is too large, friction of each direction apart."""
-    ways = np.stack(_signs(modelled), axis=1).astype(float)
-    own = modelled - ways @ np.linalg.lstsq(ways, modelled, rcond=None)[0]
-    size = float(own @ own)
-    if not size > 1e-12 * float(modelled @ modelled):
-        return Off(0.0, float("inf"), "%")
-    ratio = float(measured @ own) / size
-    error = measured - ratio * own
-    error -= ways @ np.linalg.lstsq(ways, error, rcond=None)[0]
-    spread = sqrt(float(error @ error) / (size * max(effective_samples(error) / len(error), 1e-3)) / len(error))
-    if not ratio > 0.0:
-        return Off(float("inf"), 0.0, "%")
-    return Off(100.0 * (1.0 / ratio - 1.0), 100.0 * spread / ratio**2, "%")
-
-
-def _first_order(rate: np.ndarray, change: np.ndarray, u: np.ndarray, T: float) -> tuple[float, float]:
-    """Gain (unit/s per V) and time constant (s) of the model, by its own motion: rate = K u - τ change - friction."""
-    A = np.stack([u, -change, -np.sign(rate), np.ones(len(u))], axis=1)
-    K, tau = np.linalg.lstsq(A, rate, rcond=1e-9)[0][:2]
-    return float(K), float(np.clip(tau, 2.0 * T, 10.0))

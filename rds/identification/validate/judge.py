@@ -156,7 +156,8 @@ def _said_of(measure: Measure, frequency: float) -> str:
     value = measure.off.value
     size, more = _shown(abs(value), measure.off.unit), value > 0.0
     if measure.kind == "gain":
-        return f"its gain is {size} too {'high' if more else 'low'}"
+        where = f" at {measure.off.at:.2g} Hz" if measure.off.at > 0.0 else ""
+        return f"its gain{where} is {size} too {'high' if more else 'low'}"
     if measure.kind == "phase":
         return f"at {frequency:.2g} Hz its phase {'leads' if more else 'lags'} that of the axis by {size}"
     if measure.kind == "delay":

@@ -10,6 +10,7 @@ from rds.identification.logs.log import Finding, Gravity
 from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.conclusion import DATA
 from rds.identification.validate.verdict import Bands, Reason, Side
+from rds.identification.validate.within import AS_NOISE
 
 _MISLEADING = ("sign", "units", "columns", "wrap")  # findings of a log after which a good fit proves nothing
 _IDENTICAL = 1e-9  # RMSE over the motion: only the model's own output comes so near
@@ -36,6 +37,13 @@ def of_data(a: Assessment, bands: Bands) -> Iterator[Reason]:
             "no-motion",
             f"the axis moves {a.motion:.4g} {a.unit}, {steps:.0f} steps of its encoder; {bands.least_steps:.0f} are "
             "needed to tell a model from none",
+        )
+    elif float(a.measured.std()) <= AS_NOISE * a.noise:
+        yield Reason(
+            Side.CANNOT_TELL,
+            "no-motion",
+            f"the position varies by {a.measured.std():.3g} {a.unit} (RMS), which is its noise alone: the axis did not "
+            "move, or not enough to show (play, friction)",
         )
     elif a.changes < bands.least_changes:
         yield Reason(

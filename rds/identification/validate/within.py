@@ -12,7 +12,7 @@ from rds.identification.validate.assessment import Assessment
 from rds.identification.validate.discrepancy import Discrepancy, Off
 from rds.identification.validate.verdict import Bands
 
-_AS_NOISE = 1.2  # times what noise makes of an error: no model could be better
+AS_NOISE = 1.2  # times what noise makes of an error: no model could be better
 _SURE = 2.6  # standard errors: 99 %
 _SURE_OF_DELAY = 5.0  # a delay and a time constant make up for each other, by more than derivatives say
 _LIKELY = 2.0  # 95 %
@@ -34,18 +34,18 @@ def as_good(a: Assessment) -> bool:
 
     A constant beside it is the initial state's, which a few noisy samples tell no better, and which a play hides.
     """
-    return a.free_run is not None and a.as_motion is not None and float(a.residual.std()) <= _AS_NOISE * a.noise
+    return a.free_run is not None and a.as_motion is not None and float(a.residual.std()) <= AS_NOISE * a.noise
 
 
 def as_good_velocity(a: Assessment) -> bool:
     """The same of the velocity: what noise of the position makes of a difference over a block."""
     made = sqrt(2.0) * a.noise / (a.block * a.log.sample_period)
-    return a.velocity is not None and a.as_motion is not None and a.velocity.rmse <= _AS_NOISE * made
+    return a.velocity is not None and a.as_motion is not None and a.velocity.rmse <= AS_NOISE * made
 
 
 def of_noise(a: Assessment, errors: Errors) -> bool:
     """Whether a prediction from one measured position to another is as good as noise lets it be."""
-    return errors.rmse <= _AS_NOISE * sqrt(2.0) * a.noise
+    return errors.rmse <= AS_NOISE * sqrt(2.0) * a.noise
 
 
 def skilled_at(a: Assessment, bands: Bands) -> list[int]:
@@ -67,10 +67,13 @@ class Measure:
     kind: str  # gain, phase, delay, friction
     off: Off
     band: float
+    by_chance: bool = False  # what the model leaves is no more than chance makes the truth leave
 
     @property
     def wrong(self) -> bool:
         """Clearly beyond the band."""
+        if self.by_chance:
+            return False
         sure = _SURE_OF_DELAY if self.kind == "delay" else _SURE
         return abs(self.off.value) > max(self.band, sure * self.off.error)
 
@@ -105,18 +108,21 @@ def measures(a: Assessment, bands: Bands) -> list[Measure]:
     found = judged_by(a, bands)
     if found is None:
         return []
-    listed = [Measure("gain", found.gain, bands.gain_percent), Measure("phase", found.phase, bands.phase_degrees)]
-    if (motion := a.as_motion) is not None and found is not motion and motion.rmse <= _AS_NOISE * a.noise:
+    listed = [
+        Measure("gain", found.gain, bands.gain_percent, found.by_chance),
+        Measure("phase", found.phase, bands.phase_degrees, found.by_chance),
+    ]
+    if (motion := a.as_motion) is not None and found is not motion and motion.rmse <= AS_NOISE * a.noise:
         # the model leaves noise alone: what the parameters of an axis leave open, the motion itself may tell
         beside = (
-            Measure("gain", motion.gain, bands.gain_percent),
-            Measure("phase", motion.phase, bands.phase_degrees),
+            Measure("gain", motion.gain, bands.gain_percent, motion.by_chance),
+            Measure("phase", motion.phase, bands.phase_degrees, motion.by_chance),
         )
         listed = [b if not m.told and b.told and not b.wrong else m for m, b in zip(listed, beside, strict=True)]
     if found.delay is not None:
-        listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period)))
+        listed.append(Measure("delay", found.delay, max(bands.delay, 1.5 * a.log.sample_period), found.by_chance))
     if found.friction is not None:
-        listed.append(Measure("friction", found.friction, bands.friction_percent))
+        listed.append(Measure("friction", found.friction, bands.friction_percent, found.by_chance))
     return listed
 
 
