@@ -102,13 +102,15 @@ def _state(name: str, values: Sequence[float] | None, most: Sequence[float]) -> 
     within = len(found) == len(most) and np.isfinite(found).all() and bool(np.all(np.abs(found) <= most))
     if not within:
         limits = "" if inf in most else f" within {tuple(most)}"
-        remedy = "" if inf in most else f"; give less, or raise the limits of {name.removeprefix('end_')}"
-        raise InputError(f"{name} = {tuple(found)} must be {len(most)} finite numbers{limits}, one for each axis{remedy}")
+        remedy = "" if inf in most else f"; give less, or allow more {name.removeprefix('end_')}"
+        raise InputError(
+            f"{name} = {tuple(found)} must be {len(most)} finite numbers{limits}, one for each axis{remedy}"
+        )
     return found
 
 
 def _check_end(speeds: list[float], pushes: list[float], most: Sequence[float], jerk: Sequence[float]) -> None:
-    """InputError for an end at which an axis has come from beyond its velocity: v − a|a| / (2 j), where a was 0 last."""
+    """InputError for an end that an axis comes to from beyond its velocity: v − a|a| / (2 j), where a was last 0."""
     for k, (v, a, j) in enumerate(zip(speeds, pushes, jerk, strict=True)):
         before = v - a * abs(a) / (2.0 * j)
         if abs(before) > most[k]:
