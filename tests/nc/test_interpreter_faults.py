@@ -223,7 +223,7 @@ def test_a_fault_crosses_processes() -> None:
     assert (str(again), again.line, again.column, again.word) == (str(error), 1, 7, "U2")
 
 
-FEW = settings(max_examples=300, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=120, suppress_health_check=list(HealthCheck))
 LIMITS = Dialect(max_jumps=200, gr=True, program_numbers=True)
 
 
