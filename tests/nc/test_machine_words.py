@@ -60,7 +60,7 @@ def test_outputs_that_a_machine_names_are_switched_where_the_program_says(tmp_pa
     [
         ("G88 X5 Y5 Z-2 R1 P.1", "G88 leaves the tool in the hole"),
         ("M19 Q1", "the spindle here cannot stop at an angle"),
-        ("G71 U1.5 R0.5", r"U1.5: U goes with the form .* that Fanuc's lathes have.*G71 Q100 I1.5 D0.2 R0.5"),
+        ("G73 U1.5 R5", r"U1.5: U goes with the form .* that Fanuc's lathes have.*G71 Q100 I1.5 D0.2 R0.5"),
         ("G18 G71 P10 Q20 D0.2", r"P10: P goes with the form .* that Fanuc's lathes have"),
     ],
 )

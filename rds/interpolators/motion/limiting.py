@@ -66,7 +66,7 @@ class Limiting:
 
         every = max(len(self.time) // 20000, 1)
         way = self.way[::every]
-        allowed = {"color": GREY, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+        allowed: dict[str, Any] = {"color": GREY, "linewidth": 1.0, "linestyle": (0, (4, 2))}
         top.plot(way, self.allowed[::every], label="allowed by velocity, acceleration and jerk", **allowed)
         top.plot(way, self.programmed[::every], color=ORANGE, linewidth=2.0, alpha=0.6, label="programmed")
         top.plot(way, self.planned[::every], color=BLUE, linewidth=1.2, label="planned")

@@ -30,6 +30,9 @@ BLOCK_ROWS = 65536  # at most, in a MotionBlock
 # RATE: the feed rate (units/min; in inverse time 1/min, per revolution units/rev).
 # SPEED: the spindle's speed (rev/min; under G96 units of its own), SET_SPINDLE_SPEED of spindle 0.
 # n, digits: the line number of the word N and the number of digits that it is written with (0: the line has none).
+# MOTION, the dtype of the rows, is made when it is first asked for: it takes numpy.
+
+
 def __getattr__(name: str) -> Any:
     if name != "MOTION":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -42,9 +45,8 @@ class MotionBlock:
     __slots__ = ("_columns", "_rows", "file")
 
     def __init__(self, moves: np.ndarray | Columns, file: str = ""):
-        is_columns = isinstance(moves, Columns)
-        self._columns: Columns | None = moves if is_columns else None
-        self._rows: np.ndarray | None = None if is_columns else moves
+        self._columns: Columns | None = moves if isinstance(moves, Columns) else None
+        self._rows: np.ndarray | None = None if isinstance(moves, Columns) else moves
         self.file = file
 
     @property

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rds.machines.ncc import Script
     from rds.nc.compensation.moves import Stretch
     from rds.nc.language.contour_reading import ContourReading
+    from rds.nc.language.fanuc_turning import FanucTurning
     from rds.nc.language.turning_contour import Piece
 
 _USUAL = frozenset((0, 10, 20, 30))  # motions that no line goes on with wrongly but by words that are checked
@@ -97,6 +98,7 @@ class Interpreter:
         self.context.saved_modes = self._saved_modes
         self.control.restore = self._restore
         self.context.contour = self._contour_of
+        self._fanuc: FanucTurning | None = None  # once a line of its form has been met
         self._contour: ContourReading | None = None  # while the moves of a contour's subroutine are gathered
         self.lane = FastLane(self.context, self.source)
         self._repeated = RepeatedLines(self.context.parameters)
@@ -176,7 +178,7 @@ class Interpreter:
             if not text or (text[0] == "/" and self.options.block_delete):
                 return False
             ended = self._block(text)
-            if self.control.repeats and not self.control.skipping and not self.options.program_numbers:
+            if self.control.repeats and not (self.control.skipping or self.options.program_numbers or self._fanuc):
                 self._repeated.count(raw, text)
             return ended
         except Fault as fault:
@@ -209,7 +211,7 @@ class Interpreter:
     def _block(self, text: str) -> bool:
         if self.options.program_numbers and not self.control.skipping and self._program_number(text):
             return False
-        plain = None if self.control.skipping else read_plain(text)
+        plain = None if self.control.skipping or "g7" in text else read_plain(text)  # "g7": it may be Fanuc's G71
         if plain is None:
             return self._other(text)
         digits, words = plain
@@ -242,6 +244,8 @@ class Interpreter:
             control.execute(word)
             return False
         if control.skipping:
+            return False
+        if "g7" in text and self._fanuc_turning(text):
             return False
         block = Block()
         self._places = read_words(text, at, block, self.context.parameters)
@@ -279,16 +283,33 @@ class Interpreter:
             self._bounds.after_end(f"M{block.m[STOP]}")
         return ended
 
+    def _fanuc_turning(self, text: str) -> bool:
+        """Execute a line of Fanuc's G70 to G72; False, and nothing done, where it is none. Raises Fault."""
+        if self._fanuc is None:
+            from rds.nc.language.fanuc_turning import LINE, FanucTurning  # only lathe programs need it
+
+            if LINE.match(text) is None:
+                return False
+            self._fanuc = FanucTurning()
+        block, start = self._fanuc.block(text, self.context.state), self.context.state.position()
+        if block is not None:
+            self._execute(block)
+            self._fanuc.back(self.context, start)
+        return block is not None
+
     def _contour_of(self, name: str) -> list[Piece]:
         """The contour that the subroutine `name` holds, for G70 to G72. Raises Fault, ProgramError."""
         from rds.nc.language.contour_reading import gathered  # with numpy
 
-        text, places, out, remark = self._text, self._places, self.out, self._remark
-        line = out.line
+        text, places, out, remark, state = self._text, self._places, self.out, self._remark, self.context.state
+        line, fanuc = out.line, self._fanuc
 
         def run(reading: ContourReading) -> None:
             self.out = self.context.out = reading.out
             self._contour = reading
+            if fanuc is not None and fanuc.reads:
+                fanuc.run(self.control.source, lambda raw: (self._line(raw), self.out.n)[1])
+                return
             depth = self.control.depth
             self.control.execute(Word("call", name, spelled(name), max(self._place("q"), 0)))
             while self.control.depth > depth:
@@ -298,14 +319,14 @@ class Interpreter:
                     self._bounds.file_ended()
 
         try:
-            pieces, passed_over = gathered(run, self.context.state)
+            pieces, passed_over = gathered(run, state)
         finally:
             self._text, self._places, self._contour = text, places, None
             self.out = self.context.out = out
         if passed_over and remark is not None:
             said = f"the contour in subroutine {name}: {', '.join(passed_over)} passed over; only its moves count"
             remark(ProgramError(said, file=out.file, line=line))
-        return pieces
+        return fanuc.moved(pieces, (state.z, state.x)) if fanuc is not None and fanuc.reads else pieces
 
     def _saved_modes(self, m: Context, code: int) -> None:
         """M70, M73 (save the modes), M71 (forget them), M72 (restore them). Raises Fault."""

@@ -25,12 +25,17 @@ class Columns(NamedTuple):
 
     def part(self, low: int, high: int) -> Columns:
         """A copy of the rows from `low` on, up to `high`."""
-        return Columns(*(column[low:high] for column in self[:4]), self.values[WIDTH * low : WIDTH * high])
+        kinds, digits, ns, lines, values = self
+        own = values[WIDTH * low : WIDTH * high]
+        return Columns(kinds[low:high], digits[low:high], ns[low:high], lines[low:high], own)
 
     def extend(self, other: Columns) -> None:
         """The rows of `other` behind these."""
-        for mine, more in zip(self, other, strict=True):
-            mine.extend(more)
+        self.kinds.extend(other.kinds)
+        self.digits.extend(other.digits)
+        self.ns.extend(other.ns)
+        self.lines.extend(other.lines)
+        self.values.extend(other.values)
 
     def value_rows(self) -> list[list[float]]:
         """The values, row by row."""
@@ -58,15 +63,21 @@ def rows_of(columns: Columns) -> np.ndarray:
     import numpy as np
 
     rows = np.zeros(len(columns.kinds), dtype())
-    for name, column in zip(("kind", "digits", "n", "line"), columns, strict=False):
-        rows[name] = np.frombuffer(column, rows.dtype[name]) if column else 0
-    rows["values"] = np.frombuffer(columns.values).reshape(-1, WIDTH) if columns.values else 0
+    if len(rows):
+        rows["kind"] = np.frombuffer(columns.kinds, np.int8)
+        rows["digits"] = np.frombuffer(columns.digits, np.int8)
+        rows["n"] = np.frombuffer(columns.ns, np.int32)
+        rows["line"] = np.frombuffer(columns.lines, np.int32)
+        rows["values"] = np.frombuffer(columns.values).reshape(-1, WIDTH)
     return rows
 
 
 def columns_of(rows: np.ndarray) -> Columns:
     """The rows, of dtype MOTION, as columns."""
     found = empty()
-    for name, column in zip(("kind", "digits", "n", "line", "values"), found, strict=True):
-        column.frombytes(rows[name].tobytes())
+    found.kinds.frombytes(rows["kind"].tobytes())
+    found.digits.frombytes(rows["digits"].tobytes())
+    found.ns.frombytes(rows["n"].tobytes())
+    found.lines.frombytes(rows["line"].tobytes())
+    found.values.frombytes(rows["values"].tobytes())
     return found
