@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from array import array
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rds.nc.language.state import NO_MOTION, PER_MINUTE
@@ -35,6 +36,8 @@ _PLAIN = frozenset((0, 10, 20, 30, NO_MOTION))  # motions that a line without a 
 @cache
 def stored() -> Kernels | None:
     """The compiled kernels, if they have been compiled before; loading takes the time of some thousand lines."""
+    if not any((Path(__file__).parent / "__pycache__").glob("fast_lane.*.o")):  # before llvmlite is imported for them
+        return None
     try:
         from rds.nc.language.fast_lane_native import stored_kernels
     except ImportError:
