@@ -19,9 +19,11 @@ from rds.cli.nc_options import MachineName, MaxJumps, Parameters, ProfileName, P
 from rds.core.shared_quantities import SAMPLE_PERIOD
 
 if TYPE_CHECKING:
+    from rds.interpolators.motion.limiting import Explained
     from rds.machines import Machine
     from rds.nc.check import Setup
     from rds.nc.compensation.proof import Proof
+    from rds.nc.cycle_time import CycleTime
 
 app = typer.Typer(no_args_is_help=True, help="Part programs: check, print, draw, time and make them.")
 nc_make.app.command()(nc_job.job)
@@ -225,7 +227,10 @@ def time(
     profile: ProfileName = "planned",
     why: Annotated[
         bool,
-        typer.Option("--why", help="Also what holds the planned motion back, with a picture, FILE's name -speed.png."),
+        typer.Option(
+            "--why",
+            help="Also what holds the planned motion back; the certificate as a picture, FILE's -certificate.png.",
+        ),
     ] = False,
     json: Json = False,
 ) -> None:
@@ -242,11 +247,11 @@ def time(
         notes: list[str] = []
         with progress_bars() as bar:
             found = cycle_time(motion(file, of, what, bar("plan"), notes), of, sample_period, profile)
-        held, picture = _why(file, of, what, found.T) if why else ([], None)
+        held, picture = _why(file, of, what, found, profile) if why else (None, None)
     if json:
         print_json(
             {"program": str(file), "machine": of.name, "profile": profile, **found.to_json(), "notes": notes}
-            | ({"held_back_by": held, "picture": str(picture)} if why else {})
+            | ({"held_back_by": held.rows, "picture": str(picture)} if held else {})
         )
         raise typer.Exit(0 if found.certificate.ok else 1)
     from rds.cli.console import show_table
@@ -259,13 +264,8 @@ def time(
     title = f"{file}: {_clock(found.total)} on {of.name}{how}, {found.samples} samples of {found.T:g} s"
     show_table(title, ["tool", "cutting [s]", "rapid [s]", "dwell [s]", "total [s]"], rows)
     typer.echo(found.certificate.sentence())
-    for row in held:
-        lines = ", ".join(map(str, row["lines"]))
-        typer.echo(f"{row['cause']}: {row['seconds']:.3f} s, most in line{'s' * (len(row['lines']) > 1)} {lines}")
-        if "limit" in row:
-            more = row["to_save_a_second"]
-            said = "no more of it saves a second" if more is None else f"a second less takes {more:.4g} {row['unit']}"
-            typer.echo(f"   it is {row['limit']:g} {row['unit']}: {said}")
+    for line in held.sentences() if held else ():
+        typer.echo(line)
     if picture is not None:
         typer.echo(f"picture: {picture}")
     for note in notes:
@@ -273,16 +273,19 @@ def time(
     raise typer.Exit(0 if found.certificate.ok else 1)
 
 
-def _why(file: Path, of: Machine, what: Setup, T: float) -> tuple[list[dict[str, Any]], Path]:
-    """What holds the planned motion back, row by row, and the picture of its speed."""
+def _why(file: Path, of: Machine, what: Setup, found: CycleTime, profile: str) -> tuple[Explained, Path]:
+    """What holds the planned motion back, and the picture of its certificate."""
+    from rds.core.errors import InputError
+    from rds.interpolators.motion.limiting import explained
     from rds.interpolators.motion.limits import Limits
     from rds.nc.check import motion
-    from rds.nc.limiting import explained
 
-    found, rows = explained(list(motion(file, of, what)), Limits.of(of), T)
-    path = file.with_name(f"{file.stem}-speed.png")
-    save_picture(found.plot(file.name), path)
-    return rows, path
+    if profile != "planned":
+        raise InputError(f"--why tells of the planned motion, and not of --profile {profile}; leave that away")
+    held = explained(list(motion(file, of, what)), Limits.of(of), found.T)
+    path = file.with_name(f"{file.stem}-certificate.png")
+    save_picture(found.certificate.plot(explained=held), path)
+    return held, path
 
 
 def _clock(seconds: float) -> str:

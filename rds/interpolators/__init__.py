@@ -25,6 +25,7 @@ __getattr__, __dir__ = face(
         "line": "motion.segments",
         "make_acceleration": "acceleration",
         "plan": "motion.planner",
+        "point_to_point": "motion.point_to_point",
     },
 )
 

@@ -19,12 +19,15 @@ TEXT = (ROOT / DOCUMENT).read_text(encoding="utf-8")
 
 def test_its_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
-    (block,) = (block for block in blocks(DOCUMENT) if block.language == "python")
+    block, move = (block for block in blocks(DOCUMENT) if block.language == "python")
     exec(compile(block.text, DOCUMENT, "exec"), {})
     seconds, away = capsys.readouterr().out.split(" s, ")
     assert 5.0 < float(seconds) < 7.0  # 58 mm at 10 mm/s
     assert 10.0 < float(away.split(" µm")[0]) <= 20.0
     assert (tmp_path / "certificate.png").read_bytes().startswith(b"\x89PNG")
+    pytest.importorskip("ruckig")
+    exec(compile(move.text, DOCUMENT, "exec"), {})
+    assert capsys.readouterr().out == "0.685 s, and 0.685 s to rest\n"
 
 
 def test_its_numbers() -> None:

@@ -171,8 +171,32 @@ def test_point_to_point_refuses_what_cannot_be() -> None:
     assert moving.velocity[0, 0] == 5.0 and moving.position[-1, 0] == 5.0
     with pytest.raises(InputError, match=r"end_velocity = \(0.0, 1.5\) must be 2 finite numbers within \(1, 1\)"):
         point_to_point((0, 0), (1, 1), (1, 1), (1, 1), (1, 1), T=1e-3, end_velocity=[0.0, 1.5])
+    with pytest.raises(InputError, match=r"only after 54\.43 mm/s, .*; give less end_acceleration, or more jerk"):
+        point_to_point((0,), (9,), (50,), (400,), (1.2e4,), 1e-3, end_velocity=[47.85], end_acceleration=[-397.5])
     with pytest.raises(InputError, match="start_acceleration"):
         point_to_point((0,), (1,), (1,), (1,), (1,), T=1e-3, start_acceleration=[np.nan])
+
+
+SPEEDS = st.tuples(*[st.integers(-5000, 5000).map(lambda hundredths: hundredths / 100)] * 2)  # mm/s
+
+
+@settings(max_examples=30, deadline=None)
+@given(way=st.tuples(st.integers(-20, 20), st.integers(1, 20)), first=SPEEDS, last=SPEEDS)
+def test_a_move_begins_and_ends_with_the_velocities_that_are_asked_for(
+    way: tuple[float, ...], first: tuple[float, ...], last: tuple[float, ...]
+) -> None:
+    """From any velocity within the limits to any other: both are met, at the right places, within all limits."""
+    pytest.importorskip("ruckig")
+    T, limits = 1e-3, ((50.0, 50.0), (400.0, 400.0), (12000.0, 12000.0))
+    found = point_to_point((0, 0), way, *limits, T, start_velocity=first, end_velocity=last)
+    assert found.position[0].tolist() == [0.0, 0.0] and found.position[-1].tolist() == list(way)
+    assert found.velocity[0].tolist() == list(first) and found.velocity[-1].tolist() == list(last)
+    assert np.abs(found.velocity).max() <= 50.0 * (1 + 1e-6)
+    assert np.abs(found.acceleration).max() <= 400.0 * (1 + 1e-6)
+    whole = slice(None) if any(last) else slice(-1)  # at rest the end may come before the last sample
+    assert np.abs(np.diff(found.position, axis=0)[whole]).max(initial=0.0) <= 50.0 * T * (1 + 1e-6)
+    assert np.abs(np.diff(found.velocity, axis=0)[whole]).max(initial=0.0) <= 400.0 * T * (1 + 1e-6)
+    assert np.abs(np.diff(found.acceleration, axis=0)[whole]).max(initial=0.0) <= 12000.0 * T * (1 + 1e-6)
 
 
 STATES = st.tuples(st.floats(-40, 40), st.floats(-40, 40), st.floats(-300, 300), st.floats(-300, 300))

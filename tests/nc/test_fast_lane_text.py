@@ -44,7 +44,7 @@ def test_the_same_text(rows: np.ndarray, number: int) -> None:
     assert len(rows) < canon_text.MANY  # written by Python
     usual = [f"{number + k:5d} {line[6:]}" for k, line in enumerate(usual)]
     at = 0
-    for count, lines in compiled.written(rows, number):
+    for count, lines in compiled.written(canon.MotionBlock(rows).columns, number):
         if lines:
             assert lines.splitlines() == usual[at : at + count]
         else:

@@ -113,14 +113,14 @@ words = st.one_of(
 texts = st.lists(st.lists(words, max_size=5).map(" ".join), max_size=14).map("\n".join)
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(st.integers(0, 3), texts, st.booleans())
 def test_programs_of_pieces(dialect: int, text: str, ends: bool) -> None:
     TARGETS["program"](bytes([dialect]) + text.encode() + (b"\nM2\n" if ends else b""))
 
 
 @pytest.mark.parametrize("target", TARGETS)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(data=st.binary(max_size=300))
 def test_any_bytes(target: str, data: bytes) -> None:
     TARGETS[target](data)
@@ -138,7 +138,7 @@ tables = st.lists(st.lists(fields, max_size=4).map(" ".join), max_size=6).map("\
 
 
 @pytest.mark.parametrize("target", ["tool_table", "parameter_file"])
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(text=tables)
 def test_tables_of_pieces(target: str, text: str) -> None:
     TARGETS[target](text.encode())

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rds.nc import Dialect, ProgramError, interpret
+from rds.nc.language.canon import MotionBlock
 from rds.nc.language.canon_text import text as canon_text
 from rds.nc.language.tools import Tool
 from tests.nc.random_programs import program
@@ -166,6 +167,13 @@ def test_a_loop_that_leaves_everything_as_it_was_is_found_at_once(text: str) -> 
     assert "never ends: a round leaves everything as it was" in fault(text, max_jumps=40).reason
 
 
+def test_recursion_that_calls_itself_again_and_again_ends() -> None:
+    """Each call has a frame of its own, and a later one is no earlier one."""
+    calls = "o1 call [#2]\n" * 3
+    text = f"G21 F600\no1 sub\n#2=[#1-1]\nG1 X[#1] Y#2\no2 if [#1 gt 1]\n{calls}o2 endif\no1 endsub\no1 call [8]\nM2"
+    assert sum(len(item) for item in interpret(text) if isinstance(item, MotionBlock)) == 2 + (3**8 - 1) // 2
+
+
 ENDING = [
     "o1 while [#<_x> lt 30]\nG91 G0 X1\no1 endwhile\nM2",
     "o1 while [#5221 lt 30]\nG10 L2 P1 X[#5221 + 1]\no1 endwhile\nM2",
@@ -215,7 +223,7 @@ def test_a_fault_crosses_processes() -> None:
     assert (str(again), again.line, again.column, again.word) == (str(error), 1, 7, "U2")
 
 
-FEW = settings(max_examples=300, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=120, suppress_health_check=list(HealthCheck))
 LIMITS = Dialect(max_jumps=200, gr=True, program_numbers=True)
 
 

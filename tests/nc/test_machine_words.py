@@ -13,14 +13,16 @@ from typer.testing import CliRunner
 
 from rds.cli.main import app
 from rds.core.errors import InputError
+from rds.interpolators.motion.limiting import explained
 from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.planner import plan
 from rds.machines import load_machine
 from rds.machines.machine import Machine
 from rds.nc import ProgramError, steps
 from rds.nc.check import Setup, check_program, motion
-from rds.nc.limiting import explained
+from rds.nc.path_block import PathBlock
 from rds.nc.run.prepare import prepare
+from rds.nc.run.report import certificate_picture
 
 SHIPPED = Path(load_machine("mini-cnc").path)
 
@@ -58,7 +60,7 @@ def test_outputs_that_a_machine_names_are_switched_where_the_program_says(tmp_pa
     [
         ("G88 X5 Y5 Z-2 R1 P.1", "G88 leaves the tool in the hole"),
         ("M19 Q1", "the spindle here cannot stop at an angle"),
-        ("G71 U1.5 R0.5", r"U1.5: U goes with the form .* that Fanuc's lathes have.*G71 Q100 I1.5 D0.2 R0.5"),
+        ("G73 U1.5 R5", r"U1.5: U goes with the form .* that Fanuc's lathes have.*G71 Q100 I1.5 D0.2 R0.5"),
         ("G18 G71 P10 Q20 D0.2", r"P10: P goes with the form .* that Fanuc's lathes have"),
     ],
 )
@@ -132,6 +134,23 @@ def test_what_holds_a_motion_back_adds_up_and_a_raised_limit_saves_a_second(tmp_
     raised[0] = rows[0]["to_save_a_second"]
     faster = sum(map(len, plan(blocks, replace(limits, velocity=raised), 0.001, start=np.zeros(6))))
     assert 1.0 <= (len(found.time) - faster) * 0.001 < 1.2
+
+
+def test_the_certificate_of_a_run_shows_what_holds_it_back(tmp_path: Path) -> None:
+    """Speeds along the path and their causes above the shares of the limits; as the cycle time's picture does."""
+    part = program(tmp_path, "G21 G90 G94\nG0 X60\nX-60\nM8\nG4 P0.5\nX60\nX-60\nG1 X-50 F600\nM2\n")
+    machine = load_machine("mini-cnc")
+    prepared = prepare(part, machine)
+    figure = certificate_picture(prepared)
+    top, below, *shares = figure.axes
+    assert [line.get_label() for line in top.lines][1:] == ["programmed", "planned"]
+    assert figure.get_suptitle().startswith("velocity of X is 13 mm/s: a second less takes ")
+    assert top.lines[2].get_ydata().max() == pytest.approx(Limits.of(machine).velocity[0], rel=2e-3)
+    assert {"velocity of X", "programmed feed", "at rest"} <= {text.get_text() for text in below.get_yticklabels()}
+    assert [axes.get_ylabel() for axes in shares][:1] == ["velocity [% of limit]"]
+    found = explained([PathBlock(prepared.path, list(prepared.events))], Limits.of(machine), prepared.T, 0)
+    assert len(found.limiting.time) == prepared.program.samples
+    assert found.limiting.seconds["at rest"] == pytest.approx(0.5, abs=0.02)
 
 
 def test_step_and_probe_surface_on_the_command_line(tmp_path: Path) -> None:

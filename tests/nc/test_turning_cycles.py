@@ -286,3 +286,57 @@ def test_the_document_s_lathe_program_is_cut_on_the_shipped_lathe(tmp_path: Path
     program.write_text(next(part.split("```")[0] for part in document.split("```gcode\n")[1:] if "G71 Q100" in part))
     found, _ = check_program(program, load_machine("lathe"), Setup())
     assert found.ok, str(found)
+
+
+FANUC = """\
+G71 U1.5 R0.5
+G71 P100 Q200 U{u} W0.1
+N100 G0 X4
+  G1 Z0
+  X6 Z-2
+  Z-8
+  G3 X9 Z-11 R3
+N200 G1 X12 Z-14
+"""
+
+
+def test_fanuc_s_two_lines_rough_as_the_subroutine_with_the_contour_moved_does() -> None:
+    """The same cuts as of a subroutine that is the contour moved by U and W; then back to the start."""
+    head = "G21 G18 G90 G8 F100 S500 M3\nG0 X12 Z2\n"
+    moved = "O100 SUB\nG0 X4.3 Z2.1\nG1 Z0.1\nX6.3 Z-1.9\nZ-7.9\nG3 X9.3 Z-10.9 R3\nG1 X12 Z-13.6\nO100 ENDSUB\n"
+    plain = moves(f"{moved}{head}G71 Q100 I1.5 R0.5\nG0 X12 Z2\nM2\n")
+    ours = moves(f"{head}{FANUC.format(u=0.3)}M2\n")
+    assert [kind for kind, _ in ours[: len(plain)]] == [kind for kind, _ in plain]
+    for (_, one), (_, other) in zip(ours, plain, strict=True):
+        assert one[-1] == pytest.approx(other[-1], abs=1e-4)
+    of_diameter = head.replace("G8", "G7").replace("X12", "X24")
+    doubled = re.sub(r"X([0-9]+)", lambda match: f"X{2 * int(match[1])}", FANUC.format(u=0.6))
+    for (_, one), (_, other) in zip(moves(f"{of_diameter}{doubled}M2\n"), ours, strict=True):
+        assert one[-1] == pytest.approx(other[-1], abs=1e-4)
+
+
+def test_fanuc_s_g70_finishes_the_blocks_themselves_and_the_program_goes_on() -> None:
+    found = moves(f"G21 G18 G90 G8 F100 S500 M3\nG0 X12 Z2\n{FANUC.format(u=0.3)}G70 P100 Q200 F50\nG0 X20 Z9\nM2\n")
+    ends = [tuple(points[-1].round(4)) for _, points in found]
+    cut = [(2.0, 4.0), (0.0, 4.0), (-2.0, 6.0), (-8.0, 6.0), (-11.0, 9.0), (-14.0, 12.0)]
+    assert ends[-9:] == [(2.0, 12.0), *cut, (2.0, 12.0), (9.0, 20.0)]
+
+
+@pytest.mark.parametrize(
+    ("text", "says", "line"),
+    [
+        ("G71 P100 Q200 U.3\nN100 G0 X4\nN200 G1 Z-5", "U goes with the form", 2),  # no line before it
+        ("G71 U1 R.5\nG71 P100 Q300 U.3\nN100 G0 X4\nN200 G1 Z-5", "no block N300", 3),
+        ("G71 U1 R.5\nG71 P90 Q200 U.3\nN100 G0 X4\nN200 G1 Z-5", "no block N90", 3),
+        ("G71 U0 R.5", "U, the depth of each cut, must be above 0", 2),
+        (
+            "G71 U1 R.5\nG71 P100 Q200 U.3\nN100 G0 X4 Z0\nG2 X5 Z-1 R1\nG33 Z-2 K1\nN200 G1 X9",
+            "no part of a contour",
+            6,
+        ),
+    ],
+)
+def test_what_is_wrong_in_fanuc_s_form_is_told_by_line(text: str, says: str, line: int) -> None:
+    with pytest.raises(ProgramError, match=says) as caught:
+        list(interpret(f"G21 G18 G90 G8 F100 S500 M3 G0 X12 Z2\n{text}\nM2\n"))
+    assert caught.value.line == line

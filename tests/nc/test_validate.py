@@ -153,6 +153,11 @@ def test_all_faults_of_a_line_are_told(tmp_path: Path) -> None:
     ]
 
 
+def test_what_stands_behind_a_wrong_number_of_an_o_word_is_no_fault_of_its_own(tmp_path: Path) -> None:
+    found = check(tmp_path, "G12\no5.19 sub\nG0 X1\no5.19 endsub\nM2\n")
+    assert [(fault.line, fault.word) for fault in found.faults] == [(1, "G12"), (2, "O5.19"), (4, "O5.19")]
+
+
 def test_subroutines_that_nothing_calls_are_read(tmp_path: Path) -> None:
     text = (
         "o1 sub\nG12 X1\no1 endsub\n o2 SUB\nG0 X1 U2\no5.19 if [1]\no2 endsub\no3 sub\nG0 X1\no3 endsub\no3 call\nM2\n"

@@ -17,6 +17,7 @@ from rds.interpolators.motion.segments import AXES
 
 if TYPE_CHECKING:
     from rds.interpolators.motion.least_time import LeastTime
+    from rds.interpolators.motion.limiting import Explained
 
 KINDS = ("velocity", "acceleration", "jerk")
 EXCESS = 1e-6  # by which a limit may be exceeded, relative
@@ -256,11 +257,13 @@ class Certificate:
         found = [(worst.share, axis, worst.line) for (what, axis), worst in self.worst.items() if what == kind]
         return max(found, default=(0.0, "none", 0))
 
-    def plot(self, path: Any = None) -> Any:
-        """The matplotlib figure of the shares of the limits over time; saved at `path` if given."""
+    def plot(self, path: Any = None, explained: Explained | None = None) -> Any:
+        """The matplotlib figure of the shares of the limits over time, with `explained` (limiting.py) also of the
+        speeds along the path and what holds them back; saved at `path` if given.
+        """
         from rds.interpolators.motion.certificate_plot import plot_certificate
 
-        return plot_certificate(self, path)
+        return plot_certificate(self, path, explained)
 
 
 def certified(blocks: Iterable[SampleBlock], certificate: Certificate) -> Iterator[SampleBlock]:

@@ -1,4 +1,4 @@
-"""The certificate of a motion as a picture: how much of each limit is used, over time."""
+"""The certificate of a motion as a picture: what holds it back along the path, how much of each limit is used when."""
 
 from __future__ import annotations
 
@@ -10,19 +10,31 @@ from rds.interpolators.motion.segments import AXES
 
 if TYPE_CHECKING:
     from rds.interpolators.motion.certificate import Certificate
+    from rds.interpolators.motion.limiting import Explained
 
 
-def plot_certificate(certificate: Certificate, path: str | Path | None = None) -> Any:
+def plot_certificate(
+    certificate: Certificate, path: str | Path | None = None, explained: Explained | None = None
+) -> Any:
     """Largest velocity, acceleration and jerk of each axis in % of its limit, and the deviation from the path, over
-    time.
+    time. Above them, with `explained`, the speeds along the path, what holds them back, and what would save a second.
 
     Saved as PNG at `path` if given.
     """
     from rds.core.figure import CYCLE, GREY, VERMILLION, Picture, dress, legend
 
     trace = certificate.trace()
-    drawn = Picture(7.6)
-    grid = drawn.subplots(4, 1, sharex=True)
+    if explained is None:
+        drawn = Picture(7.6)
+        grid = drawn.subplots(4, 1, sharex=True)
+    else:
+        drawn = Picture(12.0)
+        top, below, *grid = drawn.subplots(6, 1, height_ratios=[3, 2, 2, 2, 2, 2])
+        explained.limiting.draw(top, below)
+        drawn.suptitle("\n".join(explained.savings()), fontsize="medium")
+        below.sharex(top)
+        for axes in grid[1:]:
+            axes.sharex(grid[0])
     time = trace[:, 0]
     styles = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1)), (0, (8, 2)))
     for row, kind in enumerate(("velocity", "acceleration", "jerk")):

@@ -47,8 +47,8 @@ def point_to_point(
 
     Velocities (mm/s) and accelerations (mm/s²) at both ends are those given, and 0 without. The last sample is the end.
     A move that ends in motion takes as much longer than the least time as makes its duration a whole number of T, so
-    that the next move begins at its last sample. Raises InputError for limits that are not more than 0 or states that
-    cannot be, and where ruckig is not installed.
+    that the next move begins at its last sample. Raises InputError for limits that are not more than 0, for states at
+    the ends that they do not allow, and where ruckig is not installed.
     """
     with needed_for("a jerk-limited move in the least time"):
         import ruckig
@@ -68,6 +68,7 @@ def point_to_point(
         "end_acceleration": (end_acceleration, acceleration),
     }
     ends = {name: _state(name, values, most) for name, (values, most) in states.items()}
+    _check_end(ends["end_velocity"], ends["end_acceleration"], velocity, jerk)
     asked = ruckig.InputParameter(n)
     asked.current_position, asked.target_position = list(map(float, start)), list(map(float, end))
     asked.current_velocity, asked.current_acceleration = ends["start_velocity"], ends["start_acceleration"]
@@ -101,5 +102,19 @@ def _state(name: str, values: Sequence[float] | None, most: Sequence[float]) -> 
     within = len(found) == len(most) and np.isfinite(found).all() and bool(np.all(np.abs(found) <= most))
     if not within:
         limits = "" if inf in most else f" within {tuple(most)}"
-        raise InputError(f"{name} = {tuple(found)} must be {len(most)} finite numbers{limits}, one for each axis")
+        remedy = "" if inf in most else f"; give less, or allow more {name.removeprefix('end_')}"
+        raise InputError(
+            f"{name} = {tuple(found)} must be {len(most)} finite numbers{limits}, one for each axis{remedy}"
+        )
     return found
+
+
+def _check_end(speeds: list[float], pushes: list[float], most: Sequence[float], jerk: Sequence[float]) -> None:
+    """InputError for an end that an axis comes to from beyond its velocity: v − a|a| / (2 j), where a was last 0."""
+    for k, (v, a, j) in enumerate(zip(speeds, pushes, jerk, strict=True)):
+        before = v - a * abs(a) / (2.0 * j)
+        if abs(before) > most[k]:
+            raise InputError(
+                f"axis {k + 1} can end with {v:g} mm/s and {a:g} mm/s² only after {before:.4g} mm/s, which is beyond "
+                f"its velocity of {most[k]:g} mm/s; give less end_acceleration, or more jerk"
+            )

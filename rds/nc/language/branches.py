@@ -121,7 +121,7 @@ class Branches:
         flags = (self._done_if, self._breaking, self._continuing, self.value, self.returned, len(self._labels))
         tool = parameters.known["_selected_tool"]() if "_selected_tool" in parameters.known else 0.0
         rounds = [sorted(frame.repeats.items()) for frame in self._frames] + [sorted(self._repeats.items())]
-        frames = [id(frame) for frame in self._frames]
+        frames = [(frame.name, frame.source, frame.place, frame.more, frame.kept) for frame in self._frames]
         return flags, tool, rounds, frames, parameters.state.values(), parameters.snapshot()
 
     def _rounds(self) -> dict[str, int]:

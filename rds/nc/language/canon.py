@@ -4,19 +4,25 @@ Names, arguments and their order are those of LinuxCNC's canonical functions (ca
 lengths in the program's units (USE_LENGTH_UNITS says which), rotary axes in degrees, positions absolute in program
 coordinates (before offsets, which have calls of their own).
 
-Moves, feed rates and spindle speeds come in blocks, as rows of a numpy array; the rare other calls one by one, in order
-between them.
+Moves, feed rates and spindle speeds come in blocks, which give them as rows of a numpy array; the rare other calls
+one by one, in order between them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from rds.nc.language.motion_rows import Columns, columns_of, dtype, rows_of
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    MOTION: np.dtype[np.void]
 
 TRAVERSE, FEED, ARC, RATE, SPEED = 0, 1, 2, 3, 4
 BLOCK_ROWS = 65536  # at most, in a MotionBlock
+
 
 # values by kind: TRAVERSE and FEED: x, y, z, a, b, c of the end.
 # ARC: first end, second end, first centre, second centre (absolute, along the plane's axes: XY; ZX in G18; YZ in G19),
@@ -24,21 +30,43 @@ BLOCK_ROWS = 65536  # at most, in a MotionBlock
 # RATE: the feed rate (units/min; in inverse time 1/min, per revolution units/rev).
 # SPEED: the spindle's speed (rev/min; under G96 units of its own), SET_SPINDLE_SPEED of spindle 0.
 # n, digits: the line number of the word N and the number of digits that it is written with (0: the line has none).
-MOTION = np.dtype(
-    [("kind", "i1"), ("digits", "i1"), ("n", "i4"), ("line", "i4"), ("values", "f8", (9,))],
-    align=True,
-)
+# MOTION, the dtype of the rows, is made when it is first asked for: it takes numpy.
 
 
-@dataclass(frozen=True, slots=True)
+def __getattr__(name: str) -> Any:
+    if name != "MOTION":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return globals().setdefault(name, dtype())
+
+
 class MotionBlock:
     """Moves, feed rates and speeds in program order: at most BLOCK_ROWS rows of dtype MOTION, all from one file."""
 
-    rows: np.ndarray
-    file: str = ""
+    __slots__ = ("_columns", "_rows", "file")
+
+    def __init__(self, moves: np.ndarray | Columns, file: str = ""):
+        self._columns: Columns | None = moves if isinstance(moves, Columns) else None
+        self._rows: np.ndarray | None = None if isinstance(moves, Columns) else moves
+        self.file = file
+
+    @property
+    def columns(self) -> Columns:
+        """The moves as they were gathered."""
+        if self._columns is None:
+            assert self._rows is not None
+            self._columns = columns_of(self._rows)
+        return self._columns
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The moves as an array of dtype MOTION."""
+        if self._rows is None:
+            assert self._columns is not None
+            self._rows, self._columns = rows_of(self._columns), None
+        return self._rows
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return len(self._columns.kinds if self._columns is not None else self.rows)
 
 
 @dataclass(frozen=True, slots=True)

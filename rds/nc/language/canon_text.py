@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE, Call, MotionBlock
 from rds.nc.language.fast_lane import is_loaded, kernel, stored
 
 if TYPE_CHECKING:
     from rds.nc.language.fast_lane_native import Kernels
+    from rds.nc.language.motion_rows import Columns
 
 MANY = 1024  # rows that are worth writing by compiled code
 LONG_TEXT = 20_000  # lines that Python writes in the time that compiled code takes to load
@@ -70,9 +69,9 @@ _ROW_FORMATS = {
 _LINE_FORMATS = {kind: (f"%5d N..... {pattern}", count) for kind, (pattern, count) in _ROW_FORMATS.items()}
 
 
-def _row_texts(rows: np.ndarray) -> Iterator[tuple[str, str]]:
-    columns = (rows[name].tolist() for name in ("kind", "digits", "n", "values"))
-    for kind, digits, n, values in zip(*columns, strict=True):
+def _row_texts(columns: Columns) -> Iterator[tuple[str, str]]:
+    rows = zip(columns.kinds, columns.digits, columns.ns, columns.value_rows(), strict=True)
+    for kind, digits, n, values in rows:
         pattern, count = _ROW_FORMATS[kind]
         yield (str(n).zfill(digits) if digits else ""), pattern % tuple(values[:count])
 
@@ -84,7 +83,7 @@ def texts(items: Iterable[MotionBlock | Call]) -> Iterator[tuple[str, str]]:
             if item.name not in _UNWRITTEN:
                 yield item.n, _call_text(item)
         else:
-            yield from _row_texts(item.rows)
+            yield from _row_texts(item.columns)
 
 
 def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
@@ -94,18 +93,21 @@ def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
     """
     number = 1
     for item in items:
-        if isinstance(item, MotionBlock) and (compiled := _compiled(number, len(item))) is not None:
-            first = 0
-            for count, written in compiled.written(item.rows, number):
-                yield from written.splitlines() or _numbered(_row_texts(item.rows[first : first + count]), number)
+        if isinstance(item, Call):
+            if item.name == "PRINT":
+                yield from item.args
+            elif item.name not in _UNWRITTEN:
+                yield _line(number, item.n, _call_text(item))
+                number += 1
+        elif (compiled := _compiled(number, len(item))) is not None:
+            first, columns = 0, item.columns
+            for count, written in compiled.written(columns, number):
+                yield from written.splitlines() or _lines_of(columns.part(first, first + 1), number)
                 first += count
                 number += count
-        elif isinstance(item, Call) and item.name == "PRINT":
-            yield from item.args
         else:
-            lines = _lines_of(item, number)
-            yield from lines
-            number += len(lines)
+            yield from _lines_of(item.columns, number)
+            number += len(item)
 
 
 def _compiled(number: int, rows: int) -> Kernels | None:
@@ -115,18 +117,17 @@ def _compiled(number: int, rows: int) -> Kernels | None:
     return kernel() if is_loaded() else stored() if number + rows > LONG_TEXT else None
 
 
-def _lines_of(item: MotionBlock | Call, number: int) -> list[str]:
-    """The lines of one item, numbered from `number`; rows without a word N, which most are, by one format each."""
-    if isinstance(item, Call) or item.rows["digits"].any():
-        return list(_numbered(texts((item,)), number))
-    lines = []
-    for kind, values in zip(item.rows["kind"].tolist(), item.rows["values"].tolist(), strict=True):
+def _lines_of(columns: Columns, number: int) -> Iterator[str]:
+    """The lines of rows, numbered from `number`; of those without a word N, which most are, by one format each."""
+    if any(columns.digits):
+        for at, (n, row) in enumerate(_row_texts(columns), start=number):
+            yield _line(at, n, row)
+        return
+    for kind, values in zip(columns.kinds, columns.value_rows(), strict=True):
         pattern, count = _LINE_FORMATS[kind]
-        lines.append(pattern % (number, *values[:count]))
+        yield pattern % (number, *values[:count])
         number += 1
-    return lines
 
 
-def _numbered(calls: Iterable[tuple[str, str]], first: int) -> Iterator[str]:
-    for number, (n, call) in enumerate(calls, start=first):
-        yield f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}"
+def _line(number: int, n: str, call: str) -> str:
+    return f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}"

@@ -17,12 +17,11 @@ from rds.nc.language.expressions import (
     FUNCTION,
     NUMBER,
     OPERATION,
-    PI,
     PRECEDENCE,
     SPELLED,
     UNARY,
     Fault,
-    np,
+    arc_tangent,
     whole,
 )
 from rds.nc.language.parameters import COUNT, POSITION, Parameters
@@ -48,15 +47,11 @@ def _not_negative(value: float) -> None:
         raise Fault("the value is negative")
 
 
-def _arc_tangent(y: float, x: float) -> float:
-    return float(np.longdouble(math.atan2(y, x) * 180.0) / PI)
-
-
 def names_of(parameters: Parameters) -> dict[str, Any]:
     """What the code may use, besides its arguments n (numbered parameters), l and q (local and global names)."""
     return {
         "__builtins__": {},
-        "atan": _arc_tangent,
+        "atan": arc_tangent,
         "binary": BINARY,
         "declare": parameters.declare,
         "exists": lambda name: float(parameters.find(name) is not None),

@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING
-
-import numpy as np
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from rds.nc.language.parameters import Parameters
 
-PI = np.longdouble("3.14159265358979323846264338327950288")
 EQUAL = 1e-4  # numbers that differ by less are EQ (LinuxCNC's TOLERANCE_EQUAL)
 WHOLE = 1e-4  # a number this close to a whole one is whole
 DEEPEST = 50  # brackets and # inside one another
@@ -165,7 +165,7 @@ class Reader:
             if name != "atan":
                 return UNARY[name](argument)
             self.expect("/", "ATAN needs two arguments; write ATAN[y]/[x]")
-            return float(np.longdouble(math.atan2(argument, self.expression()) * 180.0) / PI)
+            return arc_tangent(argument, self.expression())
         except Fault as fault:
             if fault.at < 0:
                 fault.at = at
@@ -263,15 +263,37 @@ BINARY: dict[str, Callable[[float, float], float]] = {
 }
 
 
-def _circular(function: Callable) -> Callable[[float], float]:
-    return lambda degrees: float(function(np.longdouble(degrees) * PI / 180))
+@cache
+def _extended() -> tuple[ModuleType, Any]:
+    """numpy, for its numbers of extended precision, and π as one; imported for the programs that have an angle."""
+    import numpy as np
+
+    return np, np.longdouble("3.14159265358979323846264338327950288")
+
+
+def _circular(name: str) -> Callable[[float], float]:
+    def found(degrees: float) -> float:
+        np, pi = _extended()
+        return float(getattr(np, name)(np.longdouble(degrees) * pi / 180))
+
+    return found
+
+
+def _degrees(radians: float) -> float:
+    np, pi = _extended()
+    return float(np.longdouble(radians * 180.0) / pi)
+
+
+def arc_tangent(y: float, x: float) -> float:
+    """ATAN[y]/[x], degrees."""
+    return _degrees(math.atan2(y, x))
 
 
 def _arc(function: Callable[[float], float]) -> Callable[[float], float]:
     def angle(argument: float) -> float:
         if not -1.0 <= argument <= 1.0:
             raise Fault(f"a number from -1 to 1 is asked for, and got {argument:g}; check the expression")
-        return float(np.longdouble(function(argument) * 180.0) / PI)
+        return _degrees(function(argument))
 
     return angle
 
@@ -299,13 +321,13 @@ UNARY: dict[str, Callable[[float], float]] = {
     "abs": lambda argument: -argument if argument < 0.0 else argument,
     "acos": _arc(math.acos),
     "asin": _arc(math.asin),
-    "cos": _circular(np.cos),
+    "cos": _circular("cos"),
     "exp": _exponential,
     "fix": lambda argument: float(math.floor(argument)),
     "fup": lambda argument: float(math.ceil(argument)),
     "ln": _logarithm,
     "round": lambda argument: float(int(argument + (-0.5 if argument < 0.0 else 0.5))),
-    "sin": _circular(np.sin),
+    "sin": _circular("sin"),
     "sqrt": _root,
-    "tan": _circular(np.tan),
+    "tan": _circular("tan"),
 }

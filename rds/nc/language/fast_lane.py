@@ -6,10 +6,10 @@ Without numba (extra `fast`) it stays closed.
 
 from __future__ import annotations
 
+from array import array
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from rds.nc.language.state import NO_MOTION, PER_MINUTE
 
@@ -36,6 +36,8 @@ _PLAIN = frozenset((0, 10, 20, 30, NO_MOTION))  # motions that a line without a 
 @cache
 def stored() -> Kernels | None:
     """The compiled kernels, if they have been compiled before; loading takes the time of some thousand lines."""
+    if not any((Path(__file__).parent / "__pycache__").glob("fast_lane.*.o")):  # before llvmlite is imported for them
+        return None
     try:
         from rds.nc.language.fast_lane_native import stored_kernels
     except ImportError:
@@ -74,8 +76,8 @@ class FastLane:
         self._pause = 0
         self._is_long = source.size() >= LONG_PROGRAM
         self._reader: LineReader | None = None
-        self._state = np.zeros(8)
-        self._modes = np.zeros(5, np.int64)
+        self._state = array("d", bytes(8 * 8))
+        self._modes = array("q", bytes(8 * 5))
 
     def take(self, control: Control) -> int:
         """Read and execute the lines that come next, as far as they are plain and already in the source's buffer.
@@ -113,12 +115,13 @@ class FastLane:
         """Lines taken."""
         state, out = self._context.state, self._context.out
         values, modes = self._state, self._modes
-        values[:] = state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate, state.speed
-        modes[:] = state.motion, state.absolute, state.arc_absolute, state.plane, state.inches
-        size, lines, rows = read(np.frombuffer(source.buffer, np.uint8), source.at, source.next_line)
+        place = (state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate, state.speed)
+        values[:] = array("d", place)
+        modes[:] = array("q", (state.motion, state.absolute, state.arc_absolute, state.plane, state.inches))
+        size, lines, rows = read(source.buffer, source.at, source.next_line)
         if lines:
             state.x, state.y, state.z, state.a, state.b, state.c, state.feed_rate, state.speed = values.tolist()
-            state.motion = int(modes[0])
+            state.motion = modes[0]
             out.file = source.name
             out.rows(read.rows(rows))
             source.skip(size, lines)

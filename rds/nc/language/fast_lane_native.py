@@ -11,19 +11,19 @@ import ctypes
 import hashlib
 import os
 import sys
+from array import array
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from llvmlite import __version__ as llvmlite_version
 from llvmlite import binding as llvm
 
 from rds.core.private_files import make_folder, open_private
-from rds.nc.language.canon import MOTION
 from rds.nc.language.fast_lane_target import ENTRIES, target_machine
+from rds.nc.language.motion_rows import Columns, empty
 
 _SOURCES = (
     "fast_lane_kernel.py",
@@ -56,59 +56,61 @@ class Kernels:
         head = (ctypes.c_int32, _POINTER, _POINTER)
         self._read = ctypes.CFUNCTYPE(*head, _POINTER, whole, whole, whole, *([_POINTER] * 8), whole, _POINTER)(read)
         self._write = ctypes.CFUNCTYPE(*head, whole, *([_POINTER] * 4), whole, _POINTER, whole, _POINTER)(write)
-        self._answer = np.zeros(4, np.int64)
-        self._unused = np.zeros(2, np.int64)
-        self._out: np.ndarray | None = None
+        self._answer, self._unused = _counts(4), _counts(2)
+        self._out: ctypes.Array[ctypes.c_char] | None = None
 
-    def reader(self, state: np.ndarray, modes: np.ndarray, rows: int) -> LineReader:
+    def reader(self, state: array[float], modes: array[int], rows: int) -> LineReader:
         return LineReader(self._read, state, modes, rows)
 
-    def written(self, rows: np.ndarray, number: int) -> Iterator[tuple[int, str]]:
-        """The text of rows (dtype MOTION), numbered from `number`, in portions: rows of it and their lines.
+    def written(self, columns: Columns, number: int) -> Iterator[tuple[int, str]]:
+        """The text of rows, numbered from `number`, in portions: rows of it and their lines.
 
         A portion without text is a row that Python is to write.
         """
         if self._out is None:
-            self._out = np.empty(_OUT, np.uint8)
-        columns = [np.ascontiguousarray(rows[name]) for name in ("kind", "digits", "n", "values")]
-        strides = [column.itemsize * (column.size // len(rows)) for column in columns]
-        starts = [column.ctypes.data for column in columns]
-        unused, answer, out = self._unused.ctypes.data, self._answer.ctypes.data, self._out.ctypes.data
+            self._out = ctypes.create_string_buffer(_OUT)
+        rows, used = len(columns.kinds), (columns.kinds, columns.digits, columns.ns, columns.values)
+        strides = [column.itemsize * (len(column) // rows) for column in used]
+        starts = [_address(column) for column in used]
+        unused, answer, out = _address(self._unused), _address(self._answer), ctypes.addressof(self._out)
         first = 0
-        while first < len(rows):
+        while first < rows:
             places = [start + first * stride for start, stride in zip(starts, strides, strict=True)]
-            self._write(unused, unused + 8, number + first, *places, len(rows) - first, out, _OUT, answer)
-            count, size = self._answer[:2].tolist()
-            yield (count, self._out[:size].tobytes().decode("ascii")) if count else (1, "")
+            self._write(unused, unused + 8, number + first, *places, rows - first, out, _OUT, answer)
+            count, size = self._answer[:2]
+            yield (count, ctypes.string_at(out, size).decode("ascii")) if count else (1, "")
             first += count or 1
 
 
 class LineReader:
     """The reader of plain lines for one run, with room for so many rows."""
 
-    def __init__(self, read: Any, state: np.ndarray, modes: np.ndarray, rows: int):
+    def __init__(self, read: Any, state: array[float], modes: array[int], rows: int):
         self._read, self._room = read, rows
-        self._columns = [np.zeros(rows, MOTION[name]) for name in ("kind", "digits", "n", "line")]
-        self._columns.append(np.zeros((rows, 9)))
-        self._kept = (state, modes, np.zeros(18))
-        self._answer, self._unused = np.zeros(4, np.int64), np.zeros(2, np.int64)
-        places = (*self._kept, *self._columns)
-        self._places = [place.ctypes.data for place in places]
-        self._answers = self._unused.ctypes.data, self._unused.ctypes.data + 8, self._answer.ctypes.data
+        self._columns = empty(rows)
+        self._kept = (state, modes, array("d", bytes(8 * 18)))
+        self._answer, self._unused = _counts(4), _counts(2)
+        self._places = [_address(place) for place in (*self._kept, *self._columns)]
+        self._answers = _address(self._unused), _address(self._unused) + 8, _address(self._answer)
 
-    def __call__(self, data: np.ndarray, at: int, line: int) -> tuple[int, int, int]:
+    def __call__(self, data: bytes, at: int, line: int) -> tuple[int, int, int]:
         """Bytes and lines read, and rows written, as of `read_lines`."""
         result, fault, answer = self._answers
-        self._read(result, fault, data.ctypes.data, len(data), at, line, *self._places, self._room, answer)
-        size, lines, rows, _ = self._answer.tolist()
+        self._read(result, fault, data, len(data), at, line, *self._places, self._room, answer)
+        size, lines, rows, _ = self._answer
         return size, lines, rows
 
-    def rows(self, count: int) -> np.ndarray:
-        """The rows that were written, as MOTION."""
-        found = np.zeros(count, MOTION)
-        for name, column in zip(("kind", "digits", "n", "line", "values"), self._columns, strict=True):
-            found[name] = column[:count]
-        return found
+    def rows(self, count: int) -> Columns:
+        """A copy of the rows that were written."""
+        return self._columns.part(0, count)
+
+
+def _counts(count: int) -> array[int]:
+    return array("q", bytes(8 * count))
+
+
+def _address(column: array[Any]) -> int:
+    return column.buffer_info()[0]
 
 
 def stored_kernels() -> Kernels | None:

@@ -7,23 +7,21 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from rds.core.errors import InputError
 from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, STOP, Block, check, settle_motion
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.context import Context
-from rds.nc.language.contour_reading import ContourReading, gathered
 from rds.nc.language.control import Control
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 from rds.nc.language.fast_lane import FastLane
-from rds.nc.language.left_over import LeftOver
 from rds.nc.language.modes import execute
 from rds.nc.language.moves import move
 from rds.nc.language.names import known_names
 from rds.nc.language.offsets import start
 from rds.nc.language.owords import Word, spelled
 from rds.nc.language.parameters import Parameters, read_parameters
+from rds.nc.language.program_bounds import Bounds
 from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes, lines_to_restore, modes_now
 from rds.nc.language.source import LONGEST, open_source
@@ -35,6 +33,8 @@ from rds.nc.language.words import column_of, fill, line_number, place_of, read_p
 if TYPE_CHECKING:
     from rds.machines.ncc import Script
     from rds.nc.compensation.moves import Stretch
+    from rds.nc.language.contour_reading import ContourReading
+    from rds.nc.language.fanuc_turning import FanucTurning
     from rds.nc.language.turning_contour import Piece
 
 _USUAL = frozenset((0, 10, 20, 30))  # motions that no line goes on with wrongly but by words that are checked
@@ -98,20 +98,24 @@ class Interpreter:
         self.context.saved_modes = self._saved_modes
         self.control.restore = self._restore
         self.context.contour = self._contour_of
+        self._fanuc: FanucTurning | None = None  # once a line of its form has been met
         self._contour: ContourReading | None = None  # while the moves of a contour's subroutine are gathered
         self.lane = FastLane(self.context, self.source)
         self._repeated = RepeatedLines(self.context.parameters)
         self._others = 0  # kept lines that the fast lane could not take, since it was tried
         self._remark = remark
-        self._percent = False
+        self._bounds = Bounds(self.context, self.control, remark)
         self._first = True  # no block has been executed
         self._text = ""
         self._places: dict[str, int] = {}
-        self.configuration: Script | None = None  # what the program's head says of the machine (option ncc)
-        self._left_over: LeftOver | None = None  # what stands behind M2 or M30, once it has been met
 
     def close(self) -> None:
         self.control.close()
+
+    @property
+    def configuration(self) -> Script | None:
+        """What a script at the program's head says of the machine (option ncc)."""
+        return self._bounds.configuration
 
     def run(self) -> Iterator[MotionBlock | Call]:
         """The canonical calls. Raises ProgramError."""
@@ -121,7 +125,7 @@ class Interpreter:
         out.call("SET_FEED_REFERENCE", "CANON_XYZ")
         out.call("ON_RESET")
         try:
-            self._open()
+            self._bounds.open()
             ended, wait = False, self.lane.wait
             while not ended:
                 wait -= 1
@@ -134,7 +138,7 @@ class Interpreter:
                 if raw:
                     ended = self._line(raw)
                 else:
-                    self._file_ended()
+                    self._bounds.file_ended()
                     ended = True
                 if out.items:
                     yield from self._take()
@@ -142,7 +146,7 @@ class Interpreter:
             out.flush()
             yield from self._take()  # what was right before the fault
             raise
-        self._look_behind()
+        self._bounds.look_behind()
         out.line, out.digits = 0, 0
         out.call("ON_RESET")
         out.call("ON_RESET")
@@ -153,65 +157,6 @@ class Interpreter:
         return items
 
     # -- lines --------------------------------------------------------------------------------------------------------
-
-    def _open(self) -> None:
-        """See whether the program stands between % and %."""
-        self.source.fill()
-        first = self.source.following()
-        while raw := self.source.read():
-            if len(raw) > LONGEST + 1:
-                break
-            if stripped := raw.strip():
-                self._percent = stripped == b"%"
-                break
-        else:
-            raise ProgramError("the program is empty; write blocks and end with M2", file=self.source.name, line=1)
-        if not self._percent:
-            self.source.go_to(first)
-        if self.options.ncc:
-            self._read_configuration()
-
-    def _read_configuration(self) -> None:
-        """Read the configuration script at the program's head, if there is one. Raises ProgramError."""
-        from rds.machines.ncc import Script
-
-        script, source = Script(), self.source
-        behind = source.following()
-        try:
-            while (raw := source.read()) and script.take(raw.decode("latin-1"), source.line):
-                if script.line == source.line:
-                    behind = source.following()
-            if script.line:
-                script.check_built(source.line, f"{raw.decode('latin-1').strip():.30}" if raw else "the program's end")
-                self.configuration = script
-                if self._remark is not None:
-                    said = (
-                        f"the configuration of {len(script.links)} links, built in line {script.built}, has no fault; "
-                        "a machine that runs the program must have this chain (`rds machine new` makes one of a script)"
-                    )
-                    self._remark(ProgramError(said, file=source.name, line=script.built))
-        except InputError as error:
-            said = str(error).removeprefix(f"{error.where}: ")
-            raise ProgramError(said, file=source.name, line=script.line) from None
-        source.go_to(behind)
-
-    def _file_ended(self) -> None:
-        """Raises ProgramError, but where the last line of the program may be its end."""
-        source = self.control.source
-        try:
-            self.control.check_end()
-        except ProgramError as error:
-            raise error.at(source.name, source.line) from None
-        if self.options.open_end and not self._percent and source is self.source and not self.control.depth:
-            self._end_here()
-            if self._remark is not None:
-                said = "the program has no M2, M30 or %: its last line is taken for its end (option open-end)"
-                self._remark(ProgramError(said, file=source.name, line=source.line))
-            return
-        what = "%" if self._percent else "M2, M30 or % (then with % on the first line, too)"
-        raise ProgramError(
-            f"the program does not end; write {what} on its last line", file=source.name, line=source.line
-        )
 
     def _line(self, raw: bytes) -> bool:
         """Read and execute a block. True when the program ends by it."""
@@ -233,7 +178,7 @@ class Interpreter:
             if not text or (text[0] == "/" and self.options.block_delete):
                 return False
             ended = self._block(text)
-            if self.control.repeats and not self.control.skipping and not self.options.program_numbers:
+            if self.control.repeats and not (self.control.skipping or self.options.program_numbers or self._fanuc):
                 self._repeated.count(raw, text)
             return ended
         except Fault as fault:
@@ -266,7 +211,7 @@ class Interpreter:
     def _block(self, text: str) -> bool:
         if self.options.program_numbers and not self.control.skipping and self._program_number(text):
             return False
-        plain = None if self.control.skipping else read_plain(text)
+        plain = None if self.control.skipping or "g7" in text else read_plain(text)  # "g7": it may be Fanuc's G71
         if plain is None:
             return self._other(text)
         digits, words = plain
@@ -285,8 +230,8 @@ class Interpreter:
     def _other(self, text: str) -> bool:
         """A block with more than plain words: %, comments, parameters, expressions, O words; or one passed over."""
         control, out = self.control, self.out
-        if text == "%" and self._percent:
-            return self._percent_sign()
+        if text == "%" and self._bounds.percent:
+            return self._bounds.percent_sign()
         out.digits, out.n, at = line_number(text)
         first = text[at : at + 1]
         if first == "m" and (fanuc := self.control.fanuc(text, at)) is not None:
@@ -299,6 +244,8 @@ class Interpreter:
             control.execute(word)
             return False
         if control.skipping:
+            return False
+        if "g7" in text and self._fanuc_turning(text):
             return False
         block = Block()
         self._places = read_words(text, at, block, self.context.parameters)
@@ -333,34 +280,53 @@ class Interpreter:
         context.parameters.settle()
         ended = execute(context, block)
         if ended:
-            self._after_end(f"M{block.m[STOP]}")
+            self._bounds.after_end(f"M{block.m[STOP]}")
         return ended
+
+    def _fanuc_turning(self, text: str) -> bool:
+        """Execute a line of Fanuc's G70 to G72; False, and nothing done, where it is none. Raises Fault."""
+        if self._fanuc is None:
+            from rds.nc.language.fanuc_turning import LINE, FanucTurning  # only lathe programs need it
+
+            if LINE.match(text) is None:
+                return False
+            self._fanuc = FanucTurning()
+        block, start = self._fanuc.block(text, self.context.state), self.context.state.position()
+        if block is not None:
+            self._execute(block)
+            self._fanuc.back(self.context, start)
+        return block is not None
 
     def _contour_of(self, name: str) -> list[Piece]:
         """The contour that the subroutine `name` holds, for G70 to G72. Raises Fault, ProgramError."""
-        text, places, out, remark = self._text, self._places, self.out, self._remark
-        line = out.line
+        from rds.nc.language.contour_reading import gathered  # with numpy
+
+        text, places, out, remark, state = self._text, self._places, self.out, self._remark, self.context.state
+        line, fanuc = out.line, self._fanuc
 
         def run(reading: ContourReading) -> None:
             self.out = self.context.out = reading.out
             self._contour = reading
+            if fanuc is not None and fanuc.reads:
+                fanuc.run(self.control.source, lambda raw: (self._line(raw), self.out.n)[1])
+                return
             depth = self.control.depth
             self.control.execute(Word("call", name, spelled(name), max(self._place("q"), 0)))
             while self.control.depth > depth:
                 if raw := self.control.source.read():
                     self._line(raw)
                 else:
-                    self._file_ended()
+                    self._bounds.file_ended()
 
         try:
-            pieces, passed_over = gathered(run, self.context.state)
+            pieces, passed_over = gathered(run, state)
         finally:
             self._text, self._places, self._contour = text, places, None
             self.out = self.context.out = out
         if passed_over and remark is not None:
             said = f"the contour in subroutine {name}: {', '.join(passed_over)} passed over; only its moves count"
             remark(ProgramError(said, file=out.file, line=line))
-        return pieces
+        return fanuc.moved(pieces, (state.z, state.x)) if fanuc is not None and fanuc.reads else pieces
 
     def _saved_modes(self, m: Context, code: int) -> None:
         """M70, M73 (save the modes), M71 (forget them), M72 (restore them). Raises Fault."""
@@ -403,57 +369,6 @@ class Interpreter:
         self.out.digits = self.out.n = 0
         self.out.comment(f"program {text.upper()}")
         return True
-
-    def _percent_sign(self) -> bool:
-        """% ends a program that began with one; in a subroutine's file that is being searched it says nothing."""
-        if self.control.skipping:
-            if self.control.source is not self.source:
-                return False
-            self._file_ended()
-        self.out.digits = 0
-        if self.control.source is not self.source:
-            raise Fault("% inside a subroutine; end it with ENDSUB before", at=0)
-        self._end_here()
-        return True
-
-    def _end_here(self) -> None:
-        """End without M2 or M30: modes, spindle and coolant stay as they are."""
-        compensation = self.out.compensation
-        if compensation is not None:
-            self.out.put(compensation.stop(self.out.line))
-        self.out.call("FINISH")
-
-    def _look_behind(self) -> None:
-        """Remark on blocks behind the end; a program may also end in a subroutine's file."""
-        source = self.source
-        if self._remark is None or self.control.source is not source:
-            return
-        if self._left_over is None:
-            self._left_over = LeftOver("%", source.line)
-        while raw := source.read():
-            self._left_over.look(raw, source.line)
-        if found := self._left_over.remark(source.name):
-            self._remark(found)
-
-    def _after_end(self, word: str) -> None:
-        """A program that began with % ends with one, after M2."""
-        source = self.control.source
-        self._left_over = LeftOver(word, source.line)
-        if not self._percent:
-            return
-        last = b""
-        while raw := source.read():
-            self._left_over.look(raw, source.line)
-            if len(raw) <= LONGEST + 1:
-                if raw.strip() == b"%":
-                    return
-                last = raw
-        if last:
-            self.out.digits = 0
-            match = re.match(rb"[\t /]*[nN]([0-9]{1,9})", last)
-            if match:
-                self.out.digits, self.out.n = len(match[1]), int(match[1])
-        self.out.comment("interpreter: percent sign missing from end of file")
 
     # -- faults -------------------------------------------------------------------------------------------------------
 

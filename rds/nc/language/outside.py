@@ -77,9 +77,9 @@ def no_such_m(code: int) -> str:
 
 
 FANUC_CONTOUR = (
-    "goes with the form of G70 to G73 that Fanuc's lathes have, two lines and the blocks from P to Q as the contour;"
-    " here the contour is a subroutine (O100 SUB, its moves, O100 ENDSUB) and the cycle one line: G71 Q100 I1.5 D0.2"
-    " R0.5 (I deep each cut, D left on the contour, R back out), then G70 Q100"
+    "goes with the form of G70 to G73 that Fanuc's lathes have, of which G71 U R (G72 W R) and then G71 P Q U W are"
+    " known; else the contour is a subroutine (O100 SUB, its moves, O100 ENDSUB) and the cycle one line: G71 Q100 I1.5"
+    " D0.2 R0.5 (I deep each cut, D left on the contour, R back out), then G70 Q100"
 )
 _FANUC_CYCLE = re.compile(r"g7[0-3](?![0-9])")
 

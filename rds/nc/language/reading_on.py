@@ -76,10 +76,12 @@ class _Reading(Interpreter):
 
 
 def _without(raw: bytes, fault: ProgramError) -> bytes:
-    """The line with blanks in place of the word that is wrong; nothing where the fault is of no one word."""
+    """The line with blanks in place of the word that is wrong; nothing where the fault is of no one word, and of a
+    line that is no O word without its number.
+    """
     at = fault.column - 1
     word = fault.word.encode()
-    if at < 0 or not _WORD.fullmatch(fault.word) or raw[at : at + len(word)].upper() != word:
+    if at < 0 or fault.word[:1] == "O" or not _WORD.fullmatch(fault.word) or raw[at : at + len(word)].upper() != word:
         return b""
     return raw[:at] + b" " * len(word) + raw[at + len(word) :]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import io
 import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -188,6 +187,8 @@ class _Spool(io.RawIOBase):
 
     def __init__(self, lines: Iterator[Any]):
         self._lines = lines
+        import tempfile  # for what cannot be read again
+
         self._kept = tempfile.SpooledTemporaryFile(max_size=1 << 22)  # noqa: SIM115 (closed by close)
         self._at = 0
         self._end = 0

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from rds.nc.language.canon import BLOCK_ROWS, MOTION, RATE, SPEED, Call, MotionBlock
+from rds.nc.language.canon import BLOCK_ROWS, RATE, SPEED, Call, MotionBlock
+from rds.nc.language.motion_rows import Columns, empty
 
 if TYPE_CHECKING:
     from rds.nc.compensation.compensation import Compensation
@@ -33,11 +31,8 @@ class Stream:
         self._empty()
 
     def _empty(self) -> None:
-        self._kinds = array("b")
-        self._digits = array("b")
-        self._ns = array("i")
-        self._lines = array("i")
-        self._values = array("d")
+        self._columns = empty()
+        self._kinds, self._digits, self._ns, self._lines, self._values = self._columns
 
     @property
     def file(self) -> str:
@@ -110,28 +105,18 @@ class Stream:
                 if len(self._kinds) >= BLOCK_ROWS:
                     self.flush()
 
-    def rows(self, rows: np.ndarray) -> None:
-        """A copy of rows of dtype MOTION from somewhere else, at most BLOCK_ROWS of them. Few are gathered, too."""
-        if len(rows) > FEW or len(rows) + len(self._kinds) > BLOCK_ROWS:
+    def rows(self, columns: Columns) -> None:
+        """Rows from somewhere else, at most BLOCK_ROWS of them, which are the stream's from now on."""
+        count = len(columns.kinds)
+        if count > FEW or count + len(self._kinds) > BLOCK_ROWS:
             self.flush()
-        if len(rows) > FEW:
-            self.items.append(MotionBlock(rows.copy(), self._file))
-            return
-        self._kinds.frombytes(rows["kind"].tobytes())
-        self._digits.frombytes(rows["digits"].tobytes())
-        self._ns.frombytes(rows["n"].tobytes())
-        self._lines.frombytes(rows["line"].tobytes())
-        self._values.frombytes(rows["values"].tobytes())
+        if count > FEW:
+            self.items.append(MotionBlock(columns, self._file))
+        else:
+            self._columns.extend(columns)
 
     def flush(self) -> None:
         """What has been gathered becomes a block."""
-        if not self._kinds:
-            return
-        rows = np.zeros(len(self._kinds), MOTION)
-        rows["kind"] = np.frombuffer(self._kinds, np.int8)
-        rows["digits"] = np.frombuffer(self._digits, np.int8)
-        rows["n"] = np.frombuffer(self._ns, np.int32)
-        rows["line"] = np.frombuffer(self._lines, np.int32)
-        rows["values"] = np.frombuffer(self._values).reshape(-1, 9)
-        self._empty()
-        self.items.append(MotionBlock(rows, self._file))
+        if self._kinds:
+            self.items.append(MotionBlock(self._columns, self._file))
+            self._empty()

@@ -6,11 +6,14 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rds.core.limits import read_limited
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
-from rds.nc.language.tool_library import ShapedTool, read_library
+
+if TYPE_CHECKING:
+    from rds.nc.language.tool_library import ShapedTool
 
 _WORD = re.compile(r"([A-Za-z])([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 _WHOLE = "TPQ"
@@ -84,6 +87,8 @@ def read_tools(path: Path) -> list[Tool]:
     passes over the first and misreads the second), or a tool that comes twice.
     """
     if path.suffix.lower() == ".toml":
+        from rds.nc.language.tool_library import read_library  # with numpy
+
         return [of_shape(tool) for tool in read_library(path)]
     try:
         text = read_limited(path, _LARGEST, "a tool table", "check its path").decode("utf-8-sig", "replace")

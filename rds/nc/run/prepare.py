@@ -24,7 +24,7 @@ from rds.modes.loop.program import InterpolatedProgram, Program, ProgramEvent
 from rds.nc.check import Setup, check_program, compiled_if_current
 from rds.nc.compiled_file import Compiled, open_compiled
 from rds.nc.configuration import configured
-from rds.nc.path_block import PathBlock
+from rds.nc.path_block import Event, PathBlock
 from rds.nc.run.in_part import from_line, stepwise
 from rds.nc.tool_centre import ToolCentre, path_of_tip
 
@@ -67,6 +67,7 @@ class Prepared:
     tip: TipPath | None = None  # of a program with moves for the tool's tip
     about: dict[str, Any] = field(default_factory=dict)  # of a path as reference: what made its samples, for the result
     outputs: tuple[dict[str, Any], ...] = ()  # that are switched: name, value, planned sample, line
+    events: tuple[Event, ...] = ()  # of the path, each after one of its segments
 
     @property
     def seconds(self) -> float:
@@ -137,8 +138,9 @@ def planned(
     """
     limits = Limits.of(machine)
     path: list[np.ndarray] = []
+    events: list[Event] = []
     rows = _Rows([AXES.index(name) for name in (machine.axes if axes is None else axes) if name in AXES])
-    samples, certificate = motion_of(profile, _kept(blocks, path), limits, T, start=np.zeros(len(AXES)))
+    samples, certificate = motion_of(profile, _kept(blocks, path, events), limits, T, start=np.zeros(len(AXES)))
     for block in samples:
         rows.add(block)
         if rows.count > MOST_SAMPLES:
@@ -177,7 +179,9 @@ def planned(
             name = (machine.digital if kind == "digital" else machine.analog)[int(number)]
             outputs.append({"output": name, "value": float(value), "sample": sample, "line": event.line})
     whole = np.concatenate(path) if path else np.zeros(0, SEGMENT)
-    return Prepared(file, program, whole, segment, T, tuple(notes), certificate, outputs=tuple(outputs))
+    return Prepared(
+        *(file, program, whole, segment, T, tuple(notes), certificate), outputs=tuple(outputs), events=tuple(events)
+    )
 
 
 def tip_path(path: np.ndarray, machine: Machine, correct: bool) -> TipPath:
@@ -240,9 +244,12 @@ class _Rows:
         return [np.concatenate(parts) for parts in zip(*self._parts, strict=True)]
 
 
-def _kept(blocks: Iterable[PathBlock], path: list[np.ndarray]) -> Iterator[PathBlock]:
+def _kept(blocks: Iterable[PathBlock], path: list[np.ndarray], events: list[Event]) -> Iterator[PathBlock]:
+    first = 0
     for block in blocks:
         path.append(block.segments)
+        events += [event._replace(after=first + event.after) for event in block.events]
+        first += len(block)
         yield block
 
 

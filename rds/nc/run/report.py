@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rds.modes.experiment.report import save_with_report
+from rds.nc.path_block import PathBlock
 from rds.nc.run.judge import WAITS, worst_lines
 from rds.nc.run.prepare import Prepared
 from rds.results import Result
@@ -14,6 +15,7 @@ from rds.results.reports.content import Report, Table
 from rds.results.reports.write import write
 
 KIND = "program"
+LOOKED_AT = 60.0  # s of motion for which it is looked for what would save a second, which takes some 30 plans
 _WORST = 5  # lines in a table
 _TEXT = 60  # characters of a program line
 _CHANGES = 200  # in a table
@@ -62,7 +64,7 @@ def program_report(result: Result, prepared: Prepared) -> Report:
         figures={
             "path": partial(path, result, prepared),
             "along the program": partial(along, result, prepared),
-            **({"certificate": prepared.certificate.plot} if prepared.certificate else {}),
+            **({"certificate": partial(certificate_picture, prepared)} if prepared.certificate else {}),
         },
         findings=[*findings(about), *_certified(prepared), *map(str, result.meta.get("notes", ()))],
         links={"responses, voltages and timing of each axis": "report.html", "all samples": "result.csv"},
@@ -105,6 +107,19 @@ def findings(about: dict[str, Any]) -> list[str]:
     else:
         said.append(f"It moved for {moving:.3f} s instead of {predicted:.3f} s: the override was not 100 % throughout.")
     return said
+
+
+def certificate_picture(prepared: Prepared) -> Any:
+    """The picture of the certificate; of planned motion with what holds it back."""
+    from rds.interpolators.motion.limiting import ASKED, explained
+
+    certificate = prepared.certificate
+    assert certificate is not None
+    if certificate.least_time is None:
+        return certificate.plot()
+    whole = PathBlock(prepared.path, list(prepared.events))
+    looked_for = ASKED if prepared.seconds <= LOOKED_AT else 0
+    return certificate.plot(explained=explained([whole], certificate.limits, prepared.T, looked_for))
 
 
 def _certified(prepared: Prepared) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,9 @@ from rds.interpolators.motion.limits import Limits
 from rds.interpolators.motion.pieces import BEND, DISTANCE, RATIO, SLOPE, TWIST
 from rds.interpolators.motion.planner import plan
 from rds.interpolators.motion.segments import AXES
-from rds.nc.path_block import PathBlock
 
 if TYPE_CHECKING:
-    from rds.core.figure import Picture
+    from matplotlib.axes import Axes
 
 KINDS = ("velocity", "acceleration", "jerk")
 UNITS = ("mm/s", "mm/s²", "mm/s³")
@@ -61,22 +60,14 @@ class Limiting:
         lines, count = np.unique(self.line[rows], return_counts=True)
         return [int(line) for line in lines[np.argsort(-count, kind="stable")][:most]]
 
-    def plot(self, title: str) -> Picture:
+    def draw(self, top: Axes, below: Axes) -> None:
         """Programmed, allowed and planned speed along the path, and below them what holds the motion back."""
-        from rds.core.figure import BLUE, GREY, ORANGE, Picture, dress, legend
+        from rds.core.figure import BLUE, GREY, ORANGE, dress, legend
 
-        shown = Picture(7.0)
-        top, below = shown.subplots(2, 1, sharex=True, height_ratios=[3, 2])
         every = max(len(self.time) // 20000, 1)
         way = self.way[::every]
-        top.plot(
-            way,
-            self.allowed[::every],
-            color=GREY,
-            linewidth=1.0,
-            linestyle=(0, (4, 2)),
-            label="allowed by velocity, acceleration and jerk",
-        )
+        allowed: dict[str, Any] = {"color": GREY, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+        top.plot(way, self.allowed[::every], label="allowed by velocity, acceleration and jerk", **allowed)
         top.plot(way, self.programmed[::every], color=ORANGE, linewidth=2.0, alpha=0.6, label="programmed")
         top.plot(way, self.planned[::every], color=BLUE, linewidth=1.2, label="planned")
         dress(top, "speed [mm/s]", None)
@@ -87,8 +78,6 @@ class Limiting:
         below.set_yticks(range(len(names)), names)
         below.invert_yaxis()
         dress(below, "held back by", "way along the program [mm]")
-        shown.suptitle(title, fontsize="medium")
-        return shown
 
 
 class _Pieces(LeastTime):
@@ -117,7 +106,7 @@ class _Pieces(LeastTime):
         return table[piece, 1], table[piece, 2].astype(int)
 
 
-def limiting(blocks: Sequence[PathBlock], limits: Limits, T: float) -> Limiting:
+def limiting(blocks: Sequence[Any], limits: Limits, T: float) -> Limiting:
     """Plan the motion, and tell for each sample what holds it back. All samples are kept: some 200 bytes each."""
     pieces = _Pieces(limits, T)
     samples = list(plan(blocks, limits, T, start=np.zeros(6), least_time=pieces))
@@ -158,7 +147,7 @@ def limiting(blocks: Sequence[PathBlock], limits: Limits, T: float) -> Limiting:
     )
 
 
-def to_save(blocks: Sequence[PathBlock], limits: Limits, T: float, kind: str, axis: str) -> float | None:
+def to_save(blocks: Sequence[Any], limits: Limits, T: float, kind: str, axis: str) -> float | None:
     """How many times a limit of an axis would have to be what it is to save a second; None where it never does."""
     i = AXES.index(axis)
 
@@ -177,12 +166,44 @@ def to_save(blocks: Sequence[PathBlock], limits: Limits, T: float, kind: str, ax
     return high
 
 
-def explained(blocks: Sequence[PathBlock], limits: Limits, T: float) -> tuple[Limiting, list[dict[str, Any]]]:
-    """What holds the motion back, and a row for each cause: seconds, lines, and of the limits that do so for longest,
-    ASKED at most, what each would have to be to save a second, up to the first that can."""
+class Explained(NamedTuple):
+    """What holds a motion back, and a row for each cause: `cause`, `seconds`, `lines`, and of some limits what is
+    `limit`, `unit` and `to_save_a_second` (None where no more of it ever does).
+    """
+
+    limiting: Limiting
+    rows: list[dict[str, Any]]
+
+    def sentences(self) -> list[str]:
+        """A line for each cause, and one behind it that says what would save a second."""
+        said = []
+        for row in self.rows:
+            lines = ", ".join(map(str, row["lines"]))
+            said.append(f"{row['cause']}: {row['seconds']:.3f} s, most in line{'s' * (len(row['lines']) > 1)} {lines}")
+            if "limit" in row:
+                said.append(f"   it is {row['limit']:g} {row['unit']}: {_saving(row)}")
+        return said
+
+    def savings(self) -> list[str]:
+        """What would save a second, as far as it has been looked for."""
+        rows = [row for row in self.rows if "limit" in row]
+        return [f"{row['cause']} is {row['limit']:g} {row['unit']}: {_saving(row)}" for row in rows]
+
+
+def _saving(row: dict[str, Any]) -> str:
+    more = row["to_save_a_second"]
+    return "no more of it saves a second" if more is None else f"a second less takes {more:.4g} {row['unit']}"
+
+
+def explained(blocks: Sequence[Any], limits: Limits, T: float, looked_for: int = ASKED) -> Explained:
+    """What holds the motion of blocks of segments back, as `plan` takes them.
+
+    Of the limits that do so for longest, `looked_for` at most, what each would have to be to save a second, up to the
+    first that can; each takes some ten plans.
+    """
     found = limiting(blocks, limits, T)
     rows: list[dict[str, Any]] = []
-    left = ASKED
+    left = looked_for
     for cause, seconds in found.seconds.items():
         row: dict[str, Any] = {"cause": cause, "seconds": seconds, "lines": found.lines_of(cause)}
         kind, _, axis = cause.partition(" of ")
@@ -196,4 +217,4 @@ def explained(blocks: Sequence[PathBlock], limits: Limits, T: float) -> tuple[Li
                 "unit": UNITS[KINDS.index(kind)],
             }
         rows.append(row)
-    return found, rows
+    return Explained(found, rows)
