@@ -6,7 +6,7 @@ __getattr__, __dir__ = face(
     __name__,
     {
         "Pool": "sandbox.pool",
-        "Wanted": "exports.exported",
+        "ExportOptions": "exports.exported",
         "available": "sandbox.requirements",
         "check_assignment": "assignment.check_assignment",
         "export": "exports.export",
