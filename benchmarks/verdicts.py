@@ -93,7 +93,7 @@ def _rate(name: str, counted: Sequence[Row]) -> Figure:
     errors = [row for row in counted if row.error]
     which = ", ".join(f"{row.machine}: {row.kind}" for row in errors[:6])
     note = f"{len(errors)} of {len(counted)}" + (f" ({which})" if which else "")
-    note += f"; below {100.0 * _most(len(errors), len(counted)):.2f} % with 95 % confidence"
+    note += f"; at most {100.0 * _most(len(errors), len(counted)):.2f} % with 95 % confidence"
     return Figure(name, "%", (100.0 * len(errors) / max(len(counted), 1),), limit=LIMIT, note=note)
 
 

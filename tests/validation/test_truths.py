@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.truths import machine
+from benchmarks.truths import cases, machine
 from benchmarks.verdicts import Row, rates, rows, table
+from rds.identification.validate.assessment import assess
+from rds.identification.validate.judge import judge
+from rds.identification.validate.verdict import Bands, Word
 
 KINDS = ("truth", "tau off by 30 %", "K 5 % off", "a hidden delay", "K 5 % off, a file of one's own")
 
@@ -16,7 +19,25 @@ def test_right_models_are_valid_and_wrong_ones_are_not(number: int) -> None:
     assert [row.kind for row in found if row.right] == ["truth"] and len(found) == len(KINDS)
     assert [(row.kind, row.says) for row in found if row.error] == []
     right, wrong = rates(found)
-    assert right.met and wrong.met and wrong.note == "0 of 4; below 52.71 % with 95 % confidence"
+    assert right.met and wrong.met and wrong.note == "0 of 4; at most 52.71 % with 95 % confidence"
+
+
+def test_play_that_a_time_constant_makes_up_for_is_found() -> None:
+    (row,) = rows(153, ["fitted without options"])
+    assert row.says == "not valid" and not row.right
+
+
+def test_friction_that_differs_by_direction_keeps_its_stribeck_part_in_a_verdict() -> None:
+    truth = next(cases(172))
+    assert truth.machine.options == ("stribeck",) and truth.suffices
+    assert judge(truth.candidate, assess(truth.candidate, truth.log), Bands()).ok
+
+
+def test_a_motion_within_the_play_tells_nothing() -> None:
+    truth = next(cases(17))
+    verdict = judge(truth.candidate, assess(truth.candidate, truth.log), Bands())
+    assert verdict.word is Word.CANNOT_TELL and not truth.suffices
+    assert any(reason.kind == "no-motion" and "its noise alone" in reason.what for reason in verdict.reasons)
 
 
 def test_the_rates_count_what_is_called_otherwise_than_it_is() -> None:

@@ -51,10 +51,17 @@ def _fold(columns, last, R):
             R[j, j] = -norm if head > 0.0 else norm
             factor = 2.0 / (pivot * pivot + squares)
             for i in range(j + 1, n):
-                dot = R[j, i] * pivot
-                for k in range(rows):
-                    dot += block[i, k] * block[j, k]
-                dot *= factor
+                # four sums beside each other, which a processor makes at once
+                one, two, three, four = R[j, i] * pivot, 0.0, 0.0, 0.0
+                whole = rows - rows % 4
+                for k in range(0, whole, 4):
+                    one += block[i, k] * block[j, k]
+                    two += block[i, k + 1] * block[j, k + 1]
+                    three += block[i, k + 2] * block[j, k + 2]
+                    four += block[i, k + 3] * block[j, k + 3]
+                for k in range(whole, rows):
+                    one += block[i, k] * block[j, k]
+                dot = ((one + two) + (three + four)) * factor
                 R[j, i] -= dot * pivot
                 for k in range(rows):
                     block[i, k] -= dot * block[j, k]
