@@ -21,6 +21,7 @@ import numpy as np
 
 from benchmarks.axis import experiment
 from benchmarks.figures import Figure
+from rds.panels.session.saving import is_being_saved
 from rds.results import Result, open_result
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -225,18 +226,20 @@ def _growth(page: Any, server: int, folder: Path) -> tuple[float, float]:
         used = float(session.send("Runtime.getHeapUsage")["usedSize"])
         return max(_resident(each) for each in _kernels(server)), used / 1e3
 
+    runs = folder / "runs"
     for number in range(_RUNS):
         page.wait_for_selector("button.rds-run:visible:enabled", timeout=60_000)
-        before_it, patience = len(list((folder / "runs").iterdir())), time.monotonic() + 60.0
+        before_it = set(runs.iterdir())
         page.click("button.rds-run:visible")
-        pressed = time.monotonic()
-        while len(list((folder / "runs").iterdir())) == before_it:  # it may be over before anybody sees it run
+        written = False
+        patience = time.monotonic() + 120.0
+        while not written:  # its pictures and reports, too: what waits to be written is no growth
             if time.monotonic() > patience:
-                raise RuntimeError(f"run {number} of {_RUNS} was not begun")
-            if time.monotonic() > pressed + 2.0 and page.locator("button.rds-run:visible:enabled").count():
-                page.click("button.rds-run:visible")  # the press before came while the run before was being saved
-                pressed = time.monotonic()
+                raise RuntimeError(f"run {number} of {_RUNS} was not begun, or not written")
             page.wait_for_timeout(10)
+            written = any(
+                (new / "report.html").is_file() and not is_being_saved(new) for new in set(runs.iterdir()) - before_it
+            )
         if number == _SETTLED - 1:
             before = memory()
     page.wait_for_selector("button.rds-run:visible:enabled", timeout=60_000)

@@ -18,7 +18,7 @@ from rds.panels.page import language
 from rds.panels.page.shell import Shell
 from rds.panels.registry import PANELS
 from rds.panels.session import Session
-from rds.panels.texts import languages, texts
+from rds.panels.texts import exchanger, languages, texts
 
 SCRIPT = Path(language.__file__).parent / "static" / "texts.js"
 APART = ("style", "code", "pre", "svg", "math")
@@ -100,6 +100,9 @@ def test_values_and_parts_are_put_where_they_belong(exchange: Callable[..., Any]
         "my_file.py",
         "X error [mm]:",
     ]
+    assert [exchanger("de")(text.strip()) for text in said] == [
+        text and text.strip() for text in exchange("de", said)
+    ]  # what pictures are labelled with, and what the browser puts
     assert exchange("de", said) == [
         "Amplitude [mm]",
         "von der Mitte bis zum Scheitel (von 0 bis 75 mm)",
@@ -108,6 +111,25 @@ def test_values_and_parts_are_put_where_they_belong(exchange: Callable[..., Any]
         None,
         "X Fehler [mm]:",
     ]
+
+
+@pytest.mark.parametrize(
+    ("reason", "put"),
+    [
+        (
+            "timing met: all 250 samples were complete within their period",
+            "Zeit eingehalten: alle 250 Abtastschritte waren innerhalb ihrer Periode fertig",
+        ),
+        (
+            "timing void: the computer was busy (3 of 250 samples late, 2 periods discarded). This says nothing about "
+            "your code. Repeat it on a quieter computer",
+            "Zeit ungültig: der Rechner war ausgelastet (3 von 250 Abtastschritten verspätet, 2 Perioden verworfen). "
+            "Das sagt nichts über Ihren Code. Auf einem ruhigeren Rechner wiederholen",
+        ),
+    ],
+)
+def test_a_verdict_is_in_the_language_with_its_numbers(reason: str, put: str) -> None:
+    assert exchanger("de")(reason) == put
 
 
 def test_the_page_is_in_the_language_that_is_chosen_and_back_again(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -12,9 +13,11 @@ import numpy as np
 import pytest
 from made_results import make_result
 from matplotlib.image import imread
+from matplotlib.text import Text
 
 from rds.core.errors import InputError
 from rds.core.figure import CYCLE, Picture
+from rds.panels.texts import exchanger, languages, texts, translate_picture
 from rds.results import Result, compare, plots, plots_overlay, plots_timing
 
 MODES = [make_result("simulation", "XY"), make_result("emulation", "XY"), make_result("implementation", "XY")]
@@ -188,3 +191,16 @@ def test_the_colours_are_distinct_when_grey() -> None:
 
     greys = sorted(float(np.dot(to_rgb(colour), [0.299, 0.587, 0.114])) for colour in CYCLE[:3])
     assert np.diff(greys).min() > 0.01
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_all_that_a_picture_says_has_a_text_in_the_languages_of_the_page(name: str) -> None:
+    drawn = PICTURES[name]()
+    said = {each.get_text() for each in drawn.findobj(Text) if re.search(r"[^\W\d_]{2}", each.get_text())}
+    said -= {"simulation", "emulation", "implementation"}  # names of the runs
+    for code in languages():
+        missing = [text for text in said if exchanger(code)(text) is None]
+        assert said and not missing
+        translate_picture(drawn, code)
+        left = {each.get_text() for each in drawn.findobj(Text)}
+        assert not said & left - set(texts(code).values())

@@ -23,6 +23,7 @@ from rds.panels.session.beside import made_beside
 from rds.panels.session.kept_runs import State
 from rds.panels.session.live_values import LiveValues
 from rds.panels.session.save_as import save_as
+from rds.panels.session.session import MOST_UNWRITTEN
 from rds.results import open_result
 
 
@@ -230,13 +231,20 @@ def test_the_next_run_begins_while_pictures_of_the_last_one_are_made(
     monkeypatch.setattr("rds.panels.equipment.run.made_beside", draw)
     equipment = Equipment(Session(tmp_path), "control")
     equipment.choices.set("duration", 0.01)
-    runs = [equipment.run().start() for _ in range(2)]
+    runs = [equipment.run().start() for _ in range(MOST_UNWRITTEN)]
     for run in runs:
         while not run.done:
             time.sleep(0.01)
         assert not run.written and (run.folder / "result.csv").is_file()  # the tables are there at once
+    stopped, late = (equipment.run().start() for _ in range(2))  # no more of them are kept in memory
+    stopped.stop()
+    assert stopped.wait(60) and stopped.stopped_early
+    while not late.note:
+        time.sleep(0.01)
+    assert late.note.startswith("waiting until the reports of earlier runs") and not late.done
     drawn.set()
-    assert all(run.wait(60) and run.written and run.unwritten is None for run in runs)
+    assert all(run.wait(60) and run.written and run.unwritten is None for run in [*runs, late])
+    assert late.result is not None
 
 
 def test_what_goes_wrong_with_pictures_is_said_and_takes_no_result_away(tmp_path: Path) -> None:

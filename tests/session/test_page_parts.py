@@ -14,6 +14,8 @@ import pytest
 from rds.core.errors import InputError
 from rds.nc.check import Setup
 from rds.panels.equipment.result_actions import ResultActions
+from rds.panels.equipment.state import Equipment
+from rds.panels.equipment.view import EquipmentView
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import PATIENCE, Ticker
@@ -167,6 +169,24 @@ def test_who_was_told_to_wait_is_not_told_so_any_more_when_it_is_done(tmp_path: 
     assert notice.value == ""
 
 
+def test_a_press_of_run_while_a_run_goes_on_is_answered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A browser shows the button as free until it has heard that it is not."""
+    monkeypatch.setattr("rds.panels.equipment.run.made_beside", lambda *_: {})
+    (tmp_path / "part.ngc").write_text("G21 G90 G94\nG1 X1 F600\nM2\n")
+    shell = Shell(Session(tmp_path))
+    equipment, program = EquipmentView(shell, Equipment(shell.session, "control")), ProgramView(shell)
+    equipment.equipment.choices.set("duration", 0.01)
+    program.program.open("part.ngc")
+    for view, bar in ((equipment, equipment.bar), (program, program.operator.bar)):
+        view.start()
+        view.start()
+        assert "wait until it is done" in view.notice.value
+        while bar.busy:
+            shell.ticker.tick()
+        assert "done: " in view.notice.value  # what came of the run stands in its place
+    assert len(shell.session.runs()) == 2
+
+
 def test_a_bar_says_what_goes_on_after_the_stop(tmp_path: Path) -> None:
     """It said that a program was stopping for as long as the files of the stopped one were written."""
     bar = WorkBar(Shell(Session(tmp_path)).ticker)
@@ -186,17 +206,17 @@ def _within(widget: Any) -> Iterator[Any]:
         yield from _within(child)
 
 
-def test_a_picture_drawn_again_leaves_no_widget_behind() -> None:
+def test_a_picture_drawn_again_leaves_no_widget_behind(tmp_path: Path) -> None:
     """A kernel keeps every widget that is not closed, and all that hangs on it."""
     from ipywidgets.widgets.widget import _instances
     from matplotlib.figure import Figure
 
     from rds.panels.kit.figure import FigureView
 
-    view = FigureView()
+    view, session = FigureView(), Session(tmp_path)
     open_after = []
     for _ in range(4):
-        view.show(Figure(), caption="the error in µm")
+        view.show(Figure(), session, caption="the error in µm")
         open_after.append(len(_instances))
     assert len(set(open_after)) == 1
     view.clear()

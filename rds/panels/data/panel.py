@@ -149,7 +149,7 @@ class DataView:
             self._map.value = found.draft
             self._map_box.layout.display = ""
         if found.logs:
-            self.figure.show(overview(found.logs))
+            self.figure.show(overview(found.logs), self.shell.session)
         else:
             self.figure.clear()
 
@@ -164,7 +164,7 @@ class DataView:
         self.notice.say(said, kind)
         if self.state.fitted:
             made = for_logs(structure(estimate.structure, estimate.options), self.state.fitted)
-            self.figure.show(free_run_picture(estimate, self.state.fitted[0], made))
+            self.figure.show(free_run_picture(estimate, self.state.fitted[0], made), self.shell.session)
 
     def _show_validation(self, validation: Any) -> None:
         from rds.identification.validate.plots import overlay
@@ -172,7 +172,7 @@ class DataView:
 
         self.text.value = in_fields(fragment(validation, pictures=False))
         self.notice.say(validation.verdict.sentence, "good" if validation.verdict.ok else "warning")
-        self.figure.show(overlay(next(iter(validation.assessments.values()))))
+        self.figure.show(overlay(next(iter(validation.assessments.values()))), self.shell.session)
 
     def _keep_map(self) -> None:
         self.state.keep_map(self._map.value)

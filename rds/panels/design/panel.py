@@ -14,7 +14,7 @@ from rds.panels.design.charts import charts, details, key_numbers
 from rds.panels.design.splane import Curves, SPlane
 from rds.panels.design.state import Design
 from rds.panels.equipment.build import Checked
-from rds.panels.kit.button import button, follow, watch
+from rds.panels.kit.button import button, follow, is_free, watch
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
@@ -214,7 +214,7 @@ class DesignView:
     # the file
 
     def _write(self, replace: bool = False) -> None:
-        if self.bar.busy or not self._fit_to_write():
+        if not is_free(self.bar, self.notice) or not self._fit_to_write():
             return
         name = self.design.choices["file"]
         self._complains = False
@@ -244,7 +244,7 @@ class DesignView:
 
     def _save_picture(self) -> None:
         made, cloud, size = self._made, self._cloud, self.design.choices["step"]
-        if made is None or self.bar.busy:
+        if made is None:
             return
         self._complains = False
 

@@ -29,6 +29,7 @@ from rds.results import Result, open_result
 if TYPE_CHECKING:
     from rds.nc.run.prepare import Prepared
 
+_LOOK = 0.1  # s between two looks at whether a waiting run was stopped
 STRIP_RATE = 100.0  # rows a second of a path whose contour error is worked out for the strip
 _KINDS = ("reference", "measured", "modelled", "voltage", "target")
 
@@ -75,6 +76,7 @@ class EquipmentRun:
     def _work(self, task: Task[Result]) -> Result:
         with contextlib.ExitStack() as held:
             try:
+                self._await_turn(task, held)
                 if self._prepare is not None:
                     self._prepare(lambda: self._tell(task, "checking your files"))
                 self._tell(task, "loading")
@@ -107,6 +109,12 @@ class EquipmentRun:
                     judged = self.plan.program if "program" in self.result.meta else None  # one that failed may not be
                     self._write_files(save_run, self.result, judged, self.folder, self.title, held=held)
             return self.result
+
+    def _await_turn(self, task: Task[Result], held: contextlib.ExitStack) -> None:
+        """Wait while too many earlier runs are not written yet; `held` counts this one until it is."""
+        while not self.session.unwritten.acquire(timeout=_LOOK):
+            self._tell(task, "waiting until the reports of earlier runs are written")
+        held.callback(self.session.unwritten.release)
 
     def _write_files(self, save: Callable[..., dict[str, Path]], *of: Any, held: contextlib.ExitStack) -> None:
         """Pictures and reports, from now on and after those of earlier runs; `held` is held until they are there."""

@@ -21,7 +21,7 @@ from rds.panels.equipment.settings import EquipmentSettings
 from rds.panels.equipment.state import Equipment
 from rds.panels.equipment.taken_up import TakenUpRun, is_driven_by
 from rds.panels.equipment.what_runs import WhatRuns
-from rds.panels.kit.button import attempt, button, follow, run_order, say_error
+from rds.panels.kit.button import WAIT, attempt, button, follow, is_free, run_order, say_error
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -88,7 +88,7 @@ class EquipmentView:
 
     def start(self) -> None:
         """What the run button does."""
-        if self.bar.busy:
+        if not is_free(self.bar, self.notice):
             return
         self._refuse()
         self.notice.clear()
@@ -216,6 +216,8 @@ class EquipmentView:
             self.live.ended()
         run = self.run
         assert run is not None
+        if self.notice.take_back(WAIT) and self._shown is not None:
+            self.notice.say(*_verdict(self._shown))
         if run.stopped_early:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif run.error is not None:
@@ -228,7 +230,8 @@ class EquipmentView:
                     self.code.show_checked(checked)
         if run.result is not None:
             self.results.follow_files(run)
-        self.earlier.refresh()
+        if self.tabs.selected_index == EARLIER:  # else it is brought up to date once it is looked at
+            self.earlier.refresh()
 
     def _show(self, result: Result) -> None:
         """The loop is over; its tables are there, pictures and reports still to come."""

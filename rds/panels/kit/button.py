@@ -17,7 +17,7 @@ from rds.panels.session.task import Task
 
 T = TypeVar("T")
 _ORDER = "rds-order"  # what static/presence.js lets go only in time
-_WAIT = "wait until it is done, or stop it first"
+WAIT = "wait until it is done, or stop it first"
 
 
 class Notice(Protocol):
@@ -96,6 +96,13 @@ def say_error(what: str, error: BaseException, notice: Notice) -> None:
     notice.say(f"{what} failed: {error or type(error).__name__}", "error")
 
 
+def is_free(bar: WorkBar, notice: Line) -> bool:
+    """Whether `bar` follows nothing. A press that comes while it does, or before the browser locks, is answered."""
+    if bar.busy:
+        notice.say(WAIT, "warning")
+    return not bar.busy
+
+
 def follow(
     bar: WorkBar,
     notice: Line,
@@ -108,8 +115,7 @@ def follow(
 
     What `begin()` refuses is raised; `stopped` is said of work that was stopped, and `failed()` shows more of an error.
     """
-    if bar.busy:
-        notice.say(_WAIT, "warning")
+    if not is_free(bar, notice):
         return
     task = begin()
     notice.say("")
@@ -127,7 +133,7 @@ def watch(
     """As `follow`, for work that goes on already."""
 
     def ended() -> None:
-        notice.take_back(_WAIT)
+        notice.take_back(WAIT)
         if task.stopped:
             notice.say(stopped, "warning")
         elif task.error is not None:

@@ -12,6 +12,7 @@ import ipywidgets as widgets
 from rds.core.errors import RdsError
 from rds.panels.kit.ticker import Ticker
 from rds.panels.session.session import Session
+from rds.panels.texts import translate_picture
 
 DPI = 94  # on the page: letters that can be read on a projector
 WIDTH = 7.6  # inches: as wide as what is beside the settings on a screen of 1280, or of 1024
@@ -31,9 +32,13 @@ class FigureView(widgets.VBox):
         self._waiting: Any = None
         self._shown: list[widgets.Widget] = []  # closed when something else is: a kernel keeps every open widget
 
-    def show(self, figure: Any, caption: str = "") -> None:
-        """Show a matplotlib figure that belongs to no pyplot; `caption` is read out in its place."""
+    def show(self, figure: Any, session: Session, caption: str = "") -> None:
+        """Show a matplotlib figure that belongs to no pyplot; `caption` is read out in its place.
+
+        Its texts are in the language of the session's page.
+        """
         self.clear()
+        translate_picture(figure, session.language)
         figure.set_dpi(DPI)
         if figure.get_figwidth() > self._width:
             figure.set_figwidth(self._width)
@@ -72,7 +77,7 @@ class FigureView(widgets.VBox):
             if task.result is None:
                 self.clear()
             else:
-                self.show(task.result, caption)
+                self.show(task.result, session, caption)
             then()
 
         end = ticker.add(look)

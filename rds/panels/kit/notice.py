@@ -33,10 +33,12 @@ class Notice(widgets.HTML):
             f'<div class="rds-notice-{kind}" role="{role}"><b aria-hidden="true">{_SIGNS[kind]}</b> {lines}{more}</div>'
         )
 
-    def take_back(self, text: str) -> None:
-        """Nothing to say any more, if `text` is what was said last."""
-        if self._said == text:
+    def take_back(self, text: str) -> bool:
+        """Nothing to say any more, if `text` is what was said last; the answer is whether it was."""
+        was_said = self._said == text
+        if was_said:
             self.clear()
+        return was_said
 
     def clear(self) -> None:
         """Nothing to say."""

@@ -25,7 +25,7 @@ class ControllersView:
     """One module at a time."""
 
     def __init__(self, shell: Any, state: MachineState):
-        self.state = state
+        self.state, self._session = state, shell.session
         self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView(7.4)
         files = shell.session.choices("tuning file", [_FILE])
         self._files = files
@@ -115,7 +115,7 @@ class ControllersView:
     def _responded(self, result: Any) -> None:
         from rds.panels.design.step_plot import plot
 
-        self.figure.show(plot(result))
+        self.figure.show(plot(result), self._session)
         notes = "\n".join(map(str, result.meta.get("notes") or ()))
         self.notice.say(notes or "the axis reached the point", "warning" if notes else "good")
 

@@ -31,6 +31,7 @@ class Language(anywidget.AnyWidget):
 
     def __init__(self, session: Session):
         super().__init__(_esm=_module())
+        self._session = session
         known = {"en": ENGLISH} | languages()
         field = Choice("language", "Language", "of the panels", _AS_BROWSER, {_AS_BROWSER: _AS_BROWSER} | known)
         self._choices = session.choices("page", [field])
@@ -48,7 +49,7 @@ class Language(anywidget.AnyWidget):
         self._show(self._preferred if chosen == _AS_BROWSER else chosen)
 
     def _show(self, code: str) -> None:
-        language = "" if code == "en" else code
+        language = self._session.language = "" if code == "en" else code
         if language != self.language:
             with self.hold_sync():
                 self.texts, self.language = texts(language), language

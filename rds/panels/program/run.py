@@ -56,6 +56,7 @@ class ProgramWork(EquipmentRun):
     def _work(self, task: Task[Result]) -> Result:
         with contextlib.ExitStack() as held:
             try:
+                self._await_turn(task, held)
                 if self._prepare is not None:
                     self._prepare(lambda: self._tell(task, "checking the controller's file"))
                 self._tell(task, "reading the program" if "interpolator" in self._motion else "planning the program")

@@ -14,7 +14,7 @@ from rds.nc.stepping import Step
 from rds.panels.equipment.result_view import timing_line
 from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.interpolator.motion import MADE
-from rds.panels.kit.button import attempt, say_error
+from rds.panels.kit.button import WAIT, attempt, is_free, say_error
 from rds.panels.kit.field import FieldView, field_group
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
@@ -32,6 +32,7 @@ from rds.panels.program.step_view import StepView
 from rds.panels.program.stock import drawn
 from rds.panels.program.tool_view import ToolView
 from rds.panels.scene.scene import MachineScene
+from rds.results import Result
 
 TABS = ("Preview", "Machine", "Result", "Steps", "Touch off", "MDI", "Settings, tools")
 PREVIEW, MACHINE, RESULT, STEP, SETUP, MDI, SETTINGS = range(len(TABS))
@@ -186,7 +187,7 @@ class ProgramView:
 
     def start(self, begin: int = 0) -> None:
         """What the run button does; from line `begin` on."""
-        if self.work is not None:
+        if not is_free(self.operator.bar, self.notice):
             return
         self.notice.clear()
         try:
@@ -261,8 +262,16 @@ class ProgramView:
         self.editor.running = 0
         result = work.result
         assert result is not None
-        ending = result.meta.get("ending")
         self.strip.events = end_marks(result)
+        self._say_end(result)
+        self.result.show(work)
+        self._uncut = work
+        self._show_cut()
+        if self.tabs.selected_index == PREVIEW:  # whoever looks at something else is left there
+            self.tabs.selected_index = RESULT
+
+    def _say_end(self, result: Result) -> None:
+        ending = result.meta.get("ending")
         if ending not in (None, "done"):
             self.notice.say(f"ended early: {result.meta.get('ending_reason')}", "warning")
         elif result.verdict:
@@ -270,11 +279,6 @@ class ProgramView:
             self.notice.say(f"done; {said}", kind, why)
         else:
             self.notice.say(f"done: {len(result)} samples", "good")
-        self.result.show(work)
-        self._uncut = work
-        self._show_cut()
-        if self.tabs.selected_index == PREVIEW:  # whoever looks at something else is left there
-            self.tabs.selected_index = RESULT
 
     def _ended(self) -> None:
         work = self.work
@@ -290,6 +294,8 @@ class ProgramView:
             self._latest = at_the_end(self._latest, work.result)
             self._at = {name: at for name, at in self._latest.measured.items() if name in "XYZ"}
             self._display(self._latest)
+        if self.notice.take_back(WAIT) and work.result is not None:
+            self._say_end(work.result)
         if work.stopped_early:
             self.notice.say("stopped before it began; nothing was recorded", "warning")
         elif work.error is not None:

@@ -62,9 +62,11 @@ class RunTable:
 
     def rows(self, runs: Iterable[KeptRun]) -> list[RunRow]:
         """A row for each of `runs`, in their order, which is the latest first."""
-        notes, found = self._notes(), []
+        notes, found, runs = self._notes(), [], list(runs)
+        here = {run.name for run in runs}
+        self._read = {name: read for name, read in self._read.items() if name in here}
         before: dict[tuple[str, ...], Mapping[str, Any]] = {}  # the facts of the run before, on the same axes
-        for run in reversed(list(runs)):
+        for run in reversed(runs):
             head = self._head(run)
             own = notes.get(run.name, {})
             facts = _facts(head)

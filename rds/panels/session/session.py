@@ -22,6 +22,7 @@ from rds.panels.session.task import Task
 
 KEPT = "session.json"  # the choices of all panels
 RUNS = "runs"
+MOST_UNWRITTEN = 8  # runs at once whose pictures and reports are still to come: each keeps its samples in memory
 T = TypeVar("T")
 
 
@@ -48,6 +49,7 @@ class Session:
         self.bus = dict(bus or {})
         if self.interface == BUILTIN and self.bus.get("channel") is not None:
             self.bus["channel"] = str(self.bus["channel"])  # 0 is a channel's name there
+        self.language = ""  # of the page, for what is drawn: the name of a file of texts, "" for English
         self.messages: list[Message] = []
         self.tasks: list[Task[Any]] = []
         self.machine_user: Any = None  # what holds the machine now: something with stop()
@@ -55,6 +57,7 @@ class Session:
         self._choices: dict[str, Choices] = {}
         self._watchers: list[Callable[[Message], None]] = []
         self.writing = threading.Lock()  # held by whoever makes pictures and reports of a run: one after another
+        self.unwritten = threading.BoundedSemaphore(MOST_UNWRITTEN)  # held from a run's start until they are made
         self._lock = threading.Lock()
         self._claim: Claim | None = None
         self._kept = self._read_kept()
