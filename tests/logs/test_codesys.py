@@ -76,15 +76,31 @@ def test_a_unit_that_the_file_does_not_give_is_not_made_up(flags: int | None, tm
         ("; 5; 0\n", 2, "stands before any variable"),
         ("0.Variable; A.x\n; 1,5; 0\n", 3, "'1,5' is no time stamp"),
         ("0.Variable; A.x\n; 1; 0\n1.Variable; A.x\n; 1; 0\n", 4, "'A.x' is recorded twice"),
+        (f"0.Variable; A.x\n; {'9' * 400}; 0\n", 3, "is no time stamp"),
         ("0.Variable; A.x\nrubbish\n", 3, "neither `key; value` nor a sample"),
         ("0.Variable; A.x\n", None, "nothing was recorded"),
-        ("Flags; 16\n0.Variable; A.x\n; 2; 0\n; 1; 0\n1.Variable; A.y\n; 1; 0\n", None, "'A.x' go back"),
+        ("Flags; 16\n0.Variable; A.x\n; 2; 0\n; 1; 0\n1.Variable; A.y\n; 1; 0\n", None, "'A.x' are repeated"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_line(text: str, line: int | None, said: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=said) as refused:
         read_table(saved(tmp_path, "[key]; [value]\n" + text))
     assert str(refused.value.where).endswith("" if line is None else f", line {line}")
+
+
+def test_a_variable_without_samples_is_left_out_and_told(tmp_path: Path) -> None:
+    same = [(2 * k, k) for k in range(4)]
+    table = read_table(saved(tmp_path, trace(16, ("A.x", same), ("A.never", []), ("time", same))))
+    assert list(table.columns) == ["time stamp", "A.x", "time"]  # a variable of that name hides no stamps
+    assert table.columns["time stamp"].unit == "ms"
+    assert [finding.what for finding in table.findings] == ["left out, as nothing was recorded of them: A.never"]
+
+
+@pytest.mark.parametrize("coding", ["utf-16", "cp1252", "utf-8-sig"])
+def test_the_coding_of_the_text_is_found(coding: str, tmp_path: Path) -> None:
+    path = tmp_path / "axis.csv"
+    path.write_bytes(trace(16, ("A.fWinkelmaß", [(1, 0.5), (2, 0.25)])).replace("\n; ", "\r\n ; ").encode(coding))
+    assert read_table(path).columns["A.fWinkelmaß"].values.tolist() == [0.5, 0.25]
 
 
 def test_words_are_told_where_the_column_is_used(tmp_path: Path) -> None:

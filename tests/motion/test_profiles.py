@@ -167,6 +167,14 @@ def test_point_to_point_refuses_what_cannot_be() -> None:
         point_to_point((0,), (1,), (1,), (1,), (0,), T=1e-3)
     with pytest.raises(InputError, match="2 finite numbers"):
         point_to_point((0, 0), (1,), (1, 1), (1, 1), (1, 1), T=1e-3)
+    for T, message in ((np.inf, "T = inf must be a finite number"), (1e-12, "more than 20,000,000 samples")):
+        with pytest.raises(InputError, match=message):
+            point_to_point((0,), (9,), (5,), (50,), (500,), T)
+    for start in ((), (np.nan,), (np.inf,)):
+        with pytest.raises(InputError, match="a finite number for each axis, and one axis or more"):
+            point_to_point(start, start, start, start, start, 1e-3)
+    with pytest.raises(InputError, match="beyond ruckig's arithmetic"):
+        point_to_point((0,), (1e9,), (5e8,), (5e9,), (5e11,), 0.01)
     moving = point_to_point((0,), (5,), (10,), (100,), (1e4,), T=1e-3, start_velocity=[5.0])
     assert moving.velocity[0, 0] == 5.0 and moving.position[-1, 0] == 5.0
     with pytest.raises(InputError, match=r"end_velocity = \(0.0, 1.5\) must be 2 finite numbers within \(1, 1\)"):

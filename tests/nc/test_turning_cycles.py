@@ -326,9 +326,18 @@ def test_fanuc_s_g70_finishes_the_blocks_themselves_and_the_program_goes_on() ->
     ("text", "says", "line"),
     [
         ("G71 P100 Q200 U.3\nN100 G0 X4\nN200 G1 Z-5", "U goes with the form", 2),  # no line before it
-        ("G71 U1 R.5\nG71 P100 Q300 U.3\nN100 G0 X4\nN200 G1 Z-5", "no block N300", 3),
-        ("G71 U1 R.5\nG71 P90 Q200 U.3\nN100 G0 X4\nN200 G1 Z-5", "no block N90", 3),
+        ("G71 U1 R.5\nG71 P100 Q300 U.3\nN100 G0 X4\nN200 G1 Z-5", "ends before a block N300", 3),
+        ("G71 U1 R.5\nG71 P90 Q200 U.3\nN100 G0 X4\nN200 G1 Z-5", "the block N90 does not follow", 3),
         ("G71 U0 R.5", "U, the depth of each cut, must be above 0", 2),
+        ("G71 U1 U2 R.5", "the word U stands twice", 2),
+        ("G71 U1 R.5\nG71 P100 Q100 U.3\nN100 G0 X4", "P and Q name the same block", 3),
+        ("G71 U1 R.5\nG71 P1.5 Q100 U.3\nN100 G0 X4", "P1.5 is no block's number", 3),
+        ("G71 U1 R.5\nG71 P100 Q200 U9\nN100 G0 X4\nG1 Z0\nN200 Z-5", "U leaves more on the contour than there is", 3),
+        ("G71 U1 R.5\nG71 P100 Q200\nM8\nN100 G0 X4\nN200 G1 Z-5", "the block N100 does not follow", 3),
+        ("G71 U1 R.5\nG70 P100 Q200", "no G71 or G72 P100 Q200 stands before", 3),
+        ("G71 U1 R.5\nG71 P100 Q200\nN100 G0 X4\nG70 P100 Q200", "has no end before this cycle", 5),
+        ("G71 U1 R.5\nG71 P100 Q200\nN100 G0 X4\nG91 G1 Z-1\nN200 Z-5", "G91 in a contour changes what", 5),
+        ("O5 SUB\nG71 U1 R.5\nG71 P1 Q2\nO5 ENDSUB\nO5 CALL\nN1 G0 X4\nN2 G1 Z-5", "the block N1 does not follow", 4),
         (
             "G71 U1 R.5\nG71 P100 Q200 U.3\nN100 G0 X4 Z0\nG2 X5 Z-1 R1\nG33 Z-2 K1\nN200 G1 X9",
             "no part of a contour",
@@ -340,3 +349,14 @@ def test_what_is_wrong_in_fanuc_s_form_is_told_by_line(text: str, says: str, lin
     with pytest.raises(ProgramError, match=says) as caught:
         list(interpret(f"G21 G18 G90 G8 F100 S500 M3 G0 X12 Z2\n{text}\nM2\n"))
     assert caught.value.line == line
+
+
+def test_what_stands_around_fanuc_s_blocks_and_in_them_changes_no_cut() -> None:
+    """Comments, blank lines, a call within that G70 makes again, and block numbers with blanks."""
+    head, tail = "G21 G18 G90 G8 F100 S500 M3\nG0 X12 Z2\n", "G70 P100 Q200 F50\nM2\n"
+    plain = f"{head}{FANUC.format(u=0.3)}{tail}"
+    around = FANUC.format(u=0.3).replace("R0.5\n", "R0.5 (half a mm back)\n").replace("N200 ", "N 2 00 ")
+    around = around.replace("W0.1\n", "W0.1 (left)\n\n(the contour)\n").replace("  Z-8\n", "  O5 CALL\n")
+    called = f"O5 SUB\nZ-8\nO5 ENDSUB\n{head}{around}{tail}"
+    for (kind, one), (other_kind, other) in zip(moves(plain), moves(called), strict=True):
+        assert kind == other_kind and one[-1] == pytest.approx(other[-1], abs=1e-9)

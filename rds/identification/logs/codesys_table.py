@@ -15,6 +15,7 @@ Each sample has its time stamp. The bit 16 of `Flags` says that stamps are in ms
 
 from __future__ import annotations
 
+import codecs
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -24,10 +25,11 @@ import numpy as np
 from rds.core.errors import InputError
 from rds.core.limits import read_limited
 from rds.identification.logs.csv_layout import BLANKS
+from rds.identification.logs.log import Finding
 from rds.identification.logs.table import Column, Table
 from rds.identification.logs.units import factor, unit_of_name
 
-HEAD = b"[key]; [value]"
+_HEAD = re.compile(r"\[key\];\s*\[value\]")
 _UNITS = {16: "ms", 32: "µs"}
 _MOST = 1 << 28  # bytes
 _KEY = re.compile(r"(?:(\d+)\.)?([\w.]*);\s*(.*)")
@@ -37,7 +39,7 @@ _WORDS = {"true": 1.0, "false": 0.0, **dict.fromkeys(BLANKS, np.nan)}
 def is_trace(path: Path) -> bool:
     """Whether a text file is such a trace."""
     with open(path, "rb") as stream:
-        return stream.read(len(HEAD) + 3).removeprefix(b"\xef\xbb\xbf").startswith(HEAD)
+        return _HEAD.match(_text(stream.read(64))) is not None
 
 
 def read_trace(path: Path) -> Table:
@@ -47,27 +49,28 @@ def read_trace(path: Path) -> Table:
     sampled at different times in a unit that the file does not give.
     """
     remedy = "save a shorter trace, or the recorded variables alone"
-    lines = read_limited(path, _MOST, "a trace", remedy).decode("utf-8-sig", "replace").splitlines()
+    lines = _text(read_limited(path, _MOST, "a trace", remedy)).splitlines()
     flags, stamps = 0, []
     values: list[float] = []
     found: dict[str, tuple[list[float], list[float]]] = {}  # stamps and values by variable
     texts: dict[str, tuple[int, str]] = {}
     for number, line in enumerate(lines[1:], 2):
         where = f"{path}, line {number}"
+        line = line.strip()
         if line.startswith(";"):
             if not found:
                 raise InputError("this sample stands before any variable; save the trace again", where)
             stamp, _, cell = line[1:].partition(";")
             try:
                 stamps.append(float(int(stamp)))
-            except ValueError:
+            except (ValueError, OverflowError):
                 raise InputError(f"{stamp.strip()!r:.40} is no time stamp; save the trace again", where) from None
             value = _number(cell.strip())
             if value is None:
                 texts.setdefault(next(reversed(found)), (len(values), cell.strip()))
             values.append(np.nan if value is None else value)
-        elif line.strip():
-            key = _KEY.fullmatch(line.strip())
+        elif line:
+            key = _KEY.fullmatch(line)
             if key is None:
                 raise InputError("it is neither `key; value` nor a sample `; time; value`; save the trace again", where)
             if key[1] is not None and key[2] == "Variable":
@@ -76,13 +79,16 @@ def read_trace(path: Path) -> Table:
                 stamps, values = found[key[3]] = ([], [])
             elif key[2] == "Flags":
                 flags = int(key[3]) if key[3].isdecimal() else 0
-    if not any(stamps for stamps, _ in found.values()):
+    empty = [name for name, (stamps, _) in found.items() if not stamps]
+    if len(empty) == len(found):
         raise InputError("nothing was recorded in it; save the trace after it has run", str(path))
     columns = {
         name: Column(name, unit_of_name(name), np.array(values), np.array(stamps), texts.get(name))
         for name, (stamps, values) in found.items()
+        if stamps
     }
-    return Table(path, "codesys", _timed(columns, flags, path))
+    findings = [Finding("columns", f"left out, as nothing was recorded of them: {', '.join(empty)}")] if empty else []
+    return Table(path, "codesys", _timed(columns, flags, path), findings=tuple(findings))
 
 
 def _timed(columns: dict[str, Column], flags: int, path: Path) -> dict[str, Column]:
@@ -92,7 +98,8 @@ def _timed(columns: dict[str, Column], flags: int, path: Path) -> dict[str, Colu
     stamps = [column.time for column in columns.values() if column.time is not None]
     if all(np.array_equal(each, stamps[0]) for each in stamps):
         same = {name: replace(column, time=None) for name, column in columns.items()}
-        return {"time": Column("time", unit, stamps[0])} | same
+        name = "time" if "time" not in same else "time stamp"
+        return {name: Column(name, unit, stamps[0])} | same
     if unit is None:
         raise InputError(
             "its variables were sampled at different times, and `Flags` does not say whether these are in ms (16) or "
@@ -100,10 +107,20 @@ def _timed(columns: dict[str, Column], flags: int, path: Path) -> dict[str, Colu
             str(path),
         )
     for name, column in columns.items():
-        if column.time is not None and (np.diff(column.time) < 0.0).any():
-            raise InputError(f"the time stamps of variable {name!r} go back; record it again", str(path))
+        if column.time is not None and (np.diff(column.time) <= 0.0).any():
+            raise InputError(f"time stamps of variable {name!r} are repeated, or go back; record it again", str(path))
     second = factor(unit, "s")
     return {n: replace(c, time=c.time * second) for n, c in columns.items() if c.time is not None}
+
+
+def _text(data: bytes) -> str:
+    """The text, of whichever coding: UTF-8 or 16 by its mark, else Windows' code page 1252 where it is no UTF-8."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
 
 
 def _number(cell: str) -> float | None:

@@ -16,6 +16,7 @@ from rds.core.errors import InputError
 from rds.core.extras import needed_for
 
 _ATTEMPTS = 100  # to end a move on a sample: some durations are none that the axes can do together
+_MOST = 20_000_000  # samples
 _WHOLE = 1e-6  # of T
 
 
@@ -53,8 +54,12 @@ def point_to_point(
     with needed_for("a jerk-limited move in the least time"):
         import ruckig
     n = len(start)
-    if not T > 0.0:
-        raise InputError(f"T = {T!r} must be more than 0 s")
+    if n == 0 or not np.isfinite(start).all():
+        raise InputError(
+            f"start = {tuple(start)} must be finite numbers, one for each axis, of which there is one or more"
+        )
+    if not 0.0 < T < inf:
+        raise InputError(f"T = {T!r} must be a finite number of s, more than 0")
     given = {"end": end, "velocity": velocity, "acceleration": acceleration, "jerk": jerk}
     for name, values in given.items():
         if len(values) != n or not np.isfinite(values).all():
@@ -79,10 +84,17 @@ def point_to_point(
     found = ruckig.Trajectory(n)
     moving = any(ends["end_velocity"]) or any(ends["end_acceleration"])
     for _ in range(_ATTEMPTS):
-        outcome = ruckig.Ruckig(n).calculate(asked, found)
+        try:
+            outcome = ruckig.Ruckig(n).calculate(asked, found)
+        except ruckig.RuckigError:  # numbers too far apart for its arithmetic
+            outcome = "beyond ruckig's arithmetic"
         if outcome not in (ruckig.Result.Working, ruckig.Result.Finished):
             raise InputError(
-                f"no motion from {tuple(start)} to {tuple(end)} ({outcome}): check the states at both ends"
+                f"no motion from {tuple(start)} to {tuple(end)} ({outcome}): check limits and the states at both ends"
+            )
+        if found.duration / T > _MOST:
+            raise InputError(
+                f"T = {T:g} s makes more than {_MOST:,} samples of a move of {found.duration:g} s; give more"
             )
         count = ceil(found.duration / T - 1e-9) + 1
         if not moving or abs(found.duration - (count - 1) * T) <= _WHOLE * T:

@@ -99,6 +99,10 @@ class Branches:
         self.source = label.source
         self.source.go_to(label.place)
 
+    def begin_anew(self) -> None:
+        """What is executed from now on, such as a contour for the second time, is no round of a loop."""
+        self._kept = None
+
     def _look_for_progress(self, label: Label) -> None:
         """Raises ProgramError when everything that the program can see is as it was at an earlier jump to the label.
 

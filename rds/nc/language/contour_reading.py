@@ -1,25 +1,36 @@
 """What the subroutine of G70 to G72 would move along: run as any other, with its moves gathered instead of made.
 
 As in LinuxCNC only its moves count, G0 to G3, and the words A (fillet) and C (chamfer) at their ends: feeds, speeds and
-all other words are passed over. Parameters, branches and loops work as anywhere.
+all other words are passed over, but for those that would change what the moves mean. Parameters, branches and loops
+work as anywhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from rds.nc.language.blocks import MOTION, Block
 from rds.nc.language.canon import ARC, FEED, TRAVERSE, MotionBlock
 from rds.nc.language.expressions import Fault
+from rds.nc.language.state import XZ, State
 from rds.nc.language.stream import Stream
 from rds.nc.language.turning_contour import Corner, Piece, Point, with_corners
 
-if TYPE_CHECKING:
-    from rds.nc.language.state import State
-
 _MOVES = frozenset((0, 10, 20, 30))
 _WORDS = frozenset("xyzijkrp")
+# codes that say what the words of a move mean, and whether that is so already
+_MEANING: dict[int, Callable[[State], bool]] = {
+    **{code: lambda state: False for code in (100, 170, 190, 520, 530, *range(540, 594), 920, 921, 922, 923)},
+    70: lambda state: bool(state.diameter),
+    80: lambda state: not state.diameter,
+    180: lambda state: state.plane == XZ,
+    200: lambda state: bool(state.inches),
+    210: lambda state: not state.inches,
+    900: lambda state: bool(state.absolute),
+    910: lambda state: not state.absolute,
+    901: lambda state: bool(state.arc_absolute),
+    911: lambda state: not state.arc_absolute,
+}
 
 
 class ContourReading:
@@ -40,13 +51,17 @@ class ContourReading:
             setattr(self._state, name, value)
 
     def block(self, block: Block) -> Block:
-        """The block with its move alone. Raises Fault for another motion than G0 to G3."""
+        """The block with its move alone. Raises Fault for another motion than G0 to G3, and for a change of modes."""
         kept = Block()
         motion = block.g.get(MOTION, -1)
         if motion != -1:
             if motion not in _MOVES:
                 raise Fault(f"G{motion / 10:g} is no part of a contour; write G0, G1, G2 and G3", f"g{motion}")
             kept.g[MOTION] = motion
+        for code in block.g.values():
+            if code in _MEANING and not _MEANING[code](self._state):
+                name = f"G{code / 10:g}"
+                raise Fault(f"{name} in a contour changes what its moves mean; write it before the cycle", f"g{code}")
         kept.words = {letter: value for letter, value in block.words.items() if letter in _WORDS}
         for letter in "ac":
             if letter in block.words:

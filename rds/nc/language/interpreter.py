@@ -286,11 +286,13 @@ class Interpreter:
     def _fanuc_turning(self, text: str) -> bool:
         """Execute a line of Fanuc's G70 to G72; False, and nothing done, where it is none. Raises Fault."""
         if self._fanuc is None:
-            from rds.nc.language.fanuc_turning import LINE, FanucTurning  # only lathe programs need it
+            from rds.nc.language.fanuc_turning import FanucTurning, is_line  # only lathe programs need it
 
-            if LINE.match(text) is None:
+            if not is_line(text):
                 return False
             self._fanuc = FanucTurning()
+        if self._contour is not None and self._fanuc.reads:
+            raise Fault(f"the contour {self._fanuc.contour} has no end before this cycle; Q names its last block", at=0)
         block, start = self._fanuc.block(text, self.context.state), self.context.state.position()
         if block is not None:
             self._execute(block)
@@ -308,7 +310,8 @@ class Interpreter:
             self.out = self.context.out = reading.out
             self._contour = reading
             if fanuc is not None and fanuc.reads:
-                fanuc.run(self.control.source, lambda raw: (self._line(raw), self.out.n)[1])
+                self.control.begin_anew()
+                fanuc.run(self.control, self._line)
                 return
             depth = self.control.depth
             self.control.execute(Word("call", name, spelled(name), max(self._place("q"), 0)))
@@ -324,7 +327,8 @@ class Interpreter:
             self._text, self._places, self._contour = text, places, None
             self.out = self.context.out = out
         if passed_over and remark is not None:
-            said = f"the contour in subroutine {name}: {', '.join(passed_over)} passed over; only its moves count"
+            called = fanuc.contour if fanuc is not None and fanuc.reads else f"in subroutine {name}"
+            said = f"the contour {called}: {', '.join(passed_over)} passed over; only its moves count"
             remark(ProgramError(said, file=out.file, line=line))
         return fanuc.moved(pieces, (state.z, state.x)) if fanuc is not None and fanuc.reads else pieces
 

@@ -16,6 +16,7 @@ from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 from rds.nc.language.interpreter import Interpreter
+from rds.nc.language.words import tidy
 
 _WORD = re.compile(r"[A-Z@^][-+]?[0-9.]*")
 _SUB_OR_CALL = re.compile(rb"/?(?:n[0-9.]+)?(?:o|gr(?=[0-9<]))(<[^>]*>|[-+0-9.]+)(sub|endsub|call)")
@@ -38,6 +39,11 @@ class _Reading(Interpreter):
             return False
         return super()._other(text)
 
+    def _fanuc_turning(self, text: str) -> bool:
+        from rds.nc.language.fanuc_turning import is_line
+
+        return is_line(text)
+
     some = False  # whether there was anything after that line
 
     def faults(self, first: ProgramError) -> Iterator[ProgramError]:
@@ -47,12 +53,20 @@ class _Reading(Interpreter):
             if self.source.line < first.line:
                 continue
             if self.source.line == first.line:
-                yield from self._of_line(_without(raw, first))
+                if not self._is_cycle(raw):
+                    yield from self._of_line(_without(raw, first))
                 continue
             self.some = self.some or bool(raw.strip())
             yield from self._of_line(raw)
             if self._ended:
                 return
+
+    def _is_cycle(self, raw: bytes) -> bool:
+        """Whether it is one of Fanuc's lines, of which no word means anything without the others."""
+        try:
+            return b"7" in raw and self._fanuc_turning(tidy(raw))
+        except Fault:
+            return False
 
     def faults_between(self, lines: Iterable[range]) -> Iterator[ProgramError]:
         """Those of some lines of the file."""

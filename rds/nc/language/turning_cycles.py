@@ -50,7 +50,7 @@ def turning_cycle(m: Context, block: Block, end: list[float]) -> None:
         state.move_to(end)
     pieces = m.contour(str(int(number)))
     if not pieces:
-        raise Fault(f"the subroutine {number:g} makes no contour; write its moves as G0, G1, G2 and G3 in X and Z", "q")
+        raise Fault(f"the contour {number:g} has no moves; write them as G0, G1, G2 and G3 in X and Z", "q")
     start = state.z, state.x
     try:
         if code == 700:
