@@ -55,9 +55,7 @@ def point_to_point(
         import ruckig
     n = len(start)
     if n == 0 or not np.isfinite(start).all():
-        raise InputError(
-            f"start = {tuple(start)} must be finite numbers, one for each axis, of which there is one or more"
-        )
+        raise InputError(f"start = {tuple(start)} must be a finite number for each axis, and one axis or more")
     if not 0.0 < T < inf:
         raise InputError(f"T = {T!r} must be a finite number of s, more than 0")
     given = {"end": end, "velocity": velocity, "acceleration": acceleration, "jerk": jerk}
