@@ -19,7 +19,6 @@ PRESSES = 8  # of Tab, to Run
 SERIOUS = """async () => (await axe.run(".rds-app", { resultTypes: ["violations"] })).violations
     .filter((each) => ["serious", "critical"].includes(each.impact))
     .map((each) => `${each.id}: ${each.nodes.slice(0, 4).map((node) => node.html.slice(0, 160)).join(" | ")}`)"""
-# how many samples the strip in sight shows
 
 
 def test_axe_finds_nothing_serious_on_any_panel_in_light_and_dark(
