@@ -147,37 +147,43 @@ def _regressions(logs: Sequence[Log], motions: Sequence[Motion], grid: np.ndarra
 def _products(t, u, y, forward, backward, taus):
     """Sums of products (taus, 6, 6) of 1, the responses of the initial velocity, m u, s₊ and s₋, and the position."""
     sums, row = np.zeros((len(taus), 6, 6)), np.zeros(6)
-    v = np.zeros(3)  # velocities of the responses
+    row[0] = 1.0
+    every = max(1, len(t) // 2500)  # of the sums: neighbouring samples say the same of where to begin
     for number in range(len(taus)):
-        tau = taus[number]
-        row[:] = 0.0
-        v[:] = 0.0
-        row[0] = 1.0
-        every = max(1, len(t) // 2500)  # of the sums: neighbouring samples say the same of where to begin
+        tau, own = taus[number], sums[number]
+        # responses and their velocities as single numbers, which stay in the processor's registers
+        coasted, moved, plus, minus = 0.0, 0.0, 0.0, 0.0
+        v, v_plus, v_minus = 0.0, 0.0, 0.0
         step, decay, reach, left = -1.0, 1.0, 0.0, 1.0
+        wait = 0
         for k in range(len(t)):
-            row[5] = y[k] - y[0]
-            if k % every == 0:
+            wait -= 1
+            if wait < 0:
+                wait = every - 1
+                row[1], row[2], row[3], row[4], row[5] = coasted, moved, plus, minus, y[k] - y[0]
                 for i in range(6):
+                    one = row[i]
                     for j in range(i, 6):
-                        sums[number, i, j] += row[i] * row[j]
+                        own[i, j] += one * row[j]
             if k + 1 == len(t):
                 break
             if abs(t[k + 1] - t[k] - step) > 1e-12:
                 step = t[k + 1] - t[k]
                 decay = exp(-step / tau)
                 reach = -tau * expm1(-step / tau)
-            row[1] += left * reach
+            coasted += left * reach
             left *= decay
-            for i in range(3):
-                force = 0.0
-                if i == 0 and (forward[k] or backward[k]):
-                    force = u[k]
-                elif (i == 1 and forward[k]) or (i == 2 and backward[k]):
-                    force = 1.0
-                row[2 + i] += force * step + (v[i] - force) * reach
-                v[i] = force + (v[i] - force) * decay
+            ahead, back = forward[k], backward[k]
+            force = u[k] if ahead or back else 0.0
+            moved += force * step + (v - force) * reach
+            v = force + (v - force) * decay
+            force = 1.0 if ahead else 0.0
+            plus += force * step + (v_plus - force) * reach
+            v_plus = force + (v_plus - force) * decay
+            force = 1.0 if back else 0.0
+            minus += force * step + (v_minus - force) * reach
+            v_minus = force + (v_minus - force) * decay
         for i in range(6):
             for j in range(i):
-                sums[number, i, j] = sums[number, j, i]
+                own[i, j] = own[j, i]
     return sums
