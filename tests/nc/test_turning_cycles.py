@@ -326,7 +326,7 @@ def test_fanuc_s_g70_finishes_the_blocks_themselves_and_the_program_goes_on() ->
     ("text", "says", "line"),
     [
         ("G71 P100 Q200 U.3\nN100 G0 X4\nN200 G1 Z-5", "U goes with the form", 2),  # no line before it
-        ("G71 U1 R.5\nG71 P100 Q300 U.3\nN100 G0 X4\nN200 G1 Z-5", "ends before a block N300", 3),
+        ("G71 U1 R.5\nG71 P100 Q300 U.3\nN100 G0 X4\nN200 G1 Z-5", "the contour ends before a block N300", 3),
         ("G71 U1 R.5\nG71 P90 Q200 U.3\nN100 G0 X4\nN200 G1 Z-5", "the block N90 does not follow", 3),
         ("G71 U0 R.5", "U, the depth of each cut, must be above 0", 2),
         ("G71 U1 U2 R.5", "the word U stands twice", 2),

@@ -141,7 +141,7 @@ class FanucTurning:
                     if self._code == 700:
                         source.go_to(behind)
                     return
-            raise Fault(f"the contour from N{contour.first} on ends before a block N{contour.last}", "q")
+            raise Fault(f"the contour ends before a block N{contour.last}; Q names the last of its blocks", "q")
         except BaseException:
             if control.source is source:
                 source.go_to(behind)
