@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+BEHAVIOUR, AS_SOLUTION = "behaviour", "same_loop_as_solution"  # of a grade's details: its runs
+
 
 class Status(StrEnum):
     """What happened to a submission."""

@@ -84,7 +84,14 @@ def page(title: str, body: str) -> str:
 
     `title` is text and is escaped; `body` is HTML and stands as it is. For whoever makes a report of another kind.
     """
-    return _PAGE.format(title=escape(title), policy=_POLICY, style=_STYLE, body=body)
+    before, after = around(title)
+    return f"{before}{body}{after}"
+
+
+def around(title: str) -> tuple[str, str]:
+    """What stands before and after the body of a `page`, for whoever writes a long one piece by piece."""
+    before, after = _PAGE.split(_BODY)
+    return before.format(title=escape(title), policy=_POLICY, style=_STYLE), after
 
 
 def _labels(results: Sequence[Result]) -> list[str]:
@@ -222,6 +229,7 @@ def _files(files: Sequence[str]) -> str:
     return f"<section><h2>Files</h2><ul>{items}</ul></section>"
 
 
+_BODY = "{body}"
 _PAGE = """<!doctype html>
 <html lang="en">
 <head>

@@ -88,7 +88,7 @@ def test_hostile_text_is_only_text(assignment: Assignment, student: str) -> None
     assert_harmless(page)
     assert "\x1b" not in page and "\u202e" not in page
     assert len(page) < 120_000
-    assert_harmless(class_page("T", [bad], {student: "students/x/feedback.html"}))
+    assert_harmless("".join(class_page("T", [bad], {student: "students/x/feedback.html"})))
 
 
 def test_points_penalty_and_reason_are_said(assignment: Assignment) -> None:
@@ -215,7 +215,7 @@ def test_every_student_is_in_one_bar(points: list[float]) -> None:
 
 def test_the_class_page_names_what_needs_a_look_first() -> None:
     grades = [grade("ada"), grade("bob", Status.GRADER_ERROR), grade("cy", Status.TIMED_OUT)]
-    page = class_page("T", grades, {"ada": "students/ada/feedback.html"}, seconds={"cy": 12.3, "ada": 0.1})
+    page = "".join(class_page("T", grades, {"ada": "students/ada/feedback.html"}, seconds={"cy": 12.3, "ada": 0.1}))
     assert_harmless(page)
     assert "1 not graded" in page and "--resume" in page
     assert page.index("not graded") < page.index("<h2>Points") < page.index("<h2>Everybody")

@@ -143,14 +143,14 @@ def test_pairs_are_those_of_a_comparison_one_by_one(values: list[set[int]]) -> N
 
 
 def test_the_same_file_is_always_told_also_when_most_of_a_class_have_it() -> None:
-    given = [(f"s{n:02}", LAW.encode() if n < 7 else f"x{n} = {n}".encode()) for n in range(12)]
-    (group,) = identical_files(given, {"solution.py": b"other"})
+    given = {f"s{n:02}": "law" if n < 7 else f"x{n}" for n in range(12)}
+    (group,) = identical_files(given, {"solution.py": "other"})
     assert group.students == tuple(f"s{n:02}" for n in range(7)) and group.source == ""
-    (group,) = identical_files(given, {"solution.py": LAW.encode()})
+    (group,) = identical_files(given, {"solution.py": "law"})
     assert group.source == "solution.py"
     shown = found_html(json.loads(alike_json([], [group])))
     assert "solution.py" in shown and "s06" in shown
-    assert identical_files([("ada", b"x"), ("ben", b"y")], {"my.py": b"y"})[0].students == ("ben",)
+    assert identical_files({"ada": "x", "ben": "y"}, {"my.py": "y"})[0].students == ("ben",)
 
 
 def test_a_solution_that_was_handed_out_is_named_as_the_source() -> None:

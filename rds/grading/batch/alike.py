@@ -6,10 +6,12 @@ other processes, which may crash, and run in the sandbox alone.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from rds.core.errors import InputError
 from rds.core.parallel import spread
@@ -17,6 +19,7 @@ from rds.core.parallel.scheduler import Scheduler
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.batch.queue import Queued, queued
 from rds.grading.batch.similarity import (
+    Fingerprints,
     Identical,
     Pair,
     SameLoop,
@@ -25,8 +28,9 @@ from rds.grading.batch.similarity import (
     same_loops,
     similar_pairs,
 )
-from rds.grading.batch.work import AS_SOLUTION, BEHAVIOUR, CODE, Task, graded, setup_of
-from rds.grading.grade import Grade
+from rds.grading.batch.spool import Spool, Spooled
+from rds.grading.batch.work import CODE, Task, graded, setup_of
+from rds.grading.grade import AS_SOLUTION, BEHAVIOUR
 from rds.grading.intake import collect
 
 _PATIENCE = 600.0  # s for one file
@@ -42,12 +46,28 @@ class SimilarityReport:
     loops: list[SameLoop] = field(default_factory=list)
 
 
-def earlier_files(assignment: Assignment, places: Sequence[Path]) -> dict[str, bytes]:
+@dataclass(frozen=True, slots=True)
+class Behaviour:
+    """What is compared of a submission's runs: a hash by case, and whether all are as those of the solution."""
+
+    by_case: Mapping[str, str]
+    as_solution: bool = False
+
+    @classmethod
+    def of(cls, details: Mapping[str, Any]) -> Behaviour:
+        """By the details of its grade."""
+        found = details.get(BEHAVIOUR)
+        return cls(found if isinstance(found, dict) else {}, bool(details.get(AS_SOLUTION)))
+
+
+def earlier_files(assignment: Assignment, places: Sequence[Path]) -> dict[str, Spooled]:
     """Python by name, of all `places`: batches' folders, and folders or zips of submissions, or single files."""
-    found: dict[str, bytes] = {}
+    found: dict[str, Spooled] = {}
+    spool = Spool()
     for place in places:
         if (place / _RECORD).is_file():
-            files = {path.parent.name: path.read_bytes() for path in sorted((place / _STUDENTS).glob(f"*/{CODE}"))}
+            codes = sorted((place / _STUDENTS).glob(f"*/{CODE}"))
+            files = {path.parent.name: spool.put(path.read_bytes()) for path in codes}
         else:
             intake = collect(place, assignment.files, (assignment.title, assignment.folder.resolve().name))
             rows = queued(assignment, intake, place, 1)  # nothing is written there
@@ -64,15 +84,16 @@ def earlier_files(assignment: Assignment, places: Sequence[Path]) -> dict[str, b
 def alike(
     assignment: Assignment,
     rows: Sequence[Queued],
-    grades: Mapping[str, Grade],
+    behaviours: Mapping[str, Behaviour],
     against: Sequence[Path],
     jobs: int | None,
     scheduler: str | Scheduler | None = None,
 ) -> SimilarityReport:
     """All that is alike among `rows`, and between them and the files of `against`."""
-    given = [(each.row.student, each.code) for each in rows if each.code]
+    given = [(each.row.student, each.code) for each in rows if each.code is not None and each.code.size]
+    spool = Spool()
     own = {
-        name: (assignment.folder / name).read_bytes()
+        name: spool.put((assignment.folder / name).read_bytes())
         for name in (assignment.template, assignment.solution)
         if name is not None
     }
@@ -81,17 +102,25 @@ def alike(
     codes = [code for _, code in given] + list(parsed.values()) + list(others.values())
     if len(given) + len(others) < 2:  # no pair: a process less to start, which is what one submission's time goes into
         codes = []
-    done = [outcome.value or {} for outcome in spread(fingerprints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)]
+    done = [outcome.value or {} for outcome in spread(_prints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)]
     found = {student: prints for (student, _), prints in zip(given, done, strict=False)}
     sources = dict(zip(parsed, done[len(given) :], strict=False))
     template = sources.pop(assignment.template or "", {})
     earlier = dict(zip(others, done[len(given) + len(parsed) :], strict=False))
-    behaviours = {student: _behaviour(grade) for student, grade in grades.items()}
+    hashes = {each.row.student: each.sha256 for each in rows}
+    theirs = {name: hashlib.sha256(code.read()).hexdigest() for name, code in (own | others).items()}
     return SimilarityReport(
         similar_pairs(found, [template], sources, earlier),
-        identical_files(given, own | others),
-        same_loops(behaviours, _run(assignment, others, jobs, scheduler) | _solution(assignment, grades)),
+        identical_files({student: hashes[student] for student, _ in given}, theirs),
+        same_loops(
+            {student: each.by_case for student, each in behaviours.items()},
+            _run(assignment, others, jobs, scheduler) | _solution(assignment, behaviours),
+        ),
     )
+
+
+def _prints(code: Spooled) -> Fingerprints:
+    return fingerprints(code.read())
 
 
 def _can_tell(assignment: Assignment) -> bool:
@@ -99,19 +128,14 @@ def _can_tell(assignment: Assignment) -> bool:
     return any(not case.is_drawn for case in assignment.cases)
 
 
-def _solution(assignment: Assignment, grades: Mapping[str, Grade]) -> dict[str, Mapping[str, str]]:
+def _solution(assignment: Assignment, behaviours: Mapping[str, Behaviour]) -> dict[str, Mapping[str, str]]:
     """What the solution does, where somebody does the same: whoever graded has compared."""
-    same = [_behaviour(grade) for grade in grades.values() if grade.details.get(AS_SOLUTION)]
+    same = [each.by_case for each in behaviours.values() if each.as_solution]
     return {str(assignment.solution): same[0]} if same else {}
 
 
-def _behaviour(grade: Grade) -> Mapping[str, str]:
-    found = grade.details.get(BEHAVIOUR)
-    return found if isinstance(found, dict) else {}
-
-
 def _run(
-    assignment: Assignment, codes: Mapping[str, bytes], jobs: int | None, scheduler: str | Scheduler | None
+    assignment: Assignment, codes: Mapping[str, Spooled], jobs: int | None, scheduler: str | Scheduler | None
 ) -> dict[str, Mapping[str, str]]:
     """What the files of others do, each in the sandbox as a submission would."""
     if not (codes and _can_tell(assignment)):
@@ -121,5 +145,5 @@ def _run(
     found: dict[str, Mapping[str, str]] = {}
     for outcome in spread(work, tasks, jobs=jobs, scheduler=scheduler, time_limit=_PATIENCE):
         if outcome.ok and not outcome.value.missing:
-            found[tasks[outcome.index].student] = _behaviour(Grade.from_json(outcome.value.grade))
+            found[tasks[outcome.index].student] = Behaviour.of(outcome.value.grade["details"]).by_case
     return found

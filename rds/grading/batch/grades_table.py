@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Sequence
+from itertools import chain
 
 from rds.grading.feedback.plain_text import cell
 from rds.grading.grade import CriterionScore, Grade, Status
@@ -21,7 +22,7 @@ def grades_csv(grades: Sequence[Grade]) -> str:
     for criterion in criteria:
         columns.append(f"{criterion.name} [points of {_plain(criterion.max_score)}]")
         columns.append(heading(f"{criterion.name} value", "" if criterion.unit == "1" else criterion.unit))
-    return csv_text([[*columns, "reason", "sha256"], *(_row(grade, criteria) for grade in grades)])
+    return csv_text(chain([[*columns, "reason", "sha256"]], (_row(grade, criteria) for grade in grades)))
 
 
 def criteria_of(grades: Iterable[Grade]) -> list[CriterionScore]:
@@ -36,7 +37,7 @@ def criteria_of(grades: Iterable[Grade]) -> list[CriterionScore]:
 def csv_text(rows: Iterable[Sequence[str | float | None]]) -> str:
     """Rows as CSV. Texts are made harmless; a number is written so that reading it gives it back."""
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\r\n").writerows([[_cell(value) for value in row] for row in rows])
+    csv.writer(stream, lineterminator="\r\n").writerows([_cell(value) for value in row] for row in rows)
     return stream.getvalue()
 
 

@@ -23,13 +23,13 @@ _CHECK = 16  # hex digits
 
 
 class Journal:
-    """Opened by one process at a time. `rows` are the finished ones, in the order in which they were written.
+    """Opened by one process at a time. `rows` is what `of` makes of the finished ones, in the order of their writing.
 
     `was_torn` says whether a half-written last line was cut off. InputError if another process has it, a line in it is
     damaged, or it cannot be written.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, of: Callable[[dict[str, Any]], Any] = lambda row: row):
         self.path = path
         self.was_torn = False
         try:
@@ -44,7 +44,7 @@ class Journal:
                 raise InputError(
                     "another rds grade run, or another grader, is at work here; wait for its end", str(path)
                 ) from None
-            self.rows, good = _whole_lines(path)
+            self.rows, good = _whole_lines(path, of)
             if good < os.fstat(self._fd).st_size:
                 self.was_torn = True
                 os.ftruncate(self._fd, good)

@@ -11,6 +11,7 @@ from rds.core.atomic import write_whole
 from rds.core.parallel import spread
 from rds.grading.assignment.assignment import Assignment
 from rds.grading.assignment.late_rules import days_late
+from rds.grading.batch.spool import Spool, Spooled
 from rds.grading.batch.work import CODE
 from rds.grading.grade import Grade, Status
 from rds.grading.intake import HandedIn, Intake
@@ -22,13 +23,13 @@ from rds.grading.intake.single import wanted
 _PATIENCE = 30.0  # s for a notebook
 
 
-@dataclass
+@dataclass(slots=True)
 class Queued:
     """One row of the batch. `grade` is there at once where there is nothing to grade."""
 
     row: HandedIn
     folder: Path
-    code: bytes | None = None
+    code: Spooled | None = None
     sha256: str = ""
     notes: tuple[str, ...] = ()
     grade: Grade | None = None
@@ -41,7 +42,8 @@ class Queued:
 
 
 def queued(assignment: Assignment, intake: Intake, students: Path, jobs: int | None) -> list[Queued]:
-    """All rows; nothing is written yet. Code is held here, at most half a MiB of each."""
+    """All rows; nothing is written into a folder yet."""
+    spool = Spool()
     rows = [Queued(row, students / safe_id(row.student), notes=row.notes, about=_about(row)) for row in intake.rows]
     notebooks = []
     for each in rows:
@@ -53,14 +55,13 @@ def queued(assignment: Assignment, intake: Intake, students: Path, jobs: int | N
         except Refusal as error:
             each.grade = ungraded(assignment, each, Status.REFUSED, str(error))
             continue
-        each.code = data
+        each.code = spool.put(data)
         if each.row.is_notebook:
             notebooks.append(each)
+        else:
+            each.sha256 = hashlib.sha256(data).hexdigest()
     if notebooks:
-        _convert(assignment, notebooks, jobs)
-    for each in rows:
-        if each.code is not None:
-            each.sha256 = hashlib.sha256(each.code).hexdigest()
+        _convert(assignment, notebooks, spool, jobs)
     return rows
 
 
@@ -68,9 +69,9 @@ def keep(rows: list[Queued]) -> None:
     """The code of all rows in their folders, where it is not there already."""
     for each in rows:
         if each.code is not None:
-            path = each.folder / CODE
-            if not path.is_file() or path.read_bytes() != each.code:
-                write_whole(path, each.code)
+            path, code = each.folder / CODE, each.code.read()
+            if not path.is_file() or path.read_bytes() != code:
+                write_whole(path, code)
 
 
 def ungraded(assignment: Assignment, each: Queued, status: Status, reason: str) -> Grade:
@@ -93,23 +94,26 @@ def ungraded(assignment: Assignment, each: Queued, status: Status, reason: str) 
     )
 
 
-def _convert(assignment: Assignment, notebooks: list[Queued], jobs: int | None) -> None:
+def _convert(assignment: Assignment, notebooks: list[Queued], spool: Spool, jobs: int | None) -> None:
     """In processes of their own: what somebody wrote to crash a parser does not crash the batch."""
-    work = [(each.code or b"", wanted(assignment)) for each in notebooks]
+    work = [(each.code, wanted(assignment)) for each in notebooks]
     for each, outcome in zip(
         notebooks, spread(_converted, work, jobs=jobs, retries=0, time_limit=_PATIENCE), strict=True
     ):
         found = outcome.value if outcome.ok else f"the notebook cannot be read: {outcome.reason}"
         if isinstance(found, Converted):
-            each.code, each.notes = found.code, (*each.notes, *found.notes)
+            each.code, each.notes = spool.put(found.code), (*each.notes, *found.notes)
+            each.sha256 = hashlib.sha256(found.code).hexdigest()
             continue
         each.code = None
         each.grade = ungraded(assignment, each, Status.REFUSED, str(found))
 
 
-def _converted(work: tuple[bytes, tuple[str, ...]]) -> Converted | str:
+def _converted(work: tuple[Spooled | None, tuple[str, ...]]) -> Converted | str:
+    handed_in, names = work
+    assert handed_in is not None  # a row that could not be read is no work
     try:
-        return converted(*work)
+        return converted(handed_in.read(), names)
     except Refusal as error:
         return str(error)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from rds.core.parallel.process import WorkerProcess
 from rds.core.parallel.spread import Progress
 from rds.grading.assignment.assignment import Assignment, read_assignment
 from rds.grading.assignment.late_rules import LateRules
-from rds.grading.batch.alike import alike
+from rds.grading.batch.alike import Behaviour, alike
 from rds.grading.batch.journal import FILE as JOURNAL
 from rds.grading.batch.journal import Journal
 from rds.grading.batch.outcome import BatchOutcome
@@ -87,7 +87,7 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
     notes = [f"not a submission, and left alone: {name}" for name in intake.ignored]
     notes += _unlisted(listed, intake)
     notes += _untimed(read, intake)
-    with Journal(out / JOURNAL) as journal:  # from here on nobody else writes into this folder
+    with Journal(out / JOURNAL, _known) as journal:  # from here on nobody else writes into this folder
         if (out / FILE).exists():
             _check_free(out, how.resume)
             check_same(read_record(out), record, out)
@@ -104,11 +104,12 @@ def grade_all(read: Assignment, handed_in: Callable[[], Intake], out: Path, how:
         if len(todo) < len(rows):
             how.announce(f"{len(rows) - len(todo)} of {len(rows)} submissions are graded already")
         batch.go(todo)
-        found = alike(read, rows, batch.grades(), how.against, how.jobs, how.scheduler)
+        found = alike(read, rows, batch.behaviours(), how.against, how.jobs, how.scheduler)
         write_whole(out / SIMILARITY, alike_json(found.pairs, found.identical, found.loops))
-        del batch, found  # or a class would be in memory twice
+        count = len(todo)
+        del batch, todo, rows, intake, record, found  # or a class would be in memory twice
         grades = publish(out, read).measured
-    return BatchOutcome(out, grades, len(todo), time.monotonic() - began, tuple(notes))
+    return BatchOutcome(out, grades, count, time.monotonic() - began, tuple(notes))
 
 
 def _unlisted(listed: ClassList, intake: Intake) -> list[str]:
@@ -165,22 +166,34 @@ def _is_empty_journal(path: Path) -> bool:
     return path.name == JOURNAL and path.is_file() and path.stat().st_size == 0
 
 
+@dataclass(frozen=True, slots=True)
+class _Done:
+    """What has to be known of a grade until all are made: the rest is on the disk, so that any class has room."""
+
+    status: Status
+    behaviour: Behaviour
+
+    @classmethod
+    def of(cls, grade: Mapping[str, Any]) -> _Done:
+        """By the grade as the journal has it."""
+        return cls(Status(grade["status"]), Behaviour.of(grade["details"]))
+
+
 class _Batch:
     """Rows, and what the journal says of them."""
 
     def __init__(self, assignment: Assignment, rows: Sequence[Queued], journal: Journal, how: BatchOptions):
         self._assignment, self._journal, self._how = assignment, journal, how
         self._rows = {each.row.student: each for each in rows}
-        self._grades = {row["student"]: Grade.from_json(row["grade"]) for row in journal.rows}
-        self.seconds: dict[str, float] = {row["student"]: row["seconds"] for row in journal.rows}
+        self._done: dict[str, _Done] = dict(journal.rows)
 
     def todo(self) -> list[Queued]:
         """What has no grade yet, or none but by our fault."""
         return [each for each in self._rows.values() if not self._is_done(each)]
 
-    def grades(self) -> dict[str, Grade]:
+    def behaviours(self) -> dict[str, Behaviour]:
         """By student, in the order of their names."""
-        return {student: self._grades[student] for student in sorted(self._rows)}
+        return {student: self._done[student].behaviour for student in sorted(self._rows)}
 
     def go(self, todo: Sequence[Queued]) -> None:
         """Grade all of `todo`; what fails by our fault once more, and then it is listed."""
@@ -194,8 +207,8 @@ class _Batch:
             self._finish(each, ungraded(self._assignment, each, Status.GRADER_ERROR, reason), {})
 
     def _is_done(self, each: Queued) -> bool:
-        grade = self._grades.get(each.row.student)
-        return grade is not None and grade.status is not Status.GRADER_ERROR
+        done = self._done.get(each.row.student)
+        return done is not None and done.status is not Status.GRADER_ERROR
 
     def _round(
         self, rows: Sequence[Queued], progress: Progress | None = None, first: WorkerProcess | None = None
@@ -207,7 +220,6 @@ class _Batch:
         shared = scheduler is None
         count = min(jobs or processors(), len(rows)) if shared else None
         work = partial(graded, setup_of(self._assignment, count, shared))
-        tasks = [self._task(each, shared) for each in rows]
         limits = self._assignment.limits
         limit = _PATIENCE + _LONGEST * (limits.cpu_seconds + limits.wall_seconds)
         failed = []
@@ -218,7 +230,7 @@ class _Batch:
             "time_limit": limit,
             "first": first,
         }
-        for outcome in spread(work, tasks, in_order=False, **many):
+        for outcome in spread(work, (self._task(each, shared) for each in rows), in_order=False, **many):
             each = rows[outcome.index]
             answer = _answer(outcome)
             if answer is None:
@@ -229,8 +241,8 @@ class _Batch:
 
     def _task(self, each: Queued, shared: bool) -> Task:
         assert each.code is not None  # it has no grade yet
-        path, code = (str((each.folder / CODE).resolve()), b"") if shared else ("", each.code)
-        return Task(each.row.student, path, code, each.row.time, each.notes, each.about)
+        path = str((each.folder / CODE).resolve()) if shared else ""
+        return Task(each.row.student, path, None if shared else each.code, each.row.time, each.notes, each.about)
 
     def _finish(self, each: Queued, grade: Grade, files: dict[str, bytes], seconds: float = 0.0) -> None:
         """Its files, then its line in the journal."""
@@ -240,8 +252,12 @@ class _Batch:
         files["grade.json"] = json.dumps(told, indent=1, allow_nan=False).encode() + b"\n"
         write_files({each.folder / name: partial(_write, data) for name, data in files.items()})
         self._journal.append({"student": each.row.student, "grade": told, "seconds": seconds})
-        self.seconds[each.row.student] = seconds
-        self._grades[each.row.student] = grade
+        self._done[each.row.student] = _Done.of(told)
+
+
+def _known(row: Mapping[str, Any]) -> tuple[str, _Done]:
+    """What is kept in memory of a row of the journal."""
+    return row["student"], _Done.of(row["grade"])
 
 
 def _answer(outcome: Outcome) -> Answer | None:

@@ -69,15 +69,15 @@ def same_loops(found: Mapping[str, Mapping[str, str]], others: Mapping[str, Mapp
     return sorted(alike, key=lambda group: (-len(group.students), group.students))
 
 
-def identical_files(given: Iterable[tuple[str, bytes]], own: Mapping[str, bytes]) -> list[Identical]:
-    """Groups of students with the same file, the largest first, however many of a class they are.
+def identical_files(given: Mapping[str, str], own: Mapping[str, str]) -> list[Identical]:
+    """Groups of students with the same file, the largest first, however many of a class they are: by SHA-256 of each.
 
-    `own` are the instructor's files by name; a single student who handed in one of these is a group, too.
+    `own` are those of the instructor's files by name; a single student who handed in one of these is a group, too.
     """
     groups: dict[str, list[str]] = {}
-    for student, code in given:
-        groups.setdefault(hashlib.sha256(code).hexdigest(), []).append(student)
-    names = {hashlib.sha256(code).hexdigest(): name for name, code in own.items()}
+    for student, sha256 in given.items():
+        groups.setdefault(sha256, []).append(student)
+    names = {sha256: name for name, sha256 in own.items()}
     found = [
         Identical(tuple(sorted(students)), sha256, names.get(sha256, ""))
         for sha256, students in groups.items()

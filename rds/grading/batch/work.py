@@ -19,14 +19,15 @@ from rds.core.private_files import make_folder, write_private
 from rds.grading.assignment.assignment import FILE, Assignment, read_assignment
 from rds.grading.batch.grade_one import grade_with_runs
 from rds.grading.batch.scratch import scratch
+from rds.grading.batch.spool import Spooled
 from rds.grading.batch.warm_worker import own_fault, shared_pool
 from rds.grading.feedback.feedback import feedback_page
+from rds.grading.grade import AS_SOLUTION, BEHAVIOUR
 from rds.results.arrow import repeated, to_arrow
 
 if TYPE_CHECKING:
     from rds.grading.cases.case import CaseRun
 
-BEHAVIOUR, AS_SOLUTION = "behaviour", "same_loop_as_solution"  # of a grade's details
 _ANSWERS = ("_command", "_voltage", "_modelled")  # columns of what a submission answers
 CODE = "submission.py"  # what a submission is called in messages to its author, wherever it is graded
 COLUMNS, FEEDBACK = "columns.parquet", "feedback.html"
@@ -43,13 +44,13 @@ class Setup:
     jobs: int | None = None  # at the same time on this computer; None where nobody knows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Task:
     """One submission as Python: at `path`, or its `code` where no folder is shared. The rest goes into its grade."""
 
     student: str
     path: str = ""
-    code: bytes = b""
+    code: Spooled | None = None
     time: datetime | None = None
     notes: tuple[str, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -85,9 +86,10 @@ def graded(setup: Setup, task: Task) -> Answer:
     if task.path:
         found = grade_with_runs(assignment, task.path, task.student, pool, submitted=task.time)
     else:
+        assert task.code is not None  # where no folder is shared
         with scratch("submission") as folder:
             path = folder / CODE
-            write_private(path, task.code, is_own=True)
+            write_private(path, task.code.read(), is_own=True)
             found = grade_with_runs(assignment, path, task.student, pool, submitted=task.time)
     grade, seconds = found.grade, time.monotonic() - began
     expected = _expected(setup) if solution else ()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -30,12 +29,14 @@ def write_class_files(
 ) -> list[Path]:
     """Write both into `out`, whole or not at all; see `class_page`. InputError where the system refuses."""
     links = {grade.student: f"{STUDENTS}/{safe_id(grade.student)}/{FEEDBACK}" for grade in grades}
-    page = class_page(title, grades, links, seconds=seconds, similar=similar, about=about, review=review)
-    # spreadsheets know UTF-8 by its mark
-    made = {TABLE: grades_csv(grades).encode("utf-8-sig", "replace"), PAGE: page.encode("utf-8", "replace")}
-    write_files({out / name: partial(_write, data) for name, data in made.items()})
+
+    def table(stream: BinaryIO) -> None:
+        stream.write(grades_csv(grades).encode("utf-8-sig", "replace"))  # spreadsheets know UTF-8 by its mark
+
+    def page(stream: BinaryIO) -> None:
+        for part in class_page(title, grades, links, seconds=seconds, similar=similar, about=about, review=review):
+            stream.write(part.encode("utf-8", "replace"))
+
+    made = {TABLE: table, PAGE: page}
+    write_files({out / name: write for name, write in made.items()})
     return [out / name for name in made]
-
-
-def _write(data: bytes, stream: BinaryIO) -> None:
-    stream.write(data)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from statistics import mean, median
 from urllib.parse import quote
@@ -16,7 +16,7 @@ from rds.grading.review.applied import is_changed, of_review
 from rds.grading.review.entries import Kind, Review
 from rds.grading.review.everyone import SECTION
 from rds.results import html
-from rds.results.report import page
+from rds.results.report import around
 
 _SLOWEST = 5  # of the class that are listed
 _STYLE = f"""<style>
@@ -37,15 +37,17 @@ def class_page(
     missing: Sequence[str] = (),
     about: str = "",
     review: Review | None = None,
-) -> str:
-    """The page as HTML.
+) -> Iterator[str]:
+    """The page as HTML, piece by piece: a large class's need not have room in memory.
 
     `links` are the students' pages by identifier, as paths from this page; `seconds` is how long each submission took;
     `similar` is HTML that points out submissions that are alike; `missing` are students without a grade; `review` is
     what graders have said.
     """
     graded = [grade for grade in grades if grade.status not in (Status.GRADER_ERROR, Status.EXCUSED)]
-    parts = [
+    before, after = around(title)
+    yield before
+    parts = (
         _STYLE,
         f'<header><h1>{escape(one_line(title))}</h1><p class="about">{escape(about)}</p></header>',
         _first(grades, links, missing),
@@ -55,9 +57,10 @@ def class_page(
         _trail(review),
         f"<section><h2>Submissions that are alike</h2>{similar}</section>" if similar else "",
         _slowest(grades, links, seconds or {}),
-        _everybody(grades, links),
-    ]
-    return page(title, "\n".join(filter(None, parts)))
+    )
+    yield "".join(f"{part}\n" for part in parts if part)
+    yield from _everybody(grades, links)
+    yield after
 
 
 def _first(grades: Sequence[Grade], links: Mapping[str, str], missing: Sequence[str]) -> str:
@@ -190,15 +193,15 @@ def _slowest(grades: Sequence[Grade], links: Mapping[str, str], seconds: Mapping
     return f"<section><h2>Slowest</h2><table><thead>{head}</thead><tbody>{rows}</tbody></table></section>"
 
 
-def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> str:
+def _everybody(grades: Sequence[Grade], links: Mapping[str, str]) -> Iterator[str]:
     criteria = criteria_of(grades)
     heads = ["student", "status", "score", "late [days]", *(criterion.name for criterion in criteria), "reason"]
     head = "".join(f'<th scope="col">{escape(one_line(each))}</th>' for each in heads)
-    rows = "".join(_student(grade, [criterion.name for criterion in criteria], links) for grade in grades)
-    return (
-        f'<section><h2>Everybody</h2><div class="scroll"><table><thead><tr>{head}</tr></thead>'
-        f"<tbody>{rows}</tbody></table></div></section>"
-    )
+    yield f'<section><h2>Everybody</h2><div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>'
+    names = [criterion.name for criterion in criteria]
+    for grade in grades:
+        yield _student(grade, names, links)
+    yield "</tbody></table></div></section>"
 
 
 def _student(grade: Grade, criteria: Sequence[str], links: Mapping[str, str]) -> str:

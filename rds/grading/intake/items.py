@@ -19,7 +19,7 @@ class Refusal(Exception):
     """Why a file is not opened: a sentence for its author."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Item:
     """A file as it was found; nothing of it has been read.
 

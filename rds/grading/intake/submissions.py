@@ -26,7 +26,7 @@ from rds.grading.intake.times import listed_times, stamped_time, with_zone
 from rds.grading.sandbox.submission import LARGEST
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class HandedIn:
     """What one student handed in. `status` says why there is nothing to grade, with its `reason`; else None.
 
