@@ -9,6 +9,7 @@ import sys
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -104,43 +105,55 @@ LAZY = [("results", "modes"), ("modes", "bus"), ("results.reports", "bus")]
 TOP = {"__main__", "cli", "panels"}
 
 
+class Imported(NamedTuple):
+    """An import statement, and where it stands."""
+
+    node: ast.Import | ast.ImportFrom
+    in_function: bool
+    for_types: bool  # in the body of `if TYPE_CHECKING`
+
+
 @cache
+def _statements(path: Path) -> list[Imported]:
+    """All imports of a file. Only statements hold statements: expressions, which are most of a file, are not walked."""
+    found = []
+    todo: list[tuple[ast.AST, bool, bool]] = [(ast.parse(path.read_text(encoding="utf-8")), False, False)]
+    while todo:
+        node, inside, typed = todo.pop()
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            found.append(Imported(node, inside, typed))
+        inside = inside or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        checks = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+            part = getattr(node, name, ())
+            if isinstance(part, list):  # that of a lambda is an expression
+                todo += [(inner, inside, typed or (checks and name == "body")) for inner in part]
+    return found
+
+
 def imports(path: Path) -> list[tuple[str, bool]]:
     """The modules of rds that a file imports, and whether at its top."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    inside = {
-        id(node)
-        for function in ast.walk(tree)
-        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
-        for node in ast.walk(function)
-    }
     found = []
-    for node in ast.walk(tree):
-        names: list[str] = []
+    for node, in_function, _ in _statements(path):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert node.level == 0, f"{path}: relative import"
             module = node.module or ""
             names = [f"{module}.{alias.name}" for alias in node.names] if module in _packages() else [module]
-        found += [(name, id(node) not in inside) for name in names if name.partition(".")[0] == "rds"]
+        found += [(name, not in_function) for name in names if name.partition(".")[0] == "rds"]
     return found
 
 
 def imported_when_running(path: Path) -> set[str]:
     """The files of rds that a file imports, also inside functions, but not for type checking alone."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    checked = [
-        node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-    ]
-    for_types = {id(inner) for node in checked for part in node.body for inner in ast.walk(part)}
     names = []
-    for node in ast.walk(tree):
-        if id(node) in for_types:
+    for node, _, for_types in _statements(path):
+        if for_types:
             continue
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        else:
             inner = [f"{node.module}.{alias.name}" for alias in node.names]
             names += [name if name in MODULES else str(node.module) for name in inner]
     return {name for name in names if MODULES.get(name, path) != path}
