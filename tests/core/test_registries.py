@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterable, Set
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,7 @@ DOCS = ROOT.parent / "docs"
 OTHER_MEANINGS = {"identification/structures/__init__.py"}
 
 
-def strings(path: Path, words: Set[str]) -> set[str]:
+def strings(path: Path, words: set[str]) -> set[str]:
     """Those of the words that are a whole text in a file, and not a part of a sentence."""
     text = path.read_text(encoding="utf-8")
     if not any(f"{quote}{word}{quote}" in text for word in words for quote in "'\""):
