@@ -28,7 +28,7 @@ demo: $(DONE) ## track a sine on X, Y and Z in all three modes; the report is de
 test: $(DONE) ## ruff, mypy, then the tests
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	$(BIN)/mypy --num-workers 2
 	$(BIN)/pytest -n $(JOBS) $(ARGS)
 
 bench: $(DONE) ## measure speed and latency, beside other programs where they are installed (minutes)
