@@ -10,7 +10,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from importlib import import_module
 from pathlib import Path
 
@@ -19,6 +18,7 @@ import numpy as np
 import pictures
 import pytest
 from documents import ROOT, Block, blocks, environment, is_real_time, run, save, shorten
+from waiting import wait_for
 
 README = blocks("README.md")
 BLOCKS = [*README, *blocks("docs/first-axis.md")]
@@ -153,10 +153,8 @@ def _serve(words: list[str]) -> subprocess.Popen[bytes]:
         server = subprocess.Popen(
             [sys.executable, "-m", "rds.cli.main", *words], env=environment(), stdout=output, stderr=output
         )
-    until = time.monotonic() + 30
-    while b"Ctrl-C" not in log.read_bytes():
-        assert server.poll() is None and time.monotonic() < until, log.read_text()
-        time.sleep(0.05)
+    wait_for(lambda: b"Ctrl-C" in log.read_bytes() or server.poll() is not None)
+    assert server.poll() is None, log.read_text()
     return server
 
 

@@ -15,12 +15,13 @@ from typing import Any
 
 import can
 import pytest
+from waiting import wait_for
 
 from rds.bus.hub import wire
 from rds.bus.hub.error_states import SEATS, Board
 from rds.bus.hub.hub_loop import STALL
 
-from .conftest import FORK, wait_for
+from .conftest import FORK
 
 Opener = Callable[..., can.BusABC]
 

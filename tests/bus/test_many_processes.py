@@ -10,8 +10,9 @@ from typing import Any
 
 import can
 import pytest
+from waiting import wait_for
 
-from .conftest import FORK, wait_for
+from .conftest import FORK
 
 BURST = 20_000
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import can
 import pytest
+from waiting import wait_for
 
 from rds.bus.hub.faults import Faults
 from rds.bus.modules.dialects import SERIAL_DIALECTS, dialect_names, serve_machine, server_module
@@ -21,13 +22,6 @@ from rds.machines import load_machine
 MACHINE = load_machine("mini-cnc")
 CAN = [name for name in dialect_names() if name not in SERIAL_DIALECTS]  # a serial line: tests/serial_line
 pytestmark = [pytest.mark.realtime, pytest.mark.parametrize("dialect", CAN)]
-
-
-def wait_until(condition: Callable[[], Any], seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.02)
 
 
 def test_every_dialect_plays_a_schedule_of_faults(dialect: str, program: Callable[..., Any], tmp_path: Path) -> None:
@@ -70,7 +64,7 @@ def test_a_lost_bus_is_opened_again(
             return [node["name"] for node in line.nodes()]
 
     bus = open_bus(channel="m")  # starts another hub
-    wait_until(lambda: set(MACHINE.axes) <= set(names()))
+    wait_for(lambda: set(MACHINE.axes) <= set(names()))
     assert server.poll() is None
     bus.shutdown()
 

@@ -13,6 +13,7 @@ from typing import Any
 import can
 import numpy as np
 import pytest
+from waiting import wait_for
 
 import rds
 from rds.bus.hub import connect
@@ -25,7 +26,7 @@ from rds.core.errors import InputError, MachineError
 from rds.machines import load_machine
 from rds.results import Result
 
-from .conftest import FORK, wait_for
+from .conftest import FORK
 
 MBIT = 1_000_000
 PERIOD = 0.02  # s of runs that meet faults: with room for a busy computer

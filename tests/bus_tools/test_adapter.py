@@ -16,6 +16,7 @@ from uuid import uuid4
 import can
 import pytest
 from typer.testing import CliRunner
+from waiting import wait_for
 
 from rds.bus.modules.rds import frames
 from rds.bus.modules.rds.drivers import AxisDrivers
@@ -63,13 +64,6 @@ def channel() -> str:
     return f"adapter-{uuid4().hex[:8]}"
 
 
-def until_open(plugged: SlcanAdapter) -> None:
-    """The adapter has obeyed the computer's command to open."""
-    deadline = time.monotonic() + 10.0
-    while not plugged.is_open and time.monotonic() < deadline:
-        time.sleep(0.002)
-
-
 def message(identifier: int, data: bytes = b"", extended: bool = False) -> can.Message:
     return can.Message(arbitration_id=identifier, data=data, is_extended_id=extended)
 
@@ -93,7 +87,7 @@ def test_at_another_bit_rate_than_the_bus_nothing_is_heard_nor_acknowledged(chan
     with adapter(channel, bus_bitrate=250_000) as plugged, can.Bus(interface="virtual", channel=channel) as other:
         bus = open_bus("slcan", plugged.path, **QUICK)
         try:
-            until_open(plugged)
+            wait_for(lambda: plugged.is_open)
             bus.send(message(0x123))
             other.send(message(0x124))
             assert bus.recv(0.1) is None and other.recv(0.0) is None
@@ -130,9 +124,7 @@ def test_a_frame_waits_until_the_one_before_it_is_on_the_wire() -> None:
         try:
             for identifier in (0x202, 0x080, 0x203):
                 bus.send(message(identifier))
-            deadline = time.monotonic() + 10.0
-            while (len(wire.sent) < 3 or wire.held) and time.monotonic() < deadline:
-                time.sleep(0.002)
+            wait_for(lambda: len(wire.sent) >= 3 and not wire.held)
             assert wire.sent == [0x202, 0x080, 0x203] and wire.most == 1
             assert bus.recv(0.0) is None, "its own frames are not the computer's to hear"
         finally:
@@ -143,7 +135,7 @@ def test_a_garbled_line_names_the_adapter_the_cause_and_the_remedy(channel: str)
     with adapter(channel, garble=1.0) as plugged, can.Bus(interface="virtual", channel=channel) as other:
         bus = open_bus("slcan", plugged.path, **QUICK)
         try:
-            until_open(plugged)
+            wait_for(lambda: plugged.is_open)
             other.send(message(0x123, b"\x01"))
             with pytest.raises(
                 AdapterFailure, match=f"adapter slcan:{plugged.path} sent what is no frame.*tty_baudrate"
@@ -221,7 +213,7 @@ def test_all_modules_share_an_adapter_that_can_be_opened_once(channel: str) -> N
         server.start()
         try:
             assert ready.wait(20.0)
-            until_open(plugged)
+            wait_for(lambda: plugged.is_open)
             host.send(message(frames.CALL))
             nodes, deadline = set(), time.monotonic() + 10.0
             while len(nodes) < 3 and time.monotonic() < deadline:

@@ -13,9 +13,9 @@ from typing import Any
 
 import can
 import pytest
-from bus.conftest import wait_for
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from waiting import wait_for
 
 from rds.bus.tools import receiver as module
 from rds.bus.tools.receiver import Fault, Receiver, Trouble

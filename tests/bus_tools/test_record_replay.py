@@ -15,7 +15,7 @@ from typing import Any
 
 import can
 import pytest
-from bus.conftest import wait_for
+from waiting import wait_for
 
 from bus_tools.made_frames import frame, kept, of_every_kind
 from rds.bus.tools.link import open_bus as open_any

@@ -14,9 +14,9 @@ from typing import Any
 
 import can
 import pytest
-from bus.conftest import wait_for
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from waiting import wait_for
 
 from bus_tools.made_frames import frame, kept, of_every_kind
 from rds.bus.hub.hub_loop import STALL

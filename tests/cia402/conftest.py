@@ -11,7 +11,6 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -214,11 +213,3 @@ def bus() -> Iterator[Callable[..., can.BusABC]]:
             return stack.enter_context(can.Bus(interface=interface, channel=channel, ignore_config=True, **options))
 
         yield opener
-
-
-def wait_for(condition: Callable[[], Any], timeout: float = 30.0) -> None:
-    """Wait until the condition holds; fail after `timeout` s."""
-    deadline = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.005)

@@ -10,6 +10,7 @@ from typing import Any
 import can
 import pytest
 from canopen.sdo import SdoCommunicationError
+from waiting import wait_for
 
 from rds.bus.modules.cia402 import codes, configure
 from rds.bus.modules.cia402.codes import State
@@ -18,7 +19,6 @@ from rds.bus.modules.cia402.scan import scan
 from rds.core.errors import MachineError
 from rds.machines import Machine
 
-from .conftest import wait_for
 from .test_host import Served, cycle, drivers, no_voltage, powered
 from .test_processes import Program, serve
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import can
 import pytest
+from waiting import wait_for
 
 from rds.bus.modules.cia402.codes import Nmt, State
 from rds.bus.modules.cia402.host import Cia402Drivers
@@ -21,7 +22,7 @@ from rds.bus.modules.cia402.scan import scan
 from rds.core.errors import InputError, MachineError
 from rds.machines import Machine
 
-from .conftest import PATIENCE, wait_for
+from .conftest import PATIENCE
 
 T = 0.02  # s: no test here is about speed, and a busy computer shall not decide it
 PDOS = (0x1400, 0x1600, 0x1800, 0x1A00)

@@ -9,10 +9,9 @@ from importlib.resources import files
 import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
+from waiting import wait_for
 
 from rds.bus.modules.cia402.node import DriveNode
-
-from .conftest import wait_for
 
 PATIENCE = 10.0  # s; the library's own, 0.2 to 0.8 s, are less than a busy computer may take
 EDS = str(files("rds.bus.modules.cia402").joinpath("axis.eds"))

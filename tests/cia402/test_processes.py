@@ -11,14 +11,13 @@ from typing import Any
 
 import can
 import pytest
+from waiting import wait_for
 
 from rds.bus.modules.cia402.codes import State
 from rds.bus.modules.cia402.host import Cia402Drivers
 from rds.bus.modules.cia402.scan import scan
 from rds.core.errors import MachineError
 from rds.machines import Machine
-
-from .conftest import wait_for
 
 pytestmark = pytest.mark.realtime
 Program = Callable[..., "subprocess.Popen[str]"]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import os
-import time
 import zipfile
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from waiting import wait_for
 
 from rds.grading.batch.outcome import BatchOutcome
 from rds.grading.batch.run import run_batch
@@ -104,10 +104,7 @@ def outcome(place: Path) -> BatchOutcome:
     """All graded in one batch; afterwards nothing of it runs any more."""
     before = below(os.getpid())
     found = run_batch(place / "task", place / "in", place / "out", jobs=2)
-    end = time.monotonic() + 5.0
-    while below(os.getpid()) - before and time.monotonic() < end:  # the kernel takes namespaces apart
-        time.sleep(0.01)
-    assert below(os.getpid()) <= before
+    wait_for(lambda: below(os.getpid()) <= before)  # the kernel takes namespaces apart
     return found
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import wait_for
 
 from rds.cli.grade_run import run_alone
 from rds.core.errors import InputError
@@ -180,8 +181,7 @@ def lines(out: Path) -> int:
 def test_ctrl_c_ends_it_and_resume_goes_on(place: Path, outcome: BatchOutcome, tmp_path: Path) -> None:
     out = tmp_path / "out"
     process = subprocess.Popen(command(place, out, "--jobs", "1"), stderr=subprocess.PIPE, text=True)
-    while lines(out) < 3 and process.poll() is None:
-        time.sleep(0.01)
+    wait_for(lambda: lines(out) >= 3 or process.poll() is not None)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130 and "--resume" in said and "Traceback" not in said

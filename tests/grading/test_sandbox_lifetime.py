@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from waiting import wait_for
 
 from rds.core.types import Reference
 from rds.grading.sandbox import Pool, available
@@ -73,9 +74,7 @@ def test_a_grader_that_is_killed_leaves_no_process(written: Written) -> None:
     grader = subprocess.Popen([sys.executable, "-c", GRADER, str(path)], stdout=subprocess.PIPE, text=True)
     assert grader.stdout
     init = int(grader.stdout.readline())
-    end = time.monotonic() + 10.0
-    while len(descendants(init)) < 4 and time.monotonic() < end:
-        time.sleep(0.01)
+    wait_for(lambda: len(descendants(init)) >= 4)
     below = [init, *descendants(init), *descendants(grader.pid)]
     assert len(descendants(init)) == 4
     grader.kill()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import platform
 import signal
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import wait_for
 
 from rds.core.types import Reference
 from rds.grading.grade import Status
@@ -205,8 +205,7 @@ def test_a_submission_that_is_killed_from_outside_is_graded_again(pool: Pool, wr
         subject.begin_control()
         assert subject._cell is not None
         os.kill(process := subject._cell._process, signal.SIGKILL)
-        while Path(f"/proc/{process}").exists():
-            time.sleep(0.001)
+        wait_for(lambda: not Path(f"/proc/{process}").exists(), every=0.001)
         with pytest.raises(SandboxError, match="from outside"):  # and so is no zero
             subject.control(0.0, Reference(0.0, 0.0, 0.0), 0.0)
         subject.begin_control()  # and can be asked again

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from typer.testing import CliRunner
+from waiting import wait_for
 
 import rds
 from rds.cli.main import app
@@ -185,9 +186,7 @@ def test_a_killed_server_leaves_the_run_to_its_safe_end(serve: Serve) -> None:
     client.until(1, state="running", program="runs")
     os.kill(server.process.pid, signal.SIGKILL)
     server.process.wait()
-    deadline = time.monotonic() + 60.0
-    while not (out / "ending.json").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
+    wait_for((out / "ending.json").exists)
     result = rds.open_result(out)
     assert result.meta["ending"] == "stopped" and abs(result["X_reference_velocity"][-1]) < 1e-6  # at rest on its path
     assert server.socket.exists()

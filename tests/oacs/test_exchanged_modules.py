@@ -17,6 +17,7 @@ import can
 import numpy as np
 import pytest
 from typer.testing import CliRunner
+from waiting import wait_for
 
 import rds
 from rds.bus.modules.oacs.events import Happened
@@ -136,8 +137,7 @@ def test_a_run_ends_is_offered_a_machine_and_goes_on_by_itself(serve: Serve, cha
     refused: list[str] = []
 
     def go(of: Experiment, run: Run) -> Result:
-        while run.progress[0] < 20 and not run.done:
-            time.sleep(0.01)
+        wait_for(lambda: run.progress[0] >= 20 or run.done)
         if not events.count("ready"):
             end(slide)
         return run.wait()

@@ -12,6 +12,7 @@ from typing import Any
 import can
 import numpy as np
 import pytest
+from waiting import wait_for
 
 from rds.bus.modules.oacs import Change, Module, OacsDrivers, Watch, estop, scan
 from rds.bus.modules.oacs.tuning import gains_from_step
@@ -31,15 +32,6 @@ def press(process: subprocess.Popen[str], line: str) -> None:
     process.stdin.write(line + "\n")
     process.stdin.flush()
     time.sleep(0.3)
-
-
-def wait_for(condition: Callable[[], Any], seconds: float) -> float:
-    """How long it took; fails after `seconds`."""
-    began = time.monotonic()
-    while not condition():
-        assert time.monotonic() - began < seconds, "it did not happen in time"
-        time.sleep(0.005)
-    return time.monotonic() - began
 
 
 def test_scan_and_information(serve: Serve, bus: can.BusABC) -> None:

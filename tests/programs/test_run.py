@@ -7,13 +7,13 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
+from waiting import wait_for
 
 import rds
 from rds.cli.main import app
@@ -29,14 +29,6 @@ from rds.results.metrics import MOVING
 PERIOD = 0.002  # s: with room for a busy computer
 STOP_LINE = 7
 CUTS = 150  # samples after which it cuts along line 5
-
-
-def wait_for(condition: Callable[[], Any], timeout: float = 60.0) -> Any:
-    deadline = time.monotonic() + timeout
-    while not (found := condition()):
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.01)
-    return found
 
 
 def reaches(run: ProgramRun, state: State) -> None:

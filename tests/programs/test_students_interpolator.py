@@ -4,12 +4,12 @@ a part program; held and slowed down by hand while it runs; too slow, which the 
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from waiting import wait_for
 
 import rds
 from rds.modes.experiment.run import Run
@@ -89,11 +89,7 @@ def by_hand(run: Run) -> rds.Result:
     assert run.ready(60.0)
     run.live_values.set("override", 0.5)
     run.live_values.set("hold", 1.0)
-    deadline = time.monotonic() + 60.0
-    while not run.done and time.monotonic() < deadline:
-        if run.rows is not None and run.rows["program_state"][-1] == State.HELD:
-            break
-        time.sleep(0.02)
+    wait_for(lambda: run.done or (run.rows is not None and run.rows["program_state"][-1] == State.HELD))
     run.live_values.set_all({"hold": 0.0, "override": 0.8})
     return run.wait()
 

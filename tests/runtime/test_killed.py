@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from lost_machines import TRIES, unless_lost
 from misbehaviour import every, process, send
+from waiting import wait_for
 
 import rds
 from rds.bus.hub.address import runtime_directory
@@ -109,19 +110,12 @@ def started(
     experiment.write_text(FILE.format(mode=mode, duration=duration, channel=channel))
     command = [sys.executable, "-c", HOST, "run", str(experiment), "--out", str(folder / "run"), "--json"]
     host = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
-    wait_until(lambda: (folder / "run" / "record.rds").is_file() or host.poll() is not None)
+    wait_for(lambda: (folder / "run" / "record.rds").is_file() or host.poll() is not None)
     if host.poll() is not None:
         said = host.communicate()
         assert "no answer from" in said[1] and tries > 1, said  # else the computer has held the machine up
         return started(folder, mode, duration, channel, tries - 1, **options)
     return host
-
-
-def wait_until(condition: Callable[[], Any], timeout: float = 30.0) -> None:
-    deadline = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.02)
 
 
 def check_readable(folder: Path, ending: str, at_least: int = 100) -> Result:
@@ -141,7 +135,7 @@ def test_a_killed_target(experiment: Maker, during: During, alone: Path) -> None
         result = own.run("implementation", out=alone / "run", progress=kill)
         assert result.meta["ending"] == "killed"
         assert "signal 9" in result.meta["ending_reason"]
-        wait_until(lambda: statuses("own") == {Status.WATCHDOG})
+        wait_for(lambda: statuses("own") == {Status.WATCHDOG})
     assert 300 <= len(result) < 4500
     saved = check_readable(alone / "run", "killed", 300)
     assert (saved["X_measured"] == result["X_measured"]).all()
@@ -244,11 +238,11 @@ def test_a_killed_host_leaves_the_run_going_to_its_end(alone: Path) -> None:
     host = started(alone, "implementation", 2.0, "own")
     host.kill()
     host.communicate()
-    wait_until(lambda: (alone / "run" / "ending.json").is_file())
+    wait_for(lambda: (alone / "run" / "ending.json").is_file())
     result = check_readable(alone / "run", "done")
     assert len(result) >= 1000  # the rest were discarded, on a busy computer
     assert result["time"][-1] > 1.5
-    wait_until(lambda: not find_machine(rds.load_machine("mini-cnc"), channel="own"), 20.0)  # nobody needs it now
+    wait_for(lambda: not find_machine(rds.load_machine("mini-cnc"), channel="own"), 20.0)  # nobody needs it now
     assert sorted(path.name for path in (alone / "run").iterdir()) == ["ending.json", "record.rds"]
 
 
@@ -319,7 +313,7 @@ def test_an_interrupted_run_stops_safely_and_is_saved(alone: Path, number: signa
         os.killpg(host.pid, number)
         said, errors = host.communicate(timeout=120)
         assert host.returncode == 1, errors
-        wait_until(lambda: statuses("own") == {Status.WATCHDOG})  # after a last command of zero volts
+        wait_for(lambda: statuses("own") == {Status.WATCHDOG})  # after a last command of zero volts
     outcome = json.loads(said)
     assert outcome["ending"] == "stopped"
     assert "the run ended early (stopped)" in errors

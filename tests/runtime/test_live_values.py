@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lost_machines import unless_lost
 from misbehaviour import send
+from waiting import wait_for
 
 import rds
 from rds.core.types import Ending
@@ -247,8 +247,7 @@ def test_a_simulation_is_stopped_and_keeps_what_it_has(experiment: Maker) -> Non
     run = experiment(PID, duration=2000.0).start()
     assert run.ready(10)
     run.live_values.set("X.Pgain", 5.0)
-    while run.progress[0] < 1000:
-        time.sleep(0.001)
+    wait_for(lambda: run.progress[0] >= 1000, every=0.001)
     assert not run.done
     assert "goes on" in repr(run)
     rows = run.rows
@@ -293,8 +292,7 @@ def test_an_emulation_changed_by_hand_is_repeated_by_a_simulation(experiment: Ma
     assert run.ready(30)
     for gain in (30.0, 5.0, 42.0):
         seen = run.progress[0]
-        while run.progress[0] < seen + 100:
-            time.sleep(0.005)
+        wait_for(lambda: run.progress[0] >= seen + 100)  # noqa: B023  # called at once
         run.live_values.set_all({"X.Pgain": gain, "X.Igain": gain / 10})
     with pytest.raises(rds.InputError, match=r"X.Pgain = -3 must be at least 0 V/mm"):
         run.live_values.set("X.Pgain", -3)
@@ -314,11 +312,9 @@ def test_an_emulation_changed_by_hand_is_repeated_by_a_simulation(experiment: Ma
 def test_an_implementation_is_changed_and_stopped(experiment: Maker, alone: Path) -> None:
     run = experiment({"name": "p", "Pgain": 20.0}, duration=20.0).start("implementation", out=alone / "run")
     assert run.ready(30)
-    while run.progress[0] < 300:
-        time.sleep(0.01)
+    wait_for(lambda: run.progress[0] >= 300)
     run.live_values.set("X.Pgain", 1.0)
-    while run.progress[0] < 600:
-        time.sleep(0.01)
+    wait_for(lambda: run.progress[0] >= 600)
     rows = run.rows
     assert rows is not None and len(rows) >= 600
     assert "X_measured" in rows and rows.units["lateness"] == "µs"
@@ -338,11 +334,9 @@ def test_an_implementation_is_changed_and_stopped(experiment: Maker, alone: Path
 def test_changes_of_a_run_that_was_killed_are_kept(experiment: Maker, alone: Path) -> None:
     run = experiment(PID, duration=20.0).start("emulation", out=alone / "run")
     assert run.ready(30)
-    while run.progress[0] < 100:
-        time.sleep(0.01)
+    wait_for(lambda: run.progress[0] >= 100)
     run.live_values.set("X.Pgain", 11.0)
-    while run.progress[0] < 300:
-        time.sleep(0.01)
+    wait_for(lambda: run.progress[0] >= 300)
     send(alone / "run", "recorder")
     result = run.wait()
     assert result.meta["ending"] == "killed"
@@ -368,8 +362,7 @@ def test_a_count_is_never_seen_half_written(tmp_path: Path) -> None:
     ring = Ring.create(tmp_path / "a.ring", ["a"], 1000)
     writer = subprocess.Popen([sys.executable, "-c", APPEND, str(ring.path)])
     try:
-        while not ring.head:
-            time.sleep(0.01)
+        wait_for(lambda: ring.head)
         heads = [ring.head for _ in range(2_000_000)]
     finally:
         ring.ask_to_stop()

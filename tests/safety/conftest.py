@@ -13,10 +13,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import can
 import pytest
+from waiting import wait_for
 
 from rds.bus.modules.cia402.codes import State, state_of
 from rds.bus.modules.dialects import server_module
@@ -215,14 +215,6 @@ def ended(run: subprocess.Popen[str], folder: Path) -> tuple[str, str]:
     meta = open_result(folder / "out" / "result.csv").meta
     assert meta["ending"] != "done", err
     return str(meta["ending"]), str(meta["ending_reason"])
-
-
-def wait_for(condition: Callable[[], Any], timeout: float = PATIENCE) -> None:
-    """Wait until the condition holds; fail after `timeout` s."""
-    deadline = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.01)
 
 
 def hub_pid(base: Path, channel: str) -> int:

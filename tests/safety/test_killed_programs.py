@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import wait_for
 
 from rds.results import open_result
 
-from .conftest import Bench, wait_for
+from .conftest import Bench
 
 pytestmark = pytest.mark.realtime
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import wait_for
 
 from rds.core.errors import InputError
 from rds.core.types import ArcSegment, LineSegment, Source
@@ -32,12 +32,9 @@ def code(folder: Path, role: str = "controller") -> Code:
 
 
 def found(code: Code) -> Checked:
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
-        if (checked := code.tick()) is not None:
-            return checked
-        time.sleep(0.01)
-    raise AssertionError("no check has ended")
+    checked = wait_for(code.tick)
+    assert checked is not None
+    return checked
 
 
 @pytest.mark.parametrize("role", TEMPLATES)

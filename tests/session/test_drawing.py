@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from waiting import wait_for
 
 from rds.core.errors import InputError
 from rds.panels.drawing.state import Drawing, _fields, traced
@@ -25,12 +25,7 @@ def drawing(folder: Path, **values: Any) -> Drawing:
     made = Drawing(Session(folder))
     for name, value in values.items():
         made.choices.set(name, value)
-    deadline = time.monotonic() + PATIENCE
-    while made.tracing:
-        made.tick()
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
-    return made
+    return drawing_of(made)
 
 
 def chosen(folder: Path, **values: Any) -> dict[str, Any]:
@@ -125,9 +120,12 @@ def test_the_program_is_written_opened_and_valid(tmp_path: Path) -> None:
 
 
 def drawing_of(made: Drawing) -> Drawing:
-    while made.tracing:
-        made.tick()
-        time.sleep(0.005)
+    def is_drawn() -> bool:
+        if made.tracing:
+            made.tick()
+        return not made.tracing
+
+    wait_for(is_drawn)
     return made
 
 

@@ -9,11 +9,11 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import wait_for
 
 from rds.core.errors import InputError, RdsError
 from rds.modes.process.record import PROCESSES
@@ -67,8 +67,7 @@ def test_the_emergency_stop_reaches_a_machine_that_a_run_started_for_itself(tmp_
     equipment.choices.set("mode", "implementation")
     equipment.choices.set("duration", 60.0)
     run = equipment.run().start()
-    while not len(run.new_rows()) and not run.done:
-        time.sleep(0.05)
+    wait_for(lambda: len(run.new_rows()) or run.done)
     said = Session(tmp_path).emergency_stop()  # of another page, or of the page's server
     assert said.startswith("emergency stop: 4 modules are at zero volts")
     assert run.wait(60) and run.result is not None
@@ -119,9 +118,7 @@ def test_a_gain_is_changed_while_it_runs_and_recorded_with_its_time(alone: Path)
     assert not run.live_values
     with pytest.raises(InputError, match="in use on this page"):
         equipment.run().start()
-    end = time.monotonic() + 60
-    while not len(run.new_rows()) and time.monotonic() < end:
-        time.sleep(0.02)
+    wait_for(lambda: len(run.new_rows()))
     values = LiveValues(run)
     assert run.seconds_left is not None and run.seconds_left < 60.0  # however long it took to start
     before = values["X.Pgain"]
@@ -129,8 +126,7 @@ def test_a_gain_is_changed_while_it_runs_and_recorded_with_its_time(alone: Path)
         values.set("X.Pgain", "-1")
     assert values["X.Pgain"] == before
     values.set("X.Pgain", "7,5")
-    while not run.changes and time.monotonic() < end:
-        time.sleep(0.02)
+    wait_for(lambda: run.changes)
     run.stop()
     assert run.wait(60) and run.result is not None
     (when, *change), (stopped, *stop) = run.result.meta["changes"]
@@ -161,10 +157,7 @@ def test_a_folder_that_is_taken_away_during_a_run_is_said_so(alone: Path) -> Non
     equipment.choices.set("mode", "emulation")
     equipment.choices.set("duration", 60.0)
     run = equipment.run().start()
-    deadline = time.monotonic() + 30.0
-    while not (run.share or run.done):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_for(lambda: run.share or run.done)
     shutil.rmtree(run.folder)
     run.stop()
     assert run.wait(30) and isinstance(run.error, InputError) and run.folder.name in str(run.error)
@@ -196,9 +189,7 @@ def test_a_run_whose_page_was_killed_keeps_the_machine_until_it_ends(tmp_path: P
     with pytest.raises(InputError, match=f"a run that goes on without a page, {orphan.name}"):
         session.take_machine("another run", object())
     orphan.stop()
-    deadline = time.monotonic() + 60
-    while session.runs_that_go_on() and time.monotonic() < deadline:
-        time.sleep(0.05)
+    wait_for(lambda: not session.runs_that_go_on())
     session.take_machine("another run", object())  # what refused held nothing
 
 
@@ -210,9 +201,7 @@ def test_a_run_of_which_all_processes_were_killed_goes_on_no_more(tmp_path: Path
     processes = json.loads((orphan.folder / PROCESSES).read_text())
     for name in ("recorder", "target"):
         os.kill(processes[name], signal.SIGKILL)
-    deadline = time.monotonic() + 20
-    while session.runs_that_go_on() and time.monotonic() < deadline:
-        time.sleep(0.05)
+    wait_for(lambda: not session.runs_that_go_on())
     for kind in (".live", ".ring"):  # nobody is left to remove what they shared
         Path(processes["live_values"]).with_suffix(kind).unlink()
     assert [run.state for run in session.runs()] == [State.CUT_SHORT]
@@ -233,14 +222,12 @@ def test_the_next_run_begins_while_pictures_of_the_last_one_are_made(
     equipment.choices.set("duration", 0.01)
     runs = [equipment.run().start() for _ in range(MOST_UNWRITTEN)]
     for run in runs:
-        while not run.done:
-            time.sleep(0.01)
+        wait_for(lambda: run.done)  # noqa: B023  # called at once
         assert not run.written and (run.folder / "result.csv").is_file()  # the tables are there at once
     stopped, late = (equipment.run().start() for _ in range(2))  # no more of them are kept in memory
     stopped.stop()
     assert stopped.wait(60) and stopped.stopped_early
-    while not late.note:
-        time.sleep(0.01)
+    wait_for(lambda: late.note)
     assert late.note.startswith("waiting until the reports of earlier runs") and not late.done
     drawn.set()
     assert all(run.wait(60) and run.written and run.unwritten is None for run in [*runs, late])

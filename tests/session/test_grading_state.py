@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import wait_for
 
 from rds.core.errors import InputError
 from rds.grading.batch.run import run_batch
@@ -93,20 +92,13 @@ def slow_grading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return begun
 
 
-def until(there: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 20.0
-    while not there():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
 def test_a_batch_goes_on_without_its_page_and_another_finds_and_stops_it(slow_grading: Path, tmp_path: Path) -> None:
     state = GradingState(Session(tmp_path))
     assert state.going_on() is None
     for name in ("assignment", "submissions", "out"):
         state.choices.set(name, name)
     first = state.grade()
-    until(slow_grading.exists)
+    wait_for(slow_grading.exists)
     other = GradingState(Session(tmp_path))
     second = other.grade()
     assert second.wait(20) and "a batch of this folder goes on already" in str(second.error)
@@ -121,7 +113,7 @@ def test_a_check_of_an_assignment_is_stopped(slow_grading: Path, tmp_path: Path)
     state = GradingState(Session(tmp_path))
     state.choices.set("assignment", "assignment")
     task = state.check()
-    until(slow_grading.exists)
+    wait_for(slow_grading.exists)
     task.stop()
     assert task.wait(20) and task.stopped
 

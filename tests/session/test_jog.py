@@ -7,14 +7,14 @@ import os
 import signal
 import subprocess
 import sys
-import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
+from waiting import wait_for
 
 from rds.cli.main import app
 from rds.core.errors import InputError
@@ -27,13 +27,6 @@ from rds.panels.session.expired_orders import LATE
 
 pytestmark = pytest.mark.realtime
 PATIENCE = 30.0  # s, on a busy computer
-
-
-def wait_for(look: Callable[[], object]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not look():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from typer.testing import CliRunner
+from waiting import wait_for
 
 from rds import panels
 from rds.bus.modules.cia402.codes import State
@@ -29,7 +30,7 @@ from rds.panels.jog.orders import SPINDLE_DEAD_MAN
 from rds.panels.jog.state import Jog
 from rds.panels.session import Session
 
-from .test_jog import PATIENCE, hear, hold_until, wait_for
+from .test_jog import PATIENCE, hear, hold_until
 
 pytestmark = pytest.mark.realtime
 

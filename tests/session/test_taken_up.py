@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import wait_for
 
 from rds.core.errors import InputError
 from rds.panels.equipment.run import EquipmentRun
@@ -17,13 +16,6 @@ from rds.panels.session import Session
 from rds.panels.session.live_values import LiveValues
 
 pytestmark = pytest.mark.realtime
-
-
-def wait_for(look: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 60.0
-    while not look():
-        assert time.monotonic() < deadline, "it did not come about"
-        time.sleep(0.02)
 
 
 def begun(folder: Path, kind: str, **chosen: object) -> EquipmentRun:
