@@ -43,13 +43,14 @@ HERE = Path(__file__).parent
 PANELS, REALTIME = "panels", "realtime"  # kinds of tests that run one by one
 POLITE = 10  # niceness of the others
 MARK = "pytest.mark.realtime"
-BENCHES = ("/oacs/", "/safety/")  # wait for modules' heartbeats, not for samples: they follow the panels
+# They wait for modules' heartbeats or run short and may be late, and follow the panels: both lanes take as long.
+SECOND = ("/oacs/", "/safety/", "/test_readme.py", "/test_notebooks.py", "/test_demo.py")
 LINGER = 20.0  # s that a machine, a hub or a target may take to notice that it is not needed any more
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One worker more than there are processors: the two kinds that run one by one wait for most of their time."""
-    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 1
+    """Two workers more than there are processors: the two kinds that run one by one wait for most of their time."""
+    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 2
 
 
 @pytest.hookimpl(trylast=True)
@@ -85,7 +86,7 @@ def group_of(nodeid: str) -> str:
         return PANELS
     if name not in _waiting_for_real_time(path):
         return path
-    return PANELS if any(bench in path for bench in BENCHES) else REALTIME
+    return PANELS if any(part in path for part in SECOND) else REALTIME
 
 
 @cache
