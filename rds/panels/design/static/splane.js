@@ -13,7 +13,7 @@ function render({ model, el }) {
   svg.setAttribute("aria-label", "s-plane: poles can be moved with the arrow keys");
   box.append(svg, bar);
   el.append(box);
-  let view = null; // centre (x, y) and units per pixel
+  let view = null; // centre (x, y) and units per pixel; the width that this is for, and what was fitted, or null: by hand
   let dragged = null; // name of the pole that is being moved, and where it is proposed
   let asked = 0, waiting = null, shownKind = "";
 
@@ -55,9 +55,13 @@ function render({ model, el }) {
     const high = Math.max(5, ...poles.map((pole) => Math.abs(pole.im))) * 1.5;
     const right = -0.18 * left;
     const scale = Math.max((right - left) / inner().w, (2 * high) / inner().h);
-    view = { x: right - (scale * inner().w) / 2, y: 0, scale };
+    view = { x: right - (scale * inner().w) / 2, y: 0, scale, width: inner().w, all };
   }
-  function zoom(factor) { view.scale = Math.min(Math.max(view.scale * factor, 1e-4), 1e3); view.x *= factor; }
+  function zoom(factor) { view.scale = Math.min(Math.max(view.scale * factor, 1e-4), 1e3); view.x *= factor; view.all = null; }
+  function fitWidth() { // what was seen across stays in sight when the page is made narrower or wider
+    if (view.all !== null) fit(view.all);
+    else { view.scale *= view.width / inner().w; view.width = inner().w; }
+  }
 
   const step = (span, count) => {
     const rough = span / count, power = 10 ** Math.floor(Math.log10(rough));
@@ -66,6 +70,7 @@ function render({ model, el }) {
 
   function draw() {
     if (!view) fit(false);
+    else if (view.width !== inner().w) fitWidth();
     const focus = document.activeElement && svg.contains(document.activeElement) ? document.activeElement.dataset.pole : null;
     const { w, h } = inner();
     svg.setAttribute("width", width()); svg.setAttribute("height", height());
