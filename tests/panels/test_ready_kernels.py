@@ -160,7 +160,7 @@ def test_pages_that_ask_at_the_same_time_have_a_kernel_each(ready: ReadyKernels,
             kernel.kill()
 
 
-def test_a_kernel_that_compiled_code_holds_ends_with_the_server(
+def test_kernels_end_with_the_server_though_compiled_code_holds_one(
     ready: ReadyKernels, alone: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("JUPYTER_PATH", str(APP / "share" / "jupyter"))
@@ -168,6 +168,8 @@ def test_a_kernel_that_compiled_code_holds_ends_with_the_server(
     manager: Any = KernelManager(kernel_name="rds", connection_file=str(alone / "connection.json"))
     manager.start_kernel(cwd=str(alone), env=os.environ | {"SAID": "", "APP": ""})
     kernel = manager.provisioner.process
+    idle = ready.start([sys.executable, *LAUNCHER, "-f", str(alone / "idle.json")], os.environ, alone)
+    assert idle is not None
     client = manager.client()
     try:
         client.start_channels()
@@ -176,19 +178,11 @@ def test_a_kernel_that_compiled_code_holds_ends_with_the_server(
         while not (alone / "there").exists():
             with pytest.raises(subprocess.TimeoutExpired):
                 kernel.wait(0.05)
+        with pytest.raises(subprocess.TimeoutExpired):
+            idle.wait(0.0)
         ready.close()
-        assert kernel.wait(30.0) == 0
+        assert kernel.wait(30.0) == idle.wait(30.0) == 0
     finally:
         client.stop_channels()
         kernel.kill()
-
-
-def test_kernels_end_with_the_server(ready: ReadyKernels, alone: Path) -> None:
-    command = [sys.executable, *LAUNCHER, "-f", str(alone / "connection.json")]
-    kernel = ready.start(command, os.environ, alone)
-    assert kernel is not None
-    with pytest.raises(subprocess.TimeoutExpired):
-        kernel.wait(0.0)
-    ready.close()
-    assert kernel.wait(30.0) == 0
-    kernel.kill()  # which does nothing to whoever may have its number now
+        idle.kill()

@@ -26,7 +26,7 @@ function render({ model, el }) {
     bar.append(button);
   }
   const hint = make("span", "rds-splane-hint");
-  hint.textContent = "Drag a pole, or use the arrow keys (Shift: 10, Alt: 0.1). Dashed: limit of the sample period. Small crosses: the loop's poles over the cloud.";
+  hint.textContent = "Drag a pole, or use the arrow keys (Shift: 10, Alt: 0.1). Circles: rad/s; rays: damping ratio ζ. Dashed: limit of the sample period. Small crosses: the loop's poles over the cloud.";
   bar.append(hint);
 
   function make(tag, name = "") { const made = document.createElement(tag); made.className = name; return made; }
@@ -108,7 +108,7 @@ function render({ model, el }) {
       shape("text", { x: px(x), y: middle + 16, "text-anchor": "middle", class: "rds-splane-tick" }, svg, number(x));
     for (let y = Math.ceil(y0 / tick) * tick; y <= y1; y += tick)
       shape("text", { x: MARGIN.left - 6, y: py(y) + 4, "text-anchor": "end", class: "rds-splane-tick" }, svg, number(y));
-    shape("text", { x: MARGIN.left + w / 2, y: height() - 6, "text-anchor": "middle", class: "rds-splane-tick" }, svg, "real part [1/s]; circles: rad/s; rays: damping ratio ζ");
+    shape("text", { x: MARGIN.left + w / 2, y: height() - 6, "text-anchor": "middle", class: "rds-splane-tick" }, svg, "real part [1/s]");
     shape("text", { x: 14, y: MARGIN.top + h / 2, "text-anchor": "middle", class: "rds-splane-tick", transform: `rotate(-90 14 ${MARGIN.top + h / 2})` }, svg, "imaginary part [rad/s]");
   }
   const number = (value) => String(Number(value.toPrecision(6))).replace("-", "−");
