@@ -8,6 +8,8 @@ such a one each is made in a process that is started for it, which takes some se
 from __future__ import annotations
 
 import contextlib
+import ctypes
+import gc
 import os
 import threading
 from collections.abc import Callable
@@ -76,6 +78,7 @@ def made_beside(make: Callable[..., Any], *arguments: Any) -> Any:
             outcome = process.answer(order).outcome(0)
         finally:
             process.close()
+    _hand_memory_back()  # of this process too: a run's samples, and what they were sent as
     if outcome.failure is not None:
         raise RdsError(
             f"pictures and reports were not made: {outcome.reason}; the run's tables are kept, open it among the "
@@ -91,7 +94,17 @@ def _work() -> Work:
 def _made(order: tuple[Callable[..., Any], tuple[Any, ...]]) -> Any:
     _give_way()
     make, arguments = order
-    return make(*arguments)
+    try:
+        return make(*arguments)
+    finally:
+        gc.collect()
+        _hand_memory_back()
+
+
+def _hand_memory_back() -> None:
+    """What glibc keeps of memory that is free again, in case it is wanted soon, goes back to the system."""
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # another system's library has no such call
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _give_way() -> None:
