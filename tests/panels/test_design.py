@@ -11,6 +11,14 @@ from rds.panels.design.state import Design
 from rds.panels.session import Session
 from tests.panels.conftest import App
 
+WHOLE = """() => {
+    const [plane, band, last] = ["svg", ".rds-splane-unstable", "[data-pole=pair]"].map(
+        (each) => document.querySelector(`.rds-splane ${each}`)?.getBoundingClientRect());
+    const place = document.querySelector(".rds-splane-row").getBoundingClientRect();
+    return band && plane.width > 250 && plane.right <= place.right + 1 && band.right <= plane.right
+        && band.width > 5 && last.left > plane.left && last.right < band.left;
+}"""
+
 
 def _numbers(page: Any) -> str:
     return str(page.inner_text(".rds-splane-row .scroll"))
@@ -34,7 +42,7 @@ def _ready(page: Any) -> Any:
     return pole
 
 
-def test_a_pole_is_dragged_with_the_mouse_and_the_design_follows(open_page: Callable[..., Any]) -> None:
+def test_a_pole_is_moved_with_the_mouse_and_the_keys_and_the_design_follows(open_page: Callable[..., Any]) -> None:
     page = open_page("Design")
     pole = _ready(page)
     assert "1600" in _numbers(page)
@@ -56,10 +64,6 @@ def test_a_pole_is_dragged_with_the_mouse_and_the_design_follows(open_page: Call
     }""")
     page.wait_for_selector('.rds-main:has-text("axes drawn from the ranges")')
 
-
-def test_a_pole_is_moved_with_the_keys(open_page: Callable[..., Any]) -> None:
-    page = open_page("Design")
-    pole = _ready(page)
     _type(page, "Real part", "-32")
     _type(page, "Imaginary part", "24")
     page.wait_for_selector('.rds-splane-row .scroll:has-text("1600")')
@@ -80,6 +84,10 @@ def test_a_place_that_is_not_stable_is_refused_with_the_reason_in_the_dark_too(o
     page.click('button:text-is("Dark")')
     pole = _ready(page)
     page.wait_for_selector('.rds-main:has-text("axes drawn from the ranges")')
+    for width in (1280, 640, 390):  # made narrower, the plane shows what it showed, to its right edge
+        page.set_viewport_size({"width": width, "height": 800})
+        page.wait_for_function(WHOLE)
+    page.set_viewport_size({"width": 1280, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") <= 1280
     _type(page, "Real part", "-5")
     page.wait_for_selector('[aria-valuetext^="-5.000 ±"]')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import urllib.error
@@ -13,14 +14,18 @@ from typing import Any
 import pytest
 
 from rds.core.errors import InputError
-from rds.panels.help.build import _local, contents, help_pages, page_file, sources
+from rds.panels.help.build import _cache, _fingerprint, _local, contents, help_pages, page_file, sources
 from rds.panels.registry import PANELS
 from rds.results.serve import OWN_SCRIPT, FolderServer
 
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return help_pages(tmp_path_factory.mktemp("help") / "pages")
+    """Built anew. A panel has these, too, where nobody has built its own before."""
+    built = help_pages(tmp_path_factory.mktemp("help") / "pages")
+    if not (kept := _cache() / _fingerprint(sources())).exists():
+        shutil.copytree(built, kept)
+    return built
 
 
 @pytest.fixture
@@ -123,6 +128,7 @@ def test_only_who_knows_the_path_reads_the_pages(server: FolderServer) -> None:
             urllib.request.urlopen(base + path, timeout=10)
 
 
+@pytest.mark.usefixtures("pages")
 def test_help_opens_at_the_page_of_the_panel(open_page: Callable[..., Any]) -> None:
     page = open_page("Equipment control")
     page.click('.rds-head button:text-is("Help")')

@@ -69,7 +69,9 @@ def test_a_table_of_segments_and_what_it_refuses(open_page: Callable[..., Any]) 
     _go(page, '.rds-notice-error:has-text("segment 2 is an arc")')
 
 
-def test_a_part_program_and_a_faulty_one(open_page: Callable[..., Any], app: App) -> None:
+def test_a_part_program_a_faulty_one_and_a_user_s_file_with_its_fault_at_its_line(
+    open_page: Callable[..., Any], app: App
+) -> None:
     (app.folder / "good.ngc").write_text("G21 G90 G17 F600\nG1 X10 Y0\nG3 X0 Y10 I-10 J0\nM2\n")
     (app.folder / "bad.ngc").write_text("G21 G90 F600\nG1 X10 Q\nM2\n")
     page = open_page("Interpolator")
@@ -81,10 +83,7 @@ def test_a_part_program_and_a_faulty_one(open_page: Callable[..., Any], app: App
     _go(page)
     _turn_to(page, "Path")
 
-
-def test_a_user_s_file_shows_its_fault_at_its_line(open_page: Callable[..., Any], app: App) -> None:
     (app.folder / "broken.py").write_text(BROKEN)
-    page = open_page("Interpolator")
     page.click('button:text-is("Linear")')
     page.click('button:text-is("Single segment")')
     page.select_option('.rds-field:has(.rds-label:has-text("Method for lines")) select', "user-defined")

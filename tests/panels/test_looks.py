@@ -41,18 +41,7 @@ def test_a_projector_of_1024_and_the_keyboard_alone(open_page: Callable[..., Any
     assert page.evaluate(style) == "italic"  # the file's value, not one that was typed
 
 
-def test_long_lines_of_a_command_scroll_within_the_panel(open_page: Callable[..., Any]) -> None:
-    page = open_page("Data", width=1024)
-    right = page.evaluate("""() => {
-        const places = [...document.querySelectorAll(".rds-main .widget-html-content")];
-        const place = places.find((each) => each.offsetParent);
-        place.innerHTML = `<pre>${"x".repeat(400)}</pre>`;
-        return place.firstChild.getBoundingClientRect().right;
-    }""")
-    assert right <= 1024
-
-
-def test_what_is_said_of_a_button_is_in_sight_beside_it_and_each_panel_begins_at_its_top(
+def test_what_is_said_of_a_button_is_in_sight_beside_it_as_the_stop_is_and_each_panel_begins_at_its_top(
     open_page: Callable[..., Any],
 ) -> None:
     page = open_page("Data", height=600)
@@ -66,8 +55,20 @@ def test_what_is_said_of_a_button_is_in_sight_beside_it_and_each_panel_begins_at
     page.mouse.move(640, 400)
     page.mouse.wheel(0, 3000)
     page.wait_for_function("document.querySelector('.rds-nav').getBoundingClientRect().y < 0")
+    stop = page.locator("button.rds-stop").bounding_box()
+    assert stop["y"] >= 0 and stop["y"] + stop["height"] <= 120
     file.focus()
     assert file.bounding_box()["y"] >= head["y"] + head["height"]
     page.click('.rds-nav button:text-is("Help")')
     page.wait_for_selector('.rds-title h1:text-is("Help")')
     page.wait_for_function("document.querySelector('.rds-app').scrollTop === 0")
+    page.set_viewport_size({"width": 1024, "height": 600})
+    page.click('.rds-nav button:text-is("Data")')
+    page.wait_for_selector('.rds-title h1:text-is("Data")')
+    right = page.evaluate("""() => {
+        const places = [...document.querySelectorAll(".rds-main .widget-html-content")];
+        const place = places.find((each) => each.offsetParent);
+        place.innerHTML = `<pre>${"x".repeat(400)}</pre>`;
+        return place.firstChild.getBoundingClientRect().right;
+    }""")
+    assert right <= 1024  # long lines of a command scroll within the panel

@@ -88,8 +88,8 @@ def name_of(page: Any, name: str) -> Any:
     return {"label": page.locator(f"{MODULE} option", has_text=f": {name}, ").first.inner_text()}
 
 
-def test_a_machine_is_put_together_by_hand(own_app: App, open_page: Callable[..., Any]) -> None:
-    page = open_page("Machine", on=own_app)
+def test_a_machine_is_put_together_by_hand(app: App, open_page: Callable[..., Any]) -> None:
+    page = open_page("Machine")
     tab(page, "By hand")
     mount(page, 1, "oacs-drill")
     mount(page, 2, "oacs-x")
@@ -101,4 +101,4 @@ def test_a_machine_is_put_together_by_hand(own_app: App, open_page: Callable[...
     page.wait_for_selector('.rds-notice-good:visible:has-text("these modules make a machine")')
     press(page, "Write file")
     page.wait_for_selector('.rds-notice-good:visible:has-text("wrote by-hand.toml")')
-    assert 'module = "oacs-range-arm"' in (own_app.folder / "by-hand.toml").read_text()
+    assert 'module = "oacs-range-arm"' in (app.folder / "by-hand.toml").read_text()

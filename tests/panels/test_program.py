@@ -180,6 +180,12 @@ def test_a_simulation_ends_with_its_worst_lines(open_page: Callable[..., Any], a
     page.wait_for_selector('.rds-main :text("Saved with its report in")', timeout=SAVED)
     found = [each for each in Path(app.folder / "runs").iterdir() if (each / "program.html").is_file()]
     assert found
+    page.set_viewport_size({"width": 640, "height": 800})  # what was beside the editor is below it
+    page.wait_for_function("""() => {
+        const [editor, result] = [".rds-editor", ".rds-program .rds-main"].map(
+            (each) => document.querySelector(each).getBoundingClientRect());
+        return result.top >= editor.bottom && result.top - editor.bottom < 200;
+    }""")
 
 
 def test_a_line_is_run_by_hand_the_work_is_touched_off_and_a_program_is_run_from_its_cursor(

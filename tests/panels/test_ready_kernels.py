@@ -20,10 +20,11 @@ pytest.importorskip("jupyter_server", reason="Voilà is not installed: it is in 
 from jupyter_client import KernelManager
 
 from rds.bus.hub.address import runtime_directory
+from rds.core.parallel.forked import ForkedProcess
 from rds.panels.app import serve
 from rds.panels.app.kernels import PageKernel
 from rds.panels.app.provisioner import offer
-from rds.panels.app.ready_kernels import LAUNCHER, ForkedKernel, ReadyKernels
+from rds.panels.app.ready_kernels import LAUNCHER, ReadyKernels
 
 APP = Path(serve.__file__).parent
 ASK = (
@@ -31,6 +32,22 @@ ASK = (
     "os.environ['SAID'], os.getcwd(), 'rds.panels.program.panel' in sys.modules, os.environ['APP'] in sys.path, "
     "__import__('numpy').random.rand())"
 )
+
+# what draws for a kernel is its fork, at the lowest priority; should that be killed, the next one is not
+DRAWN = """
+import os, sys
+from rds.panels.session.beside import made_beside
+ABOUT = "(os.getpid(), os.getppid(), os.nice(0), 'rds.panels.program.panel' in sys.modules)"
+about = lambda: made_beside(eval, ABOUT, {"os": os, "sys": sys})
+first, again = about(), about()
+os.kill(first[0], 9)
+try:
+    about()
+except Exception as error:
+    assert "signal 9" in str(error), error
+later = about()
+print(first == again, first[1] == os.getpid() == later[1], first[2:], later[2:])
+"""
 
 
 @pytest.fixture
@@ -66,10 +83,12 @@ def test_jupyter_takes_all_kernels_of_the_page_from_there(
         manager: Any = KernelManager(kernel_name=name, connection_file=str(alone / f"connection{number}.json"))
         manager.start_kernel(cwd=str(alone), env=os.environ | {"SAID": "yes", "APP": str(APP)})
         try:
-            assert isinstance(manager.provisioner.process, ForkedKernel)
+            assert isinstance(manager.provisioner.process, ForkedProcess)
             said, folder, imported, own_path, number_drawn = ask(manager, ASK).split()
             assert (said, folder, imported, own_path) == ("yes", str(alone), "True", "False")
             drawn.add(number_drawn)
+            if number:
+                assert ask(manager, DRAWN) == "True True (19, True) (19, False)\n"
             ended.append(manager.provisioner.process)
         finally:
             manager.shutdown_kernel(now=number == 0)
@@ -127,7 +146,7 @@ def test_a_kernel_that_is_not_of_this_kind_is_started_as_always(ready: ReadyKern
 
 
 def test_pages_that_ask_at_the_same_time_have_a_kernel_each(ready: ReadyKernels, alone: Path) -> None:
-    def start(number: int) -> ForkedKernel | None:
+    def start(number: int) -> ForkedProcess | None:
         command = [sys.executable, *LAUNCHER, "-f", str(alone / f"connection{number}.json")]
         return ready.start(command, os.environ, alone)
 
@@ -141,7 +160,7 @@ def test_pages_that_ask_at_the_same_time_have_a_kernel_each(ready: ReadyKernels,
             kernel.kill()
 
 
-def test_a_kernel_that_compiled_code_holds_ends_with_the_server(
+def test_kernels_end_with_the_server_though_compiled_code_holds_one(
     ready: ReadyKernels, alone: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("JUPYTER_PATH", str(APP / "share" / "jupyter"))
@@ -149,6 +168,8 @@ def test_a_kernel_that_compiled_code_holds_ends_with_the_server(
     manager: Any = KernelManager(kernel_name="rds", connection_file=str(alone / "connection.json"))
     manager.start_kernel(cwd=str(alone), env=os.environ | {"SAID": "", "APP": ""})
     kernel = manager.provisioner.process
+    idle = ready.start([sys.executable, *LAUNCHER, "-f", str(alone / "idle.json")], os.environ, alone)
+    assert idle is not None
     client = manager.client()
     try:
         client.start_channels()
@@ -157,19 +178,11 @@ def test_a_kernel_that_compiled_code_holds_ends_with_the_server(
         while not (alone / "there").exists():
             with pytest.raises(subprocess.TimeoutExpired):
                 kernel.wait(0.05)
+        with pytest.raises(subprocess.TimeoutExpired):
+            idle.wait(0.0)
         ready.close()
-        assert kernel.wait(30.0) == 0
+        assert kernel.wait(30.0) == idle.wait(30.0) == 0
     finally:
         client.stop_channels()
         kernel.kill()
-
-
-def test_kernels_end_with_the_server(ready: ReadyKernels, alone: Path) -> None:
-    command = [sys.executable, *LAUNCHER, "-f", str(alone / "connection.json")]
-    kernel = ready.start(command, os.environ, alone)
-    assert kernel is not None
-    with pytest.raises(subprocess.TimeoutExpired):
-        kernel.wait(0.0)
-    ready.close()
-    assert kernel.wait(30.0) == 0
-    kernel.kill()  # which does nothing to whoever may have its number now
+        idle.kill()

@@ -21,19 +21,10 @@ def test_page_shows_its_menu_dark_and_light_with_the_stop_in_sight_which_answers
     page.wait_for_selector('.rds-notice:has-text("no module is on the bus")')
 
 
-def test_emergency_stop_stays_in_sight_on_a_long_panel(open_page: Callable[..., Any]) -> None:
-    page = open_page("Data", height=600)
-    page.mouse.move(640, 400)
-    page.mouse.wheel(0, 3000)
-    page.wait_for_function("document.querySelector('.rds-app').scrollTop > 50")
-    box = page.locator("button.rds-stop").bounding_box()
-    assert box["y"] >= 0 and box["y"] + box["height"] <= 120
-
-
 def test_the_emergency_stop_has_its_corner_at_every_width_and_zoom_and_is_hit_at_its_centre(
     second_app: App, open_page: Callable[..., Any]
 ) -> None:
-    """A zoom of 200 % halves the width that a page has, in px of CSS: 160 px are a screen of 320 px at 200 %."""
+    """A zoom of 200 % halves what a page has, in px of CSS: 160 px are the width of a screen of 320 px at 200 %."""
     page = open_page("Program", on=second_app)
     where = """() => {
         const stop = document.querySelector("button.rds-stop"), box = stop.getBoundingClientRect();
@@ -42,7 +33,7 @@ def test_the_emergency_stop_has_its_corner_at_every_width_and_zoom_and_is_hit_at
         return [x, y, inside, document.elementFromPoint(x, y) === stop];
     }"""
     for width in (160, 195, 320, 390, 643, 800, 960, 1280, 1920):
-        page.set_viewport_size({"width": width, "height": 640})
+        page.set_viewport_size({"width": width, "height": 400})
         for down in (0, 3000):
             page.evaluate(f"document.querySelector('.rds-app').scrollTop = {down}")
             x, y, inside, hit = page.evaluate(where)

@@ -61,10 +61,10 @@ class Reply:
 
 
 class WorkerProcess:
-    """The process; `environment` goes over this one's."""
+    """The process; `environment` goes over this one's. The first one may be there already (`forked_worker()`)."""
 
-    def __init__(self, work: Work, environment: Mapping[str, str]):
-        self._work, self._environment = work, {**_ONE_THREAD, **environment}
+    def __init__(self, work: Work, environment: Mapping[str, str], begun: Any = None):
+        self._work, self._environment, self._begun = work, {**_ONE_THREAD, **environment}, begun
         self._process: subprocess.Popen[bytes] | None = None
         self._told: Work | None = None  # whose function the process was sent
         self._is_ready = False  # whether it has said that it has it
@@ -169,7 +169,8 @@ class WorkerProcess:
             if self._ending:
                 raise OSError("ended")
             if self._process is None:
-                self._process = subprocess.Popen(
+                self._process, self._begun = self._begun, None
+                self._process = self._process or subprocess.Popen(
                     [sys.executable, "-P", "-m", "rds.core.parallel.worker"],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import pickle
 import sys
-from typing import Any
+from typing import IO, Any
 
 from rds.core.errors import RdsError
 from rds.core.parallel.outcome import reason_of
@@ -20,11 +20,16 @@ from rds.core.scheduling import end_with_parent
 
 
 def main() -> None:
-    """Answer items until there are none."""
+    """Be a worker, over stdin and stdout."""
     end_with_parent()
     answers = os.fdopen(os.dup(1), "wb")
+    serve(sys.stdin.buffer, answers)
+
+
+def serve(questions: IO[bytes], answers: IO[bytes]) -> None:
+    """Answer items until there are none."""
+    keep_process_private()
     os.dup2(2, 1)
-    questions = sys.stdin.buffer
     try:
         sys.path += [folder for folder in pickle.loads(receive(questions)) if folder not in sys.path]
         function: Any = None
@@ -61,5 +66,4 @@ def _answer(function: Any, data: bytes) -> bytes:
 
 
 if __name__ == "__main__":
-    keep_process_private()
     main()

@@ -14,7 +14,7 @@ from rds.core.errors import InputError
 def new_folder(names: Sequence[str], mode: str) -> Path:
     """Where the results of a run of these axes go when nobody says: a new folder under `runs/`."""
     stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-    return Path("runs") / f"{stamp}-{'-'.join(names)}-{mode}-{secrets.token_hex(2)}"
+    return Path("runs") / f"{stamp}-{'-'.join(names)}-{mode}-{secrets.token_hex(4)}"
 
 
 def require_writable(folder: str | Path) -> None:

@@ -16,60 +16,16 @@ import socket
 import subprocess
 import sys
 import threading
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rds.core.parallel.forked import ForkedProcess, fork_quietly
 from rds.core.scheduling import end_with_parent
 
 LAUNCHER = ["-m", "rds.panels.app.kernel"]  # after the interpreter: how Jupyter starts such a kernel otherwise
 _LONGEST = 64  # bytes of a process's number
 _PATIENCE = 60.0  # s for the imports, on a busy computer
-
-
-class ForkedKernel:
-    """What Jupyter uses of `subprocess.Popen`, for a process that is somebody else's child."""
-
-    stdin = stdout = stderr = None
-
-    def __init__(self, pid: int):
-        """ProcessLookupError if it has ended already."""
-        self.pid = pid
-        self.returncode: int | None = None
-        self._handle = os.pidfd_open(pid)
-
-    def poll(self) -> int | None:
-        """None while it runs; then 0, because its exit code is its parent's to know."""
-        if self.returncode is None and self._ended(0.0):
-            self.returncode = 0
-            os.close(self._handle)
-        return self.returncode
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Wait for its end, at most `timeout` s: subprocess.TimeoutExpired after that."""
-        if self.returncode is None and not self._ended(timeout):
-            raise subprocess.TimeoutExpired(f"kernel {self.pid}", timeout or 0.0)
-        return self.poll() or 0
-
-    def send_signal(self, number: int) -> None:
-        """Send a signal, unless it has ended."""
-        if self.poll() is None:
-            with contextlib.suppress(ProcessLookupError):
-                signal.pidfd_send_signal(self._handle, number)
-
-    def terminate(self) -> None:
-        """Ask it to end."""
-        self.send_signal(signal.SIGTERM)
-
-    def kill(self) -> None:
-        """End it."""
-        self.send_signal(signal.SIGKILL)
-
-    def _ended(self, timeout: float | None) -> bool:
-        poll = select.poll()
-        poll.register(self._handle, select.POLLIN)
-        return bool(poll.poll(None if timeout is None else timeout * 1e3))
 
 
 class ReadyKernels:
@@ -93,7 +49,7 @@ class ReadyKernels:
         self._channel.settimeout(_PATIENCE)
         self._answers = True
 
-    def start(self, command: Sequence[str], env: Mapping[str, str], cwd: str | Path) -> ForkedKernel | None:
+    def start(self, command: Sequence[str], env: Mapping[str, str], cwd: str | Path) -> ForkedProcess | None:
         """The kernel that `command` would start; None if it cannot come from here."""
         if list(command[1:3]) != LAUNCHER:
             return None
@@ -108,7 +64,7 @@ class ReadyKernels:
                 answer = b""
             self._answers = bool(answer)  # it has died, or hangs: what it says later is nobody's
         try:
-            return ForkedKernel(int(answer)) if answer else None
+            return ForkedProcess(int(answer)) if answer else None
         except OSError:  # the kernel has ended already
             return None
 
@@ -143,21 +99,26 @@ def main() -> None:
     if told is None:
         return
     end_with_parent()  # whatever a user's code holds; ipykernel looks now and then, in Python
+    from rds.panels.session.beside import begin_beside
+
+    begin_beside()
     if os.getppid() == parent:
         launch([*told["arguments"], f"--IPKernelApp.parent_handle={parent}"])
 
 
 def _fork_for_each(channel: socket.socket) -> dict[str, Any] | None:
     """In each forked process what it was told, ready to be a kernel; None in this one, at the end of the channel."""
+    from rds.panels.session.beside import IDLE, import_for_pictures
+
     with channel, channel.makefile("r", encoding="utf-8") as lines:
-        for line in lines:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", DeprecationWarning)  # numpy's threads, which have no work yet
-                pid = os.fork()
+        while line := lines.readline():
+            pid = fork_quietly()
             if pid == 0:
                 told: dict[str, Any] = json.loads(line)
                 break
             channel.sendall(f"{pid}\n".encode())
+            if not select.select([channel], [], [], IDLE)[0]:
+                import_for_pictures()
         else:
             return None
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)

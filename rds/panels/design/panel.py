@@ -58,7 +58,7 @@ class DesignView:
         self._stale, self._undrawn, self._quiet = True, True, 0
         self._complains = False  # whether the notice is about the poles
         self._buttons = self._make_buttons()
-        self.plane.layout.flex = "1 1 0"
+        self.plane.layout.flex = "1 1 430px"
         self.numbers.layout.flex = "0 0 auto"
         top = widgets.HBox([self.plane, self.numbers])
         top.add_class("rds-splane-row")

@@ -296,4 +296,4 @@ def followed(columns: Sequence[str]) -> list[str]:
 
 
 def _name(axes: Sequence[str], mode: str) -> str:
-    return f"{time.strftime('%Y%m%d-%H%M%S')}-{'-'.join(axes)}-{mode}-{secrets.token_hex(2)}"
+    return f"{time.strftime('%Y%m%d-%H%M%S')}-{'-'.join(axes)}-{mode}-{secrets.token_hex(4)}"

@@ -166,7 +166,7 @@ class JogView:
         axis = self.jog.axes.get(name)
         low, high = axis.travel if axis is not None else self.jog.spindles[name].speeds
         unit, what = (axis.unit, "travel") if axis is not None else ("rev/min", "speeds")
-        return f'<span class="rds-jog-at">– {escape(unit)}</span> {what} {low:g} to {high:g}'
+        return f'<span class="rds-jog-at">– {escape(unit)}</span> {what} {low:g} to {high:g} {escape(unit)}'
 
     def _place(self, name: str) -> str:
         jog = self.jog

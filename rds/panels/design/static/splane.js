@@ -13,7 +13,7 @@ function render({ model, el }) {
   svg.setAttribute("aria-label", "s-plane: poles can be moved with the arrow keys");
   box.append(svg, bar);
   el.append(box);
-  let view = null; // centre (x, y) and units per pixel
+  let view = null; // centre (x, y) and units per pixel; the width that this is for, and what was fitted, or null: by hand
   let dragged = null; // name of the pole that is being moved, and where it is proposed
   let asked = 0, waiting = null, shownKind = "";
 
@@ -26,7 +26,7 @@ function render({ model, el }) {
     bar.append(button);
   }
   const hint = make("span", "rds-splane-hint");
-  hint.textContent = "Drag a pole, or use the arrow keys (Shift: 10, Alt: 0.1). Dashed: limit of the sample period. Small crosses: the loop's poles over the cloud.";
+  hint.textContent = "Drag a pole, or use the arrow keys (Shift: 10, Alt: 0.1). Circles: rad/s; rays: damping ratio ζ. Dashed: limit of the sample period. Small crosses: the loop's poles over the cloud.";
   bar.append(hint);
 
   function make(tag, name = "") { const made = document.createElement(tag); made.className = name; return made; }
@@ -55,9 +55,13 @@ function render({ model, el }) {
     const high = Math.max(5, ...poles.map((pole) => Math.abs(pole.im))) * 1.5;
     const right = -0.18 * left;
     const scale = Math.max((right - left) / inner().w, (2 * high) / inner().h);
-    view = { x: right - (scale * inner().w) / 2, y: 0, scale };
+    view = { x: right - (scale * inner().w) / 2, y: 0, scale, width: inner().w, all };
   }
-  function zoom(factor) { view.scale = Math.min(Math.max(view.scale * factor, 1e-4), 1e3); view.x *= factor; }
+  function zoom(factor) { view.scale = Math.min(Math.max(view.scale * factor, 1e-4), 1e3); view.x *= factor; view.all = null; }
+  function fitWidth() { // what was seen across stays in sight when the page is made narrower or wider
+    if (view.all !== null) fit(view.all);
+    else { view.scale *= view.width / inner().w; view.width = inner().w; }
+  }
 
   const step = (span, count) => {
     const rough = span / count, power = 10 ** Math.floor(Math.log10(rough));
@@ -66,6 +70,7 @@ function render({ model, el }) {
 
   function draw() {
     if (!view) fit(false);
+    else if (view.width !== inner().w) fitWidth();
     const focus = document.activeElement && svg.contains(document.activeElement) ? document.activeElement.dataset.pole : null;
     const { w, h } = inner();
     svg.setAttribute("width", width()); svg.setAttribute("height", height());
@@ -103,7 +108,7 @@ function render({ model, el }) {
       shape("text", { x: px(x), y: middle + 16, "text-anchor": "middle", class: "rds-splane-tick" }, svg, number(x));
     for (let y = Math.ceil(y0 / tick) * tick; y <= y1; y += tick)
       shape("text", { x: MARGIN.left - 6, y: py(y) + 4, "text-anchor": "end", class: "rds-splane-tick" }, svg, number(y));
-    shape("text", { x: MARGIN.left + w / 2, y: height() - 6, "text-anchor": "middle", class: "rds-splane-tick" }, svg, "real part [1/s]; circles: rad/s; rays: damping ratio ζ");
+    shape("text", { x: MARGIN.left + w / 2, y: height() - 6, "text-anchor": "middle", class: "rds-splane-tick" }, svg, "real part [1/s]");
     shape("text", { x: 14, y: MARGIN.top + h / 2, "text-anchor": "middle", class: "rds-splane-tick", transform: `rotate(-90 14 ${MARGIN.top + h / 2})` }, svg, "imaginary part [rad/s]");
   }
   const number = (value) => String(Number(value.toPrecision(6))).replace("-", "−");
