@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
+from rds.nc.language.batch import Batch
 from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, STOP, Block, check, settle_motion
 from rds.nc.language.canon import Call, MotionBlock
 from rds.nc.language.context import Context
@@ -119,6 +120,14 @@ class Interpreter:
 
     def run(self) -> Iterator[MotionBlock | Call]:
         """The canonical calls. Raises ProgramError."""
+        return cast("Iterator[MotionBlock | Call]", self._run())
+
+    def run_in_batches(self) -> Iterator[MotionBlock | Call | Batch]:
+        """The same, with what compiled code has read in batches, which it can write. Raises ProgramError."""
+        self.out.in_batches = True
+        return self._run()
+
+    def _run(self) -> Iterator[MotionBlock | Call | Batch]:
         out = self.out
         out.file = self.source.name
         start(self.context)
@@ -152,7 +161,7 @@ class Interpreter:
         out.call("ON_RESET")
         yield from self._take()
 
-    def _take(self) -> list[MotionBlock | Call]:
+    def _take(self) -> list[MotionBlock | Call | Batch]:
         items, self.out.items = self.out.items, []
         return items
 
