@@ -7,7 +7,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -40,10 +39,10 @@ def canon_alone(words: Sequence[str]) -> int | None:
     from rds.core.errors import RdsError
     from rds.nc.language.dialect import Dialect
     from rds.nc.language.interpreter import Interpreter
+    from rds.nc.language.source import open_file
 
-    file = Path(words[2])
     try:
-        interpreter = Interpreter(file, options=Dialect(any_exit=True), name=str(file))
+        interpreter = Interpreter(open_file(words[2], words[2]), options=Dialect(any_exit=True))
         print_canon(interpreter.run_in_batches())
         interpreter.close()
     except RdsError as error:

@@ -6,8 +6,6 @@ left early counts anew, and a BREAK that is passed over does nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
@@ -17,26 +15,33 @@ from rds.nc.language.saved_modes import SavedModes
 from rds.nc.language.source import Place, Source
 
 
-@dataclass(slots=True)
 class Label:
     """Where an O word stands that can be jumped to: the file and the place of its block, and what kind it is."""
 
-    kind: str
-    source: Source
-    place: Place
+    __slots__ = ("kind", "place", "source")
+
+    def __init__(self, kind: str, source: Source, place: Place):
+        self.kind = kind
+        self.source = source
+        self.place = place
 
 
-@dataclass(slots=True)
 class Frame:
-    """A subroutine being executed: where it was called from, and what it found."""
+    """A subroutine being executed: where it was called from, and what it found.
 
-    name: str
-    source: Source
-    place: Place
-    kept: list[float] | None  # None: M98 called it, which has the parameters of its caller
-    saved: SavedModes | None = None  # by M70 or M73
-    more: int = 0  # how often M98 still calls it
-    repeats: dict[str, int] = field(default_factory=dict)  # rounds left, by label
+    `kept`: the parameters of its caller; None: M98 called it, which shares them. `more`: how often M98 still calls it.
+    """
+
+    __slots__ = ("kept", "more", "name", "place", "repeats", "saved", "source")
+
+    def __init__(self, name: str, source: Source, place: Place, kept: list[float] | None, more: int = 0):
+        self.name = name
+        self.source = source
+        self.place = place
+        self.kept = kept
+        self.more = more
+        self.saved: SavedModes | None = None  # by M70 or M73
+        self.repeats: dict[str, int] = {}  # rounds left, by label
 
 
 class Branches:

@@ -8,9 +8,9 @@ Other than in LinuxCNC, a subroutine ends only with its own name (RETURN may bea
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 from rds.nc.language.branches import BRANCH_ACTIONS, Branches, Frame, Label
 from rds.nc.language.dialect import Dialect
@@ -36,7 +36,7 @@ class Control(Branches):
         self._main = source
         self._seeking = ""  # the subroutine whose definition is being looked for
         self._defining = ""
-        self._opened: dict[Path, Source] = {}
+        self._opened: dict[str, Source] = {}
         self._saved: SavedModes | None = None  # by M70 in the main program
         self.restore: Callable[[SavedModes], None] = lambda _: None  # what M73 wants when a subroutine returns
 
@@ -183,13 +183,13 @@ class Control(Branches):
 
     def _file(self, word: Word) -> Source | None:
         """The file beside the program that is named like the subroutine."""
-        folder: Path | None = self._main.folder
+        folder = self._main.folder
         if folder is None or not _FILE_NAME.fullmatch(word.name) or len(word.name.encode()) > 200:
             return None
-        path = folder / f"{recoded(word.name)}.ngc"
-        if not path.is_file():
+        path = os.path.join(folder, f"{recoded(word.name)}.ngc")
+        if not os.path.isfile(path):
             return None
-        found = open_file(path, str(path), semicolons=self._dialect.program_numbers)
+        found = open_file(path, path, semicolons=self._dialect.program_numbers)
         self._opened[path] = found
         return found
 

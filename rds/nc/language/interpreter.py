@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
 from rds.nc.language.batch import Batch
@@ -25,13 +25,15 @@ from rds.nc.language.parameters import Parameters, read_parameters
 from rds.nc.language.program_bounds import Bounds
 from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes, lines_to_restore, modes_now
-from rds.nc.language.source import LONGEST, open_source
+from rds.nc.language.source import LONGEST, Source, open_source
 from rds.nc.language.state import State
 from rds.nc.language.stream import Stream
 from rds.nc.language.tools import Tool, ToolTable, read_tools
 from rds.nc.language.words import column_of, fill, line_number, place_of, read_plain, read_words, recoded, tidy, word_at
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rds.machines.ncc import Script
     from rds.nc.compensation.moves import Stretch
     from rds.nc.language.contour_reading import ContourReading
@@ -78,7 +80,7 @@ class Interpreter:
 
     def __init__(
         self,
-        source: str | Path | IO[Any],
+        source: str | Path | IO[Any] | Source,
         *,
         tools: Path | Iterable[Tool] | None = None,
         parameters: Path | Mapping[int, float] | None = None,
@@ -87,8 +89,8 @@ class Interpreter:
         stretches: list[Stretch] | None = None,
         remark: Callable[[ProgramError], None] | None = None,
     ):
-        table = ToolTable(read_tools(tools) if isinstance(tools, Path) else tools or ())
-        kept = read_parameters(parameters) if isinstance(parameters, Path) else parameters
+        table = ToolTable(read_tools(tools) if isinstance(tools, os.PathLike) else tools or ())
+        kept = read_parameters(parameters) if isinstance(parameters, os.PathLike) else parameters
         self.options = options
         self.source = open_source(source, name, semicolons=options.program_numbers)
         self.out = Stream()
