@@ -36,8 +36,8 @@ CALLS: tuple[tuple[str, tuple[int | str, ...]], ...] = (
 # What compiled code knows of the interpreter's state, by its place: floats behind the position, and modes.
 RATE_NOW, SPEED_NOW, CYCLE_R, CYCLE_DEPTH, CYCLE_DWELL, CYCLE_PECK, CYCLE_START, TOLERANCE, JOINING = range(6, 15)
 MOTION, ABSOLUTE, ARC_ABSOLUTE, PLANE, INCHES, IN_SERIES, RETRACT_HIGH, SPINDLE, MIST, FLOOD = range(10)
-PATH, FEED_OVERRIDE, SPEED_OVERRIDE, IN_PLAIN_SPACE = range(10, 14)  # only read; the last: no G43.4
-FLOATS, MODES = JOINING + 1, IN_PLAIN_SPACE + 1
+PATH, FEED_OVERRIDE, SPEED_OVERRIDE, TAKES_MODES = range(10, 14)  # only read; the last: lines that change modes
+FLOATS, MODES = JOINING + 1, TAKES_MODES + 1
 
 
 class Batch:

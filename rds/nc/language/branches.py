@@ -6,6 +6,8 @@ left early counts anew, and a BREAK that is passed over does nothing.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
@@ -15,15 +17,12 @@ from rds.nc.language.saved_modes import SavedModes
 from rds.nc.language.source import Place, Source
 
 
-class Label:
+class Label(NamedTuple):
     """Where an O word stands that can be jumped to: the file and the place of its block, and what kind it is."""
 
-    __slots__ = ("kind", "place", "source")
-
-    def __init__(self, kind: str, source: Source, place: Place):
-        self.kind = kind
-        self.source = source
-        self.place = place
+    kind: str
+    source: Source
+    place: Place
 
 
 class Frame:
@@ -103,6 +102,40 @@ class Branches:
         self._look_for_progress(label)
         self.source = label.source
         self.source.go_to(label.place)
+
+    def label_of(self, name: str) -> Label | None:
+        """Where the loop or branch `name` begins, once that has been executed."""
+        return self._labels.get(name)
+
+    def jumps_unseen(self, label: Label) -> bool:
+        """Count a jump back to a label; False, and nothing done, where something is to be looked at or kept for it."""
+        jumps, kept = self._jumps + 1, self._kept
+        if (
+            jumps > self._dialect.max_jumps
+            or not jumps & (jumps - 1)
+            or kept is None
+            or (kept[1] == self._parameters.changes and kept[0] == label)
+        ):
+            return False
+        self._jumps = jumps
+        return True
+
+    def round_of(self, name: str, label: Label, test: float) -> bool:
+        """Whether a REPEAT loop has one more round, which begins."""
+        rounds = self._rounds()
+        left = rounds.get(name)
+        if left is None:
+            left = round(test)
+        if left > 0:
+            rounds[name] = left - 1
+        else:
+            rounds.pop(name, None)
+        self._forget_rounds(label)
+        return left > 0
+
+    def has_left_branches(self) -> None:
+        """The next block stands in none, or in the one of an IF that is executed."""
+        self._done_if = True
 
     def begin_anew(self) -> None:
         """What is executed from now on, such as a contour for the second time, is no round of a loop."""
@@ -204,17 +237,9 @@ class Branches:
     def _repeat(self, word: Word) -> None:
         self._new_label(word)
         label = self._label(word, "repeat")
-        rounds = self._rounds()
         self.skipping = ""
-        left = rounds.get(word.name)
-        if left is None:
-            left = round(word.test)
-        if left > 0:
-            rounds[word.name] = left - 1
-        else:
-            rounds.pop(word.name, None)
+        if not self.round_of(word.name, label, word.test):
             self._skip_to(word.name)
-        self._forget_rounds(label)
 
     def _endrepeat(self, word: Word) -> None:
         label = self._label(word, "repeat")

@@ -50,10 +50,14 @@ class Control(Branches):
         """Whether lines have been executed again, or may be."""
         return self._jumps > 0
 
+    @property
+    def scope(self) -> str:
+        """The subroutine that labels belong to now; "" in the main program."""
+        return self._frames[-1].name if self._frames else ""
+
     def again(self, line: Line, lines: RepeatedLines) -> Word | None:
         """The O word that a kept line is now; None where it is to be read."""
-        scope = self._frames[-1].name if self._frames else ""
-        return None if self._defining else lines.control(line, scope, self.skipping)
+        return None if self._defining else lines.control(line, self.scope, self.skipping)
 
     def close(self) -> None:
         """Close the program and the files of its subroutines."""

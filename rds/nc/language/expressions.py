@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from rds.nc.language.parameters import Parameters
 
 EQUAL = 1e-4  # numbers that differ by less are EQ (LinuxCNC's TOLERANCE_EQUAL)
@@ -264,24 +262,19 @@ BINARY: dict[str, Callable[[float, float], float]] = {
 
 
 @cache
-def _extended() -> tuple[ModuleType, Any]:
-    """numpy, for its numbers of extended precision, and π as one; imported for the programs that have an angle."""
-    import numpy as np
+def _extended() -> Mapping[str, Callable[[float], float]]:
+    """Functions of angles in extended precision; for the programs that have an angle."""
+    from rds.nc.language.extended_angles import functions
 
-    return np, np.longdouble("3.14159265358979323846264338327950288")
+    return functions()
 
 
 def _circular(name: str) -> Callable[[float], float]:
-    def found(degrees: float) -> float:
-        np, pi = _extended()
-        return float(getattr(np, name)(np.longdouble(degrees) * pi / 180))
-
-    return found
+    return lambda degrees: _extended()[name](degrees)
 
 
 def _degrees(radians: float) -> float:
-    np, pi = _extended()
-    return float(np.longdouble(radians * 180.0) / pi)
+    return _extended()["degrees"](radians * 180.0)
 
 
 def arc_tangent(y: float, x: float) -> float:

@@ -80,6 +80,7 @@ class FastLane:
         else:
             self.wait = OPENS_AFTER
         self._pause = 0
+        self.takes_modes = True  # lines that change modes besides the motion, or drill
         self._is_long = source.size() >= LONG_PROGRAM
         self._reader: LineReader | None = None
         self._state = array("d", bytes(8 * FLOATS))
@@ -135,7 +136,7 @@ class FastLane:
             (
                 *(state.motion, state.absolute, state.arc_absolute, state.plane, state.inches, state.cycle_series),
                 *(state.retract_high, state.spindle, state.mist, state.flood, PATH_MODES.index(state.path_mode)),
-                *(state.feed_override, state.speed_override, not state.tcp),
+                *(state.feed_override, state.speed_override, self.takes_modes and not state.tcp),
             ),
         )
         size, lines, rows, calls = read(source.buffer, source.at, source.next_line)

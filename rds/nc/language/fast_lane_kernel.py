@@ -31,7 +31,6 @@ from rds.nc.language.batch import (
     COMMENT,
     DWELL,
     FLOOD,
-    IN_PLAIN_SPACE,
     IN_SERIES,
     INCHES,
     MIST,
@@ -41,6 +40,7 @@ from rds.nc.language.batch import (
     RETRACT_HIGH,
     SPEED_NOW,
     SPINDLE,
+    TAKES_MODES,
 )
 from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE
 from rds.nc.language.fast_lane_cycles import cycle, is_sound
@@ -176,7 +176,7 @@ def _motion(found, modes):
     """The motion of a line, -1 for none; -2 where the interpreter is to decide."""
     given, motion, modal = found[GIVEN], found[MOVE], modes[MOTION]
     if found[DWELLS] != -1:
-        return -1 if motion == -1 and not given & (AXES | IJK) and modes[IN_PLAIN_SPACE] else -2
+        return -1 if motion == -1 and not given & (AXES | IJK) and modes[TAKES_MODES] else -2
     if motion == -1:
         if given & AXES:
             motion = -2 if modal == NO_MOTION else modal
@@ -184,11 +184,9 @@ def _motion(found, modes):
             motion = modal
     elif (motion == NO_MOTION and given & AXES) or (motion > 30 and motion != NO_MOTION and not given & AXES):
         return -2
-    if (motion > 30 or found[RETRACT] != -1) and not modes[IN_PLAIN_SPACE]:
-        return -2
-    if found[DISTANCE] != -1 and found[DISTANCE] != modes[ABSOLUTE] and not modes[IN_PLAIN_SPACE]:
-        return -2
-    return motion
+    changes = motion > 30 or found[RETRACT] != -1 or found[SPINDLE_WORD] != -1 or found[COOLANT_WORD] != -1
+    changes = changes or (found[DISTANCE] != -1 and found[DISTANCE] != modes[ABSOLUTE])
+    return motion if modes[TAKES_MODES] or not changes else -2
 
 
 @njit(error_model="numpy")

@@ -114,18 +114,24 @@ def _address(column: array[float] | array[int]) -> int:
     return column.buffer_info()[0]
 
 
+def library() -> ctypes.CDLL | None:
+    """The shared library, if it has been made before and is whole."""
+    try:
+        place = file_of("so")
+        whole(place)
+        return ctypes.CDLL(place) if _IS_TRIED else None
+    except (OSError, ValueError):
+        return None
+
+
 def stored_kernels() -> Kernels | None:
     """The kernels from what was compiled before; None where there is nothing, or it is damaged."""
     if not _IS_TRIED:
         return None
-    try:
-        place = file_of("so")
-        whole(place)
-        library = ctypes.CDLL(place)
-        found = [ctypes.cast(getattr(library, name), _POINTER).value for name in ENTRIES]
-        return Kernels(found[0] or 0, found[1] or 0, library)
-    except (OSError, ValueError, AttributeError):
-        pass
+    shared = library()
+    if shared is not None:
+        found = [ctypes.cast(getattr(shared, name), _POINTER).value for name in ENTRIES]
+        return Kernels(found[0] or 0, found[1] or 0, shared)
     try:
         objects = {name: whole(file_of(f"{name}.o")) for name in ENTRIES}
         from rds.nc.language.fast_lane_target import loaded

@@ -16,6 +16,7 @@ from numba import carray, njit, types
 
 from rds.core.private_files import make_folder, open_private
 from rds.nc.language.batch import FLOATS, MODES
+from rds.nc.language.extended_angles import NAMES
 from rds.nc.language.fast_lane_kernel import read_lines
 from rds.nc.language.fast_lane_native import FOLDER, FOUND, WORDS, digest, family, file_of
 from rds.nc.language.fast_lane_target import target_machine
@@ -78,6 +79,36 @@ _ENTRIES = {
 }
 
 
+# Angles in extended precision (extended_angles.py), which numba does not know: by the C library's functions.
+_PI, _HALF_TURN = "0xK4000C90FDAA22168C235", "0xK4006B400000000000000"  # and 180
+_CIRCULAR = f"""
+declare x86_fp80 @NAMEl(x86_fp80)
+define double @rds_NAME(double %degrees) {{
+  %wide = fpext double %degrees to x86_fp80
+  %times = fmul x86_fp80 %wide, {_PI}
+  %radians = fdiv x86_fp80 %times, {_HALF_TURN}
+  %found = call x86_fp80 @NAMEl(x86_fp80 %radians)
+  %narrow = fptrunc x86_fp80 %found to double
+  ret double %narrow
+}}
+"""
+_DEGREES = f"""
+define double @rds_degrees(double %share) {{
+  %wide = fpext double %share to x86_fp80
+  %found = fdiv x86_fp80 %wide, {_PI}
+  %narrow = fptrunc x86_fp80 %found to double
+  ret double %narrow
+}}
+"""
+
+
+def _angles() -> dict[str, str]:
+    """LLVM's text of the functions of angles; nothing for a processor without numbers of 80 bits."""
+    if os.uname().machine != "x86_64":
+        return {}
+    return {"rds_angles": "".join(_CIRCULAR.replace("NAME", name) for name in NAMES[:3]) + _DEGREES}
+
+
 def compiled() -> dict[str, str] | None:
     """LLVM's text of each entry; None where one would need more of numba than a file of its own can have."""
     found = {}
@@ -108,7 +139,7 @@ def keep(texts: dict[str, str]) -> None:
     What this Python made from earlier sources is removed.
     """
     linker = shutil.which("ld")
-    library = _linked(linker, objects(texts, shared=True)) if linker else None
+    library = _linked(linker, objects(texts | _angles(), shared=True)) if linker else None
     files = {"so": library} if library else {f"{name}.o": code for name, code in objects(texts, shared=False).items()}
     with suppress(OSError):
         make_folder(FOLDER)

@@ -10,6 +10,7 @@ from typing import IO, TYPE_CHECKING, Any, cast
 from rds.nc.language.batch import Batch
 from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, STOP, Block, check, settle_motion
 from rds.nc.language.canon import Call, MotionBlock
+from rds.nc.language.compiled_loops import LOOP_ENDS, Loops
 from rds.nc.language.context import Context
 from rds.nc.language.control import Control
 from rds.nc.language.dialect import Dialect
@@ -105,6 +106,8 @@ class Interpreter:
         self._contour: ContourReading | None = None  # while the moves of a contour's subroutine are gathered
         self.lane = FastLane(self.context, self.source)
         self._repeated = RepeatedLines(self.context.parameters)
+        self._loops = Loops(self.context, self.control, self._repeated)
+        self.by_line = False  # whether one line after the other is executed, and none together with others
         self._others = 0  # kept lines that the fast lane could not take, since it was tried
         self._remark = remark
         self._bounds = Bounds(self.context, self.control, remark)
@@ -211,6 +214,8 @@ class Interpreter:
             word = control.again(line, self._repeated)
             if word is not None:
                 control.execute(word)
+                if word.kind in LOOP_ENDS and not self.by_line and not control.skipping:
+                    self._loops.go_round(word.name)
             return None if word is None else False
         if control.skipping:
             return False

@@ -38,6 +38,16 @@ class Stream:
         self._kinds, self._digits, self._ns, self._lines, self._values = self._columns
 
     @property
+    def columns(self) -> Columns:
+        """The rows gathered so far, to add to."""
+        return self._columns
+
+    def make_room(self, rows: int) -> None:
+        """So many rows may be added to `columns`."""
+        if len(self._kinds) + rows > BLOCK_ROWS:
+            self.flush()
+
+    @property
     def file(self) -> str:
         return self._file
 
