@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 from rds.nc.language.batch import Batch
 from rds.nc.language.call_text import UNWRITTEN, call_text
 from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE, Call, MotionBlock
-from rds.nc.language.fast_lane import is_loaded, kernel, stored
+from rds.nc.language.fast_lane import LONG_TEXT, LONG_TEXT_SHARED, is_loaded, kernel, stored, worth
 
 if TYPE_CHECKING:
     from rds.nc.language.fast_lane_native import Kernels
     from rds.nc.language.motion_rows import Columns
 
-MANY = 1024  # rows that are worth writing by compiled code
-LONG_TEXT = 20_000  # lines that Python writes in the time that compiled code takes to load
+MANY = 64  # rows that are worth writing by compiled code
 
 _STRAIGHT = "(%.4f, %.4f, %.4f, %.4f, %.4f, %.4f)"
 _ROW_FORMATS = {
@@ -81,7 +80,9 @@ def _compiled(number: int, item: MotionBlock | Batch) -> Kernels | None:
     rows = len(item)
     if isinstance(item, MotionBlock) and rows < MANY:
         return None
-    return kernel() if is_loaded() else stored() if number + rows > LONG_TEXT else None
+    if is_loaded():
+        return kernel()
+    return stored() if number + rows > worth(LONG_TEXT, LONG_TEXT_SHARED) else None
 
 
 def _lines(item: MotionBlock | Batch, columns: Columns, number: int) -> Iterator[str]:

@@ -22,11 +22,12 @@ if TYPE_CHECKING:
     from rds.nc.language.fast_lane_native import Kernels, LineReader
     from rds.nc.language.source import Source
 
-# Loading the kernels takes the time of some thousand lines in Python, and compiling them that of a million: each is
-# done for programs that are certain to be long, and for others (of unknown length, or with loops) once they have turned
-# out to be.
-WORTH_LOADING = 1 << 17  # bytes
-OPENS_AFTER = 5_000  # lines
+# Loading the kernels takes the time of some thousand lines in Python, or of a hundred from a shared library, and
+# compiling them that of a million: each is done for programs that are certain to be long, and for others (of unknown
+# length, or with loops) once they have turned out to be.
+WORTH_LOADING, WORTH_LOADING_SHARED = 1 << 17, 1 << 12  # bytes
+OPENS_AFTER, OPENS_AFTER_SHARED = 5_000, 200  # lines
+LONG_TEXT, LONG_TEXT_SHARED = 20_000, 500  # calls that Python writes in the time that loading takes
 LONG_PROGRAM = 1 << 21  # bytes; worth compiling
 COMPILES_AFTER = 50_000  # lines
 ROWS = 16384  # at once
@@ -39,14 +40,28 @@ _PLAIN = frozenset((0, 10, 20, 30, NO_MOTION, *(CYCLES - {870, 880})))
 
 
 @cache
+def _kept() -> frozenset[str]:
+    """The endings of the compiled files that there are."""
+    try:
+        names = os.listdir(_FOLDER)
+    except OSError:
+        return frozenset()
+    return frozenset(name[-2:] for name in names if name.startswith("fast_lane.") and name[-2:] in ("so", ".o"))
+
+
+def worth(usual: int, shared: int) -> int:
+    """From where on loading is worth its time: `usual`, or `shared` where there is a shared library."""
+    return 0 if is_loaded() else shared if "so" in _kept() else usual
+
+
+@cache
 def stored() -> Kernels | None:
     """The compiled kernels, if they have been compiled before; loading takes the time of some thousand lines."""
+    if not _kept():
+        return None  # before ctypes is imported for them
     try:
-        if not any(name.startswith("fast_lane.") and name.endswith((".so", ".o")) for name in os.listdir(_FOLDER)):
-            return None  # before ctypes is imported for them
-
         from rds.nc.language.fast_lane_native import stored_kernels
-    except (ImportError, OSError):
+    except ImportError:
         return None
     return stored_kernels()
 
@@ -75,10 +90,10 @@ class FastLane:
         self._context = context
         if context.dialect.program_numbers:
             self.wait = NEVER
-        elif is_loaded() or source.size() >= WORTH_LOADING:
+        elif source.size() >= worth(WORTH_LOADING, WORTH_LOADING_SHARED):
             self.wait = 0
         else:
-            self.wait = OPENS_AFTER
+            self.wait = worth(OPENS_AFTER, OPENS_AFTER_SHARED)
         self._pause = 0
         self.takes_modes = True  # lines that change modes besides the motion, or drill
         self._is_long = source.size() >= LONG_PROGRAM
