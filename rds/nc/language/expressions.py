@@ -21,6 +21,8 @@ DEEPEST = 50  # brackets and # inside one another
 
 NUMBER = re.compile(r"[+-]*[0-9.]*")
 SPELLED = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+_OUTSIDE_ASCII = re.compile(r"[\x80-\xff]+")
+_MINUS = "\N{MINUS SIGN}".encode().decode("latin-1")  # a program's text is read byte by byte
 FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
 OPERATION = re.compile(r"\*\*|[-+*/\]]|and|mod|or|xor|eq|ne|ge|gt|le|lt")
 PRECEDENCE = {
@@ -102,8 +104,9 @@ class Reader:
         match = NUMBER.match(self.text, self.at)
         spelled = match[0] if match else ""
         if not SPELLED.fullmatch(spelled):
-            what = f"{spelled!r} is no number" if spelled else f"a number cannot begin with {self.peek()!r}"
-            raise self.fault(f"{what}; write one like -12.5")
+            if spelled:
+                raise self.fault(f"{spelled!r} is no number; write one like -12.5")
+            raise self.fault(f"a number cannot begin with {self._character()}; write one like -12.5")
         self.at += len(spelled)
         return float(spelled)
 
@@ -148,10 +151,19 @@ class Reader:
         self.at = match.end()
         return match[0]
 
+    def _character(self) -> str:
+        """The next character as it is meant; outside of ASCII it is several bytes."""
+        match = _OUTSIDE_ASCII.match(self.text, self.at)
+        if match is None:
+            return repr(self.peek())
+        if match[0].startswith(_MINUS):
+            return f"'{_MINUS}', a minus sign of a word processor; the one of programs is -"
+        return f"'{match[0]}'"
+
     def _function(self) -> float:
         match = FUNCTION.match(self.text, self.at)
         if match is None:
-            raise self.fault(f"a value cannot begin with {self.peek()!r}; functions are {_FUNCTIONS_TEXT}")
+            raise self.fault(f"a value cannot begin with {self._character()}; functions are {_FUNCTIONS_TEXT}")
         at, name = self.at, match[0]
         self.at = match.end()
         if self.peek() != "[":
