@@ -38,8 +38,8 @@ def body(r: Random, labels: count[int], depth: int = 2) -> list[str]:
         value = r.choice(["#50", "#60", "#<a>", "[#50*0.1]", "sin[#50*7]", number(r)])
         way = r.randrange(10)
         if way < 4:
-            words = [r.choice(["G0", "G1", "", "N5 G1"]), *axes(r), f"{r.choice('XYZ')}{value}"]
-            lines.append(" ".join(dict.fromkeys(word for word in words if word)))
+            words = [r.choice(["G0", "G1", "", "N5 G1"]), *axes(r, "YZABC"), f"X{value}"]
+            lines.append(" ".join(word for word in words if word))
         elif way < 7:
             lines.append(
                 f"#{r.choice(['60', '<a>', '<_g>', '[200+#50]'])}={value}" + r.choice(["", f" F[1+abs[{value}]]"])
@@ -108,6 +108,20 @@ def test_angles_of_the_library_are_numpy_s() -> None:
     for value in (*range(-720, 721, 15), *(r.uniform(-1e4, 1e4) for _ in range(500))):
         for name in NAMES:
             assert repr(compiled[name](value)) == repr(usual[name](value))
+
+
+def test_subroutines(monkeypatch: pytest.MonkeyPatch, rounds: list[int]) -> None:
+    """They call each other and themselves, from loops and from moves, with names and parameters of their own."""
+    for seed in range(12):
+        r = Random(seed)
+        labels = count(10)
+        first = ["#<a>=#1", "#<way>=[#1*#2]", *body(r, labels, 1), "o2 call [#2] [#1]", "g1 x#<way> y[#1+#2]"]
+        deeper = ["o5 if [#1 gt 0]", "o1 call [#1-1] [#2/2]", "X#1", *r.choice([[], ["o1 return"]]), "o5 endif"]
+        second = ["#<a>=#2", "X#1 Y#2", *r.choice([[], ["Z[1/[#50-26]]"]]), *body(r, labels, 1)]
+        subs = ["o1 sub", *first, *deeper, "o1 endsub", "o2 sub", *second, "o2 endsub", "#<way>=7", "#50=0"]
+        program = "\n".join(["G21 G1 F100", *subs, ""]) + looped(["o1 call [2] [#50]", "X#<way>"], 30).decode()
+        both(program.encode(), monkeypatch, 5000)
+    assert len(rounds) > 500
 
 
 def test_flow_in_loops(monkeypatch: pytest.MonkeyPatch) -> None:

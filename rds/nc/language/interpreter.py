@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING, Any, cast
 from rds.nc.language.batch import Batch
 from rds.nc.language.blocks import AXIS_SET, CHECKED, STOP, Block, check, settle_motion
 from rds.nc.language.canon import Call, MotionBlock
-from rds.nc.language.compiled_loops import LOOP_ENDS, Loops
+from rds.nc.language.compiled_loops import GOES_ON, Loops
 from rds.nc.language.context import Context
 from rds.nc.language.control import Control
 from rds.nc.language.dialect import Dialect
@@ -215,8 +215,8 @@ class Interpreter:
             word = control.again(line, self._repeated)
             if word is not None:
                 control.execute(word)
-                if word.kind in LOOP_ENDS and not self.by_line and not control.skipping:
-                    self._loops.go_round(word.name)
+                if word.kind in GOES_ON and not self.by_line and not control.skipping:
+                    self._loops.go_on(word.name)
             return None if word is None else False
         if control.skipping:
             return False
