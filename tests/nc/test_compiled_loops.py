@@ -60,13 +60,13 @@ def body(r: Random, labels: count[int], depth: int = 2) -> list[str]:
 
 def test_random_loops(monkeypatch: pytest.MonkeyPatch, rounds: list[int]) -> None:
     whole = 0
-    for seed in range(120):
+    for seed in range(50):
         r = Random(seed)
         head = r.choice(["", "G91\n", "G20\n"])
         result, _ = both(head.encode() + looped(body(r, count(1)), 30), monkeypatch)
         whole += result["said"] is None
-    assert whole > 40
-    assert len(rounds) > 800
+    assert whole > 15
+    assert len(rounds) > 300
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_angles_of_the_library_are_numpy_s() -> None:
 
 def test_subroutines(monkeypatch: pytest.MonkeyPatch, rounds: list[int]) -> None:
     """They call each other and themselves, from loops and from moves, with names and parameters of their own."""
-    for seed in range(12):
+    for seed in range(5):
         r = Random(seed)
         labels = count(10)
         first = ["#<a>=#1", "#<way>=[#1*#2]", *body(r, labels, 1), "o2 call [#2] [#1]", "g1 x#<way> y[#1+#2]"]
@@ -121,10 +121,10 @@ def test_subroutines(monkeypatch: pytest.MonkeyPatch, rounds: list[int]) -> None
         subs = ["o1 sub", *first, *deeper, "o1 endsub", "o2 sub", *second, "o2 endsub", "#<way>=7", "#50=0"]
         program = "\n".join(["G21 G1 F100", *subs, ""]) + looped(["o1 call [2] [#50]", "X#<way>"], 30).decode()
         both(program.encode(), monkeypatch, 5000)
-    assert len(rounds) > 500
+    assert len(rounds) > 200
 
 
 def test_flow_in_loops(monkeypatch: pytest.MonkeyPatch) -> None:
-    for seed in range(40):
+    for seed in range(20):
         r = Random(seed)
         both(looped(flow(r, True, 2, count(1), r.random() < 0.5), 25), monkeypatch)
