@@ -1,4 +1,4 @@
-"""`rds nc canon` beside `rs274 -g`: processor time of whole processes, for each kind of program that a course writes."""
+"""`rds nc canon` beside `rs274 -g`: processor time of whole processes, for each kind of program of a course."""
 
 from __future__ import annotations
 
@@ -63,10 +63,9 @@ def whole(place: Path, rounds: int) -> list[Figure]:
         for name, text in PROGRAMS.items():
             file = place / "whole.ngc"
             file.write_text(text(size))
-            times: list[tuple[float, float]] = []
+            both = [*ours, str(file)], ["rs274", "-g", str(file)]
             try:
-                for _ in range(rounds):
-                    times.append((_seconds([*ours, str(file)]), _seconds(["rs274", "-g", str(file)])))
+                times = [(_seconds(both[0]), _seconds(both[1])) for _ in range(rounds)]
             except FileNotFoundError:
                 return [Figure("whole process / rs274", note="skipped: rs274 (Debian: linuxcnc-uspace) is missing")]
             note = "{:.3f} s, rs274 {:.3f} s".format(*map(min, zip(*times, strict=True)))

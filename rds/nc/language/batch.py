@@ -38,6 +38,7 @@ RATE_NOW, SPEED_NOW, CYCLE_R, CYCLE_DEPTH, CYCLE_DWELL, CYCLE_PECK, CYCLE_START,
 MOTION, ABSOLUTE, ARC_ABSOLUTE, PLANE, INCHES, IN_SERIES, RETRACT_HIGH, SPINDLE, MIST, FLOOD = range(10)
 PATH, FEED_OVERRIDE, SPEED_OVERRIDE, TAKES_MODES = range(10, 14)  # only read; the last: lines that change modes
 FLOATS, MODES = JOINING + 1, TAKES_MODES + 1
+WORDS, FOUND = 15, 11  # room for what fast_lane_words.py finds in a line: values by letter, and all else
 
 
 class Batch:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 
-from rds.nc.language.fast_lane_native import library
+from rds.nc.language.fast_lane_files import library
 
 NAMES = ("sin", "cos", "tan", "degrees")
 _PI = "3.14159265358979323846264338327950288"

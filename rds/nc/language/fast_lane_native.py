@@ -9,39 +9,15 @@ anew whenever anything that went into it has changed.
 from __future__ import annotations
 
 import ctypes
-import os
-import sys
-import zlib
 from array import array
 from collections.abc import Callable, Iterator
-from functools import cache
 
-from rds.nc.language.batch import FLOATS, MODES
+from rds.nc.language.batch import FLOATS, FOUND, MODES, WORDS
+from rds.nc.language.fast_lane_files import ENTRIES, IS_TRIED, file_of, library, whole
 from rds.nc.language.motion_rows import Columns, empty
 
-ENTRIES = ("rds_read_lines", "rds_write_rows")
-SOURCES = (
-    "fast_lane_cycles.py",
-    "fast_lane_kernel.py",
-    "fast_lane_native.py",
-    "fast_lane_object.py",
-    "fast_lane_rows.py",
-    "fast_lane_text.py",
-    "fast_lane_words.py",
-    "arcs.py",
-    "batch.py",
-    "call_text.py",
-    "canon.py",
-    "cycles.py",
-    "source.py",
-    "state.py",
-)
-FOLDER = os.path.join(os.path.dirname(__file__), "__pycache__")
-WORDS, FOUND = 15, 11  # room of fast_lane_words.py: what a line's words are put into
 _WORK = WORDS + 6  # and the target of its move
-_DIGEST = 4  # bytes
 _OUT = 1 << 20  # bytes of text at once
-_IS_TRIED = sys.platform == "linux"  # elsewhere Python reads and writes the same, slower
 _POINTER, _WHOLE = ctypes.c_void_p, ctypes.c_int64
 # numba's convention: the result and what an exception would be (neither is used), then the arguments
 _HEAD = (ctypes.c_int32, _POINTER, _POINTER)
@@ -114,19 +90,9 @@ def _address(column: array[float] | array[int]) -> int:
     return column.buffer_info()[0]
 
 
-def library() -> ctypes.CDLL | None:
-    """The shared library, if it has been made before and is whole."""
-    try:
-        place = file_of("so")
-        whole(place)
-        return ctypes.CDLL(place) if _IS_TRIED else None
-    except (OSError, ValueError):
-        return None
-
-
 def stored_kernels() -> Kernels | None:
     """The kernels from what was compiled before; None where there is nothing, or it is damaged."""
-    if not _IS_TRIED:
+    if not IS_TRIED:
         return None
     shared = library()
     if shared is not None:
@@ -137,12 +103,12 @@ def stored_kernels() -> Kernels | None:
         from rds.nc.language.fast_lane_target import loaded
     except (OSError, ValueError, ImportError):
         return None
-    return loaded(objects)
+    return Kernels(*loaded(objects))
 
 
 def compile_kernels() -> Kernels | None:
     """The kernels, compiled now and kept where that can be. None without numba, and where nobody has tried it."""
-    if not _IS_TRIED:
+    if not IS_TRIED:
         return None
     try:
         from rds.nc.language.fast_lane_object import compiled, keep, objects
@@ -153,37 +119,4 @@ def compile_kernels() -> Kernels | None:
     if texts is None:
         return None
     keep(texts)
-    return stored_kernels() or loaded(objects(texts, shared=False))
-
-
-def file_of(what: str) -> str:
-    """Where compiled code of the present sources lies, or is to lie."""
-    return os.path.join(FOLDER, f"{family()}.{_sources()}.{what}")
-
-
-def family() -> str:
-    """How the names of all files begin that this Python makes for processors of this kind."""
-    return f"fast_lane.{sys.implementation.cache_tag}-{os.uname().machine}"
-
-
-def whole(place: str) -> bytes:
-    """The file before its digest; ValueError if it is damaged, which might end the process when it is loaded."""
-    with open(place, "rb") as stream:
-        content = stream.read()
-    if digest(content[:-_DIGEST]) != content[-_DIGEST:]:
-        raise ValueError("the file is damaged")
-    return content[:-_DIGEST]
-
-
-def digest(content: bytes) -> bytes:
-    return zlib.crc32(content).to_bytes(_DIGEST, "little")
-
-
-@cache
-def _sources() -> str:
-    """Of the text that it was compiled from."""
-    found = 0
-    for name in SOURCES:
-        with open(os.path.join(os.path.dirname(__file__), name), "rb") as stream:
-            found = zlib.crc32(stream.read(), found)
-    return f"{found:08x}"
+    return stored_kernels() or Kernels(*loaded(objects(texts, shared=False)))

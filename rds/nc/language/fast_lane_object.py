@@ -14,11 +14,11 @@ from typing import Any
 from llvmlite import binding as llvm
 from numba import carray, njit, types
 
-from rds.core.private_files import make_folder, open_private
-from rds.nc.language.batch import FLOATS, MODES
+from rds.core.private_files import make_folder, open_private, write_private
+from rds.nc.language.batch import FLOATS, FOUND, MODES, WORDS
 from rds.nc.language.extended_angles import NAMES
+from rds.nc.language.fast_lane_files import FOLDER, digest, family, file_of
 from rds.nc.language.fast_lane_kernel import read_lines
-from rds.nc.language.fast_lane_native import FOLDER, FOUND, WORDS, digest, family, file_of
 from rds.nc.language.fast_lane_target import target_machine
 from rds.nc.language.fast_lane_text import write_rows
 
@@ -157,7 +157,7 @@ def _linked(linker: str, files: dict[str, bytes]) -> bytes | None:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         for name, content in files.items():
-            (place / f"{name}.o").write_bytes(content)
+            write_private(place / f"{name}.o", content, is_own=True)
         words = [linker, "-shared", "-z", "noexecstack", "-o", "kernels.so", *(f"{name}.o" for name in files)]
         with suppress(OSError, subprocess.SubprocessError):
             subprocess.run(words, cwd=place, capture_output=True, check=True, timeout=60)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from llvmlite import binding as llvm
 
-from rds.nc.language.fast_lane_native import ENTRIES, Kernels
+from rds.nc.language.fast_lane_files import ENTRIES
 
 
 def target_machine(shared: bool = False) -> llvm.TargetMachine:
@@ -18,8 +18,8 @@ def target_machine(shared: bool = False) -> llvm.TargetMachine:
     return target.create_target_machine(opt=3, reloc="static", jit=True)
 
 
-def loaded(objects: dict[str, bytes]) -> Kernels:
-    """The kernels of the object files."""
+def loaded(objects: dict[str, bytes]) -> tuple[int, int, object]:
+    """The addresses of the entries of the object files, and what keeps them."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
@@ -27,4 +27,4 @@ def loaded(objects: dict[str, bytes]) -> Kernels:
         engine.add_object_file(llvm.ObjectFileRef.from_data(object_file))
     engine.finalize_object()
     read, write = (engine.get_function_address(name) for name in ENTRIES)
-    return Kernels(read, write, engine)
+    return read, write, engine

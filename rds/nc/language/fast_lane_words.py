@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from rds.nc.language.batch import FOUND
 from rds.nc.language.source import LONGEST
 
 # Where the words are put: the axes at 0 to 5, I J K at 6 to 8.
@@ -13,7 +14,6 @@ R, F, S, P, Q, L = range(9, 15)
 AXES, IJK = 0b000_111111, 0b111_000000
 # What else a line says, by its place in `found`; -1 for a word that is not there.
 GIVEN, MOVE, DISTANCE, RETRACT, DWELLS, SPINDLE_WORD, COOLANT_WORD, N, DIGITS, SAID, SAID_SIZE = range(11)
-FOUND = SAID_SIZE + 1
 # What a byte is, when it is not a letter with a place.
 _G, _N, _M, _BLANK, _NEWLINE, _SEMICOLON, _COMMENT, _OTHER = 20, 21, 22, 30, 31, 32, 33, -1
 _EXACT = 1 << 53  # whole numbers up to here are floats, and up to 10^22 powers of ten: their quotient is rounded once
