@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks import linuxcnc_simulator
 from benchmarks.figures import Figure
+from benchmarks.jerk_bound import least_with_jerk
 from benchmarks.motion_programs import DENSE, LINES_AND_ARCS, program
 from rds.interpolators.motion import Limits, plan
 from rds.interpolators.motion.certificate import Certificate, certified
@@ -59,6 +60,10 @@ def run(peer_python: str = sys.executable) -> list[Figure]:
         ratio = seconds / kept.seconds
         peaks = ", ".join(f"{kind} {100 * worst:.1f} %" for kind, worst in _peaks(certificate))
         figures.append(Figure(f"{name}: planned / least time", "", (ratio,), asked[name], f"peaks {peaks}"))
+        f, u = (np.concatenate(column) for column in zip(*kept.pieces, strict=True))
+        on_lines, in_blends = (seconds / least_with_jerk(f, u, limits, T, corners) for corners in (False, True))
+        figures.append(Figure(f"{name}: planned / least time, with jerk on its lines", "", (on_lines,)))
+        figures.append(Figure(f"{name}: planned / the same, blends at constant speed", "", (in_blends,)))
         theirs = _toppra(kept, limits, peer_python)
         note = theirs if isinstance(theirs, str) else f"{theirs:.3f} s"
         runs = () if isinstance(theirs, str) else (max(theirs / kept.seconds, kept.seconds / theirs),)

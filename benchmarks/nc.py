@@ -18,6 +18,7 @@ from unittest.mock import patch
 from benchmarks.figures import Figure, interleaved, ratios
 from benchmarks.nc_peers import PEERS, call, rs274
 from benchmarks.nc_program import write_ball, write_program
+from benchmarks.nc_whole import floor, whole
 from rds.nc import interpret
 from rds.nc.language import fast_lane
 from rds.nc.language.canon_text import text
@@ -36,6 +37,8 @@ def run(rounds: int = 5, peer_python: str = sys.executable) -> list[Figure]:
         place = Path(folder)
         return [
             *reading(place, rounds, peer_python),
+            *whole(place, rounds),
+            floor(rounds),
             *planning(place, min(rounds, 3)),
             *tip_planning(place, min(rounds, 3)),
             *memory(place),

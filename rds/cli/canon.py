@@ -7,19 +7,19 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rds.nc.language.batch import Batch
     from rds.nc.language.canon import Call, MotionBlock
 
 
-def print_canon(items: Iterable[MotionBlock | Call]) -> None:
+def print_canon(items: Iterable[MotionBlock | Call | Batch]) -> None:
     """Print the calls as LinuxCNC's `rs274 -g` does, as they come."""
-    from rds.nc.language.canon_text import text
+    from rds.nc.language.canon_text import written
 
     try:
-        sys.stdout.writelines(f"{line}\n" for line in text(items))
+        sys.stdout.writelines(written(items))
         sys.stdout.flush()
     except BrokenPipeError:  # `| head` has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -38,11 +38,13 @@ def canon_alone(words: Sequence[str]) -> int | None:
         return None
     from rds.core.errors import RdsError
     from rds.nc.language.dialect import Dialect
-    from rds.nc.language.interpreter import interpret
+    from rds.nc.language.interpreter import Interpreter
+    from rds.nc.language.source import open_file
 
-    file = Path(words[2])
     try:
-        print_canon(interpret(file, options=Dialect(any_exit=True), name=str(file)))
+        interpreter = Interpreter(open_file(words[2], words[2]), options=Dialect(any_exit=True))
+        print_canon(interpreter.run_in_batches())
+        interpreter.close()
     except RdsError as error:
         sys.stdout.flush()
         sys.stderr.write(f"rds: {error}\n")

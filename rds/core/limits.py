@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 import os
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rds.core.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 LIFT = "RDS_FILE_LIMITS"
 _MOST_LIFTED = 1e6

@@ -64,6 +64,7 @@ class Follower(Interpreter):
 
     def __init__(self, *given: Any, between: Callable[[], None] = lambda: None, **options: Any):
         super().__init__(*given, **options)
+        self.by_line, self.lane.takes_modes = True, False
         self._between = between
         self.modes: dict[int, Modes] = {}
         self._path = "G64"

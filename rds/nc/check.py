@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,7 @@ class Setup:
         """The same for a program on a machine: links with rotary axes read G43.4, and RF03 at its head corrects."""
         tcp = self.options.tcp or has_tool_centre(machine)
         return replace(
-            self, options=replace(self.options, tcp=tcp), correct=self.correct or corrects(program, self.options)
+            self, options=self.options._replace(tcp=tcp), correct=self.correct or corrects(program, self.options)
         )
 
     def tool_list(self) -> list[Tool]:
@@ -208,7 +208,7 @@ def describe(program: Path, machine: Machine, setup: Setup) -> dict[str, Any]:
         "machine_sha256": file_sha256(Path(machine.path)),
         "tools_sha256": file_sha256(setup.tools) if setup.tools else None,
         "parameters_sha256": file_sha256(setup.parameters) if setup.parameters else None,
-        "options": asdict(setup.options),
+        "options": setup.options._asdict(),
         "correct": setup.correct,
     }
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rds.nc.path_block import Event, PathBlock
 
 TOLERANCE = 1e-6  # mm, degrees: beyond the travel by less than this is rounding
-LONGEST_DWELL = 3600.0  # s; chosen: more is a P in milliseconds
+LONG_DWELL, LONGEST_DWELL = 60.0, 3600.0  # s; chosen: more may be, and is, a P in milliseconds
 MOST_FAULTS = 1000  # are kept; others are counted
 MOST_WARNINGS = 100  # are kept
 RUNAWAY = 1000  # times that a line has left the travel, each time farther out: its loop is not followed further
@@ -125,6 +125,9 @@ class Validator:
             elif event.kind == "dwell" and float(event.value) > LONGEST_DWELL:
                 message = f"a dwell of {event.value:g} s is longer than {LONGEST_DWELL:g}; P is in seconds here"
                 self._fault(block, event.line, message, "dwell", float(event.value), "P G4")
+            elif event.kind == "dwell" and float(event.value) > LONG_DWELL:
+                message = f"a dwell of {event.value:g} s, {float(event.value) / 60.0:.1f} minutes: P is in seconds here"
+                self.warn(ProgramError(message, file=block.file or self._name, line=event.line), "P G4")
             elif event.kind == "output":
                 self._look_at_output(event, block)
             elif event.kind == "tool" and event.value:

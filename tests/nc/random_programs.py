@@ -282,3 +282,80 @@ def program(r: Random) -> bytes:
     else:
         lines.append(ending)
     return ("\n".join(lines) + r.choice(["\n", ""])).encode()
+
+
+_PLAIN_COMMENTS = [
+    "(a hole)",
+    "( Spaced  out )",
+    "()",
+    "( )",
+    "(x1;y2)",
+    "; to the end (of) it",
+    "(msg, Hi)",
+    "(log)",
+    "(a,b)",
+]
+
+
+def _plain(r: Random) -> str:
+    return r.choice(["0", "1.5", "-2", "4", f"{r.uniform(-20, 20):.3f}", f"{r.randrange(-9, 30)}."])
+
+
+_DEEP = {"G17": "Z", "G18": "Y", "G19": "X"}
+
+
+def _plain_cycle(r: Random, plane: str, turning: str, taps: bool) -> list[str]:
+    """A canned cycle, most often whole; one line in five leaves a word out, or has one that it must not have."""
+    known = ["G73", "G81", "G81", "G82", "G83", "G85", "G89", "", "", ""]
+    known += {"M3": ["G84", "G86", "G87", "G88"], "M4": ["G74", "G86"], "M5": []}[turning]
+    if not taps:  # in other planes rs274 goes elsewhere
+        known = [code for code in known if code not in ("G74", "G84")]
+    code, deep = r.choice(known), _DEEP[plane]
+    words = [code, *(letter + _plain(r) for letter in "XYZ" if letter != deep and r.random() < 0.7)]
+    if code or r.random() < 0.2:
+        words += [f"R{r.choice(['2', '1', '5.5', '0'])}", f"{deep}{r.choice(['-5', '-2.5', '-.5'])}"]
+        words += [letter + r.choice(_GIVEN[letter]) for letter in _EACH.get(code, "")]
+    if r.random() < 0.1 and code != "G74":
+        words.append(f"L{r.choice(['1', '2', '3', '3.0'])}")
+    if r.random() < 0.03:
+        words[r.randrange(len(words))] = r.choice(["", "A1", "P1", "Q1", "I1", "R9", "L0"])
+    return words
+
+
+def _plain_line(r: Random, plane: str, turning: str, taps: bool) -> list[str]:
+    """The words of one of those that the fast lane reads, or nearly."""
+    way = r.randrange(20)
+    if way < 10:
+        return _plain_cycle(r, plane, turning, taps)
+    if way < 14:
+        return [r.choice(["G0", "G1"]), *(letter + _plain(r) for letter in "XYZ" if r.random() < 0.5)]
+    if way < 15:
+        return ["G17", r.choice(["G2", "G3"]), r.choice(["X4 Y0 R5", "X0 Y4 R15", "I3", "I2 J1 Z4"])]
+    if way < 16:
+        return [r.choice(["G4 P.5", "G80", "G4 P1 M8"])]
+    words = ["G98", "G99", "G90", "G91", "M3", "M4", "M5", "M7", "M8", "M9", *(["G17"] if taps else _DEEP)]
+    return [r.choice(words) for _ in range(r.choice([1, 1, 2]))]
+
+
+def plain_program(r: Random) -> bytes:
+    """A program of lines with plain numbers only, with canned cycles, and comments in every place."""
+    taps, turning = r.random() < 0.5, r.choice(["M3", "M4"])
+    plane = "G17" if taps else r.choice(list(_DEEP))
+    path = r.choice(["", "G61", "G61.1", "G64 P0.0123 Q.004", "G64 P.5"])
+    lines = [f"{r.choice(['G20', 'G21'])} {plane} F100 S50 {turning}", path, f"G0 Z{r.choice(['5', '0', '9'])} Y3 X1"]
+    for _ in range(r.randrange(3, 20)):
+        words = _plain_line(r, plane, turning, taps)
+        plane = next((word for word in reversed(words) if word in _DEEP), plane)
+        turning = next((word for word in words if word in ("M3", "M4", "M5")), turning)
+        if r.random() < 0.2:
+            words.append(f"F{r.choice(['100', '50', '12.5'])}")
+        if r.random() < 0.1:
+            words.append(f"S{r.choice(['100', '0', '12.25'])}")
+        if r.random() < 0.1:
+            r.shuffle(words)
+        for _ in range(r.choice([0, 0, 0, 1, 1, 2])):
+            words.insert(r.randrange(len(words) + 1), r.choice(_PLAIN_COMMENTS))
+        if r.random() < 0.1:
+            words.insert(0, r.choice(["N10", "N0020", "n5"]))
+        lines.append(line(r, [word for word in words if word]))
+    return "\n".join([*lines, "M2", ""]).encode()

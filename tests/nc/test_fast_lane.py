@@ -18,6 +18,7 @@ from rds.nc.language.interpreter import Interpreter
 from rds.nc.language.source import CHUNK, LONGEST
 
 from .fuzz_targets import outcome, same
+from .random_programs import plain_program
 
 pytest.importorskip("numba", reason="without numba (extra fast) there is no fast lane")
 
@@ -64,6 +65,17 @@ PLAIN = [
     "",
     "; nothing",
     "G1",
+    "(to the left) G1 X1 (there) Y2",
+    "N7 ( spaced)",
+    "()",
+    "G4 P.5 (wait)",
+    "G91 M3 S100",
+    "G99 G81 X1 Y1 Z-3 R1",
+    "X5",
+    "G83 X1 Z-3 R1 Q.5 L2",
+    "G90 G98 M8",
+    "G84 X1 Z-3 R1 F100",
+    "G80 M9",
     "F-0.0",
 ]
 
@@ -77,8 +89,11 @@ def test_it_takes_plain_lines(taken: Callable[[bytes], int]) -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        *("G1 X1 X2", "G1 G0 X1", "X#1", "X[1+1]", "(note) X1", "G4 P1", "G91", "G17", "S-100", "T1", "M3", "G90 G91"),
-        *("/X1", "X1 P2", "G80", "G2 X1 Y1 I9 J9", "G2 X1", "G2 X1 R.01", "G2 R1", "G1 I1 X1", "N1.5 X1", "X1 N2"),
+        *("G1 X1 X2", "G1 G0 X1", "X#1", "X[1+1]", "(msg, X) X1", "G4", "G4 P1 X1", "G17", "S-100", "T1", "M3 M4"),
+        *("G90 G91", "(a", "(a(b)) X1", "(é)", "X(a)1", "(LOGCLOSE)", "(py, 1)", "M6", "M1.5", "G98 G99", "G80 X1"),
+        *("G81 X1 Z-1", "G81 X1 R1", "G81 Z-1 R1 A5", "G82 Z-1 R1", "G83 Z-1 R1", "G81 Z-1 R1 L0", "G81 Z-1 R1 Q1"),
+        *("G84 Z-1 R1", "G81 Z2 R1", "G83 Z-9 R9 Q.0001", "G87 Z-1 R1 I1 J1 K1", "G81 Z-1 R1 I1", "M7 M8", "L1", "Q1"),
+        *("/X1", "X1 P2", "G2 X1 Y1 I9 J9", "G2 X1", "G2 X1 R.01", "G2 R1", "G1 I1 X1", "N1.5 X1", "X1 N2"),
         *(
             "X",
             "X1.2.3",
@@ -240,6 +255,11 @@ programs = st.builds(
 @example(b"G91F1\nG2X0Y.02I0J9\n", Dialect())
 def test_random_programs(program: bytes, options: Dialect) -> None:
     same(program + b"M2\n", options=options)
+
+
+def test_cycles_and_comments() -> None:
+    for seed in range(150):
+        same(plain_program(Random(seed)))
 
 
 @settings(max_examples=150, deadline=None)

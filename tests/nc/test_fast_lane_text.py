@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
+from random import Random
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from rds.nc import ProgramError
 from rds.nc.language import canon, canon_text
 from rds.nc.language.fast_lane import kernel
+from rds.nc.language.interpreter import Interpreter
+
+from .random_programs import plain_program
 
 pytest.importorskip("numba", reason="without numba (extra fast) rows are written by Python")
 
@@ -53,6 +59,24 @@ def test_the_same_text(rows: np.ndarray, number: int) -> None:
     assert at == len(rows)
 
 
+def test_batches_are_written_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    kernel()
+    for seed in range(100):
+        program = plain_program(Random(seed)).decode()
+        texts = []
+        for compiled in (True, False):
+            interpreter = Interpreter(program)
+            items = interpreter.run_in_batches() if compiled else interpreter.run()
+            lines: list[str] = []
+            with monkeypatch.context() as patch, suppress(ProgramError):
+                patch.setattr("rds.nc.language.stream.FEW_OF_BATCH", 0)
+                if not compiled:
+                    patch.setattr(canon_text, "_compiled", lambda number, item: None)
+                lines.extend(canon_text.text(items))
+            texts.append(lines)
+        assert texts[0] == texts[1]
+
+
 def test_large_blocks_are_written_alike(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(1)
     rows = np.zeros(20_000, canon.MOTION)
@@ -65,6 +89,6 @@ def test_large_blocks_are_written_alike(monkeypatch: pytest.MonkeyPatch) -> None
     items = [canon.Call("SELECT_PLANE", ("XY",)), canon.MotionBlock(rows), canon.Call("PROGRAM_END")]
     kernel()
     fast = list(canon_text.text(items))
-    monkeypatch.setattr(canon_text, "_compiled", lambda number, rows: None)
+    monkeypatch.setattr(canon_text, "_compiled", lambda number, item: None)
     assert fast == list(canon_text.text(items))
     assert len(fast) == len(rows) + 2

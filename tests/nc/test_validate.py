@@ -279,3 +279,13 @@ def test_a_loop_that_ends_or_comes_back_is_followed(tmp_path: Path, lines: list[
     found = check(tmp_path, _loop(1400, *lines))
     assert found.stopped is not None
     assert found.stopped.line == 7 + len(lines)  # the wrong line behind it
+
+
+def test_what_a_student_hardly_means_is_worth_a_warning(tmp_path: Path) -> None:
+    file = tmp_path / "part.ngc"
+    file.write_text("G21 F200 G0 X0 Y0 Z5\nG4 P2000\nG41 G1 X10\nY10\nG40 G0 X0\nM2\n")
+    found, _ = check_program(file, load_machine("mini-cnc"), Setup())
+    assert found.ok
+    said = [(warning.line, warning.reason) for warning in found.warnings]
+    assert (2, "a dwell of 2000 s, 33.3 minutes: P is in seconds here") in said
+    assert any(line == 3 and "with a diameter of 0 moves nothing aside" in reason for line, reason in said)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 from rds.nc.compensation.geometry import Point, sweep
@@ -194,7 +193,9 @@ class HeldMoves:
             if isinstance(item, Move):
                 self.make(item)
             elif isinstance(item, Call):
-                self.out.append(replace(item, n=str(n).zfill(digits) if digits else ""))
+                self.out.append(
+                    Call(item.name, item.args, item.line, str(n).zfill(digits) if digits else "", item.file)
+                )
             else:
                 self.out.append((item[0], digits, n, *item[3:]))
 

@@ -75,8 +75,21 @@ def by_centre(
             f"the arc's end is off its circle by {error:.4f} ({100 * relative:.2f} %), more than {spiral:.4f} and"
             f" {100 * SPIRAL_RELATIVE:g} %: its radius is {radius:.4f} at the start and {end_radius:.4f} at the end"
             f" ({_places(start, end, centre, state)}); correct the end or the centre"
+            f"{_otherwise(start, end, offsets, state)}"
         )
     return centre
+
+
+def _otherwise(start: tuple[float, float], end: tuple[float, float], offsets: tuple[float, float], state: State) -> str:
+    """What to write where the end is on the circle if the centre is read the other way."""
+    other = (start[0] + offsets[0], start[1] + offsets[1]) if state.arc_absolute else offsets
+    radius = math.hypot(other[0] - start[0], other[1] - start[1])
+    off = abs(radius - math.hypot(other[0] - end[0], other[1] - end[1]))
+    if off > SPIRAL_TOLERANCE[state.inches] or radius < RADIUS_TOLERANCE[state.inches]:
+        return ""
+    if state.arc_absolute:
+        return ", or write G91.1 before, if the centre is counted from the start"
+    return ", or write G90.1 before, if these are the coordinates of the centre itself"
 
 
 def _places(start: tuple[float, float], end: tuple[float, float], centre: tuple[float, float], state: State) -> str:

@@ -6,7 +6,7 @@ left early counts anew, and a BREAK that is passed over does nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
@@ -17,8 +17,7 @@ from rds.nc.language.saved_modes import SavedModes
 from rds.nc.language.source import Place, Source
 
 
-@dataclass(slots=True)
-class Label:
+class Label(NamedTuple):
     """Where an O word stands that can be jumped to: the file and the place of its block, and what kind it is."""
 
     kind: str
@@ -26,17 +25,22 @@ class Label:
     place: Place
 
 
-@dataclass(slots=True)
 class Frame:
-    """A subroutine being executed: where it was called from, and what it found."""
+    """A subroutine being executed: where it was called from, and what it found.
 
-    name: str
-    source: Source
-    place: Place
-    kept: list[float] | None  # None: M98 called it, which has the parameters of its caller
-    saved: SavedModes | None = None  # by M70 or M73
-    more: int = 0  # how often M98 still calls it
-    repeats: dict[str, int] = field(default_factory=dict)  # rounds left, by label
+    `kept`: the parameters of its caller; None: M98 called it, which shares them. `more`: how often M98 still calls it.
+    """
+
+    __slots__ = ("kept", "more", "name", "place", "repeats", "saved", "source")
+
+    def __init__(self, name: str, source: Source, place: Place, kept: list[float] | None, more: int = 0):
+        self.name = name
+        self.source = source
+        self.place = place
+        self.kept = kept
+        self.more = more
+        self.saved: SavedModes | None = None  # by M70 or M73
+        self.repeats: dict[str, int] = {}  # rounds left, by label
 
 
 class Branches:
@@ -98,6 +102,40 @@ class Branches:
         self._look_for_progress(label)
         self.source = label.source
         self.source.go_to(label.place)
+
+    def label_of(self, name: str) -> Label | None:
+        """Where the loop or branch `name` begins, once that has been executed."""
+        return self._labels.get(name)
+
+    def jumps_unseen(self, label: Label) -> bool:
+        """Count a jump back to a label; False, and nothing done, where something is to be looked at or kept for it."""
+        jumps, kept = self._jumps + 1, self._kept
+        if (
+            jumps > self._dialect.max_jumps
+            or not jumps & (jumps - 1)
+            or kept is None
+            or (kept[1] == self._parameters.changes and kept[0] == label)
+        ):
+            return False
+        self._jumps = jumps
+        return True
+
+    def round_of(self, name: str, label: Label, test: float) -> bool:
+        """Whether a REPEAT loop has one more round, which begins."""
+        rounds = self._rounds()
+        left = rounds.get(name)
+        if left is None:
+            left = round(test)
+        if left > 0:
+            rounds[name] = left - 1
+        else:
+            rounds.pop(name, None)
+        self._forget_rounds(label)
+        return left > 0
+
+    def has_left_branches(self) -> None:
+        """The next block stands in none, or in the one of an IF that is executed."""
+        self._done_if = True
 
     def begin_anew(self) -> None:
         """What is executed from now on, such as a contour for the second time, is no round of a loop."""
@@ -199,17 +237,9 @@ class Branches:
     def _repeat(self, word: Word) -> None:
         self._new_label(word)
         label = self._label(word, "repeat")
-        rounds = self._rounds()
         self.skipping = ""
-        left = rounds.get(word.name)
-        if left is None:
-            left = round(word.test)
-        if left > 0:
-            rounds[word.name] = left - 1
-        else:
-            rounds.pop(word.name, None)
+        if not self.round_of(word.name, label, word.test):
             self._skip_to(word.name)
-        self._forget_rounds(label)
 
     def _endrepeat(self, word: Word) -> None:
         label = self._label(word, "repeat")

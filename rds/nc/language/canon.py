@@ -10,7 +10,6 @@ one by one, in order between them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rds.nc.language.motion_rows import Columns, columns_of, dtype, rows_of
@@ -69,12 +68,29 @@ class MotionBlock:
         return len(self._columns.kinds if self._columns is not None else self.rows)
 
 
-@dataclass(frozen=True, slots=True)
 class Call:
-    """Any other canonical call: name, arguments (int, float or str, in canon's order) and the program line it is of."""
+    """Any other canonical call: name, arguments (int, float or str, in canon's order) and the program line it is of.
 
-    name: str
-    args: tuple[Any, ...] = ()
-    line: int = 0
-    n: str = ""  # digits of the line's word N, as written
-    file: str = field(default="", compare=False)
+    `n`: digits of the line's word N, as written. Calls are equal whatever their file.
+    """
+
+    __slots__ = ("args", "file", "line", "n", "name")
+
+    def __init__(self, name: str, args: tuple[Any, ...] = (), line: int = 0, n: str = "", file: str = ""):
+        self.name = name
+        self.args = args
+        self.line = line
+        self.n = n
+        self.file = file
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Call) and self._compared() == other._compared()
+
+    def __hash__(self) -> int:
+        return hash(self._compared())
+
+    def __repr__(self) -> str:
+        return f"Call{(*self._compared(), self.file)}"
+
+    def _compared(self) -> tuple[str, tuple[Any, ...], int, str]:
+        return self.name, self.args, self.line, self.n

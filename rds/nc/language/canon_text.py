@@ -5,58 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from rds.nc.language.batch import Batch
+from rds.nc.language.call_text import UNWRITTEN, call_text
 from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE, Call, MotionBlock
-from rds.nc.language.fast_lane import is_loaded, kernel, stored
+from rds.nc.language.fast_lane import LONG_TEXT, LONG_TEXT_SHARED, is_loaded, kernel, stored, worth
 
 if TYPE_CHECKING:
     from rds.nc.language.fast_lane_native import Kernels
     from rds.nc.language.motion_rows import Columns
 
-MANY = 1024  # rows that are worth writing by compiled code
-LONG_TEXT = 20_000  # lines that Python writes in the time that compiled code takes to load
-
-# How each call is written; others are written with %.4f for floats and %s for the rest, separated by commas.
-_FORMATS = {
-    "USE_LENGTH_UNITS": "CANON_UNITS_%s",  # MM, INCHES
-    "SELECT_PLANE": "CANON_PLANE_%s",  # XY, XZ, YZ
-    "SET_FEED_REFERENCE": "%s",
-    "COMMENT": '"%s"',
-    "MESSAGE": '"%s"',
-    "PRINT": '"%s"',
-    "SET_MOTION_CONTROL_MODE": "CANON_%s",  # EXACT_PATH, EXACT_STOP, CONTINUOUS (with its tolerance)
-    "USE_TOOL_LENGTH_OFFSET": "%.4f %.4f %.4f, %.4f %.4f %.4f, %.4f %.4f %.4f",
-    "SET_SPINDLE_MODE": "%d %.4f",
-    "START_SPEED_FEED_SYNC": "%f,%d",
-    "SET_MOTION_OUTPUT_VALUE": "%d,%f",
-    "SET_AUX_OUTPUT_VALUE": "%d,%f",
-    "SET_TOOL_TABLE_ENTRY": "%d, %d, %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f %.4f, %.4f, %.4f, %d",
-    "LOG": '"%s"',
-    "LOGOPEN": '"%s"',
-    "LOGAPPEND": '"%s"',
-}
-# Calls of which only the first arguments are written, and what stands behind them.
-_SHORTENED = {
-    "NURBS_FEED": (1, ", ..."),
-    "STRAIGHT_PROBE": (6, ""),
-    "RIGID_TAP": (3, ""),
-    "CHANGE_TOOL_NUMBER": (1, ""),
-}
-_RENAMED = {"WAIT_SPINDLE_ORIENT_COMPLETE": "SPINDLE.0.WAIT_ORIENT_COMPLETE"}
-_UNWRITTEN = frozenset(("WAIT", "RETRACT_BY_HAND"))  # calls that `rs274 -g` does not print
-
-
-def _call_text(call: Call) -> str:
-    if call.name == "SET_MOTION_CONTROL_MODE" and len(call.args) == 2:
-        return f"{call.name}(CANON_{call.args[0]}, {call.args[1]:f})"
-    pattern = _FORMATS.get(call.name)
-    args, rest = call.args, ""
-    if call.name in _SHORTENED:
-        count, rest = _SHORTENED[call.name]
-        args = args[:count]
-    if pattern is None:
-        pattern = ", ".join("%.4f" if isinstance(value, float) else "%s" for value in args)
-    return f"{_RENAMED.get(call.name, call.name)}({pattern % args}{rest})"
-
+MANY = 64  # rows that are worth writing by compiled code
 
 _STRAIGHT = "(%.4f, %.4f, %.4f, %.4f, %.4f, %.4f)"
 _ROW_FORMATS = {
@@ -66,7 +24,7 @@ _ROW_FORMATS = {
     RATE: ("SET_FEED_RATE(%.4f)", 1),
     SPEED: ("SET_SPINDLE_SPEED(0, %.4f)", 1),
 }
-_LINE_FORMATS = {kind: (f"%5d N..... {pattern}", count) for kind, (pattern, count) in _ROW_FORMATS.items()}
+_LINE_FORMATS = {kind: (f"%5d N..... {pattern}\n", count) for kind, (pattern, count) in _ROW_FORMATS.items()}
 
 
 def _row_texts(columns: Columns) -> Iterator[tuple[str, str]]:
@@ -80,41 +38,60 @@ def texts(items: Iterable[MotionBlock | Call]) -> Iterator[tuple[str, str]]:
     """Of each call, the digits of its line's word N ("" without) and its text: `SELECT_PLANE(CANON_PLANE_XY)`."""
     for item in items:
         if isinstance(item, Call):
-            if item.name not in _UNWRITTEN:
-                yield item.n, _call_text(item)
+            if item.name not in UNWRITTEN:
+                yield item.n, call_text(item)
         else:
             yield from _row_texts(item.columns)
 
 
-def text(items: Iterable[MotionBlock | Call]) -> Iterator[str]:
+def text(items: Iterable[MotionBlock | Call | Batch]) -> Iterator[str]:
     """The lines that LinuxCNC's `rs274 -g` prints: running number, the program's line number (or N.....), the call.
 
     Of (PRINT, ...) it prints the text alone.
     """
+    for portion in written(items):
+        yield from portion[:-1].split("\n")
+
+
+def written(items: Iterable[MotionBlock | Call | Batch]) -> Iterator[str]:
+    """The same as text with its line breaks, in portions of some lines."""
     number = 1
     for item in items:
         if isinstance(item, Call):
             if item.name == "PRINT":
-                yield from item.args
-            elif item.name not in _UNWRITTEN:
-                yield _line(number, item.n, _call_text(item))
+                yield f"{item.args[0]}\n"
+            elif item.name not in UNWRITTEN:
+                yield _line(number, item.n, call_text(item))
                 number += 1
-        elif (compiled := _compiled(number, len(item))) is not None:
+        elif (compiled := _compiled(number, item)) is not None:
             first, columns = 0, item.columns
-            for count, written in compiled.written(columns, number):
-                yield from written.splitlines() or _lines_of(columns.part(first, first + 1), number)
+            quoted = item.text if isinstance(item, Batch) else b""
+            for count, portion in compiled.written(columns, number, quoted):
+                yield portion or "".join(_lines(item, columns.part(first, first + 1), number))
                 first += count
                 number += count
         else:
-            yield from _lines_of(item.columns, number)
+            yield "".join(_lines(item, item.columns, number))
             number += len(item)
 
 
-def _compiled(number: int, rows: int) -> Kernels | None:
+def _compiled(number: int, item: MotionBlock | Batch) -> Kernels | None:
     """What writes many rows at once, when loading it is worth the time: it is loaded already, or the text is long."""
-    if rows < MANY:
+    rows = len(item)
+    if isinstance(item, MotionBlock) and rows < MANY:
         return None
-    return kernel() if is_loaded() else stored() if number + rows > LONG_TEXT else None
+    if is_loaded():
+        return kernel()
+    return stored() if number + rows > worth(LONG_TEXT, LONG_TEXT_SHARED) else None
+
+
+def _lines(item: MotionBlock | Batch, columns: Columns, number: int) -> Iterator[str]:
+    """Rows of an item as Python writes them, numbered from `number`."""
+    if isinstance(item, MotionBlock):
+        yield from _lines_of(columns, number)
+        return
+    for at, (n, call) in enumerate(texts(Batch(columns, item.text, item.file).parts()), start=number):
+        yield _line(at, n, call)
 
 
 def _lines_of(columns: Columns, number: int) -> Iterator[str]:
@@ -130,4 +107,4 @@ def _lines_of(columns: Columns, number: int) -> Iterator[str]:
 
 
 def _line(number: int, n: str, call: str) -> str:
-    return f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}"
+    return f"{number:5d} {f'N{n:<6s}' if n else 'N..... '}{call}\n"

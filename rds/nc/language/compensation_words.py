@@ -35,6 +35,11 @@ def compensate(m: Context, code: int, words: dict[str, float]) -> None:
     out.comment(f"interpreter: cutter radius compensation on {'left' if side == LEFT else 'right'}")
     state.comp_side = side
     m.leaving = None
+    if radius == 0.0:
+        m.remark(
+            f"G{code / 10:g} with a diameter of 0 moves nothing aside; write D and the number of a tool of the table,"
+            " or load it by T and M6 before"
+        )
     if radius > 0.0:
         start = (state.x, state.y, state.z) if state.plane == XY else (state.z, state.x, state.y)
         units = "INCHES" if state.inches else "MM"

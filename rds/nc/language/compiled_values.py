@@ -47,6 +47,11 @@ def _not_negative(value: float) -> None:
         raise Fault("the value is negative")
 
 
+def checked(code: str) -> str:
+    """Code of a value that is finite, or raises Fault; expressions in brackets and functions are that already."""
+    return code if code.startswith("finite(") else f"finite({code})"
+
+
 def names_of(parameters: Parameters) -> dict[str, Any]:
     """What the code may use, besides its arguments n (numbered parameters), l and q (local and global names)."""
     return {
@@ -54,6 +59,7 @@ def names_of(parameters: Parameters) -> dict[str, Any]:
         "atan": arc_tangent,
         "binary": BINARY,
         "declare": parameters.declare,
+        "faults": FAULTS,
         "exists": lambda name: float(parameters.find(name) is not None),
         "finite": finite,
         "get": parameters.get,

@@ -42,6 +42,7 @@ class Context:
         self.out = out
         self.stretches = stretches  # gets what compensation made of what was programmed
         self.leaving: Compensation | None = None  # the compensation that G40 ended, until the move after it
+        self.remark: Callable[[str], None] = lambda said: None  # gets what is no fault, and worth a look
         self.control_points: list[tuple[float, float, float]] = []  # x, y, weight: of the NURBS since G5.2
         self.order = 3  # of that NURBS
         self.saved_modes: Callable[[Context, int], None]  # does M70 to M73, which belong to subroutines

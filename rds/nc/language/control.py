@@ -8,9 +8,9 @@ Other than in LinuxCNC, a subroutine ends only with its own name (RETURN may bea
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 from rds.nc.language.branches import BRANCH_ACTIONS, Branches, Frame, Label
 from rds.nc.language.dialect import Dialect
@@ -20,7 +20,7 @@ from rds.nc.language.owords import FANUC, Word, nested, read_fanuc, read_gr, rea
 from rds.nc.language.parameters import Parameters
 from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes
-from rds.nc.language.source import Source, open_file
+from rds.nc.language.source import Place, Source, open_file
 from rds.nc.language.words import column_of, line_number, recoded, tidy
 
 _ENDS = {"sub": "ENDSUB", "if": "ENDIF", "while": "ENDWHILE", "do": "WHILE [...]", "repeat": "ENDREPEAT"}
@@ -36,7 +36,7 @@ class Control(Branches):
         self._main = source
         self._seeking = ""  # the subroutine whose definition is being looked for
         self._defining = ""
-        self._opened: dict[Path, Source] = {}
+        self._opened: dict[str, Source] = {}
         self._saved: SavedModes | None = None  # by M70 in the main program
         self.restore: Callable[[SavedModes], None] = lambda _: None  # what M73 wants when a subroutine returns
 
@@ -50,10 +50,14 @@ class Control(Branches):
         """Whether lines have been executed again, or may be."""
         return self._jumps > 0
 
+    @property
+    def scope(self) -> str:
+        """The subroutine that labels belong to now; "" in the main program."""
+        return self._frames[-1].name if self._frames else ""
+
     def again(self, line: Line, lines: RepeatedLines) -> Word | None:
         """The O word that a kept line is now; None where it is to be read."""
-        scope = self._frames[-1].name if self._frames else ""
-        return None if self._defining else lines.control(line, scope, self.skipping)
+        return None if self._defining else lines.control(line, self.scope, self.skipping)
 
     def close(self) -> None:
         """Close the program and the files of its subroutines."""
@@ -157,6 +161,18 @@ class Control(Branches):
         elif word.name != self._frames[-1].name:
             raise nested(self._frames[-1].name, word)
 
+    @property
+    def deepest(self) -> int:
+        """How many calls inside one another there may be."""
+        return self._dialect.max_depth
+
+    def enters(self, name: str, label: Label, arguments: list[float], behind: Place) -> bool:
+        """Call a subroutine, to come back to `behind`; False, and nothing done, where there is more to it."""
+        if len(self._frames) >= self._dialect.max_depth or not self.jumps_unseen(label):
+            return False
+        self._frames.append(Frame(name, self.source, behind, self._parameters.enter(arguments)))
+        return True
+
     def _call(self, word: Word) -> None:
         if len(self._frames) >= self._dialect.max_depth:
             raise Fault(
@@ -183,13 +199,13 @@ class Control(Branches):
 
     def _file(self, word: Word) -> Source | None:
         """The file beside the program that is named like the subroutine."""
-        folder: Path | None = self._main.folder
+        folder = self._main.folder
         if folder is None or not _FILE_NAME.fullmatch(word.name) or len(word.name.encode()) > 200:
             return None
-        path = folder / f"{recoded(word.name)}.ngc"
-        if not path.is_file():
+        path = os.path.join(folder, f"{recoded(word.name)}.ngc")
+        if not os.path.isfile(path):
             return None
-        found = open_file(path, str(path), semicolons=self._dialect.program_numbers)
+        found = open_file(path, path, semicolons=self._dialect.program_numbers)
         self._opened[path] = found
         return found
 

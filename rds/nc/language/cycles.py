@@ -8,7 +8,7 @@ when that is above R, G99 (in force at the start) to R.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from rds.nc.language.arcs import AXES_OF, CENTRES_OF, LETTERS_OF
 from rds.nc.language.blocks import Block
@@ -22,8 +22,7 @@ _DWELLING = frozenset((820, 860, 880, 890))  # P is wanted when the cycle begins
 _PECKING = frozenset((730, 830))
 
 
-@dataclass(frozen=True, slots=True)
-class _Hole:
+class _Hole(NamedTuple):
     """One hole, along the plane's first, second and third axis, in program units."""
 
     first: float

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Dialect:
+class Dialect(NamedTuple):
     """Options of the language. The defaults read a program as LinuxCNC's `rs274 -g` does, on a machine in mm.
 
     block_delete: blocks that begin with `/` are left out (LinuxCNC's default is to run them).

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from rds.nc.language.parameters import Parameters
 
 EQUAL = 1e-4  # numbers that differ by less are EQ (LinuxCNC's TOLERANCE_EQUAL)
@@ -23,6 +21,8 @@ DEEPEST = 50  # brackets and # inside one another
 
 NUMBER = re.compile(r"[+-]*[0-9.]*")
 SPELLED = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+_OUTSIDE_ASCII = re.compile(r"[\x80-\xff]+")
+_MINUS = "\N{MINUS SIGN}".encode().decode("latin-1")  # a program's text is read byte by byte
 FUNCTION = re.compile(r"abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan")
 OPERATION = re.compile(r"\*\*|[-+*/\]]|and|mod|or|xor|eq|ne|ge|gt|le|lt")
 PRECEDENCE = {
@@ -104,8 +104,9 @@ class Reader:
         match = NUMBER.match(self.text, self.at)
         spelled = match[0] if match else ""
         if not SPELLED.fullmatch(spelled):
-            what = f"{spelled!r} is no number" if spelled else f"a number cannot begin with {self.peek()!r}"
-            raise self.fault(f"{what}; write one like -12.5")
+            if spelled:
+                raise self.fault(f"{spelled!r} is no number; write one like -12.5")
+            raise self.fault(f"a number cannot begin with {self._character()}; write one like -12.5")
         self.at += len(spelled)
         return float(spelled)
 
@@ -150,10 +151,19 @@ class Reader:
         self.at = match.end()
         return match[0]
 
+    def _character(self) -> str:
+        """The next character as it is meant; outside of ASCII it is several bytes."""
+        match = _OUTSIDE_ASCII.match(self.text, self.at)
+        if match is None:
+            return repr(self.peek())
+        if match[0].startswith(_MINUS):
+            return f"'{_MINUS}', a minus sign of a word processor; the one of programs is -"
+        return f"'{match[0]}'"
+
     def _function(self) -> float:
         match = FUNCTION.match(self.text, self.at)
         if match is None:
-            raise self.fault(f"a value cannot begin with {self.peek()!r}; functions are {_FUNCTIONS_TEXT}")
+            raise self.fault(f"a value cannot begin with {self._character()}; functions are {_FUNCTIONS_TEXT}")
         at, name = self.at, match[0]
         self.at = match.end()
         if self.peek() != "[":
@@ -264,24 +274,19 @@ BINARY: dict[str, Callable[[float, float], float]] = {
 
 
 @cache
-def _extended() -> tuple[ModuleType, Any]:
-    """numpy, for its numbers of extended precision, and π as one; imported for the programs that have an angle."""
-    import numpy as np
+def _extended() -> Mapping[str, Callable[[float], float]]:
+    """Functions of angles in extended precision; for the programs that have an angle."""
+    from rds.nc.language.extended_angles import functions
 
-    return np, np.longdouble("3.14159265358979323846264338327950288")
+    return functions()
 
 
 def _circular(name: str) -> Callable[[float], float]:
-    def found(degrees: float) -> float:
-        np, pi = _extended()
-        return float(getattr(np, name)(np.longdouble(degrees) * pi / 180))
-
-    return found
+    return lambda degrees: _extended()[name](degrees)
 
 
 def _degrees(radians: float) -> float:
-    np, pi = _extended()
-    return float(np.longdouble(radians * 180.0) / pi)
+    return _extended()["degrees"](radians * 180.0)
 
 
 def arc_tangent(y: float, x: float) -> float:

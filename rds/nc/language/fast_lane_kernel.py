@@ -1,4 +1,7 @@
-"""The compiled reader of plain lines: N, G0 to G3, G90 and G91 that change nothing, X Y Z A B C, I J K, R, F, S.
+"""The compiled reader of plain lines.
+
+N, G0 to G4, G80, G90, G91, G98, G99, canned cycles but G87 and G88; X Y Z A B C, I J K, R P Q L, F, S;
+M3 to M5, M7 to M9; comments.
 
 What it accepts it reads, checks and works out with the interpreter's own arithmetic, operation by operation, so that
 the rows are the same to the last bit. At the first line that has anything else in it, that is doubtful, or wrong, it
@@ -21,129 +24,82 @@ from rds.nc.language.arcs import (
     SPIRAL_RELATIVE,
     SPIRAL_TOLERANCE,
 )
+from rds.nc.language.batch import (
+    ABSOLUTE,
+    ARC_ABSOLUTE,
+    CALL,
+    COMMENT,
+    DWELL,
+    FLOOD,
+    IN_SERIES,
+    INCHES,
+    MIST,
+    MOTION,
+    PLANE,
+    RATE_NOW,
+    RETRACT_HIGH,
+    SPEED_NOW,
+    SPINDLE,
+    TAKES_MODES,
+)
 from rds.nc.language.canon import ARC, FEED, RATE, SPEED, TRAVERSE
-from rds.nc.language.source import LONGEST
+from rds.nc.language.fast_lane_cycles import cycle, is_sound
+from rds.nc.language.fast_lane_rows import (
+    FLOOD_OFF,
+    FLOOD_ON,
+    LINE_ROWS,
+    MIST_OFF,
+    MIST_ON,
+    NO_MODE,
+    NOW_ABSOLUTE,
+    NOW_INCREMENTAL,
+    TO_R,
+    TO_START,
+    put,
+    turned,
+)
+from rds.nc.language.fast_lane_words import (
+    AXES,
+    COOLANT_WORD,
+    DIGITS,
+    DISTANCE,
+    DWELLS,
+    GIVEN,
+    IJK,
+    MOVE,
+    RETRACT,
+    SAID,
+    SAID_SIZE,
+    SPINDLE_WORD,
+    F,
+    L,
+    N,
+    P,
+    Q,
+    R,
+    S,
+    read_words,
+)
 from rds.nc.language.state import NO_MOTION, XY, XZ
 
-# Where the words are put: the axes at 0 to 5, I J K at 6 to 8.
-_R, _F, _S = 9, 10, 11
-_AXES, _IJK = 0b000_111111, 0b111_000000
-# What a byte is, when it is not a letter with a place.
-_G, _N, _BLANK, _NEWLINE, _SEMICOLON, _OTHER = 20, 21, 30, 31, 32, -1
-_EXACT = 1 << 53  # whole numbers up to here are floats, and up to 10^22 powers of ten: their quotient is rounded once
-_DECIMALS = 22
-_N_DIGITS = 9
 _DOUBT = 1e-9  # of a tolerance: as near to it the interpreter decides
 _LARGEST = 1e9  # of coordinates of arcs: beyond, squares may lose digits or overflow
-
-
-def _byte_table() -> np.ndarray:
-    table = np.full(256, _OTHER, np.int8)
-    for letters in ("xyzabcijkrfs", "XYZABCIJKRFS"):
-        for place, letter in enumerate(letters):
-            table[ord(letter)] = place
-    for character, meaning in (("gG", _G), ("nN", _N), (" \t\r", _BLANK), ("\n", _NEWLINE), (";", _SEMICOLON)):
-        for byte in character.encode():
-            table[byte] = meaning
-    return table
-
-
-_BYTES = _byte_table()
-_POWERS = np.array([float(10**power) for power in range(_DECIMALS + 1)])
+_ROTARY = AXES & ~0b111
 _RADIUS_TOLERANCE = np.array(RADIUS_TOLERANCE)
 _SPIRAL_TOLERANCE = np.array(SPIRAL_TOLERANCE)
 
 
-@njit(cache=True, error_model="numpy")
-def _read_words(data, at, end, words):
-    """The words of the line at `at`.
-
-    Returns where the next line begins (-1: not a plain line), a bit for each word given, the G word of motion and that
-    of distance (-1 without), the line number and its digits.
-    """
-    given, motion, distance, n, n_digits = 0, -1, -1, 0, 0
-    bad = (-1, 0, 0, 0, 0, 0)
-    limit = min(end, at + LONGEST + 1)
-    first = True
-    while at < limit:
-        meaning = _BYTES[data[at]]
-        at += 1
-        if meaning == _BLANK:
-            continue
-        if meaning == _NEWLINE:
-            return at, given, motion, distance, n, n_digits
-        if meaning == _SEMICOLON:
-            while at < limit:
-                at += 1
-                if data[at - 1] == 10:
-                    return at, given, motion, distance, n, n_digits
-            return bad
-        if meaning < 0:
-            return bad
-        # a number
-        mantissa, digits, decimals, point, sign = 0, 0, 0, False, 0
-        while at < limit:
-            byte = data[at]
-            if 48 <= byte <= 57:
-                mantissa = 10 * mantissa + (byte - 48)
-                digits += 1
-                if point:
-                    decimals += 1
-                if mantissa > _EXACT:
-                    return bad
-            elif byte == 46:
-                if point:
-                    return bad
-                point = True
-            elif byte == 43 or byte == 45:
-                if sign or digits or point:
-                    return bad
-                sign = 1 if byte == 43 else -1
-            elif _BYTES[byte] != _BLANK:
-                break
-            at += 1
-        if digits == 0 or decimals > _DECIMALS:
-            return bad
-        if meaning == _N:
-            if not first or sign or point or digits > _N_DIGITS:
-                return bad
-            n, n_digits = mantissa, digits
-        else:
-            value = mantissa / _POWERS[decimals]
-            if meaning == _G:
-                if sign:
-                    return bad
-                if value == 0.0 or value == 1.0 or value == 2.0 or value == 3.0:
-                    if motion != -1:
-                        return bad
-                    motion = 10 * int(value)
-                elif value == 90.0 or value == 91.0:
-                    if distance != -1:
-                        return bad
-                    distance = 1 if value == 90.0 else 0
-                else:
-                    return bad
-            else:
-                bit = 1 << meaning
-                if given & bit:
-                    return bad
-                given |= bit
-                words[meaning] = -value if sign < 0 else value
-        first = False
-    return bad  # too long, or not read to its end yet
-
-
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _centre(words, given, first, second, third, clockwise, arc_absolute, inches, x0, y0, x1, y1):
     """The centre of an arc in its plane; the first value tells whether it is without doubt."""
     largest = max(max(abs(x0), abs(y0)), max(abs(x1), abs(y1)))
     if not largest < _LARGEST:
         return False, 0.0, 0.0
     smallest, spiral = _RADIUS_TOLERANCE[inches], _SPIRAL_TOLERANCE[inches]
-    if given >> _R & 1:
-        if given & _IJK or not (given >> first & 1 or given >> second & 1) or (x0 == x1 and y0 == y1):
+    if given >> R & 1:
+        if given & IJK or not (given >> first & 1 or given >> second & 1) or (x0 == x1 and y0 == y1):
             return False, 0.0, 0.0
-        radius = words[_R]
+        radius = words[R]
         size = abs(radius)
         middle_x, middle_y = (x1 + x0) / 2.0, (y1 + y0) / 2.0
         way_x, way_y = middle_x - x1, middle_y - y1
@@ -173,17 +129,76 @@ def _centre(words, given, first, second, third, clockwise, arc_absolute, inches,
     return error <= spiral or (error / most <= SPIRAL_RELATIVE and error <= spiral * SPIRAL_MOST), centre_x, centre_y
 
 
-@njit(cache=True, error_model="numpy")
-def read_lines(data, at, end, line, state, modes, words, target, kinds, digits, ns, lines, values):
+@njit(error_model="numpy")
+def _turning(word):
+    return 1 if word == 3 else -1 if word == 4 else 0
+
+
+@njit(error_model="numpy")
+def _settings(found, words, state, modes, kinds, values, row):
+    """What a line does before it moves, in the order of modes.py. Returns the row behind."""
+    given = found[GIVEN]
+    if found[SAID] != -1:
+        row = put(kinds, values, row, COMMENT, found[SAID], found[SAID_SIZE])
+    if given >> F & 1:
+        state[RATE_NOW] = words[F]
+        row = put(kinds, values, row, RATE, words[F], 0.0)
+    if given >> S & 1:
+        state[SPEED_NOW] = words[S]
+        row = put(kinds, values, row, SPEED, words[S], 0.0)
+    if found[SPINDLE_WORD] != -1:
+        modes[SPINDLE] = _turning(found[SPINDLE_WORD])
+        row = put(kinds, values, row, CALL, turned(modes[SPINDLE]), 0.0)
+    coolant = found[COOLANT_WORD]
+    if coolant == 7:
+        modes[MIST] = 1
+        row = put(kinds, values, row, CALL, MIST_ON, 0.0)
+    elif coolant == 8:
+        modes[FLOOD] = 1
+        row = put(kinds, values, row, CALL, FLOOD_ON, 0.0)
+    elif coolant == 9:
+        modes[MIST] = modes[FLOOD] = 0
+        row = put(kinds, values, row, CALL, MIST_OFF, 0.0)
+        row = put(kinds, values, row, CALL, FLOOD_OFF, 0.0)
+    if found[DWELLS] != -1:
+        row = put(kinds, values, row, DWELL, words[P], 0.0)
+    if found[DISTANCE] != -1 and found[DISTANCE] != modes[ABSOLUTE]:
+        modes[ABSOLUTE] = found[DISTANCE]
+        row = put(kinds, values, row, CALL, NOW_ABSOLUTE if found[DISTANCE] else NOW_INCREMENTAL, 0.0)
+    if found[RETRACT] != -1:
+        modes[RETRACT_HIGH] = found[RETRACT]
+        row = put(kinds, values, row, CALL, TO_START if found[RETRACT] else TO_R, 0.0)
+    return row
+
+
+@njit(error_model="numpy")
+def _motion(found, modes):
+    """The motion of a line, -1 for none; -2 where the interpreter is to decide."""
+    given, motion, modal = found[GIVEN], found[MOVE], modes[MOTION]
+    if found[DWELLS] != -1:
+        return -1 if motion == -1 and not given & (AXES | IJK) and modes[TAKES_MODES] else -2
+    if motion == -1:
+        if given & AXES:
+            motion = -2 if modal == NO_MOTION else modal
+        elif (modal == 20 or modal == 30) and given & IJK:
+            motion = modal
+    elif (motion == NO_MOTION and given & AXES) or (motion > 30 and motion != NO_MOTION and not given & AXES):
+        return -2
+    changes = motion > 30 or found[RETRACT] != -1 or found[SPINDLE_WORD] != -1 or found[COOLANT_WORD] != -1
+    changes = changes or (found[DISTANCE] != -1 and found[DISTANCE] != modes[ABSOLUTE])
+    return motion if modes[TAKES_MODES] or not changes else -2
+
+
+@njit(error_model="numpy")
+def read_lines(data, at, end, line, state, modes, words, target, found, kinds, digits, ns, lines, values):
     """Read and execute plain lines of `data` from `at` until one that is not plain, the end, or no room for rows.
 
-    `line` is the line number at `at`; `state` holds the position (X Y Z A B C), the feed rate and the speed, `modes`
-    the active motion, whether distances are absolute, centres are absolute, the plane, whether units are inches. Both
-    are left as the last line that was read leaves them. `words` (12) and `target` (6) are room to work in. The other
-    arrays, one element or row per row of MOTION, are filled. Returns bytes and lines read, and rows written.
+    `line` is the line number at `at`; `state` and `modes` hold what fast_lane_cycles.py numbers. Both are left as the
+    last line that was read leaves them. `words`, `target` (6) and `found` are room to work in. The other arrays, one
+    element or row per row of a batch, are filled. Returns bytes and lines read, and rows written, and of them calls.
     """
-    begin, first_line, row, room = at, line, 0, len(kinds) - 2
-    absolute, arc_absolute, plane, inches = modes[1], modes[2], modes[3], modes[4]
+    begin, first_line, row, room, calls = at, line, 0, len(kinds) - LINE_ROWS, 0
+    arc_absolute, plane, inches = modes[ARC_ABSOLUTE], modes[PLANE], modes[INCHES]
     if plane == XY:
         first, second, third = 0, 1, 2
     elif plane == XZ:
@@ -191,27 +206,29 @@ def read_lines(data, at, end, line, state, modes, words, target, kinds, digits, 
     else:
         first, second, third = 1, 2, 0
     while row < room and at < end:
-        behind, given, motion, distance, n, n_digits = _read_words(data, at, end, words)
-        if behind < 0 or (distance != -1 and distance != absolute):
+        behind = read_words(data, at, end, words, found)
+        if behind < 0:
             break
-        modal = modes[0]
-        if motion == -1:
-            if given & _AXES:
-                if modal == NO_MOTION:
-                    break
-                motion = modal
-            elif (modal == 20 or modal == 30) and given & _IJK:
-                motion = modal
-        arc = motion == 20 or motion == 30
-        if not arc and given & (_IJK | 1 << _R):
+        given, motion = found[GIVEN], _motion(found, modes)
+        arc, canned = motion == 20 or motion == 30, motion > 30 and motion != NO_MOTION
+        if (
+            motion == -2
+            or (not arc and given & IJK)
+            or (given >> R & 1 and not (arc or canned))
+            or (given >> P & 1 and not (canned or found[DWELLS] != -1))
+            or (given & (1 << Q | 1 << L) and not canned)
+        ):
             break
-        feed = state[6]
-        if given >> _F & 1:
-            feed = words[_F]
-            if feed < 0.0:
+        feed = words[F] if given >> F & 1 else state[RATE_NOW]
+        if feed < 0.0 or ((motion == 10 or arc or canned) and feed == 0.0) or (given >> S & 1 and words[S] < 0.0):
+            break
+        if found[DWELLS] != -1 and not (given >> P & 1 and words[P] >= 0.0):
+            break
+        if canned:
+            spindle = modes[SPINDLE] if found[SPINDLE_WORD] == -1 else _turning(found[SPINDLE_WORD])
+            if given & _ROTARY or not is_sound(motion, given, words, state, modes, spindle, third):
                 break
-        if (motion > 0 and feed == 0.0) or (given >> _S & 1 and words[_S] < 0.0):
-            break
+        absolute = modes[ABSOLUTE] if found[DISTANCE] == -1 else found[DISTANCE]
         for axis in range(6):
             target[axis] = state[axis]
             if given >> axis & 1:
@@ -234,36 +251,43 @@ def read_lines(data, at, end, line, state, modes, words, target, kinds, digits, 
             )
             if not sound:
                 break
-        # Nothing is wrong with the line: from here on it is executed.
-        if given >> _F & 1:
-            state[6] = feed
-            kinds[row], digits[row], ns[row], lines[row] = RATE, n_digits, n, line
-            values[row, 0] = feed
-            values[row, 1:] = 0.0
-            row += 1
-        if given >> _S & 1:
-            state[7] = words[_S]
-            kinds[row], digits[row], ns[row], lines[row] = SPEED, n_digits, n, line
-            values[row, 0] = words[_S]
-            values[row, 1:] = 0.0
-            row += 1
-        if motion != -1:
-            modes[0] = motion
-            digits[row], ns[row], lines[row] = n_digits, n, line
-            if arc:
+        # Nothing is wrong with the line, unless R is below the depth: from here on it is executed.
+        start = row
+        before = (state[RATE_NOW], state[SPEED_NOW])
+        modes_before = (modes[ABSOLUTE], modes[RETRACT_HIGH], modes[SPINDLE], modes[MIST], modes[FLOOD])
+        row = _settings(found, words, state, modes, kinds, values, row)
+        if canned:
+            behind_holes = cycle(motion, given, words, state, modes, kinds, values, row)
+            if behind_holes < 0:
+                state[RATE_NOW], state[SPEED_NOW] = before
+                modes[ABSOLUTE], modes[RETRACT_HIGH], modes[SPINDLE], modes[MIST], modes[FLOOD] = modes_before
+                row = start
+                break
+            row = behind_holes
+        elif motion != -1:
+            modes[MOTION], modes[IN_SERIES] = motion, 0
+            if motion == NO_MOTION:
+                row = put(kinds, values, row, CALL, NO_MODE, 0.0)
+            elif arc:
                 kinds[row] = ARC
                 values[row, 0], values[row, 1] = target[first], target[second]
                 values[row, 2], values[row, 3] = centre_x, centre_y
                 values[row, 4] = -1.0 if motion == 20 else 1.0
                 values[row, 5] = target[third]
                 values[row, 6], values[row, 7], values[row, 8] = target[3], target[4], target[5]
+                row += 1
             else:
                 kinds[row] = FEED if motion == 10 else TRAVERSE
                 for axis in range(6):
                     values[row, axis] = target[axis]
                 values[row, 6:] = 0.0
-            for axis in range(6):
-                state[axis] = target[axis]
-            row += 1
+                row += 1
+            if motion != NO_MOTION:
+                for axis in range(6):
+                    state[axis] = target[axis]
+        for place in range(start, row):
+            digits[place], ns[place], lines[place] = found[DIGITS], found[N], line
+            if kinds[place] > SPEED:
+                calls += 1
         at, line = behind, line + 1
-    return at - begin, line - first_line, row
+    return at - begin, line - first_line, row, calls

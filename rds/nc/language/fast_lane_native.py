@@ -1,69 +1,43 @@
-"""The fast lane's kernels as machine code from an object file, which numba has compiled once.
+"""The fast lane's kernels as machine code from a file that numba has compiled once.
 
-Importing numba and having it look through what it has kept takes longer than 100,000 lines of a program; an object file
-is loaded by llvmlite alone, in a tenth of that. It lies with Python's own compiled files, and is made anew whenever
-anything that went into it has changed. Importing this needs llvmlite, which comes with numba.
+Importing numba and having it look through what it has kept takes longer than 100,000 lines of a program. Where the
+computer has a linker (`ld`, of binutils), the file is a shared library, which is loaded in a thousandth of a second;
+else it is an object file, which llvmlite loads in some twentieth. It lies with Python's own compiled files, and is made
+anew whenever anything that went into it has changed.
 """
 
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import sys
 from array import array
-from collections.abc import Iterator
-from contextlib import suppress
-from functools import cache
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterator
 
-from llvmlite import __version__ as llvmlite_version
-from llvmlite import binding as llvm
-
-from rds.core.private_files import make_folder, open_private
-from rds.nc.language.fast_lane_target import ENTRIES, target_machine
+from rds.nc.language.batch import FLOATS, FOUND, MODES, WORDS
+from rds.nc.language.fast_lane_files import ENTRIES, IS_TRIED, file_of, library, whole
 from rds.nc.language.motion_rows import Columns, empty
 
-_SOURCES = (
-    "fast_lane_kernel.py",
-    "fast_lane_object.py",
-    "fast_lane_target.py",
-    "fast_lane_text.py",
-    "arcs.py",
-    "canon.py",
-    "state.py",
-)
-_DIGEST = hashlib.sha256().digest_size
+_WORK = WORDS + 6  # and the target of its move
 _OUT = 1 << 20  # bytes of text at once
-_IS_TRIED = sys.platform == "linux"  # elsewhere Python reads and writes the same, slower
-_POINTER = ctypes.c_void_p
+_POINTER, _WHOLE = ctypes.c_void_p, ctypes.c_int64
+# numba's convention: the result and what an exception would be (neither is used), then the arguments
+_HEAD = (ctypes.c_int32, _POINTER, _POINTER)
+READ = ctypes.CFUNCTYPE(*_HEAD, _POINTER, _WHOLE, _WHOLE, _WHOLE, *([_POINTER] * 9), _WHOLE, _POINTER)
+WRITE = ctypes.CFUNCTYPE(*_HEAD, _WHOLE, *([_POINTER] * 4), _WHOLE, _POINTER, _WHOLE, _POINTER, _WHOLE, _POINTER)
 
 
 class Kernels:
-    """The kernels, ready to be called."""
+    """The kernels, ready to be called: at two addresses of what `library` keeps."""
 
-    def __init__(self, objects: dict[str, bytes]):
-        llvm.initialize_native_target()
-        llvm.initialize_native_asmprinter()
-        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
-        for object_file in objects.values():
-            self._engine.add_object_file(llvm.ObjectFileRef.from_data(object_file))
-        self._engine.finalize_object()
-        read, write = (self._engine.get_function_address(name) for name in ENTRIES)
-        whole = ctypes.c_int64
-        # numba's convention: the result and what an exception would be (neither is used), then the arguments
-        head = (ctypes.c_int32, _POINTER, _POINTER)
-        self._read = ctypes.CFUNCTYPE(*head, _POINTER, whole, whole, whole, *([_POINTER] * 8), whole, _POINTER)(read)
-        self._write = ctypes.CFUNCTYPE(*head, whole, *([_POINTER] * 4), whole, _POINTER, whole, _POINTER)(write)
+    def __init__(self, read: int, write: int, library: object):
+        self._read, self._write, self._library = READ(read), WRITE(write), library
         self._answer, self._unused = _counts(4), _counts(2)
         self._out: ctypes.Array[ctypes.c_char] | None = None
 
     def reader(self, state: array[float], modes: array[int], rows: int) -> LineReader:
         return LineReader(self._read, state, modes, rows)
 
-    def written(self, columns: Columns, number: int) -> Iterator[tuple[int, str]]:
-        """The text of rows, numbered from `number`, in portions: rows of it and their lines.
+    def written(self, columns: Columns, number: int, quoted: bytes = b"") -> Iterator[tuple[int, str]]:
+        """The text of rows, numbered from `number`, in portions: rows of it and their lines. `quoted`: of a batch.
 
         A portion without text is a row that Python is to write.
         """
@@ -76,7 +50,8 @@ class Kernels:
         first = 0
         while first < rows:
             places = [start + first * stride for start, stride in zip(starts, strides, strict=True)]
-            self._write(unused, unused + 8, number + first, *places, rows - first, out, _OUT, answer)
+            rest = (rows - first, quoted, len(quoted), out, _OUT, answer)
+            self._write(unused, unused + 8, number + first, *places, *rest)
             count, size = self._answer[:2]
             yield (count, ctypes.string_at(out, size).decode("ascii")) if count else (1, "")
             first += count or 1
@@ -85,20 +60,22 @@ class Kernels:
 class LineReader:
     """The reader of plain lines for one run, with room for so many rows."""
 
-    def __init__(self, read: Any, state: array[float], modes: array[int], rows: int):
+    def __init__(self, read: Callable[..., int], state: array[float], modes: array[int], rows: int):
+        assert len(state) == FLOATS
+        assert len(modes) == MODES
         self._read, self._room = read, rows
         self._columns = empty(rows)
-        self._kept = (state, modes, array("d", bytes(8 * 18)))
+        self._kept = (state, modes, array("d", bytes(8 * _WORK)), _counts(FOUND))
         self._answer, self._unused = _counts(4), _counts(2)
         self._places = [_address(place) for place in (*self._kept, *self._columns)]
         self._answers = _address(self._unused), _address(self._unused) + 8, _address(self._answer)
 
-    def __call__(self, data: bytes, at: int, line: int) -> tuple[int, int, int]:
-        """Bytes and lines read, and rows written, as of `read_lines`."""
+    def __call__(self, data: bytes, at: int, line: int) -> tuple[int, int, int, int]:
+        """Bytes and lines read, rows written, and how many of these are calls, as of `read_lines`."""
         result, fault, answer = self._answers
         self._read(result, fault, data, len(data), at, line, *self._places, self._room, answer)
-        size, lines, rows, _ = self._answer
-        return size, lines, rows
+        size, lines, rows, calls = self._answer
+        return size, lines, rows, calls
 
     def rows(self, count: int) -> Columns:
         """A copy of the rows that were written."""
@@ -109,73 +86,37 @@ def _counts(count: int) -> array[int]:
     return array("q", bytes(8 * count))
 
 
-def _address(column: array[Any]) -> int:
+def _address(column: array[float] | array[int]) -> int:
     return column.buffer_info()[0]
 
 
 def stored_kernels() -> Kernels | None:
-    """The kernels from their object files; None where there are none, or damaged ones."""
-    if not _IS_TRIED:
+    """The kernels from what was compiled before; None where there is nothing, or it is damaged."""
+    if not IS_TRIED:
         return None
+    shared = library()
+    if shared is not None:
+        found = [ctypes.cast(getattr(shared, name), _POINTER).value for name in ENTRIES]
+        return Kernels(found[0] or 0, found[1] or 0, shared)
     try:
-        return Kernels({name: _whole(_file(name).read_bytes()) for name in ENTRIES})
-    except (OSError, ValueError):
+        objects = {name: whole(file_of(f"{name}.o")) for name in ENTRIES}
+        from rds.nc.language.fast_lane_target import loaded
+    except (OSError, ValueError, ImportError):
         return None
+    return Kernels(*loaded(objects))
 
 
 def compile_kernels() -> Kernels | None:
     """The kernels, compiled now and kept where that can be. None without numba, and where nobody has tried it."""
-    if not _IS_TRIED:
+    if not IS_TRIED:
         return None
     try:
-        from rds.nc.language.fast_lane_object import compiled
+        from rds.nc.language.fast_lane_object import compiled, keep, objects
+        from rds.nc.language.fast_lane_target import loaded
     except ImportError:
         return None
-    objects = compiled()
-    if objects is None:
+    texts = compiled()
+    if texts is None:
         return None
-    with suppress(OSError):
-        _keep(objects)
-    return Kernels(objects)
-
-
-def _file(name: str) -> Path:
-    return Path(__file__).parent / "__pycache__" / f"fast_lane.{_environment()}.{_sources()}.{name}.o"
-
-
-def _whole(content: bytes) -> bytes:
-    """The object file behind its digest; ValueError if it is damaged, which LLVM would end the process for."""
-    digest, object_file = content[:_DIGEST], content[_DIGEST:]
-    if hashlib.sha256(object_file).digest() != digest:
-        raise ValueError("the object file is damaged")
-    return object_file
-
-
-def _keep(objects: dict[str, bytes]) -> None:
-    """Each file whole or not at all; those that this Python made from earlier sources are removed."""
-    folder = _file("").parent
-    make_folder(folder)
-    for old in folder.glob(f"fast_lane.{_environment()}.*.o"):
-        old.unlink(missing_ok=True)
-    for name, content in objects.items():
-        new = folder / f"{name}.{os.getpid()}"
-        with open_private(new, "wb", is_own=True) as stream:
-            stream.write(hashlib.sha256(content).digest() + content)
-        new.replace(_file(name))
-
-
-@cache
-def _environment() -> str:
-    """Of what compiles and runs the machine code: Python, LLVM and the processor."""
-    about = f"{sys.version} {llvmlite_version} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-    return hashlib.sha256(about.encode()).hexdigest()[:16]
-
-
-@cache
-def _sources() -> str:
-    """Of the text that it was compiled from."""
-    folder = Path(__file__).parent
-    digest = hashlib.sha256()
-    for name in _SOURCES:
-        digest.update((folder / name).read_bytes())
-    return digest.hexdigest()[:16]
+    keep(texts)
+    return stored_kernels() or Kernels(*loaded(objects(texts, shared=False)))

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
-from rds.nc.language.blocks import AXES, AXIS_SET, CHECKED, STOP, Block, check, settle_motion
+from rds.nc.language.batch import Batch
+from rds.nc.language.blocks import AXIS_SET, CHECKED, STOP, Block, check, settle_motion
 from rds.nc.language.canon import Call, MotionBlock
+from rds.nc.language.compiled_loops import GOES_ON, Loops
 from rds.nc.language.context import Context
 from rds.nc.language.control import Control
 from rds.nc.language.dialect import Dialect
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 from rds.nc.language.fast_lane import FastLane
+from rds.nc.language.located import as_it_is_meant, located, place_in
 from rds.nc.language.modes import execute
 from rds.nc.language.moves import move
 from rds.nc.language.names import known_names
@@ -24,13 +27,15 @@ from rds.nc.language.parameters import Parameters, read_parameters
 from rds.nc.language.program_bounds import Bounds
 from rds.nc.language.repeated_lines import Line, RepeatedLines
 from rds.nc.language.saved_modes import SavedModes, lines_to_restore, modes_now
-from rds.nc.language.source import LONGEST, open_source
+from rds.nc.language.source import LONGEST, Source, open_source
 from rds.nc.language.state import State
 from rds.nc.language.stream import Stream
 from rds.nc.language.tools import Tool, ToolTable, read_tools
-from rds.nc.language.words import column_of, fill, line_number, place_of, read_plain, read_words, recoded, tidy, word_at
+from rds.nc.language.words import fill, line_number, read_plain, read_words, tidy
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rds.machines.ncc import Script
     from rds.nc.compensation.moves import Stretch
     from rds.nc.language.contour_reading import ContourReading
@@ -39,9 +44,6 @@ if TYPE_CHECKING:
 
 _USUAL = frozenset((0, 10, 20, 30))  # motions that no line goes on with wrongly but by words that are checked
 _PROGRAM_NUMBER = re.compile(r"[po][0-9]+")
-_SCRIPT = re.compile(r"(?:n[0-9]+)?(rf[0-9]|build)")
-_NO_SCRIPT = "a configuration script stands at the program's head, before its first block; move this line there"
-_SCRIPT_IS_OFF = "this is a line of a configuration script; read the program with the option ncc (--with ncc)"
 _MOTION_WORD = re.compile(r"(?:n[0-9]+)?(?!o).*?(g40(?![0-9])|[xyz]|m[0-9])")  # of a block that compensation refuses
 
 
@@ -77,7 +79,7 @@ class Interpreter:
 
     def __init__(
         self,
-        source: str | Path | IO[Any],
+        source: str | Path | IO[Any] | Source,
         *,
         tools: Path | Iterable[Tool] | None = None,
         parameters: Path | Mapping[int, float] | None = None,
@@ -86,8 +88,8 @@ class Interpreter:
         stretches: list[Stretch] | None = None,
         remark: Callable[[ProgramError], None] | None = None,
     ):
-        table = ToolTable(read_tools(tools) if isinstance(tools, Path) else tools or ())
-        kept = read_parameters(parameters) if isinstance(parameters, Path) else parameters
+        table = ToolTable(read_tools(tools) if isinstance(tools, os.PathLike) else tools or ())
+        kept = read_parameters(parameters) if isinstance(parameters, os.PathLike) else parameters
         self.options = options
         self.source = open_source(source, name, semicolons=options.program_numbers)
         self.out = Stream()
@@ -98,10 +100,13 @@ class Interpreter:
         self.context.saved_modes = self._saved_modes
         self.control.restore = self._restore
         self.context.contour = self._contour_of
+        self.context.remark = self._remark_on
         self._fanuc: FanucTurning | None = None  # once a line of its form has been met
         self._contour: ContourReading | None = None  # while the moves of a contour's subroutine are gathered
         self.lane = FastLane(self.context, self.source)
         self._repeated = RepeatedLines(self.context.parameters)
+        self._loops = Loops(self.context, self.control, self._repeated)
+        self.by_line = False  # whether one line after the other is executed, and none together with others
         self._others = 0  # kept lines that the fast lane could not take, since it was tried
         self._remark = remark
         self._bounds = Bounds(self.context, self.control, remark)
@@ -119,6 +124,14 @@ class Interpreter:
 
     def run(self) -> Iterator[MotionBlock | Call]:
         """The canonical calls. Raises ProgramError."""
+        return cast("Iterator[MotionBlock | Call]", self._run())
+
+    def run_in_batches(self) -> Iterator[MotionBlock | Call | Batch]:
+        """The same, with what compiled code has read in batches, which it can write. Raises ProgramError."""
+        self.out.in_batches = True
+        return self._run()
+
+    def _run(self) -> Iterator[MotionBlock | Call | Batch]:
         out = self.out
         out.file = self.source.name
         start(self.context)
@@ -152,7 +165,10 @@ class Interpreter:
         out.call("ON_RESET")
         yield from self._take()
 
-    def _take(self) -> list[MotionBlock | Call]:
+    def _error(self, fault: Fault, raw: bytes) -> ProgramError:
+        return located(fault, raw, self._text, self._places, self.control.source, self.context.state.motion)
+
+    def _take(self) -> list[MotionBlock | Call | Batch]:
         items, self.out.items = self.out.items, []
         return items
 
@@ -182,8 +198,7 @@ class Interpreter:
                 self._repeated.count(raw, text)
             return ended
         except Fault as fault:
-            scripts = Fault(_NO_SCRIPT if self.options.ncc else _SCRIPT_IS_OFF, at=0)
-            raise self._error(scripts if _SCRIPT.match(self._text) else fault, raw) from None
+            raise self._error(as_it_is_meant(fault, raw, self._text, self.options), raw) from None
         except ProgramError as error:
             if error.line:
                 raise
@@ -200,6 +215,8 @@ class Interpreter:
             word = control.again(line, self._repeated)
             if word is not None:
                 control.execute(word)
+                if word.kind in GOES_ON and not self.by_line and not control.skipping:
+                    self._loops.go_on(word.name)
             return None if word is None else False
         if control.skipping:
             return False
@@ -283,6 +300,11 @@ class Interpreter:
             self._bounds.after_end(f"M{block.m[STOP]}")
         return ended
 
+    def _remark_on(self, said: str) -> None:
+        """Say what is no fault of the block that is executed now, and worth a look."""
+        if self._remark is not None:
+            self._remark(ProgramError(said, file=self.out.file, line=self.out.line))
+
     def _fanuc_turning(self, text: str) -> bool:
         """Execute a line of Fanuc's G70 to G72; False, and nothing done, where it is none. Raises Fault."""
         if self._fanuc is None:
@@ -314,7 +336,7 @@ class Interpreter:
                 fanuc.run(self.control, self._line)
                 return
             depth = self.control.depth
-            self.control.execute(Word("call", name, spelled(name), max(self._place("q"), 0)))
+            self.control.execute(Word("call", name, spelled(name), max(place_in("q", self._text, self._places), 0)))
             while self.control.depth > depth:
                 if raw := self.control.source.read():
                     self._line(raw)
@@ -373,31 +395,3 @@ class Interpreter:
         self.out.digits = self.out.n = 0
         self.out.comment(f"program {text.upper()}")
         return True
-
-    # -- faults -------------------------------------------------------------------------------------------------------
-
-    def _place(self, key: str) -> int:
-        """Where a word of the block stands in its text; -1 when it has none."""
-        place = self._places.get(key, -1)
-        if place >= 0:
-            return place
-        return self._text.find("(") if key == "(" else place_of(key, self._text)
-
-    def _error(self, fault: Fault, raw: bytes) -> ProgramError:
-        """The fault with file, line, column and word."""
-        source, text, at, message = self.control.source, self._text, fault.at, fault.message
-        word = ""
-        if fault.key:
-            at = self._place(fault.key)
-            motion = self.context.state.motion
-            if at < 0 and fault.key == f"g{motion}":  # of a motion that an earlier line has set
-                message = f"G{motion // 10} is still in force: {message}"
-                at = min((place for axis in AXES if (place := self._place(axis)) >= 0), default=-1)
-        column = 0
-        if at == -2:
-            column = len(raw[: raw.rfind(b"(")].decode("utf-8", "replace")) + 1 + source.column
-            word = "("
-        elif at >= 0 and text:
-            column = column_of(raw, at) + source.column
-            word = word_at(text, at).encode("latin-1").decode("utf-8", "replace")
-        return ProgramError(recoded(message), file=source.name, line=source.line, column=column, word=word)

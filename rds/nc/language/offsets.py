@@ -5,8 +5,6 @@ A position in program coordinates p, with rotation R about Z, lies in the machin
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from rds.nc.language.blocks import Block
 from rds.nc.language.context import INCH, Context, given, rotate
 from rds.nc.language.expressions import Fault
@@ -246,8 +244,7 @@ def set_tool(m: Context, block: Block) -> None:
         orientation = int(words["q"])
         if orientation != words["q"] or not 0 <= orientation <= 9:
             raise Fault(f"Q{words['q']:g} is no orientation of a lathe tool; write 0 to 9", "q")
-    changed = replace(
-        tool,
+    changed = tool._replace(
         offset=tuple([m.to_machine(length) for length in offset[:3]] + offset[3:]),
         diameter=m.to_machine(words["r"]) * 2.0 if "r" in words else tool.diameter,
         front=words.get("i", tool.front),

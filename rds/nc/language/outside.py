@@ -55,6 +55,12 @@ _LETTERS = {
     "\x00": "a character 0 does not belong in a program; save the file as plain text",
 }
 
+FANUC_MACRO = (
+    "IF, WHILE, DO, END and GOTO alone are Fanuc's macro language; write O1 IF [...] and O1 ENDIF, O1 WHILE [...] and"
+    " O1 ENDWHILE on lines of their own"
+)
+OLD_LINE_ENDS = "its lines end with CR alone, so that they are one; save the file with line ends LF, or CR LF"
+
 GR_IS_OFF = (
     "GR, the subroutine call of dcs-thesis, is an option of the dialect; switch it on (`--with gr`)"
     " or write O<name> CALL"

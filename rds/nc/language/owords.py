@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 
 from rds.nc.language.expressions import Fault, Reader
 from rds.nc.language.parameters import ARGUMENTS, Parameters
@@ -18,20 +17,22 @@ FANUC = re.compile(r"m0*9([89])(?![0-9.\[#])")  # M98 calls a program by its num
 TESTS = frozenset(("while", "repeat", "if", "elseif"))
 
 
-@dataclass(slots=True)
 class Word:
     """An O word that has been read. `kind` is "" when there is nothing to do; `name`, of labels inside subroutines, is
     `sub#label`; `spelled` is for messages; `at` where it begins in its block.
     """
 
-    kind: str = ""
-    name: str = ""
-    spelled: str = ""
-    at: int = 0
-    test: float = 0.0
-    arguments: list[float] = field(default_factory=list)
-    value: float | None = None  # that RETURN or ENDSUB gives back
-    times: int = 1  # that M98 calls
+    __slots__ = ("arguments", "at", "kind", "name", "spelled", "test", "times", "value")
+
+    def __init__(self, kind: str = "", name: str = "", spelled: str = "", at: int = 0):
+        self.kind = kind
+        self.name = name
+        self.spelled = spelled
+        self.at = at
+        self.test = 0.0
+        self.arguments: list[float] = []
+        self.value: float | None = None  # that RETURN or ENDSUB gives back
+        self.times = 1  # that M98 calls
 
 
 def read_word(text: str, at: int, parameters: Parameters, *, scope: str, defining: str, skipping: str) -> Word:

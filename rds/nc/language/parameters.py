@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rds.core.limits import read_limited
@@ -12,6 +11,8 @@ from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rds.nc.language.state import State
 
 COUNT = 5602  # numbers 1 to 5601, as in LinuxCNC

@@ -6,12 +6,12 @@ line that it would fault, or that has anything rare, is left to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rds.nc.language.blocks import AXIS_SET, MOTION, Block
 from rds.nc.language.canon import FEED, TRAVERSE
-from rds.nc.language.compiled_values import FAULTS, Compiler, Refused, names_of
+from rds.nc.language.compiled_values import FAULTS, Compiler, Refused, checked, names_of
 from rds.nc.language.owords import FANUC, GLOBAL, KIND, TESTS, Word, spelled
 from rds.nc.language.parameters import ARGUMENTS, Parameters
 from rds.nc.language.state import PER_MINUTE
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _OFTEN = 3  # executions after which a line is worth being taken apart
 _MOST = 20_000  # lines kept at once
 _WHOLE = frozenset("hlt")  # words that are whole
+_FIRST_OF_USE = 5000  # parameters below are nothing but the program's
 _NOTHING = Word()
 _SIMPLE = frozenset("xyzabcf")
 _STRAIGHT: tuple[dict[int, int], ...] = ({}, {MOTION: 0}, {MOTION: 10})
@@ -32,12 +33,21 @@ _KINDS = TESTS | frozenset(
 )
 
 
+class Parts(NamedTuple):
+    """Code of a line: what is worked out, the variables of words and of settings, the values of O words."""
+
+    steps: list[str]
+    words: dict[str, str]
+    settings: list[tuple[str, str]]
+    values: Sequence[str] = ()
+
+
 class Line:
     """A kept line: its text as tidy() gives it, and the digits, number and end of its word N."""
 
     __slots__ = (
         *("axes", "code", "comment", "digits", "g", "m", "motion", "n", "places", "plain", "ready", "scope", "simple"),
-        *("text", "word"),
+        *("parts", "text", "word"),
     )
 
     def __init__(self, text: str):
@@ -53,6 +63,7 @@ class Line:
         self.simple = False  # nothing but settings, F, and a straight move: its G word, or -1, and its axis words
         self.motion, self.axes = -1, False
         self.code: Callable[..., Any] | None = None
+        self.parts = Parts([], {}, [])  # what that is made of
 
 
 class RepeatedLines:
@@ -176,17 +187,17 @@ class RepeatedLines:
                 return None
             take = self._control_code if text.startswith("o", at) else self._words_code
             source = take(line, at)
-            line.code = self._compiled(source) if source else None
+            line.code = self.compiled(source) if source else None
         except (Refused, *FAULTS, SyntaxError, RecursionError, MemoryError):
             return None
         return line
 
-    def _compiled(self, source: str) -> Callable[..., Any]:
-        """The function `line` of the code. Its values are numbers and names written by repr()."""
+    def compiled(self, source: str) -> Callable[..., Any]:
+        """The function `line` of code made here, with what that may use."""
         if not self._names:
             self._names = names_of(self._parameters)
         found: dict[str, Any] = {}
-        exec(compile(source, "<line of a part program>", "exec", dont_inherit=True), self._names, found)
+        exec(compile(source, "<lines of a part program>", "exec", dont_inherit=True), self._names, found)
         return found["line"]
 
     def _control_code(self, line: Line, at: int) -> str:
@@ -210,13 +221,14 @@ class RepeatedLines:
                 raise Refused
         if reader.peek() not in ("", ";"):
             raise Refused
+        line.parts = Parts([], {}, [], values)
         return f"def line(n, l, q):\n return [{', '.join(values)}]" if values else ""
 
     def _words_code(self, line: Line, at: int) -> str:
         reader, text = Compiler(line.text, self._parameters, at), line.text
         template = Block()
         steps: list[str] = []
-        words: list[str] = []
+        words: dict[str, str] = {}
         settings: list[tuple[str, str]] = []
         while reader.at < len(text):
             start, letter = reader.at, text[reader.at]
@@ -239,20 +251,22 @@ class RepeatedLines:
                 template.words[letter] = 0.0
                 line.places[letter] = start
                 variable = f"v{len(steps)}"
-                steps.append(f"{variable} = finite({value})")
+                steps.append(f"{variable} = {checked(value)}")
                 if letter in _WHOLE:
                     steps.append(f"{variable} = whole({variable})")
                 if letter in _WHOLE or letter in "fs":
                     steps.append(f"not_negative({variable})")
-                words.append(f"{letter!r}: {variable}")
+                words[letter] = variable
             else:
                 raise Refused
         line.g, line.m = template.g, template.m
         line.motion, line.axes = line.g.get(MOTION, -1), not AXIS_SET.isdisjoint(template.words)
         simple = line.g in _STRAIGHT and not line.m and not line.comment and template.words.keys() <= _SIMPLE
         line.simple = simple and (line.axes or line.motion == -1)
-        steps.append(f"return {{{', '.join(words)}}}, ({''.join(f'({name}, {value}), ' for name, value in settings)})")
-        return "\n ".join(["def line(n, l, q):", *steps])
+        line.parts = Parts(steps, words, settings)
+        found = ", ".join(f"{letter!r}: {variable}" for letter, variable in words.items())
+        given = "".join(f"({name}, {value}), " for name, value in settings)
+        return "\n ".join(["def line(n, l, q):", *steps, f"return {{{found}}}, ({given})"])
 
     def _setting(self, reader: Compiler, steps: list[str]) -> tuple[str, str]:
         """The steps of #... = value; code of what is set, and of its value."""
@@ -263,9 +277,11 @@ class RepeatedLines:
             steps.append(f"declare({name!r})")
             place = repr(name)
         else:
-            place = f"p{len(steps)}"
-            steps.append(f"{place} = {reader.index()}\n settable({place})")
+            place = reader.index()
+            if not (place.isdecimal() and 1 <= int(place) < _FIRST_OF_USE):
+                steps.append(f"p{len(steps)} = {place}\n settable(p{len(steps)})")
+                place = f"p{len(steps) - 1}"
         reader.expect("=")
         variable = f"v{len(steps)}"
-        steps.append(f"{variable} = finite({reader.value()})")
+        steps.append(f"{variable} = {checked(reader.value())}")
         return place, variable

@@ -5,7 +5,7 @@ They are restored as LinuxCNC does it: by a line of the words that differ, with 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from rds.nc.language.context import INCH
 from rds.nc.language.parameters import G92_APPLIED, Parameters
@@ -19,8 +19,7 @@ _WORDS = (
 _COMMANDS = ("turning", "mist", "flood", "overrides")
 
 
-@dataclass(frozen=True)
-class SavedModes:
+class SavedModes(NamedTuple):
     """What M70 or M73 found. `again`: M73, they are restored when the subroutine returns."""
 
     units: str

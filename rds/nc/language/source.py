@@ -6,10 +6,12 @@ import codecs
 import io
 import os
 from collections.abc import Iterator
-from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from rds.nc.language.errors import ProgramError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 CHUNK = 1 << 18  # bytes read at once
 LONGEST = 252  # characters of a line, as in LinuxCNC
@@ -39,7 +41,7 @@ class Source:
         stream: IO[bytes],
         name: str,
         *,
-        folder: Path | None = None,
+        folder: str | None = None,
         semicolons: bool = False,
         owned: bool = True,
     ):
@@ -219,9 +221,11 @@ class _Spool(io.RawIOBase):
         super().close()
 
 
-def open_source(source: str | Path | IO[Any], name: str = "", *, semicolons: bool = False) -> Source:
+def open_source(source: str | Path | IO[Any] | Source, name: str = "", *, semicolons: bool = False) -> Source:
     """A Path is a file; a str is the program itself; a file object is read as it goes. Raises ProgramError."""
-    if isinstance(source, Path):
+    if isinstance(source, Source):
+        return source
+    if isinstance(source, os.PathLike):  # not Path, whose import takes as long as a thousand lines
         return open_file(source, name or str(source), semicolons=semicolons)
     owned = True
     if isinstance(source, str):
@@ -233,9 +237,9 @@ def open_source(source: str | Path | IO[Any], name: str = "", *, semicolons: boo
     return Source(stream, name or str(getattr(source, "name", "")), semicolons=semicolons, owned=owned)
 
 
-def open_file(path: Path, name: str, *, semicolons: bool = False) -> Source:
+def open_file(path: str | Path, name: str, *, semicolons: bool = False) -> Source:
     try:
-        stream = path.open("rb")
+        stream = open(path, "rb")  # noqa: SIM115 (closed by close)
     except OSError as error:
         raise ProgramError(f"cannot be read ({error.strerror}); check the path", file=name, line=0) from None
-    return Source(stream, name, folder=path.parent, semicolons=semicolons)
+    return Source(stream, name, folder=os.path.dirname(path), semicolons=semicolons)

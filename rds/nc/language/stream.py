@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+from rds.nc.language.batch import Batch
 from rds.nc.language.canon import BLOCK_ROWS, RATE, SPEED, Call, MotionBlock
 from rds.nc.language.motion_rows import Columns, empty
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 _REST = (0.0,) * 3
 _ONLY = (0.0,) * 8
 FEW = 1024  # rows handed over that are worth no block of their own
+FEW_OF_BATCH = 16  # the same of a batch, which compiled code writes
 
 
 class Stream:
@@ -24,7 +26,8 @@ class Stream:
     """
 
     def __init__(self) -> None:
-        self.items: list[MotionBlock | Call] = []
+        self.items: list[MotionBlock | Call | Batch] = []
+        self.in_batches = False  # whether batches are handed on whole
         self.compensation: Compensation | None = None
         self.line = self.digits = self.n = 0
         self._file = ""
@@ -33,6 +36,16 @@ class Stream:
     def _empty(self) -> None:
         self._columns = empty()
         self._kinds, self._digits, self._ns, self._lines, self._values = self._columns
+
+    @property
+    def columns(self) -> Columns:
+        """The rows gathered so far, to add to."""
+        return self._columns
+
+    def make_room(self, rows: int) -> None:
+        """So many rows may be added to `columns`."""
+        if len(self._kinds) + rows > BLOCK_ROWS:
+            self.flush()
 
     @property
     def file(self) -> str:
@@ -114,6 +127,20 @@ class Stream:
             self.items.append(MotionBlock(columns, self._file))
         else:
             self._columns.extend(columns)
+
+    def batch(self, columns: Columns, text: bytes) -> None:
+        """Moves and calls from somewhere else; `text` is what their rows quote."""
+        batch = Batch(columns, text, self._file)
+        if self.in_batches and len(batch) > FEW_OF_BATCH:
+            self.flush()
+            self.items.append(batch)
+            return
+        for part in batch.parts():
+            if isinstance(part, Call):
+                self.flush()
+                self.items.append(part)
+            else:
+                self.rows(part.columns)
 
     def flush(self) -> None:
         """What has been gathered becomes a block."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rds.core.limits import read_limited
 from rds.nc.language.errors import ProgramError
 from rds.nc.language.expressions import Fault
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rds.nc.language.tool_library import ShapedTool
 
 _WORD = re.compile(r"([A-Za-z])([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
@@ -22,8 +22,7 @@ _LARGEST = 4 << 20  # bytes
 _MOST = 1000  # tools in a table, as in LinuxCNC
 
 
-@dataclass(frozen=True)
-class Tool:
+class Tool(NamedTuple):
     """A line of the table; lengths in the machine's units, angles in degrees.
 
     `offset`: X Y Z A B C. `front`, `back`: angles of a lathe tool; `orientation`: of its nose (0: no lathe tool).
