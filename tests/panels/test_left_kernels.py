@@ -15,11 +15,12 @@ pytest.importorskip("jupyter_server", reason="Voilà is not installed: it is in 
 
 from jupyter_server._tz import utcnow
 
-from rds.panels.app.kernels import PageKernels
 from tests.panels.conftest import App
 
 
 def test_a_kernel_ends_a_time_after_its_last_browser_left_and_not_after_its_last_word() -> None:
+    from rds.panels.app.kernels import PageKernels  # here, as each worker would spend 2 s as it collects
+
     def an_hour_later(kernels: PageKernels, kernel: str) -> None:
         kernels.get_kernel(kernel).last_activity = utcnow() - timedelta(hours=1)
 

@@ -25,7 +25,6 @@ import pytest
 pytest.importorskip("voila", reason="Voilà is not installed: it is in the extra lab")
 
 from rds.panels.app import serve
-from rds.panels.app.server import PanelsServer
 from tests.panels.conftest import App
 
 SOMEBODY = 61_234  # a user who owns nothing here
@@ -263,6 +262,8 @@ def test_the_browser_is_started_with_a_file_that_only_its_user_reads(
         ready.set()
 
     monkeypatch.setattr(webbrowser, "get", lambda _: SimpleNamespace(open=start))
+    from rds.panels.app.server import PanelsServer  # here, as each worker would spend 2 s as it collects
+
     server = PanelsServer(ip="127.0.0.1", port=8866, base_url="/path/")
     server.connection_dir = str(tmp_path)
     server.identity_provider = SimpleNamespace(token="secret", token_generated=True)
@@ -278,6 +279,8 @@ def test_a_folder_has_no_settings_of_the_server(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "voila.json").write_text('{"Voila": {"token": "", "ip": "0.0.0.0"}}')
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # it is the tests' process
+    from rds.panels.app.server import PanelsServer  # here, as each worker would spend 2 s as it collects
+
     server = PanelsServer()
     server.initialize([str(Path(serve.__file__).parent / "page.ipynb"), "--Voila.ip=127.0.0.1"])
     assert not (tmp_path / "was-run").exists()

@@ -22,7 +22,6 @@ from jupyter_client import KernelManager
 from rds.bus.hub.address import runtime_directory
 from rds.core.parallel.forked import ForkedProcess
 from rds.panels.app import serve
-from rds.panels.app.kernels import PageKernel
 from rds.panels.app.provisioner import offer
 from rds.panels.app.ready_kernels import LAUNCHER, ReadyKernels
 
@@ -111,6 +110,8 @@ def test_what_a_forked_process_prints_comes_by_a_private_socket_as_all_else(
     folder = runtime_directory()
 
     async def life() -> tuple[str, list[str]]:
+        from rds.panels.app.kernels import PageKernel  # here, as each worker would spend 2 s as it collects
+
         manager = PageKernel(kernel_name="rds", connection_file=str(folder / "kernel-0123456789ab.json"))
         await manager.start_kernel(cwd=str(APP), env=os.environ | {"SAID": "", "APP": ""})
         client = manager.client()
@@ -135,6 +136,8 @@ def test_what_a_forked_process_prints_comes_by_a_private_socket_as_all_else(
 def test_the_sockets_of_kernels_have_room_in_the_longest_runtime_directory() -> None:
     # 65 bytes are the most that runtime_directory takes; then come serve's folder and Voilà's in it, with random ends
     folder = Path("/" + "r" * 64) / "app12345678" / "voila_12345678"
+    from rds.panels.app.kernels import PageKernel  # here, as each worker would spend 2 s as it collects
+
     manager = PageKernel(connection_file=str(folder / "kernel-01234567-89ab-cdef-0123-456789abcdef.json"))
     assert manager.transport == "ipc" and len(f"{manager.ip}-6") <= 103
 
