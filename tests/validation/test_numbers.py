@@ -14,7 +14,7 @@ from rds.identification.fit.initial_state import estimate_start
 from rds.identification.fit.needed_voltage import needed_voltage, static_curve
 from rds.identification.fit.residuals import BAND, LONGEST, bandwidth, block_length, effective_samples, residual_tests
 from rds.identification.logs.fingerprint import fingerprint, shared
-from rds.identification.logs.motion import noise
+from rds.identification.logs.motion import noise as noise_of
 from rds.identification.structures.structures import structure
 from rds.identification.validate.assessment import assess, smoothed_velocity
 from rds.identification.validate.candidate import Candidate
@@ -70,7 +70,7 @@ def test_noise_is_told_beside_the_steps_of_an_encoder() -> None:
     motion = 200.0 * np.sin(np.arange(5000) * 0.005)
     for size in (0.3, 0.43, 0.6, 0.8):  # steps
         y = np.rint(motion + size * draw.standard_normal(5000))
-        assert noise(y) == pytest.approx(np.hypot(size, np.sqrt(1.0 / 12.0)), rel=0.12)
+        assert noise_of(y) == pytest.approx(np.hypot(size, np.sqrt(1.0 / 12.0)), rel=0.12)
 
 
 def test_the_velocity_changes_where_it_swings_whatever_the_encoder() -> None:
