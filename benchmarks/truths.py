@@ -28,6 +28,7 @@ FULL = 10.0  # V
 _FAR = 5.0  # standard errors: beyond doubt
 _STRETCHES = 5  # of a closed loop
 _SUBSTEP = 5e-5  # s, at most
+_DRAWS = 64  # of an encoder's rounding
 _SIGNALS = ("square", "sine", "multisine", "chirp", "steps")
 
 
@@ -212,8 +213,12 @@ def _own(made: Machine, values: Mapping[str, float]) -> Candidate:
 def _suffices(made: Machine, data: Log) -> bool:
     """Whether the log tells a model from one whose gain is 5 %, or whose time constant is 30 % off, by five standard
     errors of the best estimate that there can be (Cramér and Rao's bound) while friction, play, delay and the initial
-    state are not known either. In a closed loop each stretch has a state of its own, as disturbances that the
-    controller makes up for do not let a free run add up.
+    state, the place within the play included, are not known either. In a closed loop each stretch has a state of its
+    own, as disturbances that the controller makes up for do not let a free run add up.
+
+    That bound takes the encoder's rounding for independent noise. Where an axis rests, as within its play, or moves a
+    few steps only, the rounding is the same or follows the motion, sample after sample. So the standard error of least
+    squares with the rounding that this motion has, wherever the encoder's steps begin, must be as small, too.
     """
     axis = structure("axis", tuple({*made.options, "delay"}))
     values = {"delay": 0.0, **made.values}
@@ -222,28 +227,43 @@ def _suffices(made: Machine, data: Log) -> bool:
     stretches = max(int(made.seconds / max(1.0, 40.0 * made.values["tau"])), 1) if made.closed_loop else 1
     ends = np.linspace(0, len(data), min(stretches, _STRETCHES) + 1).astype(int)
     assert axis.sensitivities is not None
-    state = (0.0,) * axis.states
-    _, by = axis.sensitivities(data.time, data.command, state, values)
-    information = np.zeros((len(names), len(names)))
+    moved, by = axis.sensitivities(data.time, data.command, (0.0,) * axis.states, values)
+    misread = _misread(made, moved)
+    information, scores = np.zeros((len(names), len(names))), np.zeros((len(names), misread.shape[1]))
     for first, end in pairwise(ends):
         t = data.time[first:end] - data.time[first]
         decay = np.exp(-t / made.values["tau"])
-        own = np.column_stack([np.ones_like(t), decay])
+        own = np.column_stack([np.ones_like(t), decay, by[first:end, len(names) + 2 :]])
         J = by[first:end, : len(names)]
         J = J - own @ np.linalg.lstsq(own, J, rcond=None)[0]
         information += J.T @ J
+        scores += J.T @ misread[first:end]
     scale = np.sqrt(np.diag(information))
     used = scale > 0.0
     if not all(used[names.index(name)] for name in ("tau", "K")):
         return False  # nothing of its motion comes out of the play
-    bound = np.zeros_like(information)
+    inverse = np.zeros_like(information)
     part = np.ix_(used, used)
-    bound[part] = noise**2 * np.linalg.pinv(information[part] / np.outer(scale[used], scale[used]), rcond=1e-12)
-    bound[part] /= np.outer(scale[used], scale[used])
+    inverse[part] = np.linalg.pinv(information[part] / np.outer(scale[used], scale[used]), rcond=1e-12)
+    inverse[part] /= np.outer(scale[used], scale[used])
     gain = np.array([float(name == "K") for name in names])
     lag = np.array([float(name in ("tau", "delay")) for name in names])
-    gain_error, lag_error = (float(np.sqrt(max(row @ bound @ row, 0.0))) for row in (gain, lag))
+    gain_error, lag_error = (
+        max(float(noise * np.sqrt(max(row @ inverse @ row, 0.0))), float(np.std(row @ inverse @ scores)))
+        for row in (gain, lag)
+    )
     return gain_error <= 0.05 / _FAR * made.values["K"] and lag_error <= 0.3 / _FAR * made.values["tau"]
+
+
+def _misread(made: Machine, moved: np.ndarray) -> np.ndarray:
+    """By how much an encoder misreads this motion, (samples, draws): other noise, and other places of its steps."""
+    draw = np.random.default_rng([23, made.number])
+    phases = made.resolution * (np.arange(_DRAWS) + draw.random(_DRAWS)) / _DRAWS
+    there = moved[:, None] + phases
+    seen = there + made.noise * draw.standard_normal(there.shape)
+    if made.resolution > 0.0:
+        seen = np.rint(seen / made.resolution) * made.resolution
+    return np.asarray(seen - there)
 
 
 def _wrong_in(truth: Mapping[str, float], values: Mapping[str, float]) -> tuple[str, float]:

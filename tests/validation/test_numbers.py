@@ -14,10 +14,12 @@ from rds.identification.fit.initial_state import estimate_start
 from rds.identification.fit.needed_voltage import needed_voltage, static_curve
 from rds.identification.fit.residuals import BAND, LONGEST, bandwidth, block_length, effective_samples, residual_tests
 from rds.identification.logs.fingerprint import fingerprint, shared
+from rds.identification.logs.motion import noise as noise_of
 from rds.identification.structures.structures import structure
 from rds.identification.validate.assessment import assess, smoothed_velocity
 from rds.identification.validate.candidate import Candidate
 from rds.identification.validate.criterion import Rival, rank
+from rds.identification.validate.discrepancy import error_of
 from rds.identification.validate.validate import compare_models
 from tests.validation.validation_logs import STEP, T, X, candidate, moved, square
 from tests.validation.validation_logs import log as made_log
@@ -53,6 +55,29 @@ def test_rounding_alone_fails_a_test_at_the_rate_of_sampling_and_not_this_one() 
         assert a.tests is not None
         assert float(e[1:] @ e[:-1]) / float(e @ e) > 5.0 * BAND / np.sqrt(len(e))
         assert a.tests.p_white > 0.01 and a.tests.p_command > 0.01
+
+
+def test_a_standard_error_counts_how_a_figure_is_bent() -> None:
+    line = error_of(lambda p: 3.0 * float(p[0]) - float(p[1]), np.array([1.0, 2.0]), np.diag([4.0, 9.0]))
+    assert line == pytest.approx(np.hypot(6.0, 3.0))
+    bent = error_of(lambda p: float(np.hypot(1.0, p[0])), np.array([0.0]), np.array([[4.0]]))
+    assert bent == pytest.approx(np.sqrt(5.0) - 1.0)  # where its slope is 0
+    assert error_of(lambda p: float(p[0] ** 2), np.array([0.0]), np.array([[np.inf]])) == np.inf
+
+
+def test_noise_is_told_beside_the_steps_of_an_encoder() -> None:
+    draw = np.random.default_rng(3)
+    motion = 200.0 * np.sin(np.arange(5000) * 0.005)
+    for size in (0.3, 0.43, 0.6, 0.8):  # steps
+        y = np.rint(motion + size * draw.standard_normal(5000))
+        assert noise_of(y) == pytest.approx(np.hypot(size, np.sqrt(1.0 / 12.0)), rel=0.12)
+
+
+def test_the_velocity_changes_where_it_swings_whatever_the_encoder() -> None:
+    """Forward at 0 and 6 mm/s by turns, then back: every change counts, and none of the encoder's steps does."""
+    u = np.repeat([0.3, 4.0, 0.3, 4.0, -2.0, -6.0], 600)
+    for step in (None, STEP, 50.0 * STEP):
+        assert assess(candidate(), made_log(u, moved(u, step=step), resolution=step)).changes == 4
 
 
 def test_a_wrong_time_constant_is_found_in_the_residual() -> None:

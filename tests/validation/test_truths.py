@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from benchmarks.truths import cases, machine
@@ -38,6 +39,17 @@ def test_a_motion_within_the_play_tells_nothing() -> None:
     verdict = judge(truth.candidate, assess(truth.candidate, truth.log), Bands())
     assert verdict.word is Word.CANNOT_TELL and not truth.suffices
     assert any(reason.kind == "no-motion" and "its noise alone" in reason.what for reason in verdict.reasons)
+
+
+def test_play_may_begin_anywhere_within_its_width() -> None:
+    """Of a file of one's own, the way before axis and model have been driven the same way tells nothing."""
+    (row,) = rows(333, ["truth, a file of one's own"])
+    assert row.right and row.suffices and not row.error
+
+
+def test_a_few_steps_of_an_encoder_without_noise_do_not_suffice() -> None:
+    few, many = next(cases(504)), next(cases(8))
+    assert np.ptp(few.log.position) < 20.0 * few.machine.resolution and not few.suffices and many.suffices
 
 
 def test_the_rates_count_what_is_called_otherwise_than_it_is() -> None:

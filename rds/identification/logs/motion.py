@@ -10,6 +10,7 @@ from rds.identification.logs.log import Log
 
 _WINDOW = 0.02  # s: a few time constants of a table-top axis
 _MOST = 200_000  # windows
+_EQUAL = 1e-12  # of the largest position: differences that differ by less are one
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,23 @@ def noise(values: np.ndarray) -> float:
     if len(values) < 8:
         return 0.0
     third = np.diff(values, 3)  # 1, 3, 3, 1: the variance is 20 times the noise's
-    robust = 1.4826 * float(np.median(np.abs(third)))
+    robust = 1.4826 * _median(np.abs(third), _EQUAL * float(np.abs(values).max()))
     return (robust or float(np.sqrt(np.mean(third**2)))) / np.sqrt(20.0)
+
+
+def _median(sizes: np.ndarray, equal: float) -> float:
+    """The median of sizes that an encoder rounds: those that read alike, to `equal`, lie anywhere in their step.
+
+    The plain median of so few different numbers is a third too large or too small (median of grouped data).
+    """
+    middle = float(np.median(sizes))
+    below, above = sizes < middle - equal, sizes > middle + equal
+    alike = len(sizes) - int(below.sum()) - int(above.sum())
+    if middle <= equal or alike < 2:
+        return middle
+    low = 0.5 * (float(sizes[below].max(initial=0.0)) + middle)
+    high = 0.5 * (float(sizes[above].min(initial=np.inf)) + middle) if above.any() else middle
+    return low + (0.5 * len(sizes) - int(below.sum())) / alike * (high - low)
 
 
 def travel(position: np.ndarray, way: float) -> float:

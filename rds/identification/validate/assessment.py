@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,9 @@ from rds.identification.validate.same_data import Overlap, overlap
 
 _MOVES = 1e-3  # of the measured motion
 _SLOPE = 1e-3  # of a standard error, for sensitivities
+_FEWEST = 16  # blocks that are worth joining
+_LATEST = 0.75  # of the log: where play is taken up later, no more of it is left out
+_MOVED = (8.0, 2.0)  # times the noise, steps of the encoder: beyond the range of noise alone, an axis has moved
 
 
 @dataclass(frozen=True)
@@ -99,12 +102,15 @@ class Assessment:
 
     @property
     def changes(self) -> int:
-        """How often the measured velocity goes from clearly above its mean to clearly below it, or back."""
+        """How often the measured velocity swings from clearly high to clearly low, or back.
+
+        It is taken over blocks so long that a step of the encoder is no change, where the log has so long ones.
+        """
         step = 0.0 if self.log.resolution is None else self.log.resolution / (self.block * self.log.sample_period)
-        far = self.block_velocity - self.block_velocity.mean()
-        least = max(0.5 * float(far.std()), step, 1e-9)
-        sides = np.sign(far[np.abs(far) > least])
-        return int(np.count_nonzero(np.diff(sides)))
+        rate = self.block_velocity
+        while float(rate.std()) < 2.0 * step and len(rate) >= _FEWEST:
+            rate, step = block_means(rate, 2), step / 2.0
+        return _swings(rate, max(float(rate.std()), 2.0 * step, 1e-9))
 
     @property
     def motion(self) -> float:
@@ -177,11 +183,44 @@ def assess(candidate: Candidate, log: Log, initial_samples: int | None = None, b
         voltage=_voltage(candidate, log, block),
         attainable=attainable(candidate, log, start, common["noise"]),
         as_axis=as_axis(candidate, log, common["noise"], bandwidth),
-        as_motion=as_motion(
-            log, first, modelled, candidate.is_rate, rates, bandwidth, values.get("tau", 0.0), common["noise"]
-        ),
+        as_motion=_as_motion(candidate, log, first, response, block, bandwidth, common["noise"]),
         **common,
     )
+
+
+def _as_motion(
+    candidate: Candidate, log: Log, first: int, response: np.ndarray, block: int, bandwidth: float, noise: float
+) -> Discrepancy | None:
+    """As motion from sample `first` on; of a model with more states than position and velocity from where both move.
+
+    Where an axis begins within its play, no first samples tell. Once both, axis and model, have been driven the same
+    way, a constant is all that they are apart by, as the play has been taken up on the same side.
+    """
+    if candidate.structure.states > 2:
+        least = max(_MOVED[0] * noise, _MOVED[1] * (log.resolution or 0.0))
+        begun = min(max(_goes(way * y, first, least) for y in (log.position, response)) for way in (1.0, -1.0))
+        first = begun if begun <= _LATEST * len(log) else first
+    rates = [_rates(log.time[first:], y[first:], block, candidate.is_rate) for y in (log.position, response)]
+    tau = candidate.values.get("tau", 0.0)
+    return as_motion(log, first, response[first:], candidate.is_rate, rates, bandwidth, tau, noise)
+
+
+def _goes(position: np.ndarray, first: int, least: float) -> int:
+    """The first sample from `first` on that is `least` above an earlier one; their count where there is none."""
+    up = position - np.minimum.accumulate(position) > least
+    return max(first, int(np.argmax(up))) if up.any() else len(position)
+
+
+def _swings(values: np.ndarray, least: float) -> int:
+    """How often a series goes up by `least` or more, and down."""
+    count, way, low, high = 0, 0.0, inf, -inf
+    for value in values.tolist():
+        low, high = min(low, value), max(high, value)
+        if way <= 0.0 and value - low >= least:
+            count, way, high = count + 1, 1.0, value
+        elif way >= 0.0 and high - value >= least:
+            count, way, low = count + 1, -1.0, value
+    return count
 
 
 def _first(log: Log, initial_samples: int | None) -> int:

@@ -235,17 +235,29 @@ def _frictions(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def error_of(of: Callable[[np.ndarray], float], point: np.ndarray, covariance: np.ndarray) -> float:
-    slopes = np.zeros(len(point))
-    for i, value in enumerate(point):
-        step = 1e-5 * (abs(value) or 1.0)
-        below, above = point.copy(), point.copy()
-        below[i] -= step
-        above[i] += step
-        slopes[i] = (of(above) - of(below)) / (2.0 * step)
-    used = slopes != 0.0
-    if not np.isfinite(covariance[np.ix_(used, used)]).all():
+    """The standard error of a figure: how far it moves to the ends of the axes of the covariance's ellipsoid.
+
+    Slopes at the point would say too little where the figure is bent: a time constant near 0 has no slope in a gain.
+    """
+    here = of(point)
+    moved = [of(point + step) != here or of(point - step) != here for step in np.diag(0.1 * _sizes(point))]
+    used = np.flatnonzero(moved)
+    part = covariance[np.ix_(used, used)]
+    if not np.isfinite(part).all():
         return float("inf")
-    return sqrt(max(float(slopes[used] @ covariance[np.ix_(used, used)] @ slopes[used]), 0.0))
+    spread = np.sqrt(np.maximum(np.diag(part), 0.0))
+    scale = np.where(spread > 0.0, spread, 1.0)
+    sizes, axes = np.linalg.eigh(part / np.outer(scale, scale))
+    total = 0.0
+    for size, axis in zip(sizes, axes.T, strict=True):
+        step = np.zeros(len(point))
+        step[used] = sqrt(max(float(size), 0.0)) * axis * spread
+        total += max(abs(of(point + step) - here), abs(of(point - step) - here)) ** 2
+    return sqrt(total) if isfinite(total) else float("inf")
+
+
+def _sizes(point: np.ndarray) -> np.ndarray:
+    return np.where(point != 0.0, np.abs(point), 1.0)
 
 
 def _axis_of(candidate: Candidate) -> tuple[Structure, dict[str, float]] | None:
