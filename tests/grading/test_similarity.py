@@ -16,6 +16,7 @@ from rds.grading.batch.similarity import (
     LEAST_COMMON,
     LEAST_SCORE,
     WINDOW,
+    Packed,
     fingerprints,
     identical_files,
     same_loops,
@@ -76,7 +77,7 @@ def disguised(code: str) -> str:
 
 
 def prints(**codes: str) -> dict[str, dict[int, tuple[int, int]]]:
-    return {name: fingerprints(code.encode()) for name, code in codes.items()}
+    return {name: Packed(fingerprints(code.encode())) for name, code in codes.items()}
 
 
 def test_a_copy_in_disguise_is_the_same_and_another_law_is_not() -> None:
@@ -138,6 +139,7 @@ def test_pairs_are_those_of_a_comparison_one_by_one(values: list[set[int]]) -> N
         and len(both) >= LEAST_SCORE * min(len(found[a]), len(found[b]))
     }
     pairs = similar_pairs(found)
+    assert similar_pairs({name: Packed(prints) for name, prints in found.items()}) == pairs
     assert {(pair.first, pair.second, pair.score, pair.common) for pair in pairs} == expected
     assert all(sum(last - first + 1 for first, last in pair.first_lines) == pair.common for pair in pairs)
 

@@ -21,6 +21,7 @@ from rds.grading.batch.queue import Queued, queued
 from rds.grading.batch.similarity import (
     Fingerprints,
     Identical,
+    Packed,
     Pair,
     SameLoop,
     fingerprints,
@@ -102,10 +103,12 @@ def alike(
     codes = [code for _, code in given] + list(parsed.values()) + list(others.values())
     if len(given) + len(others) < 2:  # no pair: a process less to start, which is what one submission's time goes into
         codes = []
-    done = [outcome.value or {} for outcome in spread(_prints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)]
+    done = [
+        Packed(outcome.value or {}) for outcome in spread(_prints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)
+    ]
     found = {student: prints for (student, _), prints in zip(given, done, strict=False)}
     sources = dict(zip(parsed, done[len(given) :], strict=False))
-    template = sources.pop(assignment.template or "", {})
+    template = sources.pop(assignment.template or "", Packed({}))
     earlier = dict(zip(others, done[len(given) + len(parsed) :], strict=False))
     hashes = {each.row.student: each.sha256 for each in rows}
     theirs = {name: hashlib.sha256(code.read()).hexdigest() for name, code in (own | others).items()}
