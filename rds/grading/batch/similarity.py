@@ -15,7 +15,6 @@ from bisect import bisect_left
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations
 
 import numpy as np
 
@@ -151,37 +150,42 @@ def similar_pairs(
     everybody = {**foreign, **found}
     sizes = {name: sum(value not in known for value in prints) for name, prints in everybody.items()}
     shared_values = _in_several(everybody.values(), 2) - known  # what one alone has is no more than its number
-    own = {name: {v: prints[v] for v in prints if v in shared_values} for name, prints in everybody.items()}
     holders: dict[int, list[str]] = {}
-    for student in sorted(own):
-        for value in own[student]:
-            holders.setdefault(value, []).append(student)
+    for student in sorted(everybody):
+        for value in everybody[student]:
+            if value in shared_values:
+                holders.setdefault(value, []).append(student)
     groups: dict[tuple[str, ...], list[int]] = {}  # what the same students have: many have all of a file in common
     for value, students in holders.items():
-        if len(students) > 1:
-            groups.setdefault(tuple(students), []).append(value)
+        groups.setdefault(tuple(students), []).append(value)
     parts = list(groups.values())
-    shared: dict[tuple[str, str], list[int]] = {}  # by pair: numbers of groups
-    for number, together in enumerate(groups):
-        for pair in combinations(sorted(together, key=lambda name: (name not in found, name)), 2):
-            if pair[0] in found:  # students come first
-                shared.setdefault(pair, []).append(number)
+    together = [sorted(names, key=lambda name: (name not in found, name)) for names in groups]  # students come first
+    groups_of: dict[str, list[int]] = {}
+    for number, names in enumerate(together):
+        for name in names:
+            groups_of.setdefault(name, []).append(number)
 
     @cache
     def lines(student: str, numbers: tuple[int, ...]) -> tuple[Lines, ...]:
-        return _joined(own[student][value] for number in numbers for value in parts[number])
+        return _joined(everybody[student][value] for number in numbers for value in parts[number])
 
     pairs = []
-    for (first, second), numbers in shared.items():
-        common = sum(len(parts[number]) for number in numbers)
-        score = common / min(sizes[first], sizes[second])
-        if common >= LEAST_COMMON and score >= LEAST_SCORE:
-            which = tuple(numbers)
-            both = [value for number in numbers for value in parts[number]]
-            named = [(sum(value in prints for value in both), name) for name, prints in (sources or {}).items()]
-            most, source = max(named, default=(0, ""))
-            source = source if most >= LEAST_SCORE * common else ""
-            pairs.append(Pair(first, second, score, common, lines(first, which), lines(second, which), source))
+    for first in found:  # one after the other: all pairs of a class together need not have room in memory
+        shared: dict[str, list[int]] = {}  # numbers of groups
+        for number in groups_of.get(first, ()):
+            names = together[number]
+            for second in names[names.index(first) + 1 :]:
+                shared.setdefault(second, []).append(number)
+        for second, numbers in shared.items():
+            common = sum(len(parts[number]) for number in numbers)
+            score = common / min(sizes[first], sizes[second])
+            if common >= LEAST_COMMON and score >= LEAST_SCORE:
+                which = tuple(numbers)
+                both = [value for number in numbers for value in parts[number]]
+                named = [(sum(value in prints for value in both), name) for name, prints in (sources or {}).items()]
+                most, source = max(named, default=(0, ""))
+                source = source if most >= LEAST_SCORE * common else ""
+                pairs.append(Pair(first, second, score, common, lines(first, which), lines(second, which), source))
     return sorted(pairs, key=lambda pair: (-pair.score, pair.first, pair.second))
 
 
