@@ -11,12 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rds.grading.batch.alike import Behaviour
 from rds.grading.batch.similarity import (
     GRAM,
     LEAST_COMMON,
     LEAST_SCORE,
     WINDOW,
-    Packed,
+    Program,
     fingerprints,
     identical_files,
     same_loops,
@@ -76,8 +77,8 @@ def disguised(code: str) -> str:
     return "# mine\n\n" + ast.unparse(ast.parse(code)).replace("\n", "\n\n").replace("    ", "  ")
 
 
-def prints(**codes: str) -> dict[str, dict[int, tuple[int, int]]]:
-    return {name: Packed(fingerprints(code.encode())) for name, code in codes.items()}
+def prints(**codes: str) -> list[Program]:
+    return [(name, fingerprints(code.encode())) for name, code in codes.items()]
 
 
 def test_a_copy_in_disguise_is_the_same_and_another_law_is_not() -> None:
@@ -138,8 +139,7 @@ def test_pairs_are_those_of_a_comparison_one_by_one(values: list[set[int]]) -> N
         if len(both := found[a].keys() & found[b].keys()) >= LEAST_COMMON
         and len(both) >= LEAST_SCORE * min(len(found[a]), len(found[b]))
     }
-    pairs = similar_pairs(found)
-    assert similar_pairs({name: Packed(prints) for name, prints in found.items()}) == pairs
+    pairs = similar_pairs(found.items())
     assert {(pair.first, pair.second, pair.score, pair.common) for pair in pairs} == expected
     assert all(sum(last - first + 1 for first, last in pair.first_lines) == pair.common for pair in pairs)
 
@@ -171,13 +171,15 @@ def test_the_table_escapes_names() -> None:
 
 
 def test_files_of_others_are_compared_with_the_class_alone() -> None:
-    others = {"2024/eve": fingerprints(disguised(LAW).encode()), "2024/zoe": fingerprints(LAW.encode())}
+    others = prints(**{"2024/eve": disguised(LAW), "2024/zoe": LAW})
     pairs = similar_pairs(prints(ada=LAW, cy=OTHER), others=others)
     assert {(pair.first, pair.second) for pair in pairs} == {("ada", "2024/eve"), ("ada", "2024/zoe")}
 
 
 def test_equal_runs_make_a_group_whatever_the_programs_look_like() -> None:
-    one, other = {"sine": "a", "step": "b"}, {"sine": "a", "step": "c"}
-    groups = same_loops({"ada": one, "ben": dict(one), "cy": other, "di": {}, "ed": {}}, {"2024/eve": other})
+    behaviours = [{"sine": "a", "step": "b"}, {"step": "b", "sine": "a"}, {"sine": "a", "step": "c"}, {}, None]
+    one, same, other, *nothing = (Behaviour.of({"behaviour": by_case}).runs for by_case in behaviours)
+    given = {"ada": one, "ben": same, "cy": other, "di": nothing[0], "ed": nothing[1]}
+    groups = same_loops(given, {"2024/eve": other})
     assert [(group.students, group.others) for group in groups] == [(("ada", "ben"), ()), (("cy",), ("2024/eve",))]
     assert "to the last bit" in found_html(json.loads(alike_json([], [], groups)))

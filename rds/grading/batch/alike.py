@@ -7,9 +7,11 @@ other processes, which may crash, and run in the sandbox alone.
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,6 @@ from rds.grading.batch.queue import Queued, queued
 from rds.grading.batch.similarity import (
     Fingerprints,
     Identical,
-    Packed,
     Pair,
     SameLoop,
     fingerprints,
@@ -49,16 +50,17 @@ class SimilarityReport:
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """What is compared of a submission's runs: a hash by case, and whether all are as those of the solution."""
+    """What is compared: a hash of all runs of a submission, empty without any; whether they are the solution's."""
 
-    by_case: Mapping[str, str]
+    runs: bytes
     as_solution: bool = False
 
     @classmethod
     def of(cls, details: Mapping[str, Any]) -> Behaviour:
         """By the details of its grade."""
-        found = details.get(BEHAVIOUR)
-        return cls(found if isinstance(found, dict) else {}, bool(details.get(AS_SOLUTION)))
+        by_case = details.get(BEHAVIOUR)
+        told = json.dumps(by_case, sort_keys=True).encode() if by_case and isinstance(by_case, dict) else b""
+        return cls(told and hashlib.sha256(told).digest(), bool(details.get(AS_SOLUTION)))
 
 
 def earlier_files(assignment: Assignment, places: Sequence[Path]) -> dict[str, Spooled]:
@@ -100,23 +102,21 @@ def alike(
     }
     others = earlier_files(assignment, against)
     parsed = {name: code for name, code in own.items() if name.endswith(".py")}
-    codes = [code for _, code in given] + list(parsed.values()) + list(others.values())
-    if len(given) + len(others) < 2:  # no pair: a process less to start, which is what one submission's time goes into
-        codes = []
-    done = [
-        Packed(outcome.value or {}) for outcome in spread(_prints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE)
-    ]
-    found = {student: prints for (student, _), prints in zip(given, done, strict=False)}
-    sources = dict(zip(parsed, done[len(given) :], strict=False))
-    template = sources.pop(assignment.template or "", Packed({}))
-    earlier = dict(zip(others, done[len(given) + len(parsed) :], strict=False))
+    codes = [*parsed.values(), *(code for _, code in given), *others.values()]
+    pairs: list[Pair] = []
+    if len(given) + len(others) > 1:  # else a process less to start, which is what one submission's time goes into
+        done = (outcome.value or {} for outcome in spread(_prints, codes, jobs=jobs, retries=0, time_limit=_PATIENCE))
+        sources = dict(zip(parsed, islice(done, len(parsed)), strict=True))
+        template = sources.pop(assignment.template or "", {})
+        found = zip((student for student, _ in given), islice(done, len(given)), strict=True)
+        pairs = similar_pairs(found, [template], sources, zip(others, done, strict=True))
     hashes = {each.row.student: each.sha256 for each in rows}
     theirs = {name: hashlib.sha256(code.read()).hexdigest() for name, code in (own | others).items()}
     return SimilarityReport(
-        similar_pairs(found, [template], sources, earlier),
+        pairs,
         identical_files({student: hashes[student] for student, _ in given}, theirs),
         same_loops(
-            {student: each.by_case for student, each in behaviours.items()},
+            {student: each.runs for student, each in behaviours.items()},
             _run(assignment, others, jobs, scheduler) | _solution(assignment, behaviours),
         ),
     )
@@ -131,22 +131,22 @@ def _can_tell(assignment: Assignment) -> bool:
     return any(not case.is_drawn for case in assignment.cases)
 
 
-def _solution(assignment: Assignment, behaviours: Mapping[str, Behaviour]) -> dict[str, Mapping[str, str]]:
+def _solution(assignment: Assignment, behaviours: Mapping[str, Behaviour]) -> dict[str, bytes]:
     """What the solution does, where somebody does the same: whoever graded has compared."""
-    same = [each.by_case for each in behaviours.values() if each.as_solution]
+    same = [each.runs for each in behaviours.values() if each.as_solution]
     return {str(assignment.solution): same[0]} if same else {}
 
 
 def _run(
     assignment: Assignment, codes: Mapping[str, Spooled], jobs: int | None, scheduler: str | Scheduler | None
-) -> dict[str, Mapping[str, str]]:
+) -> dict[str, bytes]:
     """What the files of others do, each in the sandbox as a submission would."""
     if not (codes and _can_tell(assignment)):
         return {}
     work = partial(graded, setup_of(assignment, jobs, shared=scheduler is None))
     tasks = [Task(name, code=code) for name, code in codes.items()]
-    found: dict[str, Mapping[str, str]] = {}
+    found: dict[str, bytes] = {}
     for outcome in spread(work, tasks, jobs=jobs, scheduler=scheduler, time_limit=_PATIENCE):
         if outcome.ok and not outcome.value.missing:
-            found[tasks[outcome.index].student] = Behaviour.of(outcome.value.grade["details"]).by_case
+            found[tasks[outcome.index].student] = Behaviour.of(outcome.value.grade["details"]).runs
     return found

@@ -28,12 +28,17 @@ class Queued:
     """One row of the batch. `grade` is there at once where there is nothing to grade."""
 
     row: HandedIn
-    folder: Path
+    students: Path  # the folder of all
     code: Spooled | None = None
     sha256: str = ""
     notes: tuple[str, ...] = ()
     grade: Grade | None = None
     about: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def folder(self) -> Path:
+        """Where all of it is kept."""
+        return self.students / safe_id(self.row.student)
 
     @property
     def mark(self) -> str:
@@ -44,7 +49,7 @@ class Queued:
 def queued(assignment: Assignment, intake: Intake, students: Path, jobs: int | None) -> list[Queued]:
     """All rows; nothing is written into a folder yet."""
     spool = Spool()
-    rows = [Queued(row, students / safe_id(row.student), notes=row.notes, about=_about(row)) for row in intake.rows]
+    rows = [Queued(row, students, notes=row.notes, about=_about(row)) for row in intake.rows]
     notebooks = []
     for each in rows:
         if each.row.status is not None:

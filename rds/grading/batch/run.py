@@ -250,7 +250,8 @@ class _Batch:
             files[FEEDBACK] = feedback_page(self._assignment, grade).encode("utf-8", "replace")
         told = grade.to_json()
         files["grade.json"] = json.dumps(told, indent=1, allow_nan=False).encode() + b"\n"
-        write_files({each.folder / name: partial(_write, data) for name, data in files.items()})
+        folder = each.folder
+        write_files({folder / name: partial(_write, data) for name, data in files.items()})
         self._journal.append({"student": each.row.student, "grade": told, "seconds": seconds})
         self._done[each.row.student] = _Done.of(told)
 

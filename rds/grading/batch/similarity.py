@@ -10,13 +10,21 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from array import array
-from bisect import bisect_left
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Set
+from contextlib import closing
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
+
+from rds.core.errors import InputError
+
+if TYPE_CHECKING:
+    from sqlite3 import Connection
 
 GRAM = 12  # nodes
 WINDOW = 6  # of grams
@@ -24,29 +32,13 @@ LEAST_SCORE = 0.5  # of a pair that is worth a look
 LEAST_COMMON = 6  # fingerprints; less is chance
 _CLASS = 12  # submissions from which on what many share is taken for common knowledge
 _MANY = 0.5
+_CACHE = 256  # kB
+_KEPT = 1000  # ranges of lines: where many are alike, most have the same in common
 
 Lines = tuple[int, int]  # first and last
 Fingerprints = Mapping[int, Lines]
-
-
-class Packed(Mapping[int, Lines]):
-    """Fingerprints in a tenth of the memory that a dict of them takes: a whole class's are compared at once."""
-
-    def __init__(self, prints: Fingerprints):
-        self._values = array("Q", sorted(prints))
-        self._lines = array("I", (number for value in self._values for number in prints[value]))
-
-    def __getitem__(self, value: int) -> Lines:
-        place = bisect_left(self._values, value)
-        if place == len(self._values) or self._values[place] != value:
-            raise KeyError(value)
-        return self._lines[2 * place], self._lines[2 * place + 1]
-
-    def __iter__(self) -> Iterator[int]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
+Program = tuple[str, Fingerprints]  # with whose it is
+IntArray = NDArray[np.int_]
 
 
 @dataclass(frozen=True)
@@ -79,13 +71,13 @@ class SameLoop:
     others: tuple[str, ...] = ()
 
 
-def same_loops(found: Mapping[str, Mapping[str, str]], others: Mapping[str, Mapping[str, str]]) -> list[SameLoop]:
-    """Groups of those who behave the same: by name and case a hash of the run. Nobody without a run is in one."""
-    groups: dict[tuple[tuple[str, str], ...], tuple[list[str], list[str]]] = {}
+def same_loops(found: Mapping[str, bytes], others: Mapping[str, bytes]) -> list[SameLoop]:
+    """Groups of those who behave the same: by name a hash of all runs. Nobody without a run is in one."""
+    groups: dict[bytes, tuple[list[str], list[str]]] = {}
     for place, names in enumerate((found, others)):
-        for name, cases in names.items():
-            if cases:
-                groups.setdefault(tuple(sorted(cases.items())), ([], []))[place].append(name)
+        for name, runs in names.items():
+            if runs:
+                groups.setdefault(runs, ([], []))[place].append(name)
     made = [SameLoop(tuple(sorted(own)), tuple(sorted(rest))) for own, rest in groups.values()]
     alike = [each for each in made if each.students and len(each.students) + len(each.others) > 1]
     return sorted(alike, key=lambda group: (-len(group.students), group.students))
@@ -132,68 +124,100 @@ def fingerprints(code: bytes) -> Fingerprints:
 
 
 def similar_pairs(
-    found: Mapping[str, Fingerprints],
+    found: Iterable[Program],
     template: Iterable[Fingerprints] = (),
     sources: Mapping[str, Fingerprints] | None = None,
-    others: Mapping[str, Fingerprints] | None = None,
+    others: Iterable[Program] = (),
 ) -> list[Pair]:
     """The pairs of students whose programs are alike, the most alike first. `found` is by student.
 
     `sources` are what the instructor has of it, such as a solution: the one that holds most of what a pair has in
     common, and half of it at least, is named. `others` are programs of no student of this class, by names that no
-    student has: each is compared with the students', and not with other ones.
+    student has: each is compared with the students', and not with other ones. `found` is read before `others`, each
+    once, into a file without a name: the fingerprints of a whole class need not have room in memory. InputError where
+    the disk has none.
     """
-    foreign = others or {}
+    import sqlite3  # for more than one submission: the time of a single one is that of its imports
+
     known = {value for prints in template for value in prints}
-    if len(found) >= _CLASS:
-        known |= _in_several(found.values(), max(int(_MANY * len(found)) + 1, 3))
-    everybody = {**foreign, **found}
-    sizes = {name: sum(value not in known for value in prints) for name, prints in everybody.items()}
-    shared_values = _in_several(everybody.values(), 2) - known  # what one alone has is no more than its number
-    holders: dict[int, list[str]] = {}
-    for student in sorted(everybody):
-        for value in everybody[student]:
-            if value in shared_values:
-                holders.setdefault(value, []).append(student)
-    groups: dict[tuple[str, ...], list[int]] = {}  # what the same students have: many have all of a file in common
-    for value, students in holders.items():
-        groups.setdefault(tuple(students), []).append(value)
-    parts = list(groups.values())
-    together = [sorted(names, key=lambda name: (name not in found, name)) for names in groups]  # students come first
-    groups_of: dict[str, list[int]] = {}
-    for number, names in enumerate(together):
-        for name in names:
-            groups_of.setdefault(name, []).append(number)
+    try:
+        with closing(sqlite3.connect("")) as table:
+            return _Class(table, found, others, known).pairs(sources or {})
+    except sqlite3.Error as error:
+        said = f"programs cannot be compared: {error}; make room in the temporary folder, and go on with --resume"
+        raise InputError(said) from error
 
-    @cache
-    def lines(student: str, numbers: tuple[int, ...]) -> tuple[Lines, ...]:
-        return _joined(everybody[student][value] for number in numbers for value in parts[number])
 
-    pairs = []
-    for first in found:  # one after the other: all pairs of a class together need not have room in memory
-        shared: dict[str, list[int]] = {}  # numbers of groups
-        for number in groups_of.get(first, ()):
-            names = together[number]
-            for second in names[names.index(first) + 1 :]:
-                shared.setdefault(second, []).append(number)
-        for second, numbers in shared.items():
-            common = sum(len(parts[number]) for number in numbers)
-            score = common / min(sizes[first], sizes[second])
-            if common >= LEAST_COMMON and score >= LEAST_SCORE:
-                which = tuple(numbers)
-                both = [value for number in numbers for value in parts[number]]
-                named = [(sum(value in prints for value in both), name) for name, prints in (sources or {}).items()]
+class _Class:
+    """Programs in a table of SQLite's: `prints` has all, `shared` who has what in common."""
+
+    def __init__(self, table: Connection, found: Iterable[Program], others: Iterable[Program], known: Set[int]):
+        self._table = table
+        table.execute(f"PRAGMA cache_size = -{_CACHE}")
+        table.execute("CREATE TABLE prints (owner, value, first, last, PRIMARY KEY (owner, value)) WITHOUT ROWID")
+        self._names: list[str] = []
+        self._put(found)
+        self._students = len(self._names)
+        self._put(others)
+        self._sizes = np.zeros(len(self._names), int)  # how many there are of each that count
+        self._share(known)
+
+    def pairs(self, sources: Mapping[str, Fingerprints]) -> list[Pair]:
+        """The most alike first."""
+        lines = lru_cache(_KEPT)(self._lines)
+        found = []
+        for first in range(self._students):
+            for second, common, score in self._alike(first):
+                values = common.tolist()
+                named = [(sum(value in prints for value in values), name) for name, prints in sources.items()]
                 most, source = max(named, default=(0, ""))
-                source = source if most >= LEAST_SCORE * common else ""
-                pairs.append(Pair(first, second, score, common, lines(first, which), lines(second, which), source))
-    return sorted(pairs, key=lambda pair: (-pair.score, pair.first, pair.second))
+                ends = sorted((first, second), key=lambda owner: (owner >= self._students, self._names[owner]))
+                one, two = (lines(owner, common.tobytes()) for owner in ends)
+                source = source if most >= LEAST_SCORE * len(values) else ""
+                found.append(Pair(self._names[ends[0]], self._names[ends[1]], score, len(values), one, two, source))
+        return sorted(found, key=lambda pair: (-pair.score, pair.first, pair.second))
 
+    def _put(self, programs: Iterable[Program]) -> None:
+        for name, prints in programs:
+            rows = ((len(self._names), value, *lines) for value, lines in prints.items())
+            self._table.executemany("INSERT INTO prints VALUES (?, ?, ?, ?)", rows)
+            self._names.append(name)
 
-def _in_several(programs: Collection[Fingerprints], least: int) -> set[int]:
-    """The fingerprints that at least so many programs have."""
-    held = [np.fromiter(prints, np.uint64, len(prints)) for prints in programs]
-    values, counts = np.unique(np.concatenate([np.zeros(0, np.uint64), *held]), return_counts=True)
-    return set(values[counts >= least].tolist())
+    def _share(self, known: Set[int]) -> None:
+        """What two or more have, but not most of a large class, nor what is `known`."""
+        least = max(int(_MANY * self._students) + 1, 3) if self._students >= _CLASS else self._students + 1
+        self._table.execute("CREATE TABLE shared (value INTEGER PRIMARY KEY, owners)")
+        rows = self._table.execute("SELECT value, owner FROM prints ORDER BY value, owner")
+        for value, group in groupby(rows, itemgetter(0)):
+            owners = np.fromiter((owner for _, owner in group), np.uint32)
+            if value not in known and np.count_nonzero(owners < self._students) < least:
+                self._sizes[owners] += 1
+                if len(owners) > 1:
+                    self._table.execute("INSERT INTO shared VALUES (?, ?)", (value, owners.tobytes()))
+
+    def _alike(self, first: int) -> Iterator[tuple[int, IntArray, float]]:
+        """Those after the `first` whose programs are like it, with the fingerprints that both have, and the score."""
+        which = "SELECT value, owners FROM prints JOIN shared USING (value) WHERE owner = ? ORDER BY value"
+        rows = self._table.execute(which, (first,)).fetchall()
+        if not rows:
+            return
+        each = [np.frombuffer(owners, np.uint32) for _, owners in rows]
+        holders = np.concatenate(each)
+        counts = np.bincount(holders, minlength=len(self._names))
+        scores = counts / np.maximum(np.minimum(self._sizes, self._sizes[first]), 1)
+        seconds = np.flatnonzero((counts >= LEAST_COMMON) & (scores >= LEAST_SCORE))
+        seconds = seconds[seconds > first]
+        if not len(seconds):
+            return
+        values = np.repeat(np.array([value for value, _ in rows]), [len(owners) for owners in each])
+        values, ends = values[np.argsort(holders, kind="stable")], np.cumsum(counts)
+        for second in seconds.tolist():
+            yield second, values[ends[second] - counts[second] : ends[second]], float(scores[second])
+
+    def _lines(self, owner: int, common: bytes) -> tuple[Lines, ...]:
+        values = set(np.frombuffer(common, int).tolist())
+        rows = self._table.execute("SELECT value, first, last FROM prints WHERE owner = ?", (owner,))
+        return _joined((first, last) for value, first, last in rows if value in values)
 
 
 def _joined(spans: Iterable[Lines]) -> tuple[Lines, ...]:
@@ -244,4 +268,5 @@ def _span(lines: Iterable[int]) -> Lines:
 
 
 def _hash(text: str) -> int:
-    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "big")
+    whole = int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "big")
+    return whole >> 1  # the largest integers of SQLite have 63 bits

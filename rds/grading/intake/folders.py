@@ -40,7 +40,7 @@ def files_below(folder: Path) -> tuple[list[Item], list[str]]:
     return found, [name for name in folders if not is_clutter((name,)) and not _looks_like_code(name)]
 
 
-def read_regular(path: Path, most: int) -> bytes:
+def read_regular(path: str | Path, most: int) -> bytes:
     """At most `most` bytes of a regular file; Refusal for anything else."""
     try:
         descriptor = os.open(path, UNFOLLOWED)
@@ -88,7 +88,7 @@ def _walk(folder: Path, parts: tuple[str, ...]) -> Iterator[Item]:
             else:
                 yield from _walk(Path(entry.path), inner)
         elif stat.S_ISREG(about.st_mode):
-            yield Item(inner, partial(read_regular, Path(entry.path)))  # its date is whoever copied it's
+            yield Item(inner, partial(read_regular, entry.path))  # its date is whoever copied it's
         else:
             kind = _KINDS.get(stat.S_IFMT(about.st_mode), "no regular file")
             yield faulty(inner, f"it is {kind}; hand in one Python file or notebook")
