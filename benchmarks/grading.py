@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import shutil
 import subprocess
 import sys
@@ -41,6 +42,25 @@ params = {{"Kp": {gain}, "Kv": 0.567}}
 def control(t, r, y, state, params):
     return params["Kp"] * (r.position - y) + params["Kv"] * r.velocity, state
 """
+# what students write beside the law: passages of which many in a class have some in common
+FORMS = (
+    "x = 1",
+    "f(x)",
+    "x += y",
+    "x = [y]",
+    "x = -y",
+    "x = y if x else 1",
+    "x = {y: 1}",
+    "x = y[1]",
+    "x = y.z",
+    "if x:\n        y = 1",
+    "for x in y:\n        x = 2",
+    "x = f(y, x)",
+    "x = (y, 2)",
+    "x = y * x",
+    "x = y < x",
+)
+FUNCTIONS, STATEMENTS = 7, 10  # of a submission: about 1.5 kB
 HEAD = """
 title = "Benchmark"
 kind = "controller"
@@ -259,7 +279,8 @@ def _one(place: Path, rounds: int) -> list[Figure]:
 
 
 def _written(place: Path, students: int) -> Path:
-    """The assignment, submissions that all differ a little, and one of each kind of imports."""
+    """The assignment, submissions of the same law and a lot beside it, and one of each kind of imports."""
+    draw = random.Random(3)
     for name in ("task", "in"):
         (place / name).mkdir()
     criteria = (CRITERION.format(kind=k, full=full, none=none, unit=unit) for k, full, none, unit in CRITERIA)
@@ -268,5 +289,8 @@ def _written(place: Path, students: int) -> Path:
         (place / f"{name}.py").write_text(LAW.format(imports=imports, gain=30.0))
     for number in range(students):
         text = LAW.format(imports=IMPORTS["numpy"], gain=20.0 + 0.01 * number)
+        for function in range(FUNCTIONS):
+            body = "\n    ".join(draw.choice(FORMS) for _ in range(STATEMENTS))
+            text += f"\n\ndef helper_{function}(f, x, y):\n    {body}\n    return x\n"
         (place / f"in/s{number:04}.py").write_text(text)
     return place
