@@ -324,7 +324,7 @@ def test_what_the_grader_could_not_grade_is_a_zero_nowhere(tmp_path: Path) -> No
         exported(tmp_path / to, to, grades)
         data = json.loads((tmp_path / to / "out" / to / "bob/results.json").read_text())
         assert "score" not in data
-    assert ",grader error,," in grades_csv(grades)
+    assert ",grader error,," in "".join(grades_csv(grades))
 
 
 def test_a_batch_that_is_not_finished_says_who_is_missing(tmp_path: Path) -> None:
@@ -387,7 +387,7 @@ def test_numbers_of_a_table_stay_numbers(value: float) -> None:
 
 
 def test_the_class_table_has_a_column_with_its_unit_for_each_criterion() -> None:
-    lines = list(csv.DictReader(io.StringIO(grades_csv([grade(name) for name in HOSTILE]), newline="")))
+    lines = list(csv.DictReader(io.StringIO("".join(grades_csv([grade(name) for name in HOSTILE])), newline="")))
     assert len(lines) == len(HOSTILE)
     assert lines[0]["rms [points of 10]"] == "6" and lines[0]["rms value [mm]"] == "0.23"
     assert lines[0]["student"] == '\'=HYPERLINK("http://x")'

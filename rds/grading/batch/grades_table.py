@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from rds.grading.feedback.plain_text import cell
@@ -12,8 +11,8 @@ from rds.grading.grade import CriterionScore, Grade, Status
 from rds.results.units import heading
 
 
-def grades_csv(grades: Sequence[Grade]) -> str:
-    """The table as CSV, for spreadsheets: headings carry units, and no cell is taken for a formula.
+def grades_csv(grades: Sequence[Grade]) -> Iterator[str]:
+    """The lines of the table as CSV, for spreadsheets: headings carry units, and no cell is taken for a formula.
 
     A submission that the grader could not grade has no points at all, rather than none.
     """
@@ -22,7 +21,7 @@ def grades_csv(grades: Sequence[Grade]) -> str:
     for criterion in criteria:
         columns.append(f"{criterion.name} [points of {_plain(criterion.max_score)}]")
         columns.append(heading(f"{criterion.name} value", "" if criterion.unit == "1" else criterion.unit))
-    return csv_text(chain([[*columns, "reason", "sha256"]], (_row(grade, criteria) for grade in grades)))
+    return _csv_lines(chain([[*columns, "reason", "sha256"]], (_row(grade, criteria) for grade in grades)))
 
 
 def criteria_of(grades: Iterable[Grade]) -> list[CriterionScore]:
@@ -36,9 +35,20 @@ def criteria_of(grades: Iterable[Grade]) -> list[CriterionScore]:
 
 def csv_text(rows: Iterable[Sequence[str | float | None]]) -> str:
     """Rows as CSV. Texts are made harmless; a number is written so that reading it gives it back."""
-    stream = io.StringIO()
-    csv.writer(stream, lineterminator="\r\n").writerows([_cell(value) for value in row] for row in rows)
-    return stream.getvalue()
+    return "".join(_csv_lines(rows))
+
+
+def _csv_lines(rows: Iterable[Sequence[str | float | None]]) -> Iterator[str]:
+    writer = csv.writer(_Handed(), lineterminator="\r\n")
+    for row in rows:
+        yield writer.writerow([_cell(value) for value in row])
+
+
+class _Handed:
+    """A file that hands what is written to it back, and keeps nothing."""
+
+    def write(self, text: str) -> str:
+        return text
 
 
 def _row(grade: Grade, criteria: Sequence[CriterionScore]) -> list[str | float | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -31,7 +32,9 @@ def write_class_files(
     links = {grade.student: f"{STUDENTS}/{safe_id(grade.student)}/{FEEDBACK}" for grade in grades}
 
     def table(stream: BinaryIO) -> None:
-        stream.write(grades_csv(grades).encode("utf-8-sig", "replace"))  # spreadsheets know UTF-8 by its mark
+        stream.write(codecs.BOM_UTF8)  # by which spreadsheets know UTF-8
+        for line in grades_csv(grades):
+            stream.write(line.encode("utf-8", "replace"))
 
     def page(stream: BinaryIO) -> None:
         for part in class_page(title, grades, links, seconds=seconds, similar=similar, about=about, review=review):

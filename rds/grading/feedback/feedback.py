@@ -102,8 +102,9 @@ def total_part(grade: Grade) -> str:
 
 def class_part(grade: Grade, everybody: Sequence[Grade]) -> str:
     """How the class did, with this student's place in it; nothing of a class so small that it would name somebody."""
-    graded = [each for each in everybody if each.status not in (Status.GRADER_ERROR, Status.EXCUSED, Status.MISSING)]
-    if len(graded) < LEAST_CLASS or grade not in graded:
+    ungraded = (Status.GRADER_ERROR, Status.EXCUSED, Status.MISSING)
+    graded = [each for each in everybody if each.status not in ungraded]
+    if len(graded) < LEAST_CLASS or grade.status in ungraded:
         return ""
     points, most = [each.score for each in graded], max(each.max_score for each in graded)
     drawn = histogram.histogram(points, most, mark=grade.score)
