@@ -177,7 +177,7 @@ def _module(path: Path) -> str:
 # but for the script that makes the logs of the package: it runs experiments as a user does
 SOURCES = sorted(path for path in ROOT.rglob("*.py") if _module(path) != "rds.identification.data.make")
 MODULES = {_module(path): path for path in SOURCES}
-FILES = {room: [path for path in SOURCES if room_of(_module(path)) == room] for room in ALLOWED}
+FILES = {room: [path for module, path in MODULES.items() if room_of(module) == room] for room in ALLOWED}
 
 
 @pytest.mark.parametrize("room", ALLOWED)

@@ -15,6 +15,7 @@ import threading
 import warnings
 import webbrowser
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,10 +23,12 @@ from urllib.parse import urlsplit
 
 import pytest
 
-pytest.importorskip("voila", reason="Voilà is not installed: it is in the extra lab")
-
 from rds.panels.app import serve
 from tests.panels.conftest import App
+
+# not imported to find out, which takes seconds of each worker of the tests
+IS_THERE = find_spec("voila") is not None
+pytestmark = pytest.mark.skipif(not IS_THERE, reason="Voilà is not installed: it is in the extra lab")
 
 SOMEBODY = 61_234  # a user who owns nothing here
 UPGRADE = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,6 +43,12 @@ class Ran(NamedTuple):
     speed: np.ndarray
     ending: Ending
     reason: str
+
+
+@cache
+def whole() -> Prepared:
+    """The program of `PATH`, planned once."""
+    return prepared(PATH)
 
 
 def prepared(path: np.ndarray, *events: Event) -> Prepared:
@@ -87,18 +94,16 @@ PATH = chain(
     line((6, 4, 0), (0, 4, -2), 12.0, program_line=3),
     line((0, 4, -2), (1, 1, -2), 5.0, program_line=4),
 )
-WHOLE = prepared(PATH)
-
 
 def check_motion(ran: Ran, path: np.ndarray = PATH) -> None:
     """Within the limits, by differences of the samples, and on the path."""
     moved = np.diff(ran.position, axis=0) / T
     padded = np.pad(ran.position, ((3, 3), (0, 0)), mode="edge")
-    for order, limit in enumerate(WHOLE.program.limits, 1):
+    for order, limit in enumerate(whole().program.limits, 1):
         assert (np.abs(np.diff(padded, order, axis=0)).max(axis=0) / T**order <= limit * (1.0 + 1.1 * EXCESS)).all()
-    row = np.clip(np.ceil(ran.place).astype(int), 0, len(WHOLE.segment) - 1)
+    row = np.clip(np.ceil(ran.place).astype(int), 0, len(whole().segment) - 1)
     on_path = ran.state != State.HOME
-    off, _ = contour_error(ran.position[on_path], path, WHOLE.segment[row][on_path], np.full(on_path.sum(), 0.05))
+    off, _ = contour_error(ran.position[on_path], path, whole().segment[row][on_path], np.full(on_path.sum(), 0.05))
     assert off.max() < 1e-6
     # and what the laws are told of velocity is that of the positions
     between = 0.5 * (ran.velocity[1:] + ran.velocity[:-1])
@@ -106,8 +111,8 @@ def check_motion(ran: Ran, path: np.ndarray = PATH) -> None:
 
 
 def test_without_anybody_s_doing_it_is_the_plan() -> None:
-    ran = execute(WHOLE)
-    program = WHOLE.program
+    ran = execute(whole())
+    program = whole().program
     assert (ran.position == program.position).all()
     assert (ran.velocity == program.velocity).all()
     assert (ran.acceleration == program.acceleration).all()
@@ -126,10 +131,10 @@ def test_override_and_hold_keep_to_path_and_limits(
 ) -> None:
     changes = [(at, "override", share) for at, share in overrides]
     changes += [change for at, long in holds for change in ((at, "hold", 1), (at + long, "hold", 0))]
-    ran = execute(WHOLE, [*changes, (30.0, "hold", 0)])
+    ran = execute(whole(), [*changes, (30.0, "hold", 0)])
     check_motion(ran)
     assert ran.ending is Ending.DONE
-    assert (ran.position[-1] == WHOLE.program.position[-1]).all()
+    assert (ran.position[-1] == whole().program.position[-1]).all()
     assert (np.diff(ran.place) >= 0.0).all()
 
 
@@ -150,7 +155,7 @@ def test_rapids_are_not_made_faster_than_the_axes() -> None:
 @given(at=st.floats(0.0, 2.4))
 @settings(max_examples=20)
 def test_a_stop_comes_to_rest_on_the_path(at: float) -> None:
-    ran = execute(WHOLE, [(at, "stop", 1)])
+    ran = execute(whole(), [(at, "stop", 1)])
     check_motion(ran)
     assert ran.ending is Ending.STOPPED
     assert ran.reason == f"stopped in line {int(ran.line[-1])}"
@@ -161,10 +166,10 @@ def test_a_stop_comes_to_rest_on_the_path(at: float) -> None:
 @given(at=st.floats(0.0, 2.4))
 @settings(max_examples=20)
 def test_the_way_home_is_up_then_straight_within_the_limits(at: float) -> None:
-    ran = execute(WHOLE, [(at, "home", 1)])
+    ran = execute(whole(), [(at, "home", 1)])
     check_motion(ran)
     assert (ran.position[-1] == 0.0).all()
-    assert (np.abs(ran.acceleration).max(axis=0) <= WHOLE.program.limits[1] * (1.0 + 2.0 * EXCESS)).all()
+    assert (np.abs(ran.acceleration).max(axis=0) <= whole().program.limits[1] * (1.0 + 2.0 * EXCESS)).all()
     assert ran.reason.startswith("went home from line ")
     way = ran.position[ran.state == State.HOME]
     low = way[:, 2] < -1e-9
@@ -174,13 +179,13 @@ def test_the_way_home_is_up_then_straight_within_the_limits(at: float) -> None:
 @given(at=st.floats(0.0, 0.6), until=st.floats(0.05, 1.0))
 @settings(max_examples=20)
 def test_a_hold_on_the_way_home_keeps_the_limits(at: float, until: float) -> None:
-    ran = execute(WHOLE, [(1.6, "home", 1), (1.7 + at, "hold", 1), (1.7 + at + until, "hold", 0)])
+    ran = execute(whole(), [(1.6, "home", 1), (1.7 + at, "hold", 1), (1.7 + at + until, "hold", 0)])
     check_motion(ran)
     assert (ran.position[-1] == 0.0).all()
 
 
 def test_a_hold_that_nobody_can_end_ends_the_run() -> None:
-    ran = execute(WHOLE, [(0.5, "hold", 1)])
+    ran = execute(whole(), [(0.5, "hold", 1)])
     assert ran.ending is Ending.STOPPED
     assert "held in line 1, and nobody is there to let it go on" in ran.reason
 
@@ -249,7 +254,7 @@ def test_a_spindle_that_never_gets_there_is_told() -> None:
 
 def test_discarded_samples_are_not_lost_time() -> None:
     """A machine does not wait: where the loop was late, the path goes on."""
-    program = WHOLE.program
+    program = whole().program
     references = [LiveReference() for _ in range(4)]
     execution = Execution(program, T, RetimedProgram(program, T), references, 3, 1.0, lambda names: False)
     for k in (0, 1, 2, 50, 51, 300):
@@ -264,7 +269,7 @@ def test_blends_are_followed_too() -> None:
     square = chain(*(line(a, b, 10.0, mode=BLEND, tolerance=0.1, program_line=1) for a, b in pairwise(corners)))
     ran = execute(prepared(square), [(0.2, "override", 1.7), (0.4, "hold", 1), (0.9, "hold", 0)])
     acceleration = np.abs(np.diff(ran.position, 2, axis=0)).max(axis=0) / T**2
-    assert (acceleration[:2] <= WHOLE.program.limits[1, :2] * 1.01).all()
+    assert (acceleration[:2] <= whole().program.limits[1, :2] * 1.01).all()
     assert (ran.position[-1] == (0.0, 5.0, 0.0)).all()
 
 
