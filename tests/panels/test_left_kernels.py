@@ -8,6 +8,7 @@ import signal
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
+from types import SimpleNamespace
 
 import pytest
 
@@ -49,3 +50,30 @@ def test_a_server_ends_at_once_though_its_first_kernel_is_just_starting(start_ap
     app = start_app()
     os.killpg(app.process.pid, signal.SIGTERM)
     assert app.process.wait(60) == 0
+
+
+@pytest.mark.parametrize("gone", [True, False])
+def test_no_message_of_jupyter_s_older_format_is_read_as_one_of_the_newer(
+    gone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A page that goes just then, or asked for no format, gets the older one. Voilà's reading it does not end."""
+    from jupyter_server.services.kernels.connection.base import serialize_binary_message
+    from voila.tornado import kernel_websocket_handler
+
+    from rds.panels.app.server import KernelSocket
+
+    def read(message: bytes) -> None:
+        raise AssertionError("it would read 10^17 numbers")
+
+    monkeypatch.setattr(kernel_websocket_handler, "read_header_from_binary_message", read)
+    sent: list[bytes] = []
+    connection = SimpleNamespace(
+        is_closing=lambda: False,
+        selected_subprotocol=None,
+        write_message=lambda message, binary: sent.append(message),
+    )
+    socket = KernelSocket.__new__(KernelSocket)
+    socket.ws_connection = None if gone else connection
+    message = serialize_binary_message({"header": {"msg_type": "comm_msg"}, "buffers": [b"samples"]})
+    socket.write_message(message, binary=True)
+    assert sent == ([] if gone else [message])

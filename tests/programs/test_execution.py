@@ -95,6 +95,7 @@ PATH = chain(
     line((0, 4, -2), (1, 1, -2), 5.0, program_line=4),
 )
 
+
 def check_motion(ran: Ran, path: np.ndarray = PATH) -> None:
     """Within the limits, by differences of the samples, and on the path."""
     moved = np.diff(ran.position, axis=0) / T

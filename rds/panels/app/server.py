@@ -25,6 +25,7 @@ from traitlets import default
 from voila.app import Voila
 from voila.request_info_handler import RequestInfoSocketHandler
 from voila.shutdown_kernel_handler import VoilaShutdownKernelHandler
+from voila.tornado.kernel_websocket_handler import VoilaKernelWebsocketHandler, WebsocketHandler
 
 from rds.core.private_files import write_private
 from rds.panels.app.rescue import handlers
@@ -78,9 +79,9 @@ class PanelsServer(Voila):
         root = self.server_url.rstrip("/")
         theirs = [
             # that of the login is not under the server's address
-            (path if path.startswith(f"{root}/") else root + path, *rest)
-            for path, *rest in super().init_handlers()
-            if rest[0] not in _NOT_THEIRS
+            (path if path.startswith(f"{root}/") else root + path, _IN_PLACE.get(kind, kind), *rest)
+            for path, kind, *rest in super().init_handlers()
+            if kind not in _NOT_THEIRS
         ]
         return [Rule(_ForeignHost(), _Refused), *handlers(self.server_url), *theirs]
 
@@ -94,6 +95,24 @@ class PanelsServer(Voila):
             self.log.warning("There is no browser to be found; open the address above in one.")
             return
         threading.Thread(target=browser.open, args=(file.as_uri(), self.webbrowser_open_new), daemon=True).start()
+
+
+class KernelSocket(VoilaKernelWebsocketHandler):
+    """Takes a kernel's messages to a page. Voilà's own reads each in the newer of Jupyter's two formats; but a page
+    that asked for none gets the older one, and so does one that goes at that moment. Read as the newer, a message of
+    the older one with binary parts is a list of 10^17 numbers: the server answers nobody more, and fills the memory.
+    """
+
+    def write_message(self, message: bytes | str | dict[str, Any], binary: bool = False) -> Any:
+        """Send it; to a page that has gone, nothing."""
+        if self.ws_connection is None or self.ws_connection.is_closing():
+            return None
+        if isinstance(message, bytes) and not self.selected_subprotocol:
+            return WebsocketHandler.write_message(self, message, binary)
+        return super().write_message(message, binary)
+
+
+_IN_PLACE = {VoilaKernelWebsocketHandler: KernelSocket}  # of Voilà's
 
 
 class _ForeignHost(Matcher):
