@@ -88,6 +88,7 @@ def test_name_and_unit_of_a_heading(cell: str, name: str, unit: str | None) -> N
         ("rate_rev_min", "rev/min"),
         ("position_mm", "mm"),
         ("time_s", "s"),
+        ("position_µm", "um"),
         ("state", None),
     ],
 )
@@ -109,6 +110,12 @@ def test_a_scope_with_a_time_for_each_channel(tmp_path: Path) -> None:
     held = np.where(np.isnan(slow), np.nan, np.sin(0.03 * slow))
     (log,) = read_log(written(tmp_path, "slow.csv", TWINCAT, [T, X, slow, held], ";"))
     assert len(log) == 400 and np.allclose(log.command, np.sin(0.03 * (T // 2 * 2)), atol=1e-6)
+
+
+@pytest.mark.parametrize("head", ["time_ms;u_V;x_mm\n", "time_ms;u_V;x_mm;\n"])
+def test_a_delimiter_may_end_the_rows_and_not_the_heading(head: str, tmp_path: Path) -> None:
+    (log,) = read_log(written(tmp_path, "a.csv", head, [T, U, X], ";", ";"))
+    assert np.allclose(log.position, X, atol=1e-6) and log.units["position"] == "mm"
 
 
 def test_a_recorder_with_an_interval_for_each_channel(tmp_path: Path) -> None:
