@@ -34,7 +34,8 @@ _OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.machines.co
 def main(questions: int, answers: int, door: list[int]) -> int:
     """Serve one submission; the process's exit code. `door` is its memory and bells."""
     channel = Channel(questions, answers, *door)
-    sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__ = _stream(1), _stream(2)
+    for name, descriptor in (("stdout", 1), ("stderr", 2)):
+        vars(sys)[name] = vars(sys)[f"__{name}__"] = _stream(descriptor)
     _seed()
     try:
         order = channel.ask()
