@@ -239,3 +239,22 @@ def test_a_wait_ends_in_peace_when_another_thread_shuts_the_bus_down(opener: Ope
     bus.shutdown()
     notifier.stop(30.0)
     assert failures.seen == [] and notifier.exception is None
+
+
+def test_timing_objects_of_python_can_give_the_bit_rates() -> None:
+    classic = can.BitTiming.from_sample_point(f_clock=8_000_000, bitrate=500_000, sample_point=87.5)
+    flexible = can.BitTimingFd.from_sample_point(
+        f_clock=80_000_000,
+        nom_bitrate=500_000,
+        nom_sample_point=80.0,
+        data_bitrate=2_000_000,
+        data_sample_point=80.0,
+    )
+    for timing, expected in ((classic, (500_000, 0)), (flexible, (500_000, 2_000_000))):
+        with can.Bus(uuid4().hex, interface="rds", timing=timing) as bus:
+            assert isinstance(bus, builtin.BuiltinBus) and (bus.bitrate, bus.data_bitrate) == expected
+    parts = {key: getattr(classic, key) for key in ("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples")}
+    with can.Bus(uuid4().hex, interface="rds", **parts) as bus:  # as python-can's tools and files give it
+        assert isinstance(bus, builtin.BuiltinBus) and bus.bitrate == 500_000
+    with pytest.raises(ValueError, match="bitrate 250000 is not that of timing, 500000"):
+        can.Bus(uuid4().hex, interface="rds", timing=classic, bitrate=250_000)

@@ -95,3 +95,14 @@ def test_damping_of_proportional_control_is_that_of_its_second_order_loop(tmp_pa
 def test_what_has_no_linear_loop_has_no_margins(law: str, why: str, tmp_path: Path) -> None:
     found, _ = found_in(tmp_path, law)
     assert isinstance(found, NoLoop) and found.is_known and why in found.why, found
+
+
+@pytest.mark.parametrize(
+    "voltage, is_known", [("20.0 * (r.position - y)", False), ("8.0 * (1 - 2 * (r.position < y))", True)]
+)
+def test_who_answers_otherwise_in_a_second_run_is_for_a_review_unless_a_relay(
+    voltage: str, is_known: bool, tmp_path: Path
+) -> None:
+    law = f"import os\ndef control(t, r, y, state, params):\n    return {voltage} + os.urandom(1)[0] / 1e4, state\n"
+    found, _ = found_in(tmp_path, law)
+    assert isinstance(found, NoLoop) and found.is_known == is_known and "a seed" in found.why, found

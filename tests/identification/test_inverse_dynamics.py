@@ -154,6 +154,19 @@ def test_an_axis_that_only_moves_forward_says_so() -> None:
     assert estimate.parameters["friction_minus"].std_error == np.inf
 
 
+def test_what_comes_only_together_is_kept_together() -> None:
+    """Forward only, friction and an offset are one number: their sum is known, and the model moves as the axis."""
+    t = np.arange(6000) * T
+    torque = 0.05 + 0.01 * np.sign(np.sin(4.0 * t))
+    speed = np.zeros(len(t))
+    for k in range(len(t) - 1):  # rad/s: J = 1e-4 kg·m², B = 2e-4 Nm·s/rad, 0.02 Nm of friction
+        speed[k + 1] = speed[k] + T * (torque[k] - 0.02 - 2e-4 * speed[k]) / 1e-4
+    log = Log("M", t, torque, speed * 30.0 / np.pi, units={"position": "rev/min", "command": "Nm"}, force_gain=1.0)
+    found = fit([log.part(2000, 6000)], structure("axis-inertia"), "inverse-dynamics")
+    assert found.values()["T_c"] + found.values()["offset"] == pytest.approx(0.02, rel=0.02)
+    assert found.values()["J"] == pytest.approx(1e-4, rel=0.05) and "T_c and offset come only together" in str(found)
+
+
 def test_a_reversed_sign_is_named() -> None:
     log = simulated(stairs())
     estimate = fit([replace(log, position=-log.position)], structure("axis"), "inverse-dynamics")

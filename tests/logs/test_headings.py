@@ -42,6 +42,12 @@ Data-Type;REAL64;Data-Type;REAL64
 SampleTime[ms];1;SampleTime[ms];1
 """
 
+SIGNAL_EXPRESS = """Timestamp,2020-03-16 17:04:51,Timestamp,2020-03-16 17:04:51
+Interval,0.001,Interval,0.001
+Channel name,"Slide",Channel name,"Motor"
+Unit,"mm",Unit,"V"
+"""
+
 
 def written(folder: Path, name: str, head: str, columns: Sequence[np.ndarray], mark: str, end: str = "") -> Path:
     path = folder / name
@@ -65,6 +71,8 @@ def written(folder: Path, name: str, head: str, columns: Sequence[np.ndarray], m
         ("in/out", "in/out", None),
         ("pos/furlong", "pos/furlong", None),
         ("u, filtered", "u, filtered", None),
+        ("ms", "ms", "ms"),  # a drive's column of times, headed by its unit
+        ("s", "s", None),  # a way, as often as a time
     ],
 )
 def test_name_and_unit_of_a_heading(cell: str, name: str, unit: str | None) -> None:
@@ -80,6 +88,7 @@ def test_name_and_unit_of_a_heading(cell: str, name: str, unit: str | None) -> N
         ("rate_rev_min", "rev/min"),
         ("position_mm", "mm"),
         ("time_s", "s"),
+        ("position_µm", "um"),
         ("state", None),
     ],
 )
@@ -101,6 +110,18 @@ def test_a_scope_with_a_time_for_each_channel(tmp_path: Path) -> None:
     held = np.where(np.isnan(slow), np.nan, np.sin(0.03 * slow))
     (log,) = read_log(written(tmp_path, "slow.csv", TWINCAT, [T, X, slow, held], ";"))
     assert len(log) == 400 and np.allclose(log.command, np.sin(0.03 * (T // 2 * 2)), atol=1e-6)
+
+
+@pytest.mark.parametrize("head", ["time_ms;u_V;x_mm\n", "time_ms;u_V;x_mm;\n"])
+def test_a_delimiter_may_end_the_rows_and_not_the_heading(head: str, tmp_path: Path) -> None:
+    (log,) = read_log(written(tmp_path, "a.csv", head, [T, U, X], ";", ";"))
+    assert np.allclose(log.position, X, atol=1e-6) and log.units["position"] == "mm"
+
+
+def test_a_recorder_with_an_interval_for_each_channel(tmp_path: Path) -> None:
+    (log,) = read_log(written(tmp_path, "ni.csv", SIGNAL_EXPRESS, [T / 1e3, X, T / 1e3, U], ","))
+    assert log.sample_period == pytest.approx(1e-3)
+    assert np.allclose(log.position, X, atol=1e-6) and np.allclose(log.command, U, atol=1e-6)
 
 
 def test_times_and_channels_in_turn(tmp_path: Path) -> None:

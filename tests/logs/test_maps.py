@@ -202,6 +202,18 @@ def test_a_log_without_position_is_one_of_its_speed(tmp_path: Path) -> None:
     assert any("no position was logged" in finding.what for finding in found.findings)
 
 
+def test_a_log_of_a_speed_keeps_the_speed_that_was_wanted(tmp_path: Path) -> None:
+    made = axis(1000)
+    columns = {"time [s]": made["time"], "u [V]": made["voltage"], "n [rpm]": made["position"], "set": made["position"]}
+    data = write(tmp_path / "log.csv", columns)
+    text = '[time]\ncolumn = "time"\n[axis.X]\ncommand = "u"\nvelocity = "n"\n'
+    text += 'reference = {{ column = "set", unit = "{}" }}\n'
+    (found,) = read_log(data, saved(tmp_path, text.format("rpm")))
+    assert found.extra["reference"] == pytest.approx(found.position)
+    (found,) = read_log(data, saved(tmp_path, text.format("deg")))
+    assert any("the reference is not used: it is in deg" in finding.what for finding in found.findings)
+
+
 def test_a_csp_log_has_its_reference_or_position_by_the_following_error(tmp_path: Path) -> None:
     """A drive in cyclic synchronous position mode logs two of the three, and its torque in thousandths."""
     made = axis(1000)
@@ -232,6 +244,10 @@ def test_a_csp_log_has_its_reference_or_position_by_the_following_error(tmp_path
         (
             ("time_s", "commanded_deg_s", "angle_deg", "feedback_deg_s"),  # a speed is not where a position is to go
             {"command": "?", "position": "angle_deg", "velocity": "feedback_deg_s"},
+        ),
+        (
+            ("Zeit", "Geschwindigkeit", "Sollgeschwindigkeit", "Motorspannung"),
+            {"command": "Motorspannung", "velocity": "Geschwindigkeit", "reference": "Sollgeschwindigkeit"},
         ),
         (
             ("Time (s)", "AccX (g)", "Torque (N·m)", "Motor Optical Speed (RPM)"),

@@ -259,6 +259,28 @@ def test_what_the_structure_lacks_is_no_matter_of_wide_intervals() -> None:
     assert reason.side is Side.AGAINST and "times the measurement's noise" in reason.what
 
 
+def test_a_loop_that_only_holds_the_axis_tells_nothing_of_it() -> None:
+    """Disturbances move it and the command answers them, so the true model looks as if its gain had the other sign."""
+    draw = np.random.default_rng(1)
+    speed, load = 0.0, 0.0
+    rows: list[tuple[float, float]] = []
+    for _ in range(2000):  # tau = 0.1 s, K = 10 (mm/s)/V
+        load = 0.995 * load + 0.05 * draw.standard_normal()
+        u = -0.5 * speed
+        rows.append((u, speed))
+        speed += T / 0.1 * (10.0 * (u + load) - speed)
+    u, y = np.array(rows).T
+    known = {"units": {"position": "mm/s", "command": "V"}, "closed_loop": True, "resolution": None}
+    values = {"tau": 0.1, "K": 10.0, "friction_plus": 0.0, "friction_minus": 0.0}
+    model = replace(candidate(values), structure=structure("axis", output="mm/s"))
+    held = log(u, y, **known, extra={"reference": np.zeros(len(u))})
+    found = validate(model, held).verdict
+    (reason,) = [r for r in found.reasons if r.kind == "disturbed"]
+    assert found.word is Word.CANNOT_TELL and reason.side is Side.CANNOT_TELL
+    moved_on = log(u, y, **known, extra={"reference": y})
+    assert all(r.kind != "disturbed" for r in validate(model, moved_on).verdict.reasons)
+
+
 def test_speeds_and_voltages_beyond_the_fit_s_are_said() -> None:
     slow = fitted_stretch(log(square(6.0, 1.0), name="slow"))
     found = validate(candidate(share=1e-4, fitted_on=(slow,)), log(FRESH))

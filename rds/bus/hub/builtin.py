@@ -48,6 +48,7 @@ class BuiltinBus(can.BusABC):
     `bitrate`, bit/s (10,000 to 1,000,000): the bus has bit timing, if this is the first node on it; any other node's
     must be the same. Without it a node joins whatever is there; the first one makes the bus untimed.
     `data_bitrate`, bit/s (up to 8,000,000): of CAN FD frames with bit-rate switch.
+    `timing`: a can.BitTiming or can.BitTimingFd, in place of the bit rates, which are all that is taken of it.
     `name`: what the hub calls this node, for faults and `rds bus nodes`.
     `error_frames`: receive what this node's controller reports, in SocketCAN's format (error_reports.py).
     `restart_ms`: come back from bus off by itself, so much later.

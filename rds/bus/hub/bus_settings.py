@@ -28,6 +28,10 @@ _LINE = {
 }
 OF_OWN_LINE = ("noise", "seed", "drift", "gap", "trace")  # what only a line that is simulated here has
 _OF_SERIAL = ("interface", "channel", "dialect", "checksum", *_LINE, "drift", "trace")
+_PARTS_OF_TIMING = (
+    *("f_clock", "brp", "tseg1", "tseg2", "sjw", "nof_samples"),
+    *(f"{rate}_{part}" for rate in ("nom", "data") for part in ("brp", "tseg1", "tseg2", "sjw")),
+)
 OPTIONS = ("bitrate", "data_bitrate", "name", "error_frames", "restart_ms")
 
 # what drivers, servers and scans are told beside an adapter's options: a key of this name would be taken for it
@@ -68,10 +72,14 @@ def read_settings(options: Mapping[str, Any]) -> wire.Settings:
     """
     given = {key: value for key, value in options.items() if value is not None}
     given.pop("single_handle", None)  # python-can's own tools give it to every interface; it says nothing here
+    if (timing := given.pop("timing", None)) is not None:
+        for part in _PARTS_OF_TIMING:  # python-can's files and tools leave them beside what they have made of them
+            given.pop(part, None)
+        given |= _rates_of(timing, given)
     if unknown := sorted(set(given) - set(OPTIONS)):
         raise ValueError(
             f"the built-in bus has no option {', '.join(unknown)}; it takes channel, can_filters, "
-            f"receive_own_messages, fd, {', '.join(OPTIONS)} (python-can's files and variables count too)"
+            f"receive_own_messages, fd, timing, {', '.join(OPTIONS)} (python-can's files and variables count too)"
         )
     bitrate = _whole(given, "bitrate", BITRATE, 0)
     data_bitrate = _whole(given, "data_bitrate", DATA_BITRATE, 0)
@@ -85,6 +93,20 @@ def read_settings(options: Mapping[str, Any]) -> wire.Settings:
         raise ValueError(f"error_frames {error_frames!r} must be true or false")
     restart = _whole(given, "restart_ms", RESTART, -1)
     return wire.Settings(name, bitrate, data_bitrate, restart, error_frames)
+
+
+def _rates_of(timing: Any, given: Mapping[str, Any]) -> dict[str, int]:
+    """The bit rates of python-can's `BitTiming` or `BitTimingFd`. Sample points say nothing here: all clocks agree."""
+    if (nominal := getattr(timing, "nom_bitrate", None)) is not None:
+        rates = {"bitrate": nominal, "data_bitrate": timing.data_bitrate}
+    elif (nominal := getattr(timing, "bitrate", None)) is not None:
+        rates = {"bitrate": nominal}
+    else:
+        raise ValueError(f"timing {timing!r:.80} must be a can.BitTiming or a can.BitTimingFd")
+    for key, rate in rates.items():
+        if given.get(key, rate) != rate:
+            raise ValueError(f"{key} {given[key]!r} is not that of timing, {rate}; give one of the two")
+    return rates
 
 
 def _whole(given: Mapping[str, Any], name: str, declared: Quantity, default: int) -> int:

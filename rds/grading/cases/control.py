@@ -18,7 +18,7 @@ from rds.grading.cases.case import COUNTS, LINEAR, Answers, CaseRun, Submitted
 from rds.grading.cases.loop import LoopRun, asked, run_loop, with_parts
 from rds.grading.cases.plant import Disturbance, disturbed, drawn_model, linear_model, noise_of, read_disturbance
 from rds.grading.cases.words import Common, as_own_file, inside, read_common, read_spread
-from rds.grading.criteria.linear import LinearLoop, NoLoop, linear_loop
+from rds.grading.criteria.linear import LinearLoop, NoLoop, linear_loop, switches
 from rds.grading.criteria.pushed import begin_of, force, free_stretch
 from rds.grading.grade import Status
 from rds.grading.sandbox.errors import SubmissionError
@@ -182,8 +182,11 @@ class ControlCase:
             same = again.result[f"{name}_command"][:begin] == u[:begin]
             if not same.all():
                 t = plan.T * int(np.argmin(same))
-                why = f"at t = {t:.3f} s it answered the same samples otherwise in a second run: there is no one loop"
-                return (NoLoop(why, True),)
+                why = (
+                    f"at t = {t:.3f} s it answered the same samples otherwise in a second run; go by `t` and not by a "
+                    "clock, keep memory in `state`, and give generators of random numbers a seed"
+                )
+                return (NoLoop(why, switches(u, limit)),)
             part = slice(begin, stretch[1])
             with np.errstate(over="ignore"):  # of voltages that no converter has
                 voltage = again.result[f"{name}_command"][part] - u[part]

@@ -96,6 +96,12 @@ class NoLoop:
     is_known: bool
 
 
+def switches(command: np.ndarray, limit: float) -> bool:
+    """Whether a voltage goes to and fro by a good part of `limit` (V) from sample to sample, as that of a relay."""
+    changes = np.diff(command)
+    return not np.isfinite(changes).all() or bool(np.sqrt(np.mean(changes**2)) >= _CHATTERS * limit)
+
+
 @np.errstate(over="ignore", invalid="ignore")  # of voltages that no converter has
 def linear_loop(
     voltage: np.ndarray, position: np.ndarray, command: np.ndarray, limit: float, model: Model, T: float
@@ -121,8 +127,7 @@ def linear_loop(
             return unstable
         if loops:
             return min((loop for loop in loops if isinstance(loop, LinearLoop)), key=lambda loop: loop.margins[2])
-    changes = np.diff(command)
-    if not np.isfinite(changes).all() or np.sqrt(np.mean(changes**2)) >= _CHATTERS * limit:
+    if switches(command, limit):
         return NoLoop("its voltage switches from sample to sample by a good part of the converter's range", True)
     return NoLoop("no linear law answers a force as it does, not even nearly", False)
 

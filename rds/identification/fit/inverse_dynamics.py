@@ -146,7 +146,7 @@ def regress_logs(logs: Sequence[Log], structure: Structure, options: Mapping[str
     lengths = [len(block) for block in blocks]
     regression, held = _with_signs(table[:, 1:], table[:, 0], lengths, form, fixed)
     theta = regression.values
-    if form.gain is not None and theta[form.gain] == 0.0:
+    if form.gain is not None and (theta[form.gain] == 0.0 or form.gain in regression.unidentifiable):
         alone = not table[:, 1 + form.gain].any() or form.gain not in regression.unidentifiable
         why = (
             f"the velocity is nowhere in the {form.target}: there is no gain to estimate"

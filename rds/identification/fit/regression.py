@@ -54,7 +54,7 @@ def regress(X: np.ndarray, y: np.ndarray, lengths: Sequence[int]) -> Regression:
     ordinary = np.sqrt(np.diag(inverse) * float(residual @ residual) / freedom) / back
     size_y = float(np.linalg.norm(y))
     return Regression(
-        values=np.where(hidden, 0.0, theta / back) if hidden.any() else theta / back,
+        values=np.where(empty, 0.0, theta / back),  # what comes only together has the least that explains as much
         covariance=covariance / np.outer(back, back),
         ordinary=np.where(hidden, np.inf, ordinary),
         residual=residual,

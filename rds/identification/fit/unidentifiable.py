@@ -34,7 +34,7 @@ def unidentifiable_by(
             f"--fix {name}=VALUE"
         )
     for direction in uncertainty.directions:
-        sentence = _together(names, direction)
+        sentence = _together(structure, values, names, direction)
         if sentence:
             said.append(sentence)
     error = np.sqrt(np.diag(uncertainty.covariance))
@@ -48,7 +48,9 @@ def unidentifiable_by(
     return said
 
 
-def _together(names: Sequence[str], direction: np.ndarray) -> str | None:
+def _together(
+    structure: Structure, values: Mapping[str, float], names: Sequence[str], direction: np.ndarray
+) -> str | None:
     """Which parameters can change together, without any difference in the response."""
     changes = direction[: len(names)]
     largest = float(np.abs(changes).max(initial=0.0))
@@ -58,8 +60,12 @@ def _together(names: Sequence[str], direction: np.ndarray) -> str | None:
     if len(parts) < 2:
         return None
     if len(parts) == 2 and abs(abs(parts[0][1]) - abs(parts[1][1])) < 0.02:
-        word = "ratio" if parts[0][1] * parts[1][1] > 0.0 else "product"
-        return f"{parts[0][0]} and {parts[1][0]} come only as their {word}: these data cannot tell them apart"
+        (one, by), (other, as_well) = parts
+        # shares of equal size are a sum: by small changes it looks like a product
+        adds = structure.units.get(one) == structure.units.get(other) and np.isclose(values[one], values[other], 0.02)
+        words = ("difference", "sum") if adds else ("ratio", "product")
+        word = words[by * as_well < 0.0]
+        return f"{one} and {other} come only as their {word}: these data cannot tell them apart"
     if parts[0][1] < 0.0:
         parts = [(name, -change) for name, change in parts]
     changing = ", ".join(f"{name} by {change:+.3g} %" for name, change in parts)

@@ -125,10 +125,13 @@ def _completed(parts: dict[str, _Part], about: AxisMap, findings: list[Finding])
             made = "position and following error" if other == "reference" else "reference less following error"
             findings.append(Finding("map", f"the {other} is {made}"))
     if "position" not in parts:
+        unit = parts["velocity"].unit
         parts["position"] = parts.pop("velocity")
-        parts.pop("reference", None)
-        what = f"no position was logged: the axis is known by its speed ({parts['position'].unit}) alone"
+        what = f"no position was logged: the axis is known by its speed ({unit}) alone"
         findings.append(Finding("map", f"{what}; what depends on where it is (play, travel) cannot be told"))
+        if "reference" in parts and (of := parts["reference"].unit) != unit:
+            del parts["reference"]
+            findings.append(Finding("map", f"the reference is not used: it is in {of}, and the speed in {unit}"))
     return parts
 
 

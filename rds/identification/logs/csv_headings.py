@@ -2,7 +2,8 @@
 
 Beside `name [unit]` these are: `name/unit`, `name in unit`, `name, unit` and `name {unit}`; the head of LabVIEW's .lvm
 files, whose units stand in a row of their own; and tables in which each channel has a column of times before it, headed
-by rows of label and value in turn (`Name;ActPos;Name;SetPos`, `Unit;mm;Unit;mm`), as TwinCAT's scope exports them.
+by rows of label and value in turn (`Name;ActPos;Name;SetPos`, `Unit;mm;Unit;mm`), as TwinCAT's scope exports them, or
+NI's SignalExpress (`Channel name,"Force"`, `Interval,0.0005`). Mitsubishi's drives head their times by the unit: `ms`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ Split = Callable[[str], list[str]]
 _BRACES = re.compile(r"(?P<name>.*?)\s*\{(?P<unit>[^{}]*)\}\s*")
 _BETWEEN = re.compile(r"\s*[/,]\s*|\s+[iI][nN]\s+")  # a name and its unit
 _LABVIEW, _LABVIEW_UNITS, _LABVIEW_TIME = "LabVIEW Measurement", "Y_Unit_Label", "X_Dimension"
-_PAIR_NAME, _PAIR_UNIT, _PAIR_PERIOD = "name", "unit", "sampletime[ms]"
+_PAIR_NAMES, _PAIR_UNIT = ("name", "channel name"), "unit"
+_PAIR_TIMES = {"sampletime[ms]": "ms", "interval": "s"}  # which label says in which unit the times are
+_TIMES_ALONE = ("ms", "us", "µs", "μs")  # headings of a time by its unit; `s` may be a way, `min` a least one
 
 
 class Headings(NamedTuple):
@@ -38,8 +41,8 @@ def alternates(units: Sequence[str | None]) -> bool:
 def name_and_unit(cell: str) -> tuple[str, str | None]:
     """Name and unit of a heading; None where it gives none. Without brackets a unit must be one that is known."""
     name, unit = split_heading(cell)
-    if unit is not None:
-        return name, unit
+    if unit is not None or name in _TIMES_ALONE:
+        return name, unit or name
     if braced := _BRACES.fullmatch(cell):
         return braced["name"], braced["unit"].strip()
     for between in _BETWEEN.finditer(cell) if dimension(cell) is None else ():  # `mm/s` is no mm in s
@@ -70,11 +73,11 @@ def paired_headings(above: Sequence[str], split: Split, width: int) -> Headings 
         cells = split(line)[:width]
         if width % 2 == 0 and len(cells) == width and len(set(cells[::2])) == 1:
             rows.setdefault(cells[0].casefold(), cells[1::2])
-    named = rows.get(_PAIR_NAME)
+    named = next((rows[label] for label in _PAIR_NAMES if label in rows), None)
     if named is None or width < 4 or len(set(named)) < len(named):
         return None
     units = rows.get(_PAIR_UNIT, [""] * len(named))
-    time = "ms" if _PAIR_PERIOD in rows else None
+    time = next((unit for label, unit in _PAIR_TIMES.items() if label in rows), None)
     return Headings(
         names=tuple(name for channel in named for name in (f"time of {channel}", channel)),
         units=tuple(unit for own in units for unit in (time, own.strip("[]() ") or None)),

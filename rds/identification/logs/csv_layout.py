@@ -18,6 +18,7 @@ from rds.identification.logs.csv_headings import Headings, alternates, labview_u
 from rds.identification.logs.units import dimension
 from rds.results.units import split_heading
 
+_FEW = 20  # rows of data that are looked at for how they end
 HEAD = 1 << 16  # bytes looked at
 COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|", "space": " "}
@@ -183,7 +184,11 @@ def _with_faulty_rows(lines: Sequence[str], first: int, delimiter: str, decimal:
 def _headings(lines: Sequence[str], first: int, delimiter: str, decimal: str, width: int) -> Headings:
     """Names and units from the lines above the data: headings, perhaps with a row of units below them."""
     above = [line for line in lines[:first] if line.strip()][-2:]
-    rows = [_heading_cells(line, delimiter, width) for line in above]
+    below = [split(line, delimiter) for line in lines[first : first + _FEW] if line.strip() and not is_comment(line)]
+    ended = bool(below) and all(cells[-1] == "" for cells in below)  # a delimiter ends each row, and perhaps no heading
+    rows = [_heading_cells(line + delimiter * ended, delimiter, width) for line in above]
+    if ended and None in rows:
+        rows = [found or _heading_cells(line, delimiter, width) for found, line in zip(rows, above, strict=True)]
     units: list[str | None] = [None] * width
     heads = rows[-1] if rows else None
     if heads is not None and _are_units(heads) and len(rows) > 1 and rows[-2] is not None:

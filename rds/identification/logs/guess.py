@@ -16,13 +16,15 @@ from rds.identification.logs.table import Column, Table, remedy
 from rds.identification.logs.units import dimension, known_units
 
 _DRIVING = frozenset(("torque", "force", "effort", "drehmoment", "kraft"))
-_ACTS = _DRIVING | {"voltage", "volt", "volts", "spannung", "current", "strom"}
+_VOLTAGES = frozenset(("voltage", "volt", "volts", "spannung", "motorspannung", "ankerspannung"))
+_CURRENTS = frozenset(("current", "amps", "strom", "iststrom", "motorstrom", "ankerstrom", "i", "amperage"))
+_ACTS = _DRIVING | _VOLTAGES | {"current", "strom", "motorstrom", "ankerstrom"}
 # words of names, lower case, that tell a quantity; the first that fits
 _WORDS: Mapping[str, frozenset[str]] = {
     "time": frozenset(("time", "t", "zeit", "timestamp", "timestamps", "elapsed", "seconds", "zeitstempel")),
     "reference": frozenset(
         ("reference", "ref", "setpoint", "set", "desired", "target", "commanded", "soll", "demand", "qg")
-    ).union(("sollposition", "lagesollwert")),
+    ).union(("sollposition", "lagesollwert", "solldrehzahl", "sollgeschwindigkeit", "drehzahlsollwert")),
     "velocity": frozenset(
         (
             "velocity",
@@ -34,13 +36,12 @@ _WORDS: Mapping[str, frozenset[str]] = {
             "geschwindigkeit",
             "drehzahl",
             "istdrehzahl",
+            "istgeschwindigkeit",
             "drehzahlistwert",
         )
     ),
-    "current": frozenset(("current", "amps", "strom", "iststrom", "i", "amperage")),
-    "command": frozenset(
-        ("voltage", "command", "cmd", "volt", "volts", "u", "input", "control", "vir", "spannung")
-    ).union(_DRIVING),
+    "current": _CURRENTS,
+    "command": frozenset(("command", "cmd", "u", "input", "control", "vir")).union(_DRIVING, _VOLTAGES),
     "position": frozenset(
         ("measured", "position", "pos", "encoder", "enc", "y", "x", "q", "qm", "ist", "output", "angle", "counts")
     ).union(("feedback", "actual", "act", "istposition", "lageistwert", "lage")),

@@ -12,6 +12,7 @@ from rds.machines.machine import Axis
 
 _LAGS = 10  # windows by which a motion may follow its command
 _CLEAR, _FAINT = 0.5, 0.15  # correlations
+_STILL = 0.1  # of the motion's range: that of a reference which does not make it
 _BRAKED = 0.1  # of the energy that a force could give: what noise, gravity and the ends of a log may take
 _NEAR = 0.7  # of the largest correlation: a peak as good as it
 _JUMP, _SMOOTH = 0.3, 0.1  # of the range, in one sample: what a command may do, and a position does not
@@ -44,6 +45,8 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
     if log.units.get("command", "V") != "V":
         return _driven(seen)
     follows = _follows(seen)
+    if (only_held := held(log, follows)) is not None:
+        return [only_held]
     if follows < -_CLEAR:
         what = (
             f"the axis moves against its command (correlation {follows:.2f}): give one of them sign = -1 in the map, "
@@ -57,6 +60,30 @@ def direction(log: Log, axis: Axis | None) -> list[Finding]:
         )
         return [Finding("columns", what, Gravity.WARNING)]
     return []
+
+
+def held(log: Log, follows: float | None = None) -> Finding | None:
+    """Whether a controller seems to do nothing but hold the axis where it is, against disturbances; None if not.
+
+    By a reference that stands still beside the motion; without one, by a motion that hardly follows the command.
+    `follows` is their correlation, where it is known.
+    """
+    if not log.closed_loop or log.units.get("command", "V") != "V":
+        return None
+    if np.ptp(log.command) == 0.0 or np.ptp(log.position) == 0.0:
+        return None
+    follows = _follows(motion(log)) if follows is None else follows
+    reference = log.extra.get("reference")
+    if follows >= _FAINT or (reference is None and follows <= -_CLEAR):
+        return None
+    if reference is not None and float(np.ptp(reference)) >= _STILL * float(np.ptp(log.position)):
+        return None
+    what = (
+        f"in a closed loop, the motion does not follow the command (correlation {follows:.2f} at best): what moves the "
+        "axis are disturbances, which the command answers, so how the axis answers the command does not show; log a "
+        "motion whose reference changes"
+    )
+    return Finding("disturbed", what, Gravity.WARNING)
 
 
 def _noisy_or_led(log: Log, seen: Motion) -> bool:

@@ -102,9 +102,15 @@ def _jitter(
     if worst > limit * period * (1.0 + 1e-9):
         first = int(np.flatnonzero(off > limit * period * (1.0 + 1e-9))[0])
         k = first + int(np.searchsorted(wide - np.arange(len(wide)), first, side="right")) + 1
+        remedy = (
+            "a larger jitter_limit in the map (at most 0.5) takes the times as they are"
+            if worst <= 0.5 * period
+            else "no jitter_limit (at most 0.5) allows that: record at equal steps, "
+            "with times of what measured, or resample the file"
+        )
         raise InputError(
             f"{what}; beyond the limit of {100.0 * limit:g} % first at sample {k} ({time[k - 1]:.9g} s, then "
-            f"{time[k]:.9g} s); a larger jitter_limit in the map (at most 0.5) takes the times as they are",
+            f"{time[k]:.9g} s); {remedy}",
             where,
         )
     return [Finding("jitter", f"{what}; used as they are")]

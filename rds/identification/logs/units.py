@@ -76,7 +76,7 @@ def unit_of_name(name: str) -> str | None:
     if rate := _RATES.fullmatch(name):
         unit = f"{rate['unit']}/{'s' if rate['time'] == 'sec' else rate['time']}"
         return unit if dimension(unit) else None
-    stem, _, ending = name.rpartition("_")
+    stem, _, ending = name.replace("µ", "u").replace("μ", "u").rpartition("_")
     return ending if stem and ending in _ENDINGS else None
 
 

@@ -140,6 +140,8 @@ def _discrepancy(a: Assessment, bands: Bands) -> Iterator[Reason]:
         if measure.borderline and measure.told:
             limit += ", borderline"
         what = f"{_said_of(measure, found.frequency)}: ± {_shown(off.error, off.unit)} standard error; {limit}"
+        if off.value == float("inf"):
+            what = _said_of(measure, found.frequency)
         if measure.wrong:
             yield Reason(Side.AGAINST, measure.kind, what)
         elif measure.told:
@@ -156,6 +158,8 @@ def _said_of(measure: Measure, frequency: float) -> str:
     """A clause: what the model is off by."""
     value = measure.off.value
     size, more = _shown(abs(value), measure.off.unit), value > 0.0
+    if measure.kind == "gain" and value == float("inf"):
+        return "the axis does not move as the model does, or moves the other way"
     if measure.kind == "gain":
         where = f" at {measure.off.at:.2g} Hz" if measure.off.at > 0.0 else ""
         return f"its gain{where} is {size} too {'high' if more else 'low'}"

@@ -7,6 +7,7 @@ from math import sqrt
 
 from rds.identification.fit.upsets import upsets
 from rds.identification.logs.log import Finding, Gravity
+from rds.identification.logs.plausibility import held
 from rds.identification.validate.assessment import Assessment, largest
 from rds.identification.validate.conclusion import DATA
 from rds.identification.validate.verdict import Bands, Reason, Side
@@ -58,8 +59,10 @@ def of_data(a: Assessment, bands: Bands) -> Iterator[Reason]:
             "no-excitation",
             f"the command is {log.command[0]:.4g} V throughout: it excites no dynamics",
         )
+    if (disturbed := held(log)) is not None:  # of this log: it may be a part of another, which has moved
+        yield Reason(Side.CANNOT_TELL, disturbed.kind, disturbed.what)
     for finding in log.findings:
-        if finding.gravity is not Gravity.NOTE:
+        if finding.gravity is not Gravity.NOTE and finding.kind != "disturbed":
             yield Reason(_side_of(finding), f"{DATA}{finding.kind}", finding.what)
     yield from _too_good(a, bands)
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 import numpy.random  # here, before the forks: else each of them imports it anew
@@ -34,10 +34,9 @@ _OWN = ("rds.checks.rows", "rds.core.types", "rds.core.values", "rds.machines.co
 def main(questions: int, answers: int, door: list[int]) -> int:
     """Serve one submission; the process's exit code. `door` is its memory and bells."""
     channel = Channel(questions, answers, *door)
-    for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(line_buffering=True)  # type: ignore[union-attr] # nothing is lost if it is ended
-    random.seed(0)
-    np.random.seed(0)
+    for name, descriptor in (("stdout", 1), ("stderr", 2)):
+        vars(sys)[name] = vars(sys)[f"__{name}__"] = _stream(descriptor)
+    _seed()
     try:
         order = channel.ask()
         file = Path(walls.HOME) / order["name"]
@@ -54,6 +53,23 @@ def main(questions: int, answers: int, door: list[int]) -> int:
                 _RUNS[order["op"]](channel, loaded, order, count)
     except Closed:
         return 0
+
+
+def _stream(descriptor: int) -> TextIO:
+    """Its output, by lines, so that nothing is lost if it is ended.
+
+    Made anew after the fork: the warm interpreter's own streams hold that they could be rewound, and so refuse the
+    `sys.stdout.reconfigure(encoding="utf-8")` that many files for Windows begin with.
+    """
+    errors = "backslashreplace" if descriptor == 2 else "surrogateescape"
+    return open(descriptor, "w", buffering=1, encoding="utf-8", errors=errors, closefd=False)
+
+
+def _seed() -> None:
+    """The same numbers in each run from whatever is not seeded, `numpy.random.default_rng()` included."""
+    random.seed(0)
+    np.random.seed(0)
+    vars(np.random.bit_generator)["randbits"] = random.Random(0).getrandbits  # where numpy takes its entropy
 
 
 def _counted(questions: int, answers: int, order: dict[str, Any] | None) -> Counted | None:
