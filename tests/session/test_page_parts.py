@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -222,3 +223,23 @@ def test_a_picture_drawn_again_leaves_no_widget_behind(tmp_path: Path) -> None:
     view.clear()
     assert view.children == ()
     assert len(_instances) < open_after[-1]
+
+
+@pytest.mark.parametrize("is_canvas", [True, False], ids=["ipympl", "picture"])
+def test_a_figure_is_as_wide_as_its_place_and_not_wider_than_it_was_made_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_canvas: bool
+) -> None:
+    from rds.core.figure import Picture
+    from rds.panels.kit.figure import DPI, FigureView
+
+    if not is_canvas:
+        monkeypatch.setitem(sys.modules, "ipympl.backend_nbagg", None)
+    view = FigureView()
+    view.show(Picture(4.0, 10.0), Session(tmp_path))
+    (room, _) = view.children
+    for pixels, wanted in ((340, 340 / DPI), (5000, 10.0), (60, 3.0), ("wide", 3.0), (500, 500 / DPI)):
+        room._said(room, {"kind": "width", "width": pixels}, [])
+        assert view.figure.get_figwidth() == pytest.approx(wanted, abs=0.5 / DPI)
+        assert view.figure.get_figheight() == pytest.approx(4.0, abs=0.5 / DPI)
+    view.show(Picture(4.0, 10.0), Session(tmp_path))  # the next one is drawn so at once
+    assert view.figure.get_figwidth() == pytest.approx(500 / DPI)

@@ -17,6 +17,7 @@ from rds.panels.code.versions import Version, change_sentence, changes
 from rds.panels.equipment.build import Checked
 from rds.panels.kit.button import attempt, button
 from rds.panels.kit.file_import import FileImport
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.session.file_params import file_params
@@ -39,7 +40,7 @@ class CodeView:
         self.editor = CodeEditor(lambda: attempt("run", self.press, self.said), self._dropped, label=label)
         self.editor.observe(lambda change: self._typed(change["new"]), "text")
         roles = [(role.capitalize(), role) for role in self.codes]
-        self.roles = widgets.ToggleButtons(options=roles, tooltips=[f"your {role}" for role in self.codes])
+        self.roles = widgets.ToggleButtons(options=roles, tooltips=[f"your {role}" for role in self.codes], tooltip="")
         self.roles.layout.display = "" if len(roles) > 1 else "none"
         self.roles.observe(lambda change: self._turn(change["new"]), "value")
         self.list = widgets.Dropdown(tooltip="Your files in this folder", options=[])
@@ -56,7 +57,7 @@ class CodeView:
         self.which.observe(lambda change: self._compare(), "value")
         tip = "Put this version's text into the editor; the text that is there now can be had back by Ctrl-Z"
         self.back = button("Back to this version", tip, self._go_back, self.said)
-        self.difference = widgets.HTML()
+        self.difference = Html()
         self._versions: list[Version] = []
         history = widgets.Accordion(
             [widgets.VBox([row(self.which, self.back), self.difference])], titles=("Versions",), selected_index=None

@@ -16,6 +16,7 @@ from rds.panels.design.state import Design
 from rds.panels.equipment.build import Checked
 from rds.panels.kit.button import button, follow, is_free, watch
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -47,7 +48,7 @@ class DesignView:
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.plane = SPlane(self._moved)
         self.curves = Curves(columns=3, height=200)
-        self.numbers, self.details = widgets.HTML(), widgets.HTML()
+        self.numbers, self.details = Html(), Html()
         self._views: dict[str, FieldView] = {}
         self._side = widgets.VBox([])
         self._side.add_class("rds-side")

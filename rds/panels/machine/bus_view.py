@@ -5,12 +5,11 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-import ipywidgets as widgets
-
 from rds.core.errors import InputError
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -47,7 +46,7 @@ class BusView:
         self.session, self.state, self.monitor = shell.session, state, BusMonitor()
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.choices = shell.session.choices("bus", [_FILTER, *_LOAD])
-        self.live, self.load = widgets.HTML(), widgets.HTML()
+        self.live, self.load = Html(), Html()
         for each in (self.live, self.load):
             each.add_class("rds-scroll")
         self.live.add_class("rds-monitor")
