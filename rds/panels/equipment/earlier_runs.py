@@ -143,7 +143,7 @@ def difference_html(a: RunRow, b: RunRow, names: Sequence[str]) -> str:
     rows = [["RMS error", a.rms, b.rms], ["fit", a.fit, b.fit], ["timing", a.verdict, b.verdict]]
     rows = [each for each in rows if each[1] or each[2]]
     rows += [list(each) for each in differences(a.facts, b.facts)]
-    shown = html.table(["", *names], rows, "What differs")
+    shown = html.table(["", *names], rows, "What differs", mixed=True)
     before, after = code_of(a), code_of(b)
     for key in before.keys() & after.keys():
         if before[key] != after[key]:

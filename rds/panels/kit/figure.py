@@ -97,7 +97,8 @@ class FigureView(widgets.VBox):
     def clear(self) -> None:
         """Nothing to show."""
         self._waiting = self.figure = None
-        self.children = []
+        # it stays: of a widget that is shown once more, ipywidgets keeps what the page had of it before
+        self.children = [self._room] if self._room is not None else []
         for widget in self._shown:
             toolbar = getattr(widget, "toolbar", None)  # an ipympl canvas has one
             for part in (

@@ -112,7 +112,7 @@ function render({ model, el }) {
         label: `${traces[k].name} [${traces[k].unit}]`, stroke: traces[k].color, width: traces[k].width || 1.6, dash: traces[k].dash || [],
         scale: "y", points: { show: false }, value: (u, v) => (v == null ? "–" : v.toPrecision(5)),
       }));
-      of.forEach((k) => series.push({ label: `${traces[k].name}, earlier`, stroke: traces[k].color, width: 1.4, dash: [2, 4], scale: "y", points: { show: false }, show: !!ghost, value: (u, v) => (v == null ? "–" : v.toPrecision(5)) }));
+      if (ghost) of.forEach((k) => series.push({ label: `${traces[k].name}, earlier`, stroke: traces[k].color, width: 1.4, dash: [2, 4], scale: "y", points: { show: false }, value: (u, v) => (v == null ? "–" : v.toPrecision(5)) }));
       const plot = new uPlot({
         width: Math.max(box.clientWidth, 280), height: Math.max(room * weights[i] / sum, LOWEST) + (isLast ? AXIS : 0), padding: [6, 8, 0, 0],
         scales: { x: { time: false, range: () => [left(), right()] }, y: { auto: true } }, axes, series,
@@ -199,7 +199,7 @@ function render({ model, el }) {
       }
     }
     const clean = (values) => values.map((v) => (Number.isNaN(v) ? null : v));
-    return [x, ...ys.map(clean), ...of.map((k) => (ghost ? clean(at(ghost.columns, k + 1, x)) : x.map(() => null)))];
+    return [x, ...ys.map(clean), ...(ghost ? of.map((k) => clean(at(ghost.columns, k + 1, x))) : [])];
   }
   // the values of an earlier run at the times x
   function at(rows, k, x) {
@@ -324,16 +324,19 @@ function render({ model, el }) {
 
   const rebuild = () => { build(); dirty = true; };
   model.on("msg:custom", receive);
-  model.on("change:traces", () => { hidden = new Set(); rebuild(); });
-  model.on("change:window", () => { wide = model.get("window"); dirty = true; });
-  model.on("change:events", () => { dirty = true; });
+  const retraced = () => { hidden = new Set(); rebuild(); }, widened = () => { wide = model.get("window"); dirty = true; }, marked = () => { dirty = true; };
+  model.on("change:traces", retraced);
+  model.on("change:window", widened);
+  model.on("change:events", marked);
+  const sized = new ResizeObserver(marked); // the lanes are as wide as their place, at rest as well
+  sized.observe(box);
   const themed = new MutationObserver(rebuild);
   themed.observe(document.body, { attributes: true, attributeFilter: ["class", "data-jp-theme-light"] });
   const app = document.querySelector(".rds-app");
   if (app) themed.observe(app, { attributes: true, attributeFilter: ["class", "lang"] });
   let around = null;
   requestAnimationFrame(() => { around = place(); around.addEventListener("rds-time", heard); build(); model.send({ kind: "all" }); });
-  return () => { clearInterval(timer); around?.removeEventListener("rds-time", heard); themed.disconnect(); model.off("msg:custom", receive); plots.forEach(({ plot }) => plot.destroy()); };
+  return () => { clearInterval(timer); around?.removeEventListener("rds-time", heard); themed.disconnect(); sized.disconnect(); model.off("msg:custom", receive); model.off("change:traces", retraced); model.off("change:window", widened); model.off("change:events", marked); plots.forEach(({ plot }) => plot.destroy()); };
 }
 
 export default { render };
