@@ -34,6 +34,7 @@ class CodeView:
         self.shell, self.codes, self._run = shell, dict(codes), run
         self.role = next(iter(self.codes))
         self._loading = False
+        self.on_good: Callable[[], Any] = lambda: None  # when the file in sight has no fault any more
         self.notice = Notice()  # what the check says
         self.said = Notice()  # what was done with files
         label = f"code of the {self.role}"
@@ -140,6 +141,8 @@ class CodeView:
         self.editor.mark(told(mark, found.text, params) for mark in found.marks)
         self.editor.words = self.code.words()
         self.notice.say(verdict(found), "good" if found.ok else "error")
+        if found.ok:
+            self.on_good()
         self._list_files()
 
     def _show(self) -> None:

@@ -229,6 +229,8 @@ class EquipmentView:
                 if self.code is not None and self.code.shows(checked):
                     self.tabs.selected_index = CODE
                     self.code.show_checked(checked)
+                    said = str(run.error)
+                    self.code.on_good = lambda: self.notice.take_back(said)
         if run.result is not None:
             self.results.follow_files(run)
         if self.tabs.selected_index == EARLIER:  # else it is brought up to date once it is looked at

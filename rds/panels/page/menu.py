@@ -36,6 +36,9 @@ def _first(shell: Any) -> widgets.Widget:
         shell.open("equipment-control")
 
     def write() -> None:
+        from rds.panels.equipment.state import Equipment
+
+        Equipment(shell.session, "control").own_controller()  # so that Run runs what is written
         shell.open("equipment-control")
         if shell.on_code is not None:
             shell.on_code()
