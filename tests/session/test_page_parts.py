@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import ipywidgets as widgets
+import numpy as np
 import pytest
 
-from rds.core.errors import InputError
+from rds.core.errors import ContractError, InputError
 from rds.nc.check import Setup
+from rds.panels.equipment.build import Checked, Mark
+from rds.panels.equipment.preview import preview
 from rds.panels.equipment.result_actions import ResultActions
 from rds.panels.equipment.state import Equipment
 from rds.panels.equipment.view import EquipmentView
@@ -186,6 +191,38 @@ def test_a_press_of_run_while_a_run_goes_on_is_answered(tmp_path: Path, monkeypa
             shell.ticker.tick()
         assert "done: " in view.notice.value  # what came of the run stands in its place
     assert len(shell.session.runs()) == 2
+
+
+def test_what_a_run_found_in_a_file_is_said_until_it_is_mended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell = Shell(Session(tmp_path))
+    view = EquipmentView(shell, Equipment(shell.session, "control"))
+    code = view.edit()
+    bad = Checked("controller", code.code.file.path, code.code.file.text, (Mark(1, "x is wrong"),))
+    monkeypatch.setattr(view.equipment.builds, "latest", lambda: [bad])
+    view.run = SimpleNamespace(stopped_early=False, error=ContractError("line 1: x is wrong"), result=None)
+    view._ended()
+    assert "line 1: x is wrong" in view.notice.value
+    code._found(bad)
+    assert "line 1: x is wrong" in view.notice.value
+    code._found(replace(bad, marks=()))
+    assert view.notice.value == ""
+
+
+def test_the_lanes_before_a_run_have_the_signal_that_is_chosen(tmp_path: Path) -> None:
+    control, model = (Equipment(Session(tmp_path), kind) for kind in ("control", "model"))
+    (points,) = re.findall(r'polyline points="([^"]+)"', preview(control))
+    pairs = np.array([pair.split(",") for pair in points.split()], dtype=float)
+    cycles = 10.0 * 0.2  # final time and frequency of the first reference
+    assert pairs[:, 1] == pytest.approx(-0.9 * np.sin(2.0 * np.pi * cycles * pairs[:, 0]), abs=2e-3)
+    assert re.findall(r"<span>(.*?)</span>", preview(control)) == [
+        "position [mm]",
+        "as chosen, 10 s",
+        "error [mm]",
+        "voltage [V]",
+    ]
+    assert re.findall(r"<span>(.*?)</span>", preview(model)) == ["position [mm]", "voltage [V]", "as chosen, 8 s"]
+    control.choices.set("shape", "user")  # the file is not named yet, and is not run for this
+    assert "polyline" not in preview(control)
 
 
 def test_a_bar_says_what_goes_on_after_the_stop(tmp_path: Path) -> None:
