@@ -132,14 +132,14 @@ def legend(axes: Axes, columns: int = 4) -> None:
     _by_width(axes.figure, lay_out)
 
 
-def common_legend(picture: Picture, handles: Sequence[Any], texts: Sequence[str], loc: str, **options: Any) -> None:
+def common_legend(picture: Picture, handles: Sequence[Any], texts: Sequence[str], loc: Any) -> None:
     """One legend for all axes, at `loc` outside them: as many entries side by side as there is room for."""
 
     def lay_out(width: float) -> None:
         for earlier in list(picture.legends):
             earlier.remove()
         columns = beside(texts, width)
-        picture.legend(handles, texts, loc=loc, ncols=columns, frameon=False, fontsize="small", **options)
+        picture.legend(handles, texts, loc=loc, ncols=columns, frameon=False, fontsize="small")
 
     picture.lay_out(lay_out)
 
