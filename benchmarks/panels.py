@@ -98,7 +98,8 @@ def run() -> list[Figure]:
         Figure("kernel, with the machine in motion too", "% of a core", tuple(in_motion), 3.0),
         Figure("main thread of the browser, with the machine in motion too", "% of a core", tuple(main_thread), 30.0),
         Figure(f"memory of the kernel that {_RUNS - _SETTLED} runs leave, after {_SETTLED}", "kB a run", grown[:1]),
-        Figure(f"memory of the page that {_RUNS - _SETTLED} runs leave, after {_SETTLED}", "kB a run", grown[1:]),
+        Figure(f"memory of the page that {_RUNS - _SETTLED} runs leave, after {_SETTLED}", "kB a run", grown[1:2]),
+        Figure("of that, data: without the machine code that the browser makes of scripts", "kB a run", grown[2:], 1.0),
         Figure("lateness of the loop at 99 %, with the page", "µs", tuple(beside)),
         Figure("lateness of the loop at 99 %, with the machine in motion too", "µs", tuple(moving)),
         Figure("lateness of the loop at 99 %, without", "µs", tuple(alone)),
@@ -214,17 +215,20 @@ def _held(page: Any) -> list[float]:
     return found
 
 
-def _growth(page: Any, server: int, folder: Path) -> tuple[float, float]:
-    """kB of the kernel's memory and of the page's heap that one more run leaves, over some of _RUNS simulations."""
+def _growth(page: Any, server: int, folder: Path) -> tuple[float, float, float]:
+    """kB that one more run leaves, over some of _RUNS simulations: kernel, heap of the page, data in that heap.
+
+    The rest of the heap is machine code: the browser compiles a function once it has been called often.
+    """
     page.select_option('.rds-field:has(label:text-is("Mode")) select', label="Simulation")
     page.get_by_label("Final time").fill("0.2")
     page.keyboard.press("Enter")
     session = page.context.new_cdp_session(page)
 
-    def memory() -> tuple[float, float]:
+    def memory() -> tuple[float, float, float]:
         session.send("HeapProfiler.collectGarbage")
         used = float(session.send("Runtime.getHeapUsage")["usedSize"])
-        return max(_resident(each) for each in _kernels(server)), used / 1e3
+        return max(_resident(each) for each in _kernels(server)), used / 1e3, _data(session) / 1e3
 
     runs = folder / "runs"
     for number in range(_RUNS):
@@ -245,6 +249,21 @@ def _growth(page: Any, server: int, folder: Path) -> tuple[float, float]:
     page.wait_for_selector("button.rds-run:visible:enabled", timeout=60_000)
     after = memory()
     return tuple((b - a) / (_RUNS - _SETTLED) for a, b in zip(before, after, strict=True))  # type: ignore[return-value]
+
+
+def _data(session: Any) -> float:
+    """Bytes of all that scripts of the page hold, from a snapshot of its heap: strings, arrays, objects, functions."""
+    chunks: list[str] = []
+    session.on("HeapProfiler.addHeapSnapshotChunk", keep := lambda event: chunks.append(event["chunk"]))
+    session.send("HeapProfiler.takeHeapSnapshot")
+    session.remove_listener("HeapProfiler.addHeapSnapshotChunk", keep)
+    snapshot = json.loads("".join(chunks))
+    meta = snapshot["snapshot"]["meta"]
+    nodes = np.array(snapshot["nodes"]).reshape(-1, len(meta["node_fields"]))
+    kinds = meta["node_types"][0]
+    apart = [kinds.index(kind) for kind in ("code", "native", "synthetic")]  # native: of the browser, such as the DOM
+    counted = ~np.isin(nodes[:, meta["node_fields"].index("type")], apart)
+    return float(nodes[counted, meta["node_fields"].index("self_size")].sum())
 
 
 def _resident(process: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,7 @@ __all__ = [
     "SKY",
     "VERMILLION",
     "Picture",
+    "common_legend",
     "dress",
     "legend",
     "quantity",
@@ -45,10 +47,25 @@ RESPONSES: dict[str, dict[str, Any]] = {
 
 
 class Picture(Figure):
-    """A figure that shows itself in a notebook without pyplot's global state."""
+    """A figure that shows itself in a notebook without pyplot's global state.
+
+    What hangs on its width, such as the columns of a legend, is laid out anew when it is made wider or narrower.
+    """
 
     def __init__(self, height: float, width: float = WIDTH):
+        self._layouts: list[Callable[[float], None]] = []
         super().__init__(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
+
+    def lay_out(self, by_width: Callable[[float], None]) -> None:
+        """Call `by_width(inches)` now, and again with each other width."""
+        self._layouts.append(by_width)
+        by_width(self.get_figwidth())
+
+    def set_size_inches(self, w: Any, h: Any = None, forward: bool = True) -> None:
+        """As ever; then what hangs on the width."""
+        super().set_size_inches(w, h, forward=forward)
+        for by_width in self._layouts:
+            by_width(self.get_figwidth())
 
     def draw(self, renderer: Any) -> None:
         """Names are the user's: a $ in them is a $, and not the beginning of a formula, which may be a wrong one."""
@@ -85,27 +102,58 @@ def dress(axes: Axes, y: str, x: str | None = "time [s]") -> None:
 
 
 def legend(axes: Axes, columns: int = 4) -> None:
-    """The legend above the axes, where it covers no line; `columns` entries side by side."""
+    """The legend above the axes, where it covers no line; at most `columns` entries side by side, as there is room."""
     handles, labels = axes.get_legend_handles_labels()
     if not handles:
         return
-    drawn = axes.legend(
-        handles,
-        labels,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
-        frameon=False,
-        fontsize="small",
-        handlelength=1.6,
-        handletextpad=0.5,
-        columnspacing=0.9,
-        labelspacing=0.2,  # as close as the lines of the blank title, which keeps the height free
-        borderaxespad=0.2,
-    )
-    # a legend wider than its axes would make the layout shrink them; a blank title keeps just the height free
-    drawn.set_in_layout(False)
-    axes.set_title("\n".join([" "] * -(-len(handles) // columns)), fontsize="small", pad=9)
+    place = axes.get_subplotspec()
+    across = place.get_gridspec().ncols if place is not None else 1
+
+    def lay_out(width: float) -> None:
+        most = min(columns, beside(labels, width / across))
+        drawn = axes.legend(
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=most,
+            frameon=False,
+            fontsize="small",
+            handlelength=1.6,
+            handletextpad=0.5,
+            columnspacing=0.9,
+            labelspacing=0.2,  # as close as the lines of the blank title, which keeps the height free
+            borderaxespad=0.2,
+        )
+        # a legend wider than its axes would make the layout shrink them; a blank title keeps just the height free
+        drawn.set_in_layout(False)
+        axes.set_title("\n".join([" "] * -(-len(handles) // most)), fontsize="small", pad=9)
+
+    _by_width(axes.figure, lay_out)
+
+
+def common_legend(picture: Picture, handles: Sequence[Any], texts: Sequence[str], loc: Any) -> None:
+    """One legend for all axes, at `loc` outside them: as many entries side by side as there is room for."""
+
+    def lay_out(width: float) -> None:
+        for earlier in list(picture.legends):
+            earlier.remove()
+        columns = beside(texts, width)
+        picture.legend(handles, texts, loc=loc, ncols=columns, frameon=False, fontsize="small")
+
+    picture.lay_out(lay_out)
+
+
+def beside(texts: Sequence[str], width: float) -> int:
+    """How many entries of a legend have room beside each other in `width` inches."""
+    return max(1, min(len(texts), int(width / (0.45 + 0.075 * max(map(len, texts), default=0)))))
+
+
+def _by_width(figure: Any, lay_out: Callable[[float], None]) -> None:
+    if isinstance(figure, Picture):
+        figure.lay_out(lay_out)
+    else:  # of somebody's own
+        lay_out(figure.get_figwidth())
 
 
 def quantity(axis: str, unit: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rds.core.figure import BLUE, GREY, ORANGE, Picture, dress
+from rds.core.figure import BLUE, GREY, ORANGE, Picture, common_legend, dress
 from rds.interpolators.motion.segments import AXES
 from rds.machines import Machine
 
@@ -42,9 +42,7 @@ def plot_axes(segments: Iterable[np.ndarray], machine: Machine, title: str = "")
         text: handle for place in places for handle, text in zip(*place.get_legend_handles_labels(), strict=True)
     }
     if handles:
-        picture.legend(
-            list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False, fontsize="small"
-        )
+        common_legend(picture, list(handles.values()), list(handles), "outside lower center")
     return picture
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rds.core.figure import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, Picture
+from rds.core.figure import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, Picture, common_legend
 from rds.interpolators.motion.segments import AXES
 from rds.machines import Machine
 from rds.nc.trace import CURVED, RAPID, STRAIGHT, Trace
@@ -52,7 +52,7 @@ def plot(trace: Trace, machine: Machine | None = None, title: str = "") -> Pictu
     space = picture.add_subplot(places[0, 1], projection="3d")
     _space(space, trace, points, beyond)
     handles, labels = picture.axes[0].get_legend_handles_labels()
-    picture.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize="small")
+    common_legend(picture, handles, labels, "outside lower center")
     picture.suptitle(_title(trace, title, machine, whole), x=0.01, ha="left", fontsize="medium")
     return picture
 

@@ -36,10 +36,12 @@ def number(value: Any) -> str:
     return f"{value:.0f}" if "e+" in text and abs(value) < 1e7 else text  # 10070, and not 1.007e+04
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "", note: str = "") -> str:
-    """A table of escaped cells: columns that hold numbers are right-aligned."""
+def table(
+    columns: Sequence[str], rows: Iterable[Sequence[Any]], title: str = "", note: str = "", mixed: bool = False
+) -> str:
+    """A table of escaped cells: columns that hold numbers are right-aligned, unless they are `mixed` with words."""
     rows = [list(row) for row in rows]
-    right = [any(map(_is_number, cells)) for cells in zip(*rows, strict=False)]
+    right = [not mixed and any(map(_is_number, cells)) for cells in zip(*rows, strict=False)]
     right += [False] * (len(columns) - len(right))
     head = "".join(_cell(column, to, 'th scope="col"') for column, to in zip(columns, right, strict=False))
     body = "".join(f"<tr>{''.join(_cell(*cell) for cell in zip(row, right, strict=False))}</tr>" for row in rows)

@@ -6,7 +6,19 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rds.core.errors import InputError
-from rds.core.figure import BLUE, CYCLE, GREY, ORANGE, RESPONSES, VERMILLION, Picture, dress, legend, quantity
+from rds.core.figure import (
+    BLUE,
+    CYCLE,
+    GREY,
+    ORANGE,
+    RESPONSES,
+    VERMILLION,
+    Picture,
+    common_legend,
+    dress,
+    legend,
+    quantity,
+)
 from rds.results.metrics import error_metrics, settled, tracking_error
 
 if TYPE_CHECKING:
@@ -18,7 +30,6 @@ _PAIR: tuple[dict[str, Any], ...] = (
     {"color": ORANGE, "linewidth": 2.4, "alpha": 0.9},
     {"color": BLUE, "linewidth": 1.2},
 )  # two results over each other
-_NARROWEST = 7.4  # inches that a legend has, also where the picture is made narrower to fit beside settings
 
 
 def modes(results: Sequence[Result], labels: Sequence[str] | None = None) -> Picture:
@@ -50,11 +61,9 @@ def modes(results: Sequence[Result], labels: Sequence[str] | None = None) -> Pic
         dress(left, quantity(axis, unit), x)
         dress(right, f"{axis} tracking error [{unit}]", x)
         right.axhline(0.0, color=GREY, linewidth=0.8)
-        legend(right, columns=_beside(right.get_legend_handles_labels()[1], _NARROWEST / 2.0))
+        legend(right, columns=len(results) + 1)
     handles, texts = grid[0, 0].get_legend_handles_labels()
-    picture.legend(
-        handles, texts, loc="outside upper left", ncols=_beside(texts, _NARROWEST), frameon=False, fontsize="small"
-    )
+    common_legend(picture, handles, texts, "outside upper left")
     picture.align_ylabels()
     return picture
 
@@ -100,11 +109,6 @@ def comparison(compared: Comparison) -> Picture:
         axes.set_axis_off()
     picture.align_ylabels()
     return picture
-
-
-def _beside(texts: Sequence[str], width: float) -> int:
-    """How many entries of a legend have room beside each other in `width` inches."""
-    return max(1, min(len(texts), int(width / (0.45 + 0.075 * max(map(len, texts), default=0)))))
 
 
 def _reference(axes: Any, results: Sequence[Result], axis: str) -> None:

@@ -165,7 +165,7 @@ def test_a_newcomer_gets_from_an_empty_folder_to_a_part_and_a_mail(
     hand.count()
     page.locator("[role=slider][aria-valuetext]").first.press("ArrowLeft")
     hand.press("Write the file")
-    page.wait_for_selector('.rds-notice-good:has-text("Try it runs it")')
+    page.wait_for_selector('.rds-notice-good:has-text("Try it opens it beside Run")')
     hand.press("Try it")
     page.wait_for_selector('.rds-title h1:text-is("Equipment control")')
 

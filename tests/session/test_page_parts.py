@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import re
+import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import ipywidgets as widgets
+import numpy as np
 import pytest
 
-from rds.core.errors import InputError
+from rds.core.errors import ContractError, InputError
 from rds.nc.check import Setup
+from rds.panels.equipment.build import Checked, Mark
+from rds.panels.equipment.preview import preview
 from rds.panels.equipment.result_actions import ResultActions
 from rds.panels.equipment.state import Equipment
 from rds.panels.equipment.view import EquipmentView
@@ -187,6 +193,38 @@ def test_a_press_of_run_while_a_run_goes_on_is_answered(tmp_path: Path, monkeypa
     assert len(shell.session.runs()) == 2
 
 
+def test_what_a_run_found_in_a_file_is_said_until_it_is_mended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell = Shell(Session(tmp_path))
+    view = EquipmentView(shell, Equipment(shell.session, "control"))
+    code = view.edit()
+    bad = Checked("controller", code.code.file.path, code.code.file.text, (Mark(1, "x is wrong"),))
+    monkeypatch.setattr(view.equipment.builds, "latest", lambda: [bad])
+    view.run = SimpleNamespace(stopped_early=False, error=ContractError("line 1: x is wrong"), result=None)
+    view._ended()
+    assert "line 1: x is wrong" in view.notice.value
+    code._found(bad)
+    assert "line 1: x is wrong" in view.notice.value
+    code._found(replace(bad, marks=()))
+    assert view.notice.value == ""
+
+
+def test_the_lanes_before_a_run_have_the_signal_that_is_chosen(tmp_path: Path) -> None:
+    control, model = (Equipment(Session(tmp_path), kind) for kind in ("control", "model"))
+    (points,) = re.findall(r'polyline points="([^"]+)"', preview(control))
+    pairs = np.array([pair.split(",") for pair in points.split()], dtype=float)
+    cycles = 10.0 * 0.2  # final time and frequency of the first reference
+    assert pairs[:, 1] == pytest.approx(-0.9 * np.sin(2.0 * np.pi * cycles * pairs[:, 0]), abs=2e-3)
+    assert re.findall(r"<span>(.*?)</span>", preview(control)) == [
+        "position [mm]",
+        "as chosen, 10 s",
+        "error [mm]",
+        "voltage [V]",
+    ]
+    assert re.findall(r"<span>(.*?)</span>", preview(model)) == ["position [mm]", "voltage [V]", "as chosen, 8 s"]
+    control.choices.set("shape", "user")  # the file is not named yet, and is not run for this
+    assert "polyline" not in preview(control)
+
+
 def test_a_bar_says_what_goes_on_after_the_stop(tmp_path: Path) -> None:
     """It said that a program was stopping for as long as the files of the stopped one were written."""
     bar = WorkBar(Shell(Session(tmp_path)).ticker)
@@ -220,5 +258,25 @@ def test_a_picture_drawn_again_leaves_no_widget_behind(tmp_path: Path) -> None:
         open_after.append(len(_instances))
     assert len(set(open_after)) == 1
     view.clear()
-    assert view.children == ()
+    assert [type(each).__name__ for each in view.children] == ["_Room"]  # which nobody sees
     assert len(_instances) < open_after[-1]
+
+
+@pytest.mark.parametrize("is_canvas", [True, False], ids=["ipympl", "picture"])
+def test_a_figure_is_as_wide_as_its_place_and_not_wider_than_it_was_made_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_canvas: bool
+) -> None:
+    from rds.core.figure import Picture
+    from rds.panels.kit.figure import DPI, FigureView
+
+    if not is_canvas:
+        monkeypatch.setitem(sys.modules, "ipympl.backend_nbagg", None)
+    view = FigureView()
+    view.show(Picture(4.0, 10.0), Session(tmp_path))
+    (room, _) = view.children
+    for pixels, wanted in ((340, 340 / DPI), (5000, 10.0), (60, 3.0), ("wide", 3.0), (500, 500 / DPI)):
+        room._said(room, {"kind": "width", "width": pixels}, [])
+        assert view.figure.get_figwidth() == pytest.approx(wanted, abs=0.5 / DPI)
+        assert view.figure.get_figheight() == pytest.approx(4.0, abs=0.5 / DPI)
+    view.show(Picture(4.0, 10.0), Session(tmp_path))  # the next one is drawn so at once
+    assert view.figure.get_figwidth() == pytest.approx(500 / DPI)

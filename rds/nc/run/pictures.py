@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rds.core.figure import BLACK, CYCLE, GREY, ORANGE, SKY, VERMILLION, Picture, dress, legend
+from rds.core.figure import BLACK, CYCLE, GREY, ORANGE, SKY, VERMILLION, Picture, common_legend, dress, legend
 from rds.modes.loop.execution import State
 from rds.modes.loop.program import InterpolatedProgram
 from rds.nc.path_block import PathBlock
@@ -109,7 +109,7 @@ def path(result: Result, prepared: Prepared) -> Picture:
     if drawn is not None:
         picture.colorbar(drawn, ax=list(places), label="contour error of the cuts [µm]", shrink=0.8)
     handles, texts = places[0].get_legend_handles_labels()
-    picture.legend(handles, texts, loc="outside upper left", ncols=len(texts), frameon=False, fontsize="small")
+    common_legend(picture, handles, texts, "outside upper left")
     return picture
 
 

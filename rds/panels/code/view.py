@@ -17,6 +17,7 @@ from rds.panels.code.versions import Version, change_sentence, changes
 from rds.panels.equipment.build import Checked
 from rds.panels.kit.button import attempt, button
 from rds.panels.kit.file_import import FileImport
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.session.file_params import file_params
@@ -33,13 +34,14 @@ class CodeView:
         self.shell, self.codes, self._run = shell, dict(codes), run
         self.role = next(iter(self.codes))
         self._loading = False
+        self.on_good: Callable[[], Any] = lambda: None  # when the file in sight has no fault any more
         self.notice = Notice()  # what the check says
         self.said = Notice()  # what was done with files
         label = f"code of the {self.role}"
         self.editor = CodeEditor(lambda: attempt("run", self.press, self.said), self._dropped, label=label)
         self.editor.observe(lambda change: self._typed(change["new"]), "text")
         roles = [(role.capitalize(), role) for role in self.codes]
-        self.roles = widgets.ToggleButtons(options=roles, tooltips=[f"your {role}" for role in self.codes])
+        self.roles = widgets.ToggleButtons(options=roles, tooltips=[f"your {role}" for role in self.codes], tooltip="")
         self.roles.layout.display = "" if len(roles) > 1 else "none"
         self.roles.observe(lambda change: self._turn(change["new"]), "value")
         self.list = widgets.Dropdown(tooltip="Your files in this folder", options=[])
@@ -56,7 +58,7 @@ class CodeView:
         self.which.observe(lambda change: self._compare(), "value")
         tip = "Put this version's text into the editor; the text that is there now can be had back by Ctrl-Z"
         self.back = button("Back to this version", tip, self._go_back, self.said)
-        self.difference = widgets.HTML()
+        self.difference = Html()
         self._versions: list[Version] = []
         history = widgets.Accordion(
             [widgets.VBox([row(self.which, self.back), self.difference])], titles=("Versions",), selected_index=None
@@ -139,6 +141,8 @@ class CodeView:
         self.editor.mark(told(mark, found.text, params) for mark in found.marks)
         self.editor.words = self.code.words()
         self.notice.say(verdict(found), "good" if found.ok else "error")
+        if found.ok:
+            self.on_good()
         self._list_files()
 
     def _show(self) -> None:

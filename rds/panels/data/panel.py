@@ -15,6 +15,7 @@ from rds.panels.kit.field import FieldView
 from rds.panels.kit.field_names import in_fields
 from rds.panels.kit.figure import FigureView
 from rds.panels.kit.file_import import FileImport
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -48,17 +49,17 @@ class DataView:
     def __init__(self, shell: Any):
         self.shell, self.state = shell, DataState(shell.session)
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
-        self.text, self.figure = widgets.HTML(_FIRST), FigureView()
+        self.text, self.figure = Html(_FIRST), FigureView()
         self.text.add_class("rds-scroll")
         self._known = widgets.Dropdown(
             options=[("files of the folder …", "")], tooltip="What the folder holds", layout={"width": "auto"}
         )
         self._known.observe(self._picked, "value")
         self._upload = FileImport("Import a file", _IMPORT, self._imported, self.notice)
-        self._map = widgets.Textarea(rows=10, layout=widgets.Layout(width="100%"))
+        self._map = widgets.Textarea(rows=10, tooltip="", layout=widgets.Layout(width="100%"))
         self._map_box = widgets.VBox(
             [
-                widgets.HTML("What its columns mean is not clear. Correct this map, and save it:"),
+                Html("What its columns mean is not clear. Correct this map, and save it:"),
                 self._map,
                 button("Save map", "Write it beside the data, and describe again", self._keep_map, self.notice),
             ]

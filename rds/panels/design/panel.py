@@ -16,6 +16,7 @@ from rds.panels.design.state import Design
 from rds.panels.equipment.build import Checked
 from rds.panels.kit.button import button, follow, is_free, watch
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -47,7 +48,7 @@ class DesignView:
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.plane = SPlane(self._moved)
         self.curves = Curves(columns=3, height=200)
-        self.numbers, self.details = widgets.HTML(), widgets.HTML()
+        self.numbers, self.details = Html(), Html()
         self._views: dict[str, FieldView] = {}
         self._side = widgets.VBox([])
         self._side.add_class("rds-side")
@@ -80,7 +81,7 @@ class DesignView:
         )
         self.replace_button.button_style = "warning"
         self.replace_button.layout.display = "none"
-        self.try_button = button("Try it", "Go to Equipment control with this file chosen", self._try, say)
+        self.try_button = button("Try it", "Go to Equipment control with this file open", self._try, say)
         self.picture_button = button(
             "Save a picture", "Poles and curves as a PNG file beside the controller's file", self._save_picture, say
         )
@@ -229,7 +230,7 @@ class DesignView:
 
         def checked(found: Checked) -> None:
             if found.ok:
-                self.notice.say(f"wrote {path.name}; {found.sentence}; Try it runs it", "good")
+                self.notice.say(f"wrote {path.name}; {found.sentence}; Try it opens it beside Run", "good")
             else:
                 self.notice.say(found.sentence, "error")
 
@@ -241,6 +242,8 @@ class DesignView:
             raise InputError(f"there is no {path.name} yet: write the file first")
         self.design.try_it(path)
         self.shell.open("equipment-control")
+        if self.shell.on_code is not None:
+            self.shell.on_code()
 
     def _save_picture(self) -> None:
         made, cloud, size = self._made, self._cloud, self.design.choices["step"]

@@ -12,6 +12,7 @@ from rds.panels.code.versions import changes
 from rds.panels.code.view import changes_html
 from rds.panels.equipment.runs_widget import RunsWidget
 from rds.panels.kit.button import attempt, button, follow
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -49,7 +50,7 @@ class EarlierRuns:
         tip = "Let the run that is ticked stand behind the strip, to compare the next one with; none ticked: no ghost"
         behind = button("As ghost", tip, self.show_ghost, self.notice)
         again = button("Look again", "Look for runs that other pages have made meanwhile", self.refresh, self.notice)
-        self.difference = widgets.HTML()
+        self.difference = Html()
         self.widget = widgets.VBox(
             [row(self.open_button, differ, behind, again, self.bar), self.notice, self.difference, self.table]
         )
@@ -142,7 +143,7 @@ def difference_html(a: RunRow, b: RunRow, names: Sequence[str]) -> str:
     rows = [["RMS error", a.rms, b.rms], ["fit", a.fit, b.fit], ["timing", a.verdict, b.verdict]]
     rows = [each for each in rows if each[1] or each[2]]
     rows += [list(each) for each in differences(a.facts, b.facts)]
-    shown = html.table(["", *names], rows, "What differs")
+    shown = html.table(["", *names], rows, "What differs", mixed=True)
     before, after = code_of(a), code_of(b)
     for key in before.keys() & after.keys():
         if before[key] != after[key]:

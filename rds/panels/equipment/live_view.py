@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import ipywidgets as widgets
@@ -13,22 +13,18 @@ from rds.panels.equipment.parameters import Parameters
 from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.equipment.taken_up import TakenUpRun
+from rds.panels.kit.html import Html
 from rds.panels.scene.scene import MachineScene
 from rds.panels.session.live_values import LiveValues
 from rds.results import Result, html
-
-_HINT = (
-    "<p>Choose on the left what to try, then Run. Here will be, as it happens, in lanes that share their time: the "
-    "reference and the measured position; the error between them; the voltage. Drag in a lane to zoom, place two "
-    "cursors to measure, and let an earlier run stand behind.</p>"
-)
 
 
 class LiveView:
     """`follow(run)`, then `look()` ten times a second until `ended()`."""
 
-    def __init__(self, machine: Machine, parameters: Parameters):
-        """In `parameters` the values of a run can be changed while it goes on."""
+    def __init__(self, machine: Machine, parameters: Parameters, preview: Callable[[], str]):
+        """In `parameters` the values of a run can be changed while it goes on; `preview()` is HTML before a run."""
+        self._preview = preview
         self._parameters = parameters
         self._run: EquipmentRun | TakenUpRun | None = None
         self._traces: list[tuple[str, str]] = []
@@ -37,9 +33,9 @@ class LiveView:
         self._ghost: tuple[Result | None, str] = (None, "")
         self.strip = StripChart()
         self.strip.layout.display = "none"
-        self.hint = widgets.HTML(_HINT)
+        self.hint = Html(preview())
         self.scene = MachineScene(machine)
-        self._changes = widgets.HTML()
+        self._changes = Html()
         beside = widgets.Box([self.strip, self.scene])
         beside.add_class("rds-live")
         self.widget = widgets.VBox([self.hint, beside, self._changes])
@@ -52,6 +48,11 @@ class LiveView:
         self.strip.layout.display = "none"
         self._is_live = False
         self._parameters.lock()
+
+    def chosen(self) -> None:
+        """Something else is chosen: before a run, that is what will be there."""
+        if self._run is None and not self._traces:
+            self.hint.value = self._preview()
 
     def look(self) -> None:
         """What has come since."""
@@ -92,7 +93,7 @@ class LiveView:
             self._list_changes(run)
             self._mark_end(run)
             if not self._traces:
-                self.hint.value = _HINT
+                self.hint.value = self._preview()
 
     def _list_changes(self, run: EquipmentRun | TakenUpRun) -> None:
         changes = run.changes

@@ -12,6 +12,7 @@ import ipywidgets as widgets
 from rds.core.errors import InputError
 from rds.panels.kit.button import button, follow, say_error
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -48,7 +49,7 @@ class ResultActions:
         self._result: Result | None = None
         self._folder: Path | None = None
         self._sent: list[str] = []
-        self.where = widgets.HTML()
+        self.where = Html()
         self.bar = WorkBar(shell.ticker)
         self.notice = Notice()
         self._rows = self._made()

@@ -12,6 +12,7 @@ import ipywidgets as widgets
 from rds.panels.equipment.live_view import changes_table
 from rds.panels.equipment.result_actions import ResultActions, Saved
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.html import Html
 from rds.results import Result, html
 
 if TYPE_CHECKING:
@@ -36,11 +37,11 @@ class ResultView:
         self._shell, self._session = shell, shell.session
         self.result: Result | None = None
         self._timing_of: Result | None = None
-        self.numbers = widgets.HTML(_EMPTY)
+        self.numbers = Html(_EMPTY)
         self.path, self.figure = FigureView(), FigureView()
-        self.validation = widgets.HTML()
+        self.validation = Html()
         self.timing_figure = FigureView()
-        self.timing_numbers = widgets.HTML(_NO_TIMING)
+        self.timing_numbers = Html(_NO_TIMING)
         self.timing = widgets.VBox([self.timing_numbers, self.timing_figure])
         self.actions = ResultActions(shell)
         self.widget = widgets.VBox([self.numbers, self.path, self.figure, self.validation, self.actions.widget])

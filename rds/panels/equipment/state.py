@@ -130,6 +130,11 @@ class Equipment:
         for name in (*SIZES, "duration", "sample_period", *self.parameters):
             self.choices.set(name, self.choices.fields[name].default)
 
+    def own_controller(self) -> None:
+        """The controller is the student's own."""
+        if "controller" in self.choices and _option(self.choices.fields["controller"], USER):
+            self.choices.set("controller", USER)
+
     def table(self) -> dict[str, Any]:
         """The experiment, as the table of a TOML file. InputError where a file is not named, or will not do."""
         chosen = self.choices

@@ -15,6 +15,7 @@ from rds.panels.equipment.build import Checked
 from rds.panels.equipment.earlier_runs import EarlierRuns
 from rds.panels.equipment.fields import USER
 from rds.panels.equipment.live_view import LiveView
+from rds.panels.equipment.preview import preview
 from rds.panels.equipment.result_view import ResultView, timing_line
 from rds.panels.equipment.run import EquipmentRun
 from rds.panels.equipment.settings import EquipmentSettings
@@ -42,7 +43,7 @@ class EquipmentView:
         self.settings = EquipmentSettings(equipment)
         self.bar = WorkBar(shell.ticker)
         self.notice = Notice()
-        self.live = LiveView(equipment.machine, self.settings.parameters)
+        self.live = LiveView(equipment.machine, self.settings.parameters, lambda: preview(equipment))
         self.results = ResultView(shell)
         self.what = WhatRuns(equipment, shell.ticker)
         self.earlier = EarlierRuns(shell, self._reopened, self.live.show_ghost)
@@ -78,7 +79,7 @@ class EquipmentView:
         self.widget = widgets.HBox([main, self.settings.widget])  # Tab comes to Run before the settings
         self.widget.add_class("rds-columns")
         equipment.choices.watch(self._chosen)
-        self._stale = False  # whether something was chosen since what runs was shown
+        self._stale: set[int] = set()  # tabs that show what is chosen, and not yet what is chosen now
         if equipment.kind == "control":
             shell.on_code = self.edit
         shell.ticker.add(self._tick)
@@ -228,6 +229,8 @@ class EquipmentView:
                 if self.code is not None and self.code.shows(checked):
                     self.tabs.selected_index = CODE
                     self.code.show_checked(checked)
+                    said = str(run.error)
+                    self.code.on_good = lambda: self.notice.take_back(said)
         if run.result is not None:
             self.results.follow_files(run)
         if self.tabs.selected_index == EARLIER:  # else it is brought up to date once it is looked at
@@ -253,16 +256,16 @@ class EquipmentView:
         self.tabs.selected_index = RESULTS
 
     def _chosen(self, name: str) -> None:
-        self._stale = True
+        self._stale = {LIVE, WHAT}
         choices = self.equipment.choices
         if name in ("controller", "model") and choices[name] == USER and not str(choices[f"{name}_file"]).strip():
             self.edit().turn(name)  # nobody need know how such a file is written
 
     def _tick(self) -> None:
         """What runs is shown as it is chosen now, while one looks at it."""
-        if self._stale and self.tabs.selected_index == WHAT:
-            self._stale = False
-            self.what.refresh()
+        if (tab := self.tabs.selected_index) in self._stale:
+            self._stale.discard(tab)
+            (self.what.refresh if tab == WHAT else self.live.chosen)()
 
     def _turned(self, change: Any) -> None:
         """Tabs that cost something are filled when they are looked at."""

@@ -16,6 +16,7 @@ from rds.panels.equipment.equations import equations, equations_html
 from rds.panels.equipment.state import Equipment
 from rds.panels.kit.button import button
 from rds.panels.kit.diagram import diagram_svg
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
@@ -32,10 +33,10 @@ class WhatRuns:
         self._equipment, self._ticker = equipment, ticker
         self._planning: Task[str] | None = None
         self._checked: dict[str, Checked] = {}
-        self.drawing = widgets.HTML()
-        self.equations = widgets.HTML()
-        self.sources = widgets.HTML()
-        self.toml, self.python = widgets.HTML(), widgets.HTML()
+        self.drawing = Html()
+        self.equations = Html()
+        self.sources = Html()
+        self.toml, self.python = Html(), Html()
         self.notice = Notice()
         self._name = widgets.Text(
             placeholder="experiment.toml", tooltip="a name that ends with .toml", continuous_update=False

@@ -13,6 +13,7 @@ from rds.panels.grading.review import USES
 from rds.panels.grading.state import GradingState, rows
 from rds.panels.kit.button import attempt, button, follow, runs, watch
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -48,8 +49,8 @@ class GradingView:
     def __init__(self, shell: Any):
         self.shell, self.state = shell, GradingState(shell.session)
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
-        self.table = widgets.HTML(_FIRST)
-        self._said = widgets.HTML()
+        self.table = Html(_FIRST)
+        self._said = Html()
         say = self.notice
         tip = "Grade all submissions, or go on with those that are left"
         self._run = runs(button("Grade", tip, self.grade, say, primary=True))

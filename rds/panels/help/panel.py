@@ -9,6 +9,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels.kit.button import watch
+from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
 from rds.results.serve import OWN_SCRIPT, FolderServer, server_of
@@ -27,7 +28,7 @@ class Guide:
         self._subject = "readme"
         self.notice = Notice()
         self.bar = WorkBar(shell.ticker)
-        self.frame = widgets.HTML()
+        self.frame = Html()
         self.frame.add_class("rds-guide")
         self.widget = widgets.VBox([self.notice, self.bar, self.frame])
         self._ready = False
@@ -53,8 +54,7 @@ class Guide:
         address = escape(f"{help_server().url(page_file(self._subject))}?colours={self.shell.colours.name}")
         self.frame.value = (
             f'<a href="{address}" target="_blank" rel="noopener">open in a page of its own</a>'
-            f'<iframe src="{address}" title="Help" style="width: 100%; height: 72vh; border: 1px solid #888">'
-            "</iframe>"
+            f'<iframe src="{address}" title="Help"></iframe>'
         )
 
 

@@ -19,6 +19,7 @@ from rds.panels.interpolator.state import Interpolating
 from rds.panels.kit.button import button, follow, runs
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -58,7 +59,7 @@ class InterpolatorView:
     def __init__(self, shell: Any, interpolating: Interpolating):
         self.shell, self.work = shell, interpolating
         self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView()
-        self.numbers, self.source = widgets.HTML(_FIRST), widgets.HTML()
+        self.numbers, self.source = Html(_FIRST), Html()
         self.done: Interpolation | None = None
         self._views: dict[str, FieldView] = {}
         self._side = widgets.VBox([])
@@ -78,7 +79,9 @@ class InterpolatorView:
         self.code_button.observe(lambda change: self._show_code(change["new"]), "value")
         self._code_place = widgets.VBox([])
         self._code_view: CodeView | None = None
-        self.picture = widgets.ToggleButtons(options=[("Motion", "motion")], tooltips=["which picture is shown"])
+        self.picture = widgets.ToggleButtons(
+            options=[("Motion", "motion")], tooltips=["which picture is shown"], tooltip=""
+        )
         self.picture.observe(lambda change: self._draw(), "value")
         self._save_row = self._saving()
         self.results = widgets.VBox([self.picture, self.figure, self._save_row])

@@ -10,6 +10,7 @@ import ipywidgets as widgets
 from rds.core.errors import InputError
 from rds.core.geometry import PLANES
 from rds.panels.interpolator.fields import read_point
+from rds.panels.kit.html import Html
 from rds.panels.session.choices import Choices
 
 _FEED_TIP = "feed rate of this segment, in the unit on the left; empty: that of the path"
@@ -28,7 +29,7 @@ class SegmentTable(widgets.VBox):
         self._add.on_click(lambda _: self.add("line"))
         self._add_arc = widgets.Button(description="Add an arc", tooltip="An arc from where the path ends")
         self._add_arc.on_click(lambda _: self.add("arc"))
-        self._refusal = widgets.HTML("")
+        self._refusal = Html("")
         self._refusal.add_class("rds-refusal")
         self._show()
         choices.watch(self._follow)
@@ -78,9 +79,7 @@ class SegmentTable(widgets.VBox):
             row.label.value = f"{number}"
         buttons = widgets.HBox([self._add, self._add_arc])
         buttons.add_class("rds-row")
-        head = widgets.HTML(
-            "<h3>Segments: each begins where the one before ends (positions in mm: X, Y or X, Y, Z)</h3>"
-        )
+        head = Html("<h3>Segments: each begins where the one before ends (positions in mm: X, Y or X, Y, Z)</h3>")
         self.children = [head, *self._rows, self._refusal, buttons]
 
 
@@ -88,7 +87,7 @@ class _Row(widgets.HBox):
     """One line or arc."""
 
     def __init__(self, owner: SegmentTable, row: dict[str, Any]):
-        self.label = widgets.Label()
+        self.label = widgets.Label(tooltip="")
         self.kind = widgets.Dropdown(
             options=[("Line", "line"), ("Arc", "arc")], value=row["kind"], tooltip="line or arc"
         )

@@ -14,6 +14,7 @@ from rds.panels.jog.state import Jog
 from rds.panels.jog.turn import TurnButtons
 from rds.panels.kit.button import attempt, follow, halt, order
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -53,9 +54,9 @@ class JogView:
         self._find = order(shell, "Find home", tip, self.find_home, say)
         self._holds = {name: self._hold(name) for name in jog.axes}
         self._turns = {name: self._turn(name) for name in jog.spindles}
-        self._places = {name: widgets.HTML() for name in (*jog.axes, *jog.spindles)}
+        self._places = {name: Html() for name in (*jog.axes, *jog.spindles)}
         jog.choices.watch(lambda name: self._set_way())
-        self._not_homed = widgets.HTML()
+        self._not_homed = Html()
         fields = [FieldView(jog.choices, "home_axis"), FieldView(jog.choices, "method")]
         self._homing = group("Homing of drives", *fields, row(self._find), self._not_homed)
         motion = ["way", "step", "speed", *(["spindle_speed"] if jog.spindles else [])]
@@ -65,12 +66,12 @@ class JogView:
             self._homing,
         ]
         rows = [
-            row(widgets.HTML(f"<b>{escape(name)}</b>"), buttons, self._places[name])
+            row(Html(f"<b>{escape(name)}</b>"), buttons, self._places[name])
             for name, buttons in (self._holds | self._turns).items()
         ]
         for each in rows:
             each.add_class("rds-jog-axis")
-        self.widget = columns(side, [self.bar, self.notice, *rows, widgets.HTML(_HINT), self._here])
+        self.widget = columns(side, [self.bar, self.notice, *rows, Html(_HINT), self._here])
         self._shown_error = self._shown_homing = ""
         self._set_way()
         self._show()

@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.core.errors import InputError
+from rds.panels.kit.html import Html
 from rds.panels.kit.slider import Slider
 from rds.panels.session.choices import Choices
 from rds.panels.session.fields import Choice, Field, Flag, Number, Several, Text
@@ -33,7 +34,7 @@ class FieldView(widgets.VBox):
         self.add_class(f"rds-field-{type(choices.fields[name]).__name__.lower()}")
         self._choices, self._name = choices, name
         self._buttons = buttons
-        self._refusal = widgets.HTML("")
+        self._refusal = Html("")
         self._refusal.add_class("rds-refusal")
         self._loading = False
         self._end = choices.watch(self._changed)
@@ -76,7 +77,7 @@ class FieldView(widgets.VBox):
         unit = f" [{field.unit}]" if isinstance(field, Number) and field.unit else ""
         tip = field.tooltip + (f" ({field.range})" if isinstance(field, Number) else "")
         label = "" if isinstance(field, Flag) else f'<label title="{escape(tip)}">{escape(field.label + unit)}</label>'
-        self._label = widgets.HTML(label)
+        self._label = Html(label)
         self._label.add_class("rds-label")
         self.control = self._control(field, tip)
         self.control.disabled = self._disabled
@@ -96,7 +97,7 @@ class FieldView(widgets.VBox):
         if isinstance(field, Choice):
             pairs = [(words, key) for key, words in field.options.items()]
             if self._buttons if self._buttons is not None else len(pairs) <= _BUTTONS:
-                return widgets.ToggleButtons(options=pairs, value=value, tooltips=[tip] * len(pairs))
+                return widgets.ToggleButtons(options=pairs, value=value, tooltips=[tip] * len(pairs), tooltip=tip)
             return widgets.Dropdown(options=pairs, value=value, tooltip=tip)
         if isinstance(field, Flag):
             return widgets.Checkbox(value, description=field.label, indent=False, tooltip=tip)
@@ -154,7 +155,7 @@ def _placeholder(field: Number) -> str:
 
 def field_group(choices: Choices, names: list[str], title: str = "") -> widgets.VBox:
     """Fields under a heading."""
-    head = [widgets.HTML(f"<h3>{escape(title)}</h3>")] if title else []
+    head = [Html(f"<h3>{escape(title)}</h3>")] if title else []
     group = widgets.VBox([*head, *(FieldView(choices, name) for name in names)])
     group.add_class("rds-group")
     return group

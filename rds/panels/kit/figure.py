@@ -1,21 +1,32 @@
-"""A matplotlib figure to read: zoom, pan and save through ipympl, or a picture where that is not installed."""
+"""A matplotlib figure to read: zoom, pan and save through ipympl, or a picture where that is not installed.
+
+It is as wide as its place on the page, and not wider than it was made for. When the place changes, it is drawn anew:
+letters keep their size.
+"""
 
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
+from functools import cache
 from html import escape
+from pathlib import Path
 from typing import Any
 
+import anywidget
 import ipywidgets as widgets
+import traitlets
 
 from rds.core.errors import RdsError
+from rds.panels.kit.html import Html
 from rds.panels.kit.ticker import Ticker
 from rds.panels.session.session import Session
 from rds.panels.texts import translate_picture
 
 DPI = 94  # on the page: letters that can be read on a projector
 WIDTH = 7.6  # inches: as wide as what is beside the settings on a screen of 1280, or of 1024
+NARROWEST = 3.0  # inches: below, labels leave no room for curves
 
 
 class FigureView(widgets.VBox):
@@ -23,11 +34,12 @@ class FigureView(widgets.VBox):
 
     children: Any  # ipywidgets has no types
 
-    def __init__(self, width: float = WIDTH) -> None:
-        """`width` in inches of DPI pixels: wider figures are made narrower."""
+    def __init__(self) -> None:
         super().__init__([])
         self.add_class("rds-figure")
-        self._width = width
+        self._width = WIDTH  # inches of DPI pixels, until the page says how wide its place is
+        self._made_for = WIDTH  # inches, of the figure
+        self._room: _Room | None = None
         self.figure: Any = None
         self._waiting: Any = None
         self._shown: list[widgets.Widget] = []  # closed when something else is: a kernel keeps every open widget
@@ -40,10 +52,10 @@ class FigureView(widgets.VBox):
         self.clear()
         translate_picture(figure, session.language)
         figure.set_dpi(DPI)
-        if figure.get_figwidth() > self._width:
-            figure.set_figwidth(self._width)
+        self._made_for = figure.get_figwidth()
+        figure.set_figwidth(min(self._width, self._made_for))
         self.figure = figure
-        words = [widgets.HTML(f"<p>{caption}</p>")] if caption else []
+        words = [Html(f"<p>{caption}</p>")] if caption else []
         self._put(_canvas(figure), *words)
 
     def draw(
@@ -59,7 +71,7 @@ class FigureView(widgets.VBox):
         `then()` is called once it is there.
         """
         self.clear()
-        self._put(widgets.HTML('<p role="status">drawing …</p>'))
+        self._put(Html('<p role="status">drawing …</p>'))
         task = self._waiting = session.work("a plot", lambda task: make())
 
         def look() -> None:
@@ -72,7 +84,7 @@ class FigureView(widgets.VBox):
                 if not isinstance(task.error, RdsError):
                     logging.getLogger(__name__).error("a plot could not be drawn", exc_info=task.error)
                 self.clear()
-                self._put(widgets.HTML(f'<p role="alert">✖ no plot: {escape(str(task.error))}</p>'))
+                self._put(Html(f'<p role="alert">✖ no plot: {escape(str(task.error))}</p>'))
                 return
             if task.result is None:
                 self.clear()
@@ -85,7 +97,8 @@ class FigureView(widgets.VBox):
     def clear(self) -> None:
         """Nothing to show."""
         self._waiting = self.figure = None
-        self.children = []
+        # it stays: of a widget that is shown once more, ipywidgets keeps what the page had of it before
+        self.children = [self._room] if self._room is not None else []
         for widget in self._shown:
             toolbar = getattr(widget, "toolbar", None)  # an ipympl canvas has one
             for part in (
@@ -103,7 +116,42 @@ class FigureView(widgets.VBox):
         # in a box of its own, because a closed canvas does not leave a page by itself
         box = widgets.VBox(shown)
         self._shown = [*shown, box]
-        self.children = [box]
+        self._room = self._room or _Room(self._fit)
+        self.children = [self._room, box]
+
+    def _fit(self, pixels: float) -> None:
+        """The place is so wide."""
+        self._width = max(pixels / DPI, NARROWEST)
+        width = min(self._width, self._made_for)
+        if self.figure is None or round(width * DPI) == round(self.figure.get_figwidth() * DPI):
+            return
+        if (resize := getattr(self.figure.canvas, "handle_resize", None)) is not None:  # as a drag of its corner does
+            resize({"width": round(width * DPI), "height": round(self.figure.get_figheight() * DPI)})
+        else:
+            self.figure.set_figwidth(width)
+            self._shown[0].value = self.figure.png()
+
+
+@cache
+def _module() -> str:
+    return (Path(__file__).parent / "static" / "room.js").read_text(encoding="utf-8")
+
+
+class _Room(anywidget.AnyWidget):
+    """Invisible; calls `told(pixels)` with the width of its place, each time that it is another one."""
+
+    _esm = traitlets.Unicode().tag(sync=True)
+
+    def __init__(self, told: Callable[[float], None]):
+        super().__init__(_esm=_module())
+        self._told = told
+        self.on_msg(self._said)
+
+    def _said(self, _: Any, content: Any, __: Any) -> None:
+        """Anything else than a width does nothing."""
+        width = content.get("width") if isinstance(content, dict) and content.get("kind") == "width" else None
+        if isinstance(width, int | float) and not isinstance(width, bool) and math.isfinite(width):
+            self._told(float(width))
 
 
 def _canvas(figure: Any) -> widgets.DOMWidget:

@@ -6,6 +6,8 @@ from typing import Any
 
 import ipywidgets as widgets
 
+from rds.panels.kit.html import Html
+
 
 def row(*children: Any) -> widgets.HBox:
     """Controls side by side, which go on in the next line where there is no room."""
@@ -16,7 +18,7 @@ def row(*children: Any) -> widgets.HBox:
 
 def group(title: str, *children: Any) -> widgets.VBox:
     """Controls under a heading."""
-    box = widgets.VBox([widgets.HTML(f"<h3>{title}</h3>"), *children])
+    box = widgets.VBox([Html(f"<h3>{title}</h3>"), *children])
     box.add_class("rds-group")
     return box
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from html import escape
 
-import ipywidgets as widgets
-
 from rds.panels.kit.field_names import in_fields
+from rds.panels.kit.html import Html
 
 _SIGNS = {"note": "ℹ", "good": "✔", "warning": "⚠", "error": "✖"}
 
 
-class Notice(widgets.HTML):
+class Notice(Html):
     """Empty until something is said."""
 
     def __init__(self) -> None:

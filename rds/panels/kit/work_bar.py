@@ -46,9 +46,9 @@ class WorkBar(widgets.HBox):
 
     def __init__(self, ticker: Ticker):
         self.locks: Sequence[widgets.Button] = ()
-        self._bar = widgets.FloatProgress(value=0.0, min=0.0, max=1.0)
+        self._bar = widgets.FloatProgress(value=0.0, min=0.0, max=1.0, tooltip="")
         self._bar.add_class("rds-progress")
-        self._text = widgets.Label("")
+        self._text = widgets.Label("", tooltip="")
         self.stop_button = widgets.Button(
             description="Stop", icon="", button_style="warning", tooltip="End it; what was recorded is kept"
         )

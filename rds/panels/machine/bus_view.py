@@ -5,12 +5,11 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-import ipywidgets as widgets
-
 from rds.core.errors import InputError
 from rds.core.shared_quantities import SAMPLE_PERIOD
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -33,6 +32,10 @@ _LOAD = (
     Number.of(SAMPLE_PERIOD, "period", "Sample period", 0.001),
     Number("answer", "Modules answer within", "From a command's arrival", 0.0, unit="s", low=0.0, high=0.1),
 )
+_FIRST = (
+    "<p>Listen shows each kind of frame here while it comes: how often, from whom, and what it says. Analyse works out "
+    "the load of the bus, and the worst response time of each frame beside its deadline, before anything runs.</p>"
+)
 _EVERY = 3  # ticks of 0.1 s between two tables
 
 
@@ -47,7 +50,7 @@ class BusView:
         self.session, self.state, self.monitor = shell.session, state, BusMonitor()
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
         self.choices = shell.session.choices("bus", [_FILTER, *_LOAD])
-        self.live, self.load = widgets.HTML(), widgets.HTML()
+        self.live, self.load = Html(_FIRST), Html()
         for each in (self.live, self.load):
             each.add_class("rds-scroll")
         self.live.add_class("rds-monitor")
@@ -97,6 +100,8 @@ class BusView:
         follow(self.bar, self.notice, lambda: self.session.work("bus analysis", work), self._show_load)
 
     def _show_load(self, analysis: Any) -> None:
+        if self.live.value == _FIRST:
+            self.live.value = ""
         rows = [
             [
                 each.name,

@@ -14,6 +14,7 @@ from rds.machines.machine import Machine
 from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.machine.configuration import NEXT_STEP, directions, moved, write_machine
@@ -39,10 +40,10 @@ class ConfigurationView:
         self.notice = Notice()
         self.choices = shell.session.choices("configuration", [_PART, _FILE])
         self.order: list[int | str] = []
-        self._place, self._found = widgets.VBox([]), widgets.HTML()
+        self._place, self._found = widgets.VBox([]), Html()
         self._write = button("Write machine", "Write the machine's file", self.write, self.notice, primary=True)
         side = [group("The machine", FieldView(self.choices, "file"), row(self._write))]
-        head = widgets.HTML("<p>Number the modules as they are mounted: 1 holds the tool, the last one the work.</p>")
+        head = Html("<p>Number the modules as they are mounted: 1 holds the tool, the last one the work.</p>")
         self._parts = row(
             FieldView(self.choices, "part"),
             button("Add", "Put it into the order", self.add, self.notice),
@@ -93,7 +94,7 @@ class ConfigurationView:
         up.disabled, down.disabled = place == 1, place == len(self.order)
         for each in (up, down):
             each.layout.min_width = each.layout.width = "44px"
-        text = widgets.HTML(f"<b>{place}</b> &nbsp; {escape(self._name(number))}")
+        text = Html(f"<b>{place}</b> &nbsp; {escape(self._name(number))}")
         if isinstance(number, int):
             return row(up, down, text)
         return row(

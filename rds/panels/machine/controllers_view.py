@@ -11,6 +11,7 @@ from rds.core.errors import InputError
 from rds.panels.kit.button import button, follow, order
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -26,7 +27,7 @@ class ControllersView:
 
     def __init__(self, shell: Any, state: MachineState):
         self.state, self._session = state, shell.session
-        self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView(7.4)
+        self.notice, self.bar, self.figure = Notice(), WorkBar(shell.ticker), FigureView()
         files = shell.session.choices("tuning file", [_FILE])
         self._files = files
         self._which = widgets.Dropdown(description="Module", tooltip="The module that is tuned")
@@ -64,7 +65,7 @@ class ControllersView:
         )
         rows = [[name, *words] for name, words in ADVICE.items()]
         advice = html.table(["raise", "rise time", "overshoot", "settling time", "steady error"], rows)
-        table = widgets.HTML(f"<details><summary>By trial and error: what a gain does</summary>{advice}</details>")
+        table = Html(f"<details><summary>By trial and error: what a gain does</summary>{advice}</details>")
         self.widget = columns(side, [acts, self.bar, self.notice, self.figure, table])
         self.refresh()
 

@@ -14,6 +14,7 @@ from rds.machines.library import library
 from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.machine.configuration import NEXT_STEP, moved, write_machine_text
@@ -35,7 +36,7 @@ class LibraryView:
         module = Choice("module", "Module", "Of the library", next(iter(names)), names)
         self.choices = shell.session.choices("by hand", [module, _FILE])
         self.order: list[str] = []
-        self._place, self._found = widgets.VBox([]), widgets.HTML()
+        self._place, self._found = widgets.VBox([]), Html()
         self._write = button("Write file", "Write the machine's file", self.write, self.notice, primary=True)
         side = [
             group(
@@ -45,7 +46,7 @@ class LibraryView:
             ),
             group("The machine", FieldView(self.choices, "file"), row(self._write)),
         ]
-        head = widgets.HTML("<p>From the tool (1) to the work; each module is mounted on the one below it.</p>")
+        head = Html("<p>From the tool (1) to the work; each module is mounted on the one below it.</p>")
         self.widget = columns(side, [self.notice, head, self._place, self._found, self._figure])
         self._show()
 
@@ -101,7 +102,7 @@ class LibraryView:
         for each in (up, down):
             each.layout.min_width = each.layout.width = "44px"
         module = library()[self.order[place]]
-        text = widgets.HTML(f"<b>{place + 1}</b> &nbsp; {escape(module.kind)}: {escape(module.title or module.name)}")
+        text = Html(f"<b>{place + 1}</b> &nbsp; {escape(module.kind)}: {escape(module.title or module.name)}")
         return row(up, down, text, button("Remove", "Take the module out", partial(self._remove, place), self.notice))
 
     def _move(self, place: int, by: int) -> None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import ipywidgets as widgets
-
 from rds.panels.kit.button import button, follow
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import columns, group, row
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.work_bar import WorkBar
@@ -24,7 +23,7 @@ class ModulesView:
     def __init__(self, shell: Any, state: MachineState, found: Callable[[], None]):
         self.state, self._found = state, found
         self.notice, self.bar = Notice(), WorkBar(shell.ticker)
-        self.table = widgets.HTML()
+        self.table = Html()
         self.table.add_class("rds-scroll")
         say = self.notice
         self._start = button("Start modules", "Run the simulated modules until they are stopped", self.start, say)

@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels.kit.button import button
+from rds.panels.kit.html import Html
 from rds.panels.page.alive import Alive
 from rds.panels.registry import PANELS
 
@@ -35,6 +36,9 @@ def _first(shell: Any) -> widgets.Widget:
         shell.open("equipment-control")
 
     def write() -> None:
+        from rds.panels.equipment.state import Equipment
+
+        Equipment(shell.session, "control").own_controller()  # so that Run runs what is written
         shell.open("equipment-control")
         if shell.on_code is not None:
             shell.on_code()
@@ -65,7 +69,7 @@ def _first(shell: Any) -> widgets.Widget:
     rows = []
     for number, (title, tip, act, text) in enumerate(steps):
         press = button(title, tip, act, shell, primary=number == 0)
-        line = widgets.HBox([press, widgets.HTML(f"<p>{text}</p>")])
+        line = widgets.HBox([press, Html(f"<p>{text}</p>")])
         line.add_class("rds-first-step")
         rows.append(line)
     first = widgets.HBox([Alive(shell.session, shell.ticker), widgets.VBox(rows)])
@@ -75,7 +79,7 @@ def _first(shell: Any) -> widgets.Widget:
 
 def _card(shell: Any, name: str) -> widgets.VBox:
     module = PANELS.module(name)
-    press = button(module.TITLE, module.SUMMARY, lambda: shell.open(name), shell, primary=True)
-    card = widgets.VBox([press, widgets.HTML(f"<p>{escape(module.SUMMARY)}</p>")])
+    press = button(module.TITLE, module.SUMMARY, lambda: shell.open(name), shell)
+    card = widgets.VBox([press, Html(f"<p>{escape(module.SUMMARY)}</p>")])
     card.add_class("rds-card")
     return card

@@ -14,6 +14,7 @@ import ipywidgets as widgets
 
 from rds.core.errors import RdsError
 from rds.panels.kit.button import button, order
+from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
 from rds.panels.kit.ticker import Ticker
 from rds.panels.page.colours import Colours
@@ -49,7 +50,7 @@ class Shell:
         self.on_code: Callable[[], Any] | None = None  # shows the code of a controller, once its panel is there
         self._notice = Notice()
         self._heard: list[Message] = list(session.messages)  # what was said before there was a page
-        self._title = widgets.HTML()
+        self._title = Html()
         self._title.add_class("rds-title")
         self._title.layout.flex = "1 1 0"
         self._buttons = {name: self._button(name) for name in PANELS.names()}
@@ -63,7 +64,7 @@ class Shell:
         self.colours = Colours(self._darken)
         self.presence = Presence(self._shown, lambda sentence: self.say(sentence, "warning"))
         self.language = Language(session)
-        unseen = [self.presence, self.colours, self.language, Keys(), widgets.HTML(_style())]
+        unseen = [self.presence, self.colours, self.language, Keys(), Html(_style())]
         self.widget = widgets.VBox([*unseen, self._corner(), self._head(), self._notice, body, self._rescue])
         self.widget.add_class("rds-app")
         session.watch(self._heard.append)  # from any thread; shown at the next tick

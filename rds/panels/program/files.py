@@ -8,6 +8,7 @@ from typing import Any
 import ipywidgets as widgets
 
 from rds.panels.kit.button import attempt, button
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.program.state import Program
@@ -26,7 +27,7 @@ class ProgramFiles:
         self.name = widgets.Text(placeholder="name.ngc", tooltip="A name for a copy, which is open from then on")
         self.name.layout.width = "120px"
         self.name.add_class("rds-program-name")
-        self.state = widgets.HTML()
+        self.state = Html()
         self.save_button = button("Save", "Write the file (Ctrl-S in the editor); Run saves, too", self.save, notice)
         self.discard_button = button("Discard changes", "Go back to the file as it was saved", self._discard, notice)
         self.widget = row(

@@ -9,6 +9,7 @@ import ipywidgets as widgets
 from rds.core.atomic import write_whole
 from rds.core.errors import InputError
 from rds.panels.kit.button import run_order
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.program.run import ProgramWork
@@ -33,8 +34,8 @@ class Mdi:
         self._text = widgets.Text(placeholder="G0 X10", tooltip="A line of G-code", continuous_update=False)
         self.button = run_order(shell, "Run this line", self._go, notice, program.choices, "Run line")
         self.button.remove_class("rds-run")  # Ctrl+Enter is the program's
-        self._kept = widgets.HTML()
-        self.widget = widgets.VBox([widgets.HTML(_WORDS), row(self._text, self.button), self._kept])
+        self._kept = Html()
+        self.widget = widgets.VBox([Html(_WORDS), row(self._text, self.button), self._kept])
         self._show()
 
     def ended(self, work: ProgramWork) -> None:

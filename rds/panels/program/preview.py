@@ -8,6 +8,7 @@ from typing import Any
 
 import ipywidgets as widgets
 
+from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
 from rds.panels.program.cut_html import cut_html
@@ -27,7 +28,7 @@ class Preview:
         self.verdict = Notice()
         self.verdict.add_class("rds-verdict")
         self.verdict.say("checking …")
-        self.numbers = widgets.HTML()
+        self.numbers = Html()
         self.in_space = widgets.ToggleButton(
             description="In space (3-D)", tooltip="The path in three dimensions, to be turned with the mouse"
         )

@@ -10,6 +10,7 @@ import ipywidgets as widgets
 
 from rds.panels.equipment.result_actions import ResultActions
 from rds.panels.kit.figure import FigureView
+from rds.panels.kit.html import Html
 from rds.panels.program.cut_html import cut_html
 from rds.panels.program.run import ProgramWork
 from rds.panels.program.stock import Cut, cut_of_run
@@ -27,10 +28,10 @@ class ProgramResult:
     def __init__(self, shell: Any, go: Callable[[int], None]):
         """`go(line)` shows a line of the program."""
         self._shell, self._go = shell, go
-        self.words, self.tables = widgets.HTML(_EMPTY), widgets.HTML()
+        self.words, self.tables = Html(_EMPTY), Html()
         self.actions = ResultActions(shell)
         self.path, self.along, self.cut = FigureView(), FigureView(), FigureView()
-        self.cut_words = widgets.HTML()
+        self.cut_words = Html()
         self.worst = widgets.HBox([])
         self.worst.add_class("rds-row")
         pictures = [self.path, self.along, self.cut_words, self.cut]

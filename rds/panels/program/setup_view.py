@@ -10,6 +10,7 @@ from rds.core.errors import InputError
 from rds.nc.language.frame import SYSTEMS
 from rds.panels.kit.button import button
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.program.offsets import FIRST, Offsets
@@ -49,11 +50,11 @@ class SetupView:
         tip = "Write the origin into the parameter file; the program is checked anew with it"
         press = button("Touch off", tip, self._touch_off, self.notice)
         again = button("Take positions", "Fill in where the axes were measured last", self._take, self.notice)
-        self._table = widgets.HTML()
+        self._table = Html()
         group = widgets.VBox([FieldView(self._choices, "system"), *rows, row(again, press)])
         group.add_class("rds-group")
         file = FieldView(program.choices, "parameters", buttons=False)
-        self.widget = widgets.VBox([widgets.HTML(_WORDS), group, self.notice, file, self._table])
+        self.widget = widgets.VBox([Html(_WORDS), group, self.notice, file, self._table])
         self.refresh()
         program.choices.watch(lambda name: self.refresh() if name == "parameters" else None)
 

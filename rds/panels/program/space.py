@@ -10,6 +10,7 @@ import numpy as np
 
 from rds.machines import Machine
 from rds.nc.trace import CURVED, RAPID, STRAIGHT, Trace
+from rds.panels.kit.html import Html
 from rds.panels.program.path_view import travel_of
 
 _COLORS = {RAPID: 0xD55E00, STRAIGHT: 0x0072B2, CURVED: 0x009E73}
@@ -39,7 +40,7 @@ class SpaceView:
         self._plot += self._tool
         self._lines: list[object] = []
         words = "<p>In mm. Orange: rapid; blue: straight; green: arc feed; violet: the tool. Turn it by mouse.</p>"
-        self.widget = widgets.VBox([self._plot, widgets.HTML(words)])
+        self.widget = widgets.VBox([self._plot, Html(words)])
 
     def show(self, trace: Trace) -> None:
         """Draw the path, as large as may be."""

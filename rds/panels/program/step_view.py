@@ -10,6 +10,7 @@ import ipywidgets as widgets
 from rds.core.errors import InputError, RdsError
 from rds.nc.stepping import Step, steps
 from rds.panels.kit.button import button
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.program.state import Program
@@ -41,8 +42,8 @@ class StepView:
             button("To the cursor", tip, self._to_cursor, self.notice),
             button("From the start", "Forget all that was executed", self.leave, self.notice),
         ]
-        self._shown = widgets.HTML()
-        self.widget = widgets.VBox([widgets.HTML(_WORDS), row(*buttons), self.notice, self._shown])
+        self._shown = Html()
+        self.widget = widgets.VBox([Html(_WORDS), row(*buttons), self.notice, self._shown])
         self._show()
 
     def leave(self) -> None:

@@ -11,6 +11,7 @@ from rds.nc.language.errors import ProgramError
 from rds.nc.language.tools import Tool
 from rds.panels.kit.button import attempt, button
 from rds.panels.kit.field import FieldView
+from rds.panels.kit.html import Html
 from rds.panels.kit.layout import row
 from rds.panels.kit.notice import Notice
 from rds.panels.program.editor import Editor
@@ -29,12 +30,12 @@ class ToolView:
         self._file: ToolFile | None = None
         self._kept: dict[str, ToolFile] = {}  # those that were left without being saved
         self.notice = Notice()
-        self.table = widgets.HTML()
+        self.table = Html()
         self.editor = Editor(lambda: attempt("saving", self._save, self.notice), label="tool table", height=170)
         self.editor.observe(lambda change: self._typed(change["new"]), "text")
         tip = "Look for tool tables in the folder, and read this one anew; what is not saved of it is given up"
         again = button("Look again", tip, self._again, self.notice)
-        self.state = widgets.HTML()
+        self.state = Html()
         choose = row(FieldView(program.choices, "tools", buttons=False), again)
         choose.layout.align_items = "flex-end"
         tip = "A name for a new tool table: .toml for tools with shapes, .tbl as LinuxCNC has them"

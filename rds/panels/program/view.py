@@ -16,6 +16,7 @@ from rds.panels.equipment.strip import StripChart, end_marks
 from rds.panels.interpolator.motion import MADE
 from rds.panels.kit.button import WAIT, attempt, is_free, say_error
 from rds.panels.kit.field import FieldView, field_group
+from rds.panels.kit.html import Html
 from rds.panels.kit.notice import Notice
 from rds.panels.program.check import Look
 from rds.panels.program.editor import Editor
@@ -55,7 +56,7 @@ class ProgramView:
         self.files = ProgramFiles(self.program, self.notice, self._opened)
         self.operator = Operator(shell, self.program.choices, self.notice, self.start, self.start_from_cursor)
         self.preview = Preview(self.program)
-        self.status = widgets.HTML()
+        self.status = Html()
         self.strip = StripChart(height=170)
         self.strip.layout.display = "none"
         self.scene = MachineScene(self.program.machine)

@@ -10,6 +10,7 @@ import contextlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,20 @@ class RunRow:
         """What a page needs of it."""
         words = {key: getattr(self, key) for key in _SHOWN}
         axes = ", ".join(self.axes) or self.name
-        return words | {"when": self.when, "state": str(self.state), "star": self.star, "axes": axes}
+        return words | {
+            "when": begun(self.name) or self.when,
+            "state": str(self.state),
+            "star": self.star,
+            "axes": axes,
+        }
+
+
+def begun(name: str) -> float | None:
+    """When the run began, s since 1970, by the name of its folder; None where that does not say it."""
+    try:
+        return datetime.strptime(name[:15], "%Y%m%d-%H%M%S").timestamp()
+    except ValueError:
+        return None
 
 
 _SHOWN = ("name", "mode", "controller", "changed", "rms", "fit", "verdict", "note")
@@ -151,7 +165,8 @@ def differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[tuple[str, s
         if key.startswith("code") and isinstance(one, str) and isinstance(other, str):
             found.append((key, "", change_sentence(one, other)))
         elif not key.startswith("code"):
-            found.append((key, _text(one), _text(other)))
+            text = _complex if key.rpartition(" ")[2] == "poles" else _text
+            found.append((key, text(one), text(other)))
     return found
 
 
@@ -247,6 +262,14 @@ def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, list | dict) else str(value)
+
+
+def _complex(value: Any) -> str:
+    """Pairs of real and imaginary part, as numbers."""
+    try:
+        return ", ".join(f"{real:g}{imaginary:+g}j" for real, imaginary in value)
+    except (TypeError, ValueError):  # none, or of another kind
+        return _text(value)
 
 
 def _json(path: Path) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 // of the interface's names, each fault below its line, files taken by drop.
 
 const QUIET_MS = 250; // after the last key, before the text is sent
+const SAID_PX = 76; // what is said of a line, below it
 const LARGEST = 1 << 20; // bytes of a file that is dropped
 
 // the page's own colours, which follow light and dark
@@ -95,6 +96,10 @@ function render({ model, el }) {
   function mark() {
     const marks = model.get("marks");
     view.dispatch({ effects: setMarks.of(marks), annotations: CM.Transaction.remote.of(true) });
+    const line = view.state.doc.lineAt(view.state.selection.main.head);
+    if (view.hasFocus && marks.some((each) => each.line === line.number)) { // what is said below the line is in sight, too
+      view.dispatch({ effects: CM.EditorView.scrollIntoView(line.to, { y: "nearest", yMargin: SAID_PX }) });
+    }
     view.contentDOM.setAttribute("aria-invalid", String(marks.some((each) => each.fault)));
   }
   function go(line) {

@@ -6,6 +6,7 @@ const STEP_MS = 80; // a little more often than rows come
 const WHOLE_MS = 400; // between two drawings of a whole run
 const MOST = 3000; // points of a trace that are drawn: more are thinned to their extremes
 const LOWEST = 92; // px of a lane
+const LETTER = 6.2; // px, of an axis's label
 const AXIS = 34; // px below the last lane
 
 function render({ model, el }) {
@@ -104,17 +105,17 @@ function render({ model, el }) {
     const text = ink("--rds-text", "#222"), grid = { stroke: ink("--rds-grid", "#ddd"), width: 1 };
     lanes.forEach((lane, i) => {
       const of = traces.flatMap((trace, k) => (trace.scale === lane ? [k] : []));
-      const isLast = i === lanes.length - 1;
+      const isLast = i === lanes.length - 1, height = Math.max(room * weights[i] / sum, LOWEST);
       const axes = [{ stroke: text, grid, label: isLast ? say("time [s]") : undefined, labelSize: isLast ? 18 : 0, size: isLast ? AXIS - 2 : 4, values: isLast ? undefined : (u, shown) => shown.map(() => "") },
-        { scale: "y", stroke: text, grid, size: 58, labelSize: 18, label: axisLabel(of.map((k) => traces[k])), space: 22 }];
+        { scale: "y", stroke: text, grid, size: 58, labelSize: 18, label: axisLabel(of.map((k) => traces[k]), height), space: 22 }];
       const series = [{ label: "time [s]", value: (u, v) => (v == null ? "–" : v.toFixed(3)) }];
       of.forEach((k) => series.push({
         label: `${traces[k].name} [${traces[k].unit}]`, stroke: traces[k].color, width: traces[k].width || 1.6, dash: traces[k].dash || [],
         scale: "y", points: { show: false }, value: (u, v) => (v == null ? "–" : v.toPrecision(5)),
       }));
-      of.forEach((k) => series.push({ label: `${traces[k].name}, earlier`, stroke: traces[k].color, width: 1.4, dash: [2, 4], scale: "y", points: { show: false }, show: !!ghost, value: (u, v) => (v == null ? "–" : v.toPrecision(5)) }));
+      if (ghost) of.forEach((k) => series.push({ label: `${traces[k].name}, earlier`, stroke: traces[k].color, width: 1.4, dash: [2, 4], scale: "y", points: { show: false }, value: (u, v) => (v == null ? "–" : v.toPrecision(5)) }));
       const plot = new uPlot({
-        width: Math.max(box.clientWidth, 280), height: Math.max(room * weights[i] / sum, LOWEST) + (isLast ? AXIS : 0), padding: [6, 8, 0, 0],
+        width: Math.max(box.clientWidth, 280), height: height + (isLast ? AXIS : 0), padding: [6, 8, 0, 0],
         scales: { x: { time: false, range: () => [left(), right()] }, y: { auto: true } }, axes, series,
         cursor: { sync: { key: sync }, drag: { x: true, y: false, setScale: false, dist: 6 }, points: { size: 5 } }, legend: { live: true },
         hooks: {
@@ -149,11 +150,12 @@ function render({ model, el }) {
 
   const laneName = (traces, lane) => traces.find((trace) => trace.scale === lane).lane || lane;
   const say = (text) => (window.rdsText ? window.rdsText(text) : text); // in the page's language, where it is drawn
-  // the legend names each trace; an axis names the quantity, and its unit
-  function axisLabel(traces) {
+  // the legend names each trace; an axis names the quantity, and its unit, which is all that a low lane has room for
+  function axisLabel(traces, height) {
     const of = new Set(traces.map((trace) => trace.name.split(" ")[0]));
     const lane = traces[0].lane || traces[0].name;
-    return say(`${of.size === 1 && lane !== traces[0].name ? `${[...of][0]} ` : ""}${lane} [${traces[0].unit}]`);
+    const text = say(`${of.size === 1 && lane !== traces[0].name ? `${[...of][0]} ` : ""}${lane} [${traces[0].unit}]`);
+    return text.length * LETTER > height ? `[${traces[0].unit}]` : text;
   }
 
   // marks of what happened, and the cursors
@@ -199,7 +201,7 @@ function render({ model, el }) {
       }
     }
     const clean = (values) => values.map((v) => (Number.isNaN(v) ? null : v));
-    return [x, ...ys.map(clean), ...of.map((k) => (ghost ? clean(at(ghost.columns, k + 1, x)) : x.map(() => null)))];
+    return [x, ...ys.map(clean), ...(ghost ? of.map((k) => clean(at(ghost.columns, k + 1, x))) : [])];
   }
   // the values of an earlier run at the times x
   function at(rows, k, x) {
@@ -223,7 +225,7 @@ function render({ model, el }) {
     for (const { plot, of } of plots) {
       plot.setData(shown(of));
       const newest = plot.data[0].length - 1; // the legend has the values at the right edge, unless the mouse asks for others
-      if (newest >= 0 && !hovered) plot.setLegend({ idx: newest });
+      if (newest >= 0 && (!hovered || plot.cursor.idx == null)) plot.setLegend({ idx: newest });
     }
     if (span() > 0) scrub.value = 1000 * (end - first()) / span();
     const state = follows ? "live" : speed ? `${speed}×` : "paused";
@@ -324,16 +326,19 @@ function render({ model, el }) {
 
   const rebuild = () => { build(); dirty = true; };
   model.on("msg:custom", receive);
-  model.on("change:traces", () => { hidden = new Set(); rebuild(); });
-  model.on("change:window", () => { wide = model.get("window"); dirty = true; });
-  model.on("change:events", () => { dirty = true; });
+  const retraced = () => { hidden = new Set(); rebuild(); }, widened = () => { wide = model.get("window"); dirty = true; }, marked = () => { dirty = true; };
+  model.on("change:traces", retraced);
+  model.on("change:window", widened);
+  model.on("change:events", marked);
+  const sized = new ResizeObserver(marked); // the lanes are as wide as their place, at rest as well
+  sized.observe(box);
   const themed = new MutationObserver(rebuild);
   themed.observe(document.body, { attributes: true, attributeFilter: ["class", "data-jp-theme-light"] });
   const app = document.querySelector(".rds-app");
   if (app) themed.observe(app, { attributes: true, attributeFilter: ["class", "lang"] });
   let around = null;
   requestAnimationFrame(() => { around = place(); around.addEventListener("rds-time", heard); build(); model.send({ kind: "all" }); });
-  return () => { clearInterval(timer); around?.removeEventListener("rds-time", heard); themed.disconnect(); model.off("msg:custom", receive); plots.forEach(({ plot }) => plot.destroy()); };
+  return () => { clearInterval(timer); around?.removeEventListener("rds-time", heard); themed.disconnect(); sized.disconnect(); model.off("msg:custom", receive); model.off("change:traces", retraced); model.off("change:window", widened); model.off("change:events", marked); plots.forEach(({ plot }) => plot.destroy()); };
 }
 
 export default { render };

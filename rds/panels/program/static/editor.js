@@ -6,7 +6,7 @@ const QUIET_MS = 250; // after the last key, before the text is sent
 function render({ model, el }) {
   const box = document.createElement("div");
   box.className = "rds-editor";
-  box.style.height = `${model.get("height")}px`;
+  box.style.setProperty("--rds-editor-height", `${model.get("height")}px`);
   const gutter = document.createElement("div");
   gutter.className = "rds-editor-gutter";
   gutter.setAttribute("aria-hidden", "true");
